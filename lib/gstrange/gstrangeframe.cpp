@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "gstrangeframe.hpp"
+
+#include <string>
+
+using rangecast::RangeImage;
+using rangecast::Rgbx;
+using rangecast::Roi;
+using rangecast::StatusCode;
+
+namespace gstrange {
+
+static RangeImage
+image_of (const GstRangeView &view, GstClockTime capture_time)
+{
+  const int width = static_cast<int> (view.width), height = static_cast<int> (view.height);
+  RangeImage image;
+  image.view_id = static_cast<int> (view.view_id);
+  image.roi = {static_cast<int> (view.x), static_cast<int> (view.y), width, height};
+  image.depth = {view.depth, width, height, view.depth_stride};
+  image.colour = {reinterpret_cast<Rgbx *> (view.colour), width, height, view.colour_stride};
+  image.capture_time_ns = capture_time;
+  return image;
+}
+
+RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
+{
+  gpointer state = nullptr;
+  GstRangeMeta *meta;
+  while ((meta = gst_buffer_iterate_range_meta (buffer, &state))) {
+    const bool fits = count_ < maps_.size () && meta->view_id < guint (rangecast::kMaxViews) &&
+                      meta->x <= guint (rangecast::kMaxImageSide) &&
+                      meta->y <= guint (rangecast::kMaxImageSide);
+    if (!fits || !gst_range_view_map (&maps_[count_], buffer, meta, flags)) {
+      status_ = {StatusCode::kBadData, "range buffer: the GstRangeMeta of view " +
+                                           std::to_string (meta->view_id) +
+                                           " does not describe planes inside the buffer"};
+      unmap ();
+      return;
+    }
+    metas_[count_] = meta;
+    images_[count_] = image_of (maps_[count_], meta->capture_time);
+    count_++;
+  }
+}
+
+RangeFrameMap::~RangeFrameMap ()
+{
+  unmap ();
+}
+
+void
+RangeFrameMap::unmap ()
+{
+  for (std::size_t i = 0; i < count_; i++)
+    gst_range_view_unmap (&maps_[i]);
+  count_ = 0;
+}
+
+void
+RangeFrameMap::crop (std::size_t index, const Roi &roi)
+{
+  RangeImage &image = images_[index];
+  GstRangeMeta *meta = metas_[index];
+  const gsize dx = roi.empty () ? 0 : static_cast<gsize> (roi.x - image.roi.x);
+  const gsize dy = roi.empty () ? 0 : static_cast<gsize> (roi.y - image.roi.y);
+  const Roi kept = roi.empty () ? Roi{} : roi;
+  meta->x = static_cast<guint> (kept.x);
+  meta->y = static_cast<guint> (kept.y);
+  meta->width = static_cast<guint> (kept.width);
+  meta->height = static_cast<guint> (kept.height);
+  meta->depth_offset += dy * meta->depth_stride + dx * 2;
+  meta->colour_offset += dy * meta->colour_stride + dx * 4;
+  if (!kept.empty ()) {
+    image.depth = image.depth.crop (int (dx), int (dy), kept.width, kept.height);
+    image.colour = image.colour.crop (int (dx), int (dy), kept.width, kept.height);
+  } else {
+    image.depth = {};
+    image.colour = {};
+  }
+  image.roi = kept;
+}
+
+} // namespace gstrange

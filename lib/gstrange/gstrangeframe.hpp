@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <rangecast/geometry/range_image.hpp>
+#include <rangecast/status.hpp>
+#include <span>
+
+#include "gstrangemeta.h"
+
+namespace gstrange {
+
+/** Maps all views of a frame set, for as long as it lives. Lives on the stack, allocates nothing.
+ *  After a failure views() is empty and status() says which view is at fault.
+ *  crop() changes a view's ROI in its meta, without touching pixels. */
+class GST_RANGE_API RangeFrameMap {
+public:
+  RangeFrameMap (GstBuffer *buffer, GstMapFlags flags);
+  ~RangeFrameMap ();
+  RangeFrameMap (const RangeFrameMap &) = delete;
+  RangeFrameMap &operator= (const RangeFrameMap &) = delete;
+
+  [[nodiscard]] const rangecast::Status &status () const { return status_; }
+  /** In the order of the buffer's metas. Read-only maps must not be written through. */
+  [[nodiscard]] std::span<const rangecast::RangeImage> views () const
+  {
+    return {images_.data (), count_};
+  }
+
+  /** Shrinks view number `index` (not view-id) to `roi`, given in full-image pixels, which must
+   *  lie inside its present ROI (or be empty). The buffer must be writable. */
+  void crop (std::size_t index, const rangecast::Roi &roi);
+
+private:
+  void unmap ();
+
+  rangecast::Status status_;
+  std::size_t count_ = 0;
+  std::array<rangecast::RangeImage, rangecast::kMaxViews> images_;
+  std::array<GstRangeView, rangecast::kMaxViews> maps_;
+  std::array<GstRangeMeta *, rangecast::kMaxViews> metas_;
+};
+
+} // namespace gstrange

@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "gstrangeinfo.hpp"
+
+#include <algorithm>
+
+using rangecast::Rig;
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::View;
+
+namespace gstrange {
+
+static Status
+parse_rig (const GstStructure *structure, Rig &rig)
+{
+  const GValue *value = gst_structure_get_value (structure, "rig");
+  if (!value || !GST_VALUE_HOLDS_BUFFER (value) || !gst_value_get_buffer (value))
+    return {StatusCode::kNotFound, "caps: no field \"rig\" (buffer) with the rig's binary form"};
+  GstBuffer *buffer = gst_value_get_buffer (value);
+  GstMapInfo map;
+  if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+    return {StatusCode::kBadData, "caps: the buffer in field \"rig\" cannot be read"};
+  Status status = rangecast::decode_rig ({map.data, map.size}, rig);
+  gst_buffer_unmap (buffer, &map);
+  if (!status.ok ())
+    return {status.code (), "caps: field \"rig\": " + status.message ()};
+  return {};
+}
+
+Status
+parse_caps (const GstCaps *caps, RangeInfo &info)
+{
+  if (!caps || !gst_caps_is_fixed (caps))
+    return {StatusCode::kBadValue, "caps: not fixed"};
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  RangeInfo parsed;
+  int views = 0;
+  if (!gst_structure_get_int (structure, "width", &parsed.width) ||
+      !gst_structure_get_int (structure, "height", &parsed.height) || parsed.width < 1 ||
+      parsed.height < 1)
+    return {StatusCode::kNotFound, "caps: no fields \"width\" and \"height\" in pixels"};
+  if (!gst_structure_get_int (structure, "views", &views))
+    return {StatusCode::kNotFound, "caps: no field \"views\""};
+  gst_structure_get_fraction (structure, "framerate", &parsed.fps_n, &parsed.fps_d);
+  if (Status s = parse_rig (structure, parsed.rig); !s.ok ())
+    return s;
+  if (parsed.views () != views)
+    return {StatusCode::kBadValue, "caps: views=" + std::to_string (views) + " but the rig has " +
+                                       std::to_string (parsed.views ())};
+  for (const View &view : parsed.rig.views) {
+    const std::string name = "caps: rig: view " + std::to_string (view.id);
+    if (!view.is_range_view ())
+      return {StatusCode::kBadValue, name + " is not rectified: expected neither distortion nor "
+                                            "partner cameras"};
+    if (view.width > parsed.width || view.height > parsed.height)
+      return {StatusCode::kBadValue, name + " is larger than the caps' width and height"};
+  }
+  info = std::move (parsed);
+  return {};
+}
+
+GstClockTime
+RangeInfo::frame_duration () const
+{
+  if (fps_n <= 0 || fps_d <= 0)
+    return GST_CLOCK_TIME_NONE;
+  return gst_util_uint64_scale_int (GST_SECOND, fps_d, fps_n);
+}
+
+RangeInfo
+make_info (Rig rig, int fps_n, int fps_d)
+{
+  RangeInfo info;
+  for (const View &view : rig.views) {
+    info.width = std::max (info.width, view.width);
+    info.height = std::max (info.height, view.height);
+  }
+  info.fps_n = fps_n;
+  info.fps_d = fps_d;
+  info.rig = std::move (rig);
+  return info;
+}
+
+static GstCaps *
+with_common_fields (GstCaps *caps, const RangeInfo &info)
+{
+  const std::vector<std::uint8_t> blob = rangecast::encode_rig (info.rig);
+  GstBuffer *rig = gst_buffer_new_memdup (blob.data (), blob.size ());
+  gst_caps_set_simple (caps, "width", G_TYPE_INT, info.width, "height", G_TYPE_INT, info.height,
+      "framerate", GST_TYPE_FRACTION, info.fps_n, info.fps_d, "views", G_TYPE_INT, info.views (),
+      "rig", GST_TYPE_BUFFER, rig, nullptr);
+  gst_buffer_unref (rig);
+  return caps;
+}
+
+GstCaps *
+make_range_caps (const RangeInfo &info)
+{
+  return with_common_fields (
+      gst_caps_new_simple (GST_RANGE_MEDIA_TYPE, "format", G_TYPE_STRING, "Z16_RGBx", nullptr),
+      info);
+}
+
+GstCaps *
+make_neighbour_code_caps (const RangeInfo &info, const char *alignment)
+{
+  return with_common_fields (gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version",
+                                 G_TYPE_INT, 1, "alignment", G_TYPE_STRING, alignment, nullptr),
+      info);
+}
+
+} // namespace gstrange
+
+/**
+ * gst_range_caps_get_camera:
+ * @caps: fixed video/x-range or application/x-neighbour-code caps
+ * @view_id: which view
+ * @camera: (out caller-allocates): its camera
+ *
+ * Returns: %FALSE if the caps have no valid rig or the rig no such view
+ */
+gboolean
+gst_range_caps_get_camera (const GstCaps *caps, guint view_id, GstRangeCamera *camera)
+{
+  gstrange::RangeInfo info;
+  if (!gstrange::parse_caps (caps, info).ok () || view_id >= guint (rangecast::kMaxViews))
+    return FALSE;
+  const View *view = info.rig.find (static_cast<int> (view_id));
+  if (!view)
+    return FALSE;
+  *camera = GstRangeCamera{view_id, view->width, view->height, view->intrinsics.fx,
+      view->intrinsics.fy, view->intrinsics.cx, view->intrinsics.cy, {}, view->depth_unit_m,
+      view->near_m, view->far_m};
+  const double t[] = {view->world_from_view.translation.x, view->world_from_view.translation.y,
+      view->world_from_view.translation.z};
+  for (int row = 0; row < 3; row++) {
+    for (int column = 0; column < 3; column++)
+      camera->world_from_view[4 * row + column] = view->world_from_view.rotation[3 * row + column];
+    camera->world_from_view[4 * row + 3] = t[row];
+  }
+  return TRUE;
+}

@@ -1,0 +1,260 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "gstrangemeta.h"
+
+#include <algorithm>
+#include <rangecast/geometry/range_image.hpp>
+
+static void
+gst_range_meta_clear (GstRangeMeta *self)
+{
+  const GstMeta meta = self->meta;
+  *self = GstRangeMeta{};
+  self->meta = meta;
+  self->capture_time = GST_CLOCK_TIME_NONE;
+}
+
+static gboolean
+gst_range_meta_init (GstMeta *meta, gpointer, GstBuffer *)
+{
+  gst_range_meta_clear (reinterpret_cast<GstRangeMeta *> (meta));
+  return TRUE;
+}
+
+static void
+gst_range_meta_copy_fields (GstRangeMeta *to, const GstRangeMeta *from)
+{
+  const GstMeta meta = to->meta;
+  *to = *from;
+  to->meta = meta;
+}
+
+/* Copies stay true as long as the bytes stay where they are: a copy of the whole buffer. */
+static gboolean
+gst_range_meta_transform (GstBuffer *dest, GstMeta *meta, GstBuffer *, GQuark type, gpointer data)
+{
+  if (!GST_META_TRANSFORM_IS_COPY (type))
+    return FALSE;
+  if (static_cast<GstMetaTransformCopy *> (data)->region)
+    return TRUE;
+  auto copy =
+      reinterpret_cast<GstRangeMeta *> (gst_buffer_add_meta (dest, GST_RANGE_META_INFO, nullptr));
+  gst_range_meta_copy_fields (copy, reinterpret_cast<GstRangeMeta *> (meta));
+  return TRUE;
+}
+
+GType
+gst_range_meta_api_get_type (void)
+{
+  static const GType type = [] {
+    static const gchar *tags[] = {GST_META_TAG_MEMORY_STR, nullptr};
+    return gst_meta_api_type_register ("GstRangeMetaAPI", tags);
+  }();
+  return type;
+}
+
+const GstMetaInfo *
+gst_range_meta_get_info (void)
+{
+  static const GstMetaInfo *info = gst_meta_register (GST_RANGE_META_API_TYPE, "GstRangeMeta",
+      sizeof (GstRangeMeta), gst_range_meta_init, nullptr, gst_range_meta_transform);
+  return info;
+}
+
+/**
+ * gst_buffer_iterate_range_meta:
+ * @buffer: a frame set
+ * @state: (inout): %NULL at first
+ *
+ * Returns: (transfer none) (nullable): the next view, in the order in which they were added
+ */
+GstRangeMeta *
+gst_buffer_iterate_range_meta (GstBuffer *buffer, gpointer *state)
+{
+  return reinterpret_cast<GstRangeMeta *> (
+      gst_buffer_iterate_meta_filtered (buffer, state, GST_RANGE_META_API_TYPE));
+}
+
+/**
+ * gst_buffer_get_range_meta:
+ * @buffer: a frame set
+ * @view_id: which view
+ *
+ * Returns: (transfer none) (nullable): that view, or %NULL if the frame set is without it
+ */
+GstRangeMeta *
+gst_buffer_get_range_meta (GstBuffer *buffer, guint view_id)
+{
+  gpointer state = nullptr;
+  GstRangeMeta *meta;
+  while ((meta = gst_buffer_iterate_range_meta (buffer, &state)))
+    if (meta->view_id == view_id)
+      return meta;
+  return nullptr;
+}
+
+/**
+ * gst_buffer_n_range_metas:
+ * @buffer: a frame set
+ *
+ * Returns: how many views it has
+ */
+guint
+gst_buffer_n_range_metas (GstBuffer *buffer)
+{
+  return gst_buffer_get_n_meta (buffer, GST_RANGE_META_API_TYPE);
+}
+
+/**
+ * gst_range_buffer_append:
+ * @frame_set: a writable buffer
+ * @views: (transfer none): a frame set whose views shall be added
+ *
+ * Adds the views of one buffer to another without copying pixels: the memories are shared, and
+ * @views stays alive as long as @frame_set does, so that its pool gets it back afterwards.
+ * (Above gst_buffer_get_max_memory() memories GStreamer itself merges them, which copies.)
+ *
+ * Returns: %FALSE, with @frame_set untouched, if both have a view of the same view-id
+ */
+gboolean
+gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)
+{
+  const gsize base = gst_buffer_get_size (frame_set);
+  gpointer state = nullptr;
+  GstRangeMeta *meta;
+  while ((meta = gst_buffer_iterate_range_meta (views, &state)))
+    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
+      return FALSE;
+
+  gst_buffer_copy_into (frame_set, views, GST_BUFFER_COPY_MEMORY, 0, -1);
+  gst_buffer_add_parent_buffer_meta (frame_set, views);
+  state = nullptr;
+  while ((meta = gst_buffer_iterate_range_meta (views, &state))) {
+    auto added = reinterpret_cast<GstRangeMeta *> (
+        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
+    gst_range_meta_copy_fields (added, meta);
+    added->depth_offset += base;
+    added->colour_offset += base;
+  }
+  return TRUE;
+}
+
+static GstCaps *
+capture_time_reference ()
+{
+  static GstStaticCaps caps = GST_STATIC_CAPS ("timestamp/x-range-capture");
+  return gst_static_caps_get (&caps);
+}
+
+/**
+ * gst_range_buffer_set_capture_time:
+ * @buffer: a writable buffer, raw or coded
+ * @time: ns on the clock that the camera hosts share
+ *
+ * Sets (or replaces) the buffer's #GstReferenceTimestampMeta with the reference
+ * `timestamp/x-range-capture`.
+ */
+void
+gst_range_buffer_set_capture_time (GstBuffer *buffer, GstClockTime time)
+{
+  GstCaps *reference = capture_time_reference ();
+  if (auto meta = gst_buffer_get_reference_timestamp_meta (buffer, reference))
+    meta->timestamp = time;
+  else
+    gst_buffer_add_reference_timestamp_meta (buffer, reference, time, GST_CLOCK_TIME_NONE);
+  gst_caps_unref (reference);
+}
+
+/**
+ * gst_range_buffer_get_capture_time:
+ * @buffer: a buffer, raw or coded
+ *
+ * Returns: the capture time, or %GST_CLOCK_TIME_NONE if the buffer does not tell
+ */
+GstClockTime
+gst_range_buffer_get_capture_time (GstBuffer *buffer)
+{
+  GstCaps *reference = capture_time_reference ();
+  const auto meta = gst_buffer_get_reference_timestamp_meta (buffer, reference);
+  gst_caps_unref (reference);
+  if (meta)
+    return meta->timestamp;
+  gpointer state = nullptr;
+  const auto view = gst_buffer_iterate_range_meta (buffer, &state);
+  return view ? view->capture_time : GST_CLOCK_TIME_NONE;
+}
+
+/* The bytes [begin, end) of the buffer that a plane covers; false if the layout is absurd. */
+static bool
+plane_extent (gsize offset, gsize stride, gsize row_bytes, gsize rows, gsize buffer_size,
+    gsize *begin, gsize *end)
+{
+  if (offset > buffer_size || stride < row_bytes || rows > G_MAXUINT32)
+    return false;
+  const gsize length = (rows - 1) * stride + row_bytes;
+  if (length > buffer_size - offset)
+    return false;
+  *begin = std::min (*begin, offset);
+  *end = std::max (*end, offset + length);
+  return true;
+}
+
+/**
+ * gst_range_view_map:
+ * @view: (out caller-allocates): the mapped view
+ * @buffer: the buffer that @meta belongs to
+ * @meta: which view
+ * @flags: for reading, writing or both
+ *
+ * Maps one view. A view with an empty ROI maps to %NULL planes.
+ *
+ * Returns: %FALSE if the planes do not lie inside the buffer or cannot be mapped; there is then
+ *   nothing to unmap
+ */
+gboolean
+gst_range_view_map (
+    GstRangeView *view, GstBuffer *buffer, const GstRangeMeta *meta, GstMapFlags flags)
+{
+  *view = GstRangeView{};
+  view->view_id = meta->view_id;
+  view->x = meta->x;
+  view->y = meta->y;
+  view->width = meta->width;
+  view->height = meta->height;
+  view->depth_stride = meta->depth_stride;
+  view->colour_stride = meta->colour_stride;
+  if (meta->width == 0 || meta->height == 0)
+    return TRUE;
+  if (meta->width > rangecast::kMaxImageSide || meta->height > rangecast::kMaxImageSide ||
+      meta->depth_offset % 2 || meta->depth_stride % 2)
+    return FALSE;
+
+  const gsize size = gst_buffer_get_size (buffer);
+  gsize begin = G_MAXSIZE, end = 0, skip = 0;
+  guint index = 0, length = 0;
+  if (!plane_extent (meta->depth_offset, meta->depth_stride, gsize{meta->width} * 2, meta->height,
+          size, &begin, &end) ||
+      !plane_extent (meta->colour_offset, meta->colour_stride, gsize{meta->width} * 4, meta->height,
+          size, &begin, &end) ||
+      !gst_buffer_find_memory (buffer, begin, end - begin, &index, &length, &skip) ||
+      !gst_buffer_map_range (buffer, index, length, &view->map, flags))
+    return FALSE;
+  view->buffer = buffer;
+  guint8 *base = view->map.data + skip;
+  view->depth = reinterpret_cast<guint16 *> (base + (meta->depth_offset - begin));
+  view->colour = base + (meta->colour_offset - begin);
+  return TRUE;
+}
+
+/**
+ * gst_range_view_unmap:
+ * @view: a mapped view
+ */
+void
+gst_range_view_unmap (GstRangeView *view)
+{
+  if (view->buffer)
+    gst_buffer_unmap (view->buffer, &view->map);
+  view->buffer = nullptr;
+  view->depth = nullptr;
+  view->colour = nullptr;
+}

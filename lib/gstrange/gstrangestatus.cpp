@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "gstrangestatus.hpp"
+
+using rangecast::Status;
+using rangecast::StatusCode;
+
+struct ErrorDomain {
+  GQuark domain;
+  gint code;
+};
+
+static ErrorDomain
+domain_of (StatusCode code)
+{
+  switch (code) {
+    case StatusCode::kNotFound:
+      return {GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND};
+    case StatusCode::kNoSpace:
+      return {GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT};
+    case StatusCode::kBadValue:
+    case StatusCode::kBadSize:
+      return {GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_SETTINGS};
+    case StatusCode::kUnsupported:
+      return {GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE};
+    default:
+      return {GST_STREAM_ERROR, GST_STREAM_ERROR_DECODE};
+  }
+}
+
+static void
+post (GstElement *element, const Status &status, GstMessageType type)
+{
+  const ErrorDomain error = domain_of (status.code ());
+  gst_element_message_full (element, type, error.domain, error.code,
+      g_strdup (status.message ().c_str ()), nullptr, __FILE__, GST_FUNCTION, __LINE__);
+}
+
+GstFlowReturn
+gst_range_flow_return (GstElement *element, const Status &status)
+{
+  if (status.ok ())
+    return GST_FLOW_OK;
+  post (element, status, GST_MESSAGE_ERROR);
+  return GST_FLOW_ERROR;
+}
+
+void
+gst_range_post_warning (GstElement *element, const Status &status)
+{
+  if (!status.ok ())
+    post (element, status, GST_MESSAGE_WARNING);
+}

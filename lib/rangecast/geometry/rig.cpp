@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rig.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangecast {
+namespace {
+
+Status
+bad_field (const View &view, const std::string &what)
+{
+  return {StatusCode::kBadValue, "view " + std::to_string (view.id) + ": " + what};
+}
+
+bool
+all_finite (std::span<const double> values)
+{
+  return std::ranges::all_of (values, [] (double v) { return std::isfinite (v); });
+}
+
+bool
+is_rotation (const Mat3 &r)
+{
+  if (!all_finite (r))
+    return false;
+  const Mat3 product = r * transposed (r);
+  for (int i = 0; i < 9; i++)
+    if (std::abs (product[i] - kIdentity3[i]) > 1e-5)
+      return false;
+  const Vec3 a{r[0], r[1], r[2]}, b{r[3], r[4], r[5]}, c{r[6], r[7], r[8]};
+  return dot (cross (a, b), c) > 0;
+}
+
+Status
+check_pose (const View &view, const Pose &pose, const std::string &name)
+{
+  if (!is_rotation (pose.rotation))
+    return bad_field (
+        view, name + ".rotation is not a rotation matrix (orthonormal to 1e-5, determinant +1)");
+  const Vec3 &t = pose.translation;
+  if (!(norm (t) < 1e6))
+    return bad_field (view, name + ".translation is not finite and below 1e6 m");
+  return {};
+}
+
+Status
+check_lens (
+    const View &view, const Intrinsics &k, const Distortion &distortion, const std::string &name)
+{
+  const double values[] = {k.fx, k.fy, k.cx, k.cy};
+  if (!all_finite (values) || !(k.fx > 0) || !(k.fy > 0) || k.fx > 1e6 || k.fy > 1e6 ||
+      std::abs (k.cx) > 1e6 || std::abs (k.cy) > 1e6)
+    return bad_field (view, name + "intrinsics: expected finite fx, fy > 0 and cx, cy, in pixels");
+  static constexpr std::size_t kSizes[] = {0, 4, 5, 8, 12, 14};
+  if (std::ranges::find (kSizes, distortion.size ()) == std::end (kSizes))
+    return bad_field (view, name + "distortion: expected 0, 4, 5, 8, 12 or 14 coefficients, got " +
+                                std::to_string (distortion.size ()));
+  if (!all_finite (distortion))
+    return bad_field (view, name + "distortion: a coefficient is not finite");
+  return {};
+}
+
+Status
+check_partner (const View &view, const std::optional<PartnerCamera> &partner, const char *name)
+{
+  if (!partner)
+    return {};
+  const std::string prefix = std::string (name) + ".";
+  if (Status s = check_lens (view, partner->intrinsics, partner->distortion, prefix); !s.ok ())
+    return s;
+  if (Status s = check_pose (view, partner->partner_from_left, prefix + "partner_from_left");
+      !s.ok ())
+    return s;
+  if (norm (partner->partner_from_left.translation) < 1e-6)
+    return bad_field (view, prefix + "partner_from_left: the baseline is zero");
+  return {};
+}
+
+Status
+check_view (const View &view)
+{
+  if (view.id < 0 || view.id >= kMaxViews)
+    return {StatusCode::kBadValue, "view-id " + std::to_string (view.id) + ": expected 0 to " +
+                                       std::to_string (kMaxViews - 1)};
+  if (view.name.size () > kMaxViewName)
+    return bad_field (view, "name is longer than 255 bytes");
+  if (view.width < 1 || view.height < 1 || view.width > kMaxImageSide ||
+      view.height > kMaxImageSide)
+    return bad_field (view, "image size " + std::to_string (view.width) + "x" +
+                                std::to_string (view.height) + ": expected 1 to " +
+                                std::to_string (kMaxImageSide) + " each");
+  if (Status s = check_lens (view, view.intrinsics, view.distortion, ""); !s.ok ())
+    return s;
+  if (Status s = check_pose (view, view.world_from_view, "world_from_view"); !s.ok ())
+    return s;
+  if (!(view.depth_unit_m >= 1e-7 && view.depth_unit_m <= 1.0))
+    return bad_field (view, "depth_unit: expected 1e-7 to 1 metres");
+  if (!(view.near_m > 0) || !(view.far_m > view.near_m) ||
+      !(view.far_m / view.depth_unit_m < 65536.0))
+    return bad_field (view, "near and far: expected 0 < near < far < 65536 depth units");
+  if (Status s = check_partner (view, view.right, "right"); !s.ok ())
+    return s;
+  return check_partner (view, view.third, "third");
+}
+
+} // namespace
+
+const View *
+Rig::find (int view_id) const
+{
+  const auto it = std::ranges::find (views, view_id, &View::id);
+  return it == views.end () ? nullptr : &*it;
+}
+
+Status
+validate (const Rig &rig)
+{
+  if (rig.views.size () > kMaxViews)
+    return {StatusCode::kBadValue,
+        "a rig has at most 64 views, this one " + std::to_string (rig.views.size ())};
+  std::uint64_t seen = 0;
+  for (const View &view : rig.views) {
+    if (Status s = check_view (view); !s.ok ())
+      return s;
+    if (seen >> view.id & 1)
+      return bad_field (view, "view-id is used twice");
+    seen |= std::uint64_t{1} << view.id;
+  }
+  return {};
+}
+
+Status
+merge (Rig &into, const Rig &other)
+{
+  Rig merged = into;
+  for (const View &view : other.views) {
+    const View *known = merged.find (view.id);
+    if (!known)
+      merged.views.push_back (view);
+    else if (encode_rig ({{*known}}) != encode_rig ({{view}}))
+      return bad_field (view, "view-id stands for two different cameras");
+  }
+  std::ranges::sort (merged.views, {}, &View::id);
+  into = std::move (merged);
+  return {};
+}
+
+} // namespace rangecast
