@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Installs what the project needs (Debian 12 packages), configures and builds build/.
+# Quick when nothing changed. Everything it prints beyond a line goes to build/setup.log.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+packages=(
+  # build
+  g++ meson ninja-build pkg-config git ca-certificates
+  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev
+  libopencv-dev libassimp-dev libturbojpeg0-dev
+  # run: launch strings, RTP, image and video files, software OpenGL without a display
+  gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
+  gstreamer1.0-libav gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
+  # test
+  libgtest-dev python3 python3-numpy opencv-doc valgrind xvfb
+)
+
+missing_packages () {
+  local package
+  for package in "${packages[@]}"; do
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || echo "$package"
+  done
+}
+
+install_packages () {
+  command -v dpkg-query >/dev/null || {
+    echo "setup.sh: not a Debian system; install yourself what these packages hold: ${packages[*]}" >&2
+    return 0
+  }
+  local missing sudo=
+  missing=$(missing_packages)
+  [ -n "$missing" ] || return 0
+  [ "$(id -u)" = 0 ] || sudo=sudo
+  echo "setup.sh: installing $(wc -w <<<"$missing") packages"
+  $sudo apt-get update -qq
+  # shellcheck disable=SC2086
+  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+}
+
+build () {
+  local log=build/setup.log
+  mkdir -p build
+  [ -f build/build.ninja ] || { echo "setup.sh: configuring"; meson setup build >"$log" 2>&1 || { cat "$log" >&2; return 1; }; }
+  ninja -C build >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+}
+
+install_packages
+build

@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Runs all tests: core, elements, pipelines. Last line: "N passed, N failed, N skipped".
+# Arguments go to `meson test`, e.g. a test's name or --suite check.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+./setup.sh || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
+meson test -C build --print-errorlogs --no-rebuild "$@"
+status=$?
+python3 tests/summary.py build/meson-logs/testlog.json "$status"
