@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# One camera host: a stereo pair to a coded range image of the person, over RTP to the parent.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
+  --view N        view-id of this host's stereo pair in the rig
+  --to HOST:PORT  where the parent listens for this host
+  --rig FILE      rig file with all views
+  --input WHAT    avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
+                  DIR: recorded pairs DIR/viewN-left.* and DIR/viewN-right.* (video files, or image
+                  sequences viewN-left-%05d.png from 0), which begin with the empty scene
+  --views N       number of views in the rig, for avatar (default 4)
+  --size WxH      picture size, for avatar (default 320x240)
+  --fps N         frames per second, for avatar and image sequences (default 15)
+  --learn N       frames from which the background is learnt (default 20)
+END
+}
+
+view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --view) view=${2:-}; shift ;;
+    --to) to=${2:-}; shift ;;
+    --rig) rig=${2:-}; shift ;;
+    --input) input=${2:-}; shift ;;
+    --views) views=${2:-}; shift ;;
+    --size) size=${2:-}; shift ;;
+    --fps) fps=${2:-}; shift ;;
+    --learn) learn=${2:-}; shift ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; die "unknown option '$1'" ;;
+  esac
+  shift
+done
+need_number "$view" --view 0 63
+need_number "$views" --views 1 64
+need_number "$fps" --fps 1 1000
+need_number "$learn" --learn 1 100000
+need_size "$size" --size
+split_address "$to" --to
+[ -f "$rig" ] || die "--rig: no file '$rig'"
+
+# One side of a recorded pair, played at its own speed.
+recorded () { # left|right
+  local file
+  file=$(find "$input" -maxdepth 1 -name "view$view-$1.*" | head -n 1)
+  if [ -n "$file" ]; then
+    echo "filesrc location=\"$file\" ! decodebin ! videoconvert ! clocksync"
+  elif file=$(find "$input" -maxdepth 1 -name "view$view-$1-00000.*" | head -n 1) && [ -n "$file" ]; then
+    echo "multifilesrc location=\"$input/view$view-$1-%05d.${file##*.}\" caps=image/${file##*.},framerate=$fps/1 ! decodebin ! videoconvert ! clocksync"
+  else
+    die "--input: no view$view-$1.* and no view$view-$1-00000.* in '$input'"
+  fi
+}
+
+case "$input" in
+  avatar | avatar=*)
+    model=
+    [ "$input" = avatar ] || model="location=\"${input#avatar=}\""
+    caps="video/x-raw,format=RGBx,width=${size%x*},height=${size#*x},framerate=$fps/1"
+    cameras="avatartestsrc name=cameras is-live=true views=$views view-id=$view empty-frames=$((learn + 5)) $model
+      cameras.left ! $caps ! queue max-size-buffers=2 ! depth.left
+      cameras.right ! $caps ! queue max-size-buffers=2 ! depth.right" ;;
+  *)
+    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL or a folder of recorded pairs"
+    left=$(recorded left)
+    right=$(recorded right)
+    cameras="$left ! queue ! depth.left  $right ! queue ! depth.right" ;;
+esac
+
+# shellcheck disable=SC2086
+eval launch "$(cat <<END
+  $cameras
+  stereodepth name=depth rig='"$rig"' view-id=$view
+    ! roiextract background-frames=$learn
+    ! queue max-size-buffers=2 leaky=downstream
+    ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink host=$host port=$port sync=false async=false
+END
+)"

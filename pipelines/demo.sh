@@ -1,0 +1,129 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The main job on one machine: N camera hosts, a parent and a viewer as separate processes, joined
+# by RTP over UDP on loopback. Measures it and leaves picture, film and report in the output folder.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+usage () {
+  cat <<'END'
+usage: demo.sh [options]
+  --input WHAT  avatar (default), avatar=MODEL.glb, or a folder of recorded pairs with its rig.yaml
+                (see camera-host.sh --help)
+  --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
+  --size WxH    size of the camera pictures (default 320x240)
+  --frames N    frame sets to render (default 150)
+  --fps N       frame sets per second (default 15)
+  --out DIR     where avatar.png, avatar.webm and report.json go (default out)
+  --port N      first of views + 1 UDP ports (default 18400)
+  --window      also show it in a window
+END
+}
+
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window=
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --input) input=${2:-}; shift ;;
+    --views) views=${2:-}; shift ;;
+    --size) size=${2:-}; shift ;;
+    --frames) frames=${2:-}; shift ;;
+    --fps) fps=${2:-}; shift ;;
+    --out) out=${2:-}; shift ;;
+    --port) port=${2:-}; shift ;;
+    --window) window=--window ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; echo "demo.sh: unknown option '$1'" >&2; exit 2 ;;
+  esac
+  shift
+done
+
+./setup.sh
+source pipelines/env.sh
+need_size "$size" --size
+need_number "$frames" --frames 1 1000000
+need_number "$fps" --fps 1 120
+need_number "$port" --port 1024 65000
+[ -n "$out" ] || die "--out: expected a folder"
+mkdir -p "$out/log" || die "--out: cannot make '$out'"
+
+# The rig: written by the test source, or recorded with the pictures.
+rig=$out/rig.yaml
+case "$input" in
+  avatar | avatar=*)
+    views=${views:-4}
+    need_number "$views" --views 1 64
+    model=()
+    [ "$input" = avatar ] || model=("location=${input#avatar=}")
+    gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
+      ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
+  *)
+    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, or a folder with a rig.yaml"
+    cp "$input/rig.yaml" "$rig"
+    recorded_views=$(grep -c '^ *id:' "$rig" || true)
+    views=${views:-$recorded_views}
+    need_number "$views" --views 1 "$recorded_views" ;;
+esac
+
+pids=()
+stop_hosts () {
+  [ ${#pids[@]} = 0 ] || kill -INT "${pids[@]}" 2>/dev/null || true
+}
+trap stop_hosts EXIT
+
+start () { # name command...
+  local name=$1
+  shift
+  RANGECAST_LAUNCH="rangecast-run $run_options --report $out/log/$name.json" \
+    "$@" >"$out/log/$name.log" 2>&1 &
+  pids+=($!)
+  names[$!]=$name
+}
+declare -A names=()
+
+# Recorded pictures have capture times from 0 on: all hosts begin them at the same clock time.
+epoch=0 run_options=
+case "$input" in
+  avatar | avatar=*) ;;
+  *) epoch=$(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')
+     run_options="--base-time $epoch" ;;
+esac
+
+parent_port=$port viewer_port=$((port + views))
+echo "$views stereo cameras at $size, $fps frame sets/s: $views camera hosts, parent and viewer"
+for ((i = 0; i < views; i++)); do
+  start "camera$i" pipelines/camera-host.sh --view "$i" --views "$views" --rig "$rig" --input "$input" \
+    --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))"
+done
+run_options=
+start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port"
+
+# The view turns once round while the frames last.
+orbit=$(awk -v f="$fps" -v n="$frames" 'BEGIN { printf "%.3f", 360 * f / n }')
+RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --timeout $((60 + 4 * frames / fps)) \
+  --capture-epoch $epoch --snapshot $out/avatar.png --report $out/log/viewer.json" \
+  pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" --orbit "$orbit" $window &
+viewer=$!
+pids+=($viewer)
+
+# The viewer ends the run; a host that ends earlier has failed (or its recording is over).
+while true; do
+  status=0
+  wait -n -p ended "${pids[@]}" || status=$?
+  [ "$ended" != "$viewer" ] || break
+  if [ "$status" != 0 ]; then
+    echo "demo.sh: ${names[$ended]} failed:" >&2
+    cat "$out/log/${names[$ended]}.log" >&2
+    exit 1
+  fi
+  left=()
+  for pid in "${pids[@]}"; do
+    [ "$pid" = "$ended" ] || left+=("$pid")
+  done
+  pids=("${left[@]}")
+done
+[ "$status" = 0 ] || { echo "demo.sh: the viewer failed" >&2; exit 1; }
+
+stop_hosts
+wait || true
+pids=()
+python3 pipelines/demo-report.py "$out"

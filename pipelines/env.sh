@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Sourced by the scripts here: makes the elements of the build tree known (an installed plugin is
+# found without it), picks software OpenGL where there is no display, and reads HOST:PORT.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+if [ -d "$root/build/gst" ]; then
+  export GST_PLUGIN_PATH="$root/build/gst${GST_PLUGIN_PATH:+:$GST_PLUGIN_PATH}"
+  export GST_REGISTRY="${GST_REGISTRY:-$root/build/registry.bin}"
+  PATH="$root/build/pipelines:$PATH"
+fi
+if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+  export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
+fi
+
+# What runs the launch strings; demo.sh replaces it by rangecast-run, which measures.
+launch () { ${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q} "$@"; }
+
+die () { echo "$(basename "$0"): $*" >&2; exit 2; }
+
+# usage: split_address HOST:PORT option -> sets $host and $port
+split_address () {
+  host=${1%:*} port=${1##*:}
+  [[ "$1" == *:* && -n "$host" && "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1 ] && [ "$port" -le 65535 ] ||
+    die "$2: expected HOST:PORT, got '$1'"
+}
+
+# usage: need_number VALUE option minimum maximum
+need_number () {
+  [[ "$1" =~ ^[0-9]+$ ]] && [ "$1" -ge "$3" ] && [ "$1" -le "$4" ] ||
+    die "$2: expected a whole number from $3 to $4, got '$1'"
+}
+
+need_size () {
+  [[ "$1" =~ ^[1-9][0-9]*x[1-9][0-9]*$ ]] || die "$2: expected WIDTHxHEIGHT, e.g. 320x240, got '$1'"
+}
+
+rtp_caps='application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'

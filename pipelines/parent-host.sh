@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The parent host: the coded views of all camera hosts, matched by capture time, on to the viewer.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: parent-host.sh --views N --listen PORT --to HOST:PORT [options]
+  --views N       how many camera hosts there are
+  --listen PORT   camera host of view i sends to UDP port PORT + i
+  --to HOST:PORT  where the viewer listens
+  --jitter MS     jitter buffer of each camera stream (default 30)
+  --latency MS    how long to wait for a late view (default 60)
+END
+}
+
+views= listen= to= jitter=30 latency=60
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --views) views=${2:-}; shift ;;
+    --listen) listen=${2:-}; shift ;;
+    --to) to=${2:-}; shift ;;
+    --jitter) jitter=${2:-}; shift ;;
+    --latency) latency=${2:-}; shift ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; die "unknown option '$1'" ;;
+  esac
+  shift
+done
+need_number "$views" --views 1 64
+need_number "$listen" --listen 1 $((65535 - views))
+need_number "$jitter" --jitter 0 10000
+need_number "$latency" --latency 0 10000
+split_address "$to" --to
+
+cameras=()
+for ((i = 0; i < views; i++)); do
+  cameras+=(udpsrc "port=$((listen + i))" reuse=false buffer-size=1048576 "caps=$rtp_caps"
+    ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay ! mux.)
+done
+launch rangemux name=mux "latency=$((latency * 1000000))" \
+  ! rtpneighbourcodepay ! udpsink "host=$host" "port=$port" sync=false async=false "${cameras[@]}"
