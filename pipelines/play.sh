@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Plays a recording of coded frame sets: in a window, or to a film.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: play.sh FILE [options]
+  --film WEBM    write a film instead of showing a window
+  --orbit DEG    degrees per second by which the view turns (default 30)
+  --size WxH     picture size (default 640x480)
+END
+}
+
+file= film= orbit=30 size=640x480
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --film) film=${2:-}; shift ;;
+    --orbit) orbit=${2:-}; shift ;;
+    --size) size=${2:-}; shift ;;
+    -h | --help) usage; exit 0 ;;
+    -*) usage >&2; die "unknown option '$1'" ;;
+    *) file=$1 ;;
+  esac
+  shift
+done
+[ -n "$file" ] || { usage >&2; die "expected a file to play"; }
+[ -f "$file" ] || die "no file '$file'"
+need_size "$size" --size
+
+picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
+view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
+  ! striprender "auto-orbit=$orbit" ! "$picture")
+if [ -n "$film" ]; then
+  launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
+else
+  launch "${view[@]}" ! glimagesink
+fi

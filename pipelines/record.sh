@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Records coded frame sets to a file: what a parent sends, or the built-in figure.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: record.sh FILE [options]
+  --listen PORT  record the stream that arrives at this UDP port, until Ctrl-C; without it, the
+                 built-in figure with exact depth:
+  --views N      views round the figure (default 4)
+  --size WxH     picture size (default 320x240)
+  --frames N     frame sets (default 60)
+END
+}
+
+file= listen= views=4 size=320x240 frames=60
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --listen) listen=${2:-}; shift ;;
+    --views) views=${2:-}; shift ;;
+    --size) size=${2:-}; shift ;;
+    --frames) frames=${2:-}; shift ;;
+    -h | --help) usage; exit 0 ;;
+    -*) usage >&2; die "unknown option '$1'" ;;
+    *) file=$1 ;;
+  esac
+  shift
+done
+[ -n "$file" ] || { usage >&2; die "expected a file to write"; }
+need_number "$views" --views 1 64
+need_number "$frames" --frames 1 1000000
+need_size "$size" --size
+
+if [ -n "$listen" ]; then
+  need_number "$listen" --listen 1 65535
+  source=(udpsrc "port=$listen" reuse=false "caps=$rtp_caps" ! rtpjitterbuffer latency=50 ! rtpneighbourcodedepay)
+else
+  source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
+    ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
+fi
+launch "${source[@]}" ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
+  ! filesink "location=$file"

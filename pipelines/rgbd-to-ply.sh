@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Colour and depth pictures of any RGB-D camera to point clouds (PLY), or to one rendered picture.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: rgbd-to-ply.sh COLOUR DEPTH OUT [options]
+  COLOUR, DEPTH      image files, or sequences such as colour/%05d.jpg and depth/%05d.png; depth is
+                     a 16-bit grey PNG
+  OUT                a PLY file (with %05d for sequences), or a .png: rendered instead
+  --focal-length PX  default: 0.82 of the picture's width (an ordinary RGB-D camera)
+  --depth-scale M    metres per unit of the depth picture (default 0.001)
+  --near M --far M   depths that count (default 0.3 and 6)
+  --turn DEG         of the rendered picture (default 20)
+END
+}
+
+files=() focal=() scale=0.001 near=0.3 far=6 turn=20
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --focal-length) focal=("focal-length=${2:-}"); shift ;;
+    --depth-scale) scale=${2:-}; shift ;;
+    --near) near=${2:-}; shift ;;
+    --far) far=${2:-}; shift ;;
+    --turn) turn=${2:-}; shift ;;
+    -h | --help) usage; exit 0 ;;
+    -*) usage >&2; die "unknown option '$1'" ;;
+    *) files+=("$1") ;;
+  esac
+  shift
+done
+[ ${#files[@]} = 3 ] || { usage >&2; die "expected COLOUR DEPTH OUT"; }
+
+pictures () { # FILE-or-sequence
+  case "$1" in
+    *%*) echo "multifilesrc location=\"$1\" caps=image/$(suffix "$1"),framerate=30/1" ;;
+    *) [ -f "$1" ] || die "no file '$1'"; echo "filesrc location=\"$1\"" ;;
+  esac
+}
+suffix () {
+  case "${1##*.}" in jpg | jpeg | JPG) echo jpeg ;; *) echo "${1##*.}" ;; esac
+}
+
+case "${files[2]}" in
+  *.png) sink="striprender azimuth=$turn ! video/x-raw(memory:GLMemory),width=960,height=720 ! gldownload
+    ! videoconvert ! pngenc snapshot=true ! filesink location=\"${files[2]}\"" ;;
+  *) sink="plyenc ! multifilesink location=\"${files[2]}\"" ;;
+esac
+colour=$(pictures "${files[0]}")
+depth=$(pictures "${files[1]}")
+eval launch "$(sed 's/(memory:GLMemory)/\\(memory:GLMemory\\)/' <<END
+  $colour ! decodebin ! videoconvert ! combine.colour
+  $depth ! pngdec ! videoconvert ! video/x-raw,format=GRAY16_LE ! combine.depth
+  rangecombine name=combine ${focal[@]:-} depth-scale=$scale near=$near far=$far ! $sink
+END
+)"

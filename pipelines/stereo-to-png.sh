@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# One rectified stereo pair of image files to a rendered picture, turned a little.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: stereo-to-png.sh LEFT RIGHT PNG --focal-length PX --baseline M --near M --far M [options]
+  --focal-length PX  of both (rectified) pictures
+  --baseline M       distance of the cameras, metres
+  --near M --far M   depths to look for, metres
+  --turn DEG         how far the view is turned from the camera's own (default 20)
+  --size WxH         size of the rendered picture (default 960x720)
+  --algorithm NAME   bm, sgbm, sgbm-3way (default: stereodepth's)
+END
+}
+
+files=() focal= baseline= near= far= turn=20 size=960x720 algorithm=()
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --focal-length) focal=${2:-}; shift ;;
+    --baseline) baseline=${2:-}; shift ;;
+    --near) near=${2:-}; shift ;;
+    --far) far=${2:-}; shift ;;
+    --turn) turn=${2:-}; shift ;;
+    --size) size=${2:-}; shift ;;
+    --algorithm) algorithm=("algorithm=${2:-}"); shift ;;
+    -h | --help) usage; exit 0 ;;
+    -*) usage >&2; die "unknown option '$1'" ;;
+    *) files+=("$1") ;;
+  esac
+  shift
+done
+[ ${#files[@]} = 3 ] && [ -n "$focal" ] && [ -n "$baseline" ] && [ -n "$near" ] && [ -n "$far" ] ||
+  { usage >&2; die "expected LEFT RIGHT PNG, --focal-length, --baseline, --near and --far"; }
+[ -f "${files[0]}" ] || die "no file '${files[0]}'"
+[ -f "${files[1]}" ] || die "no file '${files[1]}'"
+need_size "$size" --size
+
+launch filesrc "location=${files[0]}" ! decodebin ! videoconvert ! depth.left \
+  filesrc "location=${files[1]}" ! decodebin ! videoconvert ! depth.right \
+  stereodepth name=depth "focal-length=$focal" "baseline=$baseline" "near=$near" "far=$far" "${algorithm[@]}" \
+  ! striprender "azimuth=$turn" ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" \
+  ! gldownload ! videoconvert ! pngenc ! filesink "location=${files[2]}"
