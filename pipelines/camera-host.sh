@@ -44,40 +44,39 @@ need_size "$size" --size
 split_address "$to" --to
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
-# One side of a recorded pair, played at its own speed.
-recorded () { # left|right
-  local file
+# Sets `side` to the elements that play one side of a recorded pair at its own speed.
+read_side () { # left|right
+  local file type
   file=$(find "$input" -maxdepth 1 -name "view$view-$1.*" | head -n 1)
   if [ -n "$file" ]; then
-    echo "filesrc location=\"$file\" ! decodebin ! videoconvert ! clocksync"
-  elif file=$(find "$input" -maxdepth 1 -name "view$view-$1-00000.*" | head -n 1) && [ -n "$file" ]; then
-    echo "multifilesrc location=\"$input/view$view-$1-%05d.${file##*.}\" caps=image/${file##*.},framerate=$fps/1 ! decodebin ! videoconvert ! clocksync"
-  else
-    die "--input: no view$view-$1.* and no view$view-$1-00000.* in '$input'"
+    side=(filesrc "location=$file" ! decodebin ! videoconvert ! clocksync)
+    return
   fi
+  file=$(find "$input" -maxdepth 1 -name "view$view-$1-00000.*" | head -n 1)
+  [ -n "$file" ] || die "--input: no view$view-$1.* and no view$view-$1-00000.* in '$input'"
+  type=${file##*.}
+  [ "$type" != jpg ] || type=jpeg
+  side=(multifilesrc "location=$input/view$view-$1-%05d.${file##*.}" "caps=image/$type,framerate=$fps/1"
+    ! decodebin ! videoconvert ! clocksync)
 }
 
 case "$input" in
   avatar | avatar=*)
-    model=
-    [ "$input" = avatar ] || model="location=\"${input#avatar=}\""
     caps="video/x-raw,format=RGBx,width=${size%x*},height=${size#*x},framerate=$fps/1"
-    cameras="avatartestsrc name=cameras is-live=true views=$views view-id=$view empty-frames=$((learn + 5)) $model
-      cameras.left ! $caps ! queue max-size-buffers=2 ! depth.left
-      cameras.right ! $caps ! queue max-size-buffers=2 ! depth.right" ;;
+    cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))")
+    [ "$input" = avatar ] || cameras+=("location=${input#avatar=}")
+    cameras+=(cameras.left ! "$caps" ! queue max-size-buffers=2 ! depth.left
+      cameras.right ! "$caps" ! queue max-size-buffers=2 ! depth.right) ;;
   *)
     [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL or a folder of recorded pairs"
-    left=$(recorded left)
-    right=$(recorded right)
-    cameras="$left ! queue ! depth.left  $right ! queue ! depth.right" ;;
+    read_side left
+    cameras=("${side[@]}" ! queue ! depth.left)
+    read_side right
+    cameras+=("${side[@]}" ! queue ! depth.right) ;;
 esac
 
-# shellcheck disable=SC2086
-eval launch "$(cat <<END
-  $cameras
-  stereodepth name=depth rig='"$rig"' view-id=$view
-    ! roiextract background-frames=$learn
-    ! queue max-size-buffers=2 leaky=downstream
-    ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink host=$host port=$port sync=false async=false
-END
-)"
+launch "${cameras[@]}" \
+  stereodepth name=depth "rig=$rig" "view-id=$view" \
+  ! roiextract "background-frames=$learn" \
+  ! queue max-size-buffers=2 leaky=downstream \
+  ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink "host=$host" "port=$port" sync=false async=false

@@ -33,26 +33,28 @@ while [ $# -gt 0 ]; do
 done
 [ ${#files[@]} = 3 ] || { usage >&2; die "expected COLOUR DEPTH OUT"; }
 
-pictures () { # FILE-or-sequence
+# Sets `reader` to the elements that read a picture file or a sequence of them.
+read_pictures () {
   case "$1" in
-    *%*) echo "multifilesrc location=\"$1\" caps=image/$(suffix "$1"),framerate=30/1" ;;
-    *) [ -f "$1" ] || die "no file '$1'"; echo "filesrc location=\"$1\"" ;;
+    *%*)
+      local type=${1##*.}
+      [ "${type,,}" != jpg ] || type=jpeg
+      reader=(multifilesrc "location=$1" "caps=image/${type,,},framerate=30/1") ;;
+    *)
+      [ -f "$1" ] || die "no file '$1'"
+      reader=(filesrc "location=$1") ;;
   esac
 }
-suffix () {
-  case "${1##*.}" in jpg | jpeg | JPG) echo jpeg ;; *) echo "${1##*.}" ;; esac
-}
+read_pictures "${files[0]}"
+colour=("${reader[@]}")
+read_pictures "${files[1]}"
+depth=("${reader[@]}")
 
 case "${files[2]}" in
-  *.png) sink="striprender azimuth=$turn ! video/x-raw(memory:GLMemory),width=960,height=720 ! gldownload
-    ! videoconvert ! pngenc snapshot=true ! filesink location=\"${files[2]}\"" ;;
-  *) sink="plyenc ! multifilesink location=\"${files[2]}\"" ;;
+  *.png) output=(striprender "azimuth=$turn" ! "video/x-raw(memory:GLMemory),width=960,height=720" ! gldownload
+    ! videoconvert ! pngenc snapshot=true ! filesink "location=${files[2]}") ;;
+  *) output=(plyenc ! multifilesink "location=${files[2]}") ;;
 esac
-colour=$(pictures "${files[0]}")
-depth=$(pictures "${files[1]}")
-eval launch "$(sed 's/(memory:GLMemory)/\\(memory:GLMemory\\)/' <<END
-  $colour ! decodebin ! videoconvert ! combine.colour
-  $depth ! pngdec ! videoconvert ! video/x-raw,format=GRAY16_LE ! combine.depth
-  rangecombine name=combine ${focal[@]:-} depth-scale=$scale near=$near far=$far ! $sink
-END
-)"
+launch "${colour[@]}" ! decodebin ! videoconvert ! combine.colour \
+  "${depth[@]}" ! pngdec ! videoconvert ! video/x-raw,format=GRAY16_LE ! combine.depth \
+  rangecombine name=combine "${focal[@]}" "depth-scale=$scale" "near=$near" "far=$far" ! "${output[@]}"
