@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# pipelines/demo.sh: all hosts as separate processes.
+
+report () { python3 -c "import json; r = json.load(open('$1')); print($2)"; }
+
+# What every run must leave behind. Nothing here asserts a speed.
+check_report () { # folder frames views
+  expect_file "$1/avatar.png" 2000
+  expect_file "$1/avatar.webm" 2000
+  [ "$(report "$1/report.json" "r['frames']")" = "$2" ] || fail "frames: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "r['views']")" = "$3" ] || fail "views: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "r['points_per_frame_set'] > 1000 * $3")" = True ] || fail "points: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "0 < r['points_after_cylinder'] < r['points_per_frame_set']")" = True ] ||
+    fail "the cylinder removed nothing: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "0 < r['coded_bytes_per_frame_set'] < r['raw_bytes_per_frame_set']")" = True ] ||
+    fail "coded is not smaller than raw: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "0 < r['latency_ms']['p50'] <= r['latency_ms']['p99'] < 60000")" = True ] ||
+    fail "latency: $(cat "$1/report.json")"
+  [ "$(report "$1/report.json" "r['rtp_packets'] > r['frames'] and r['cpu_seconds'] > 0")" = True ] ||
+    fail "packets or CPU: $(cat "$1/report.json")"
+}
+
+# The picture shows somebody: many pixels differ from the background in the corner.
+check_picture () {
+  python3 - "$1" <<'END' || fail "$1 shows nobody"
+import sys, subprocess
+raw = subprocess.run(["gst-launch-1.0", "-q", "filesrc", "location=" + sys.argv[1], "!", "pngdec", "!", "videoconvert",
+                      "!", "video/x-raw,format=RGB", "!", "fdsink"], stdout=subprocess.PIPE, check=True).stdout
+background = raw[:3]
+different = sum(max(abs(raw[i + c] - background[c]) for c in range(3)) > 24 for i in range(0, len(raw) - 2, 3))
+sys.exit(different < len(raw) / 3 * 0.05)
+END
+}
+
+test_demo_renders_the_built_in_figure () {
+  need_gl
+  "$pipelines/demo.sh" --frames 20 --fps 8 --size 160x120 --out demo --port 22000
+  check_report demo 20 4
+  check_picture demo/avatar.png
+}
+
+test_demo_renders_a_scanned_head () {
+  need_gl
+  need_data lps_head/LeePerrySmith.glb
+  "$pipelines/demo.sh" --input "avatar=$data/lps_head/LeePerrySmith.glb" --views 2 --frames 10 --fps 8 \
+    --size 160x120 --out demo --port 22010
+  check_report demo 10 2
+  check_picture demo/avatar.png
+}
+
+test_demo_plays_recorded_pairs () {
+  need_gl
+  mkdir pairs
+  for view in 0 1; do
+    gst-launch-1.0 -q avatartestsrc name=s views=2 arc=60 view-id=$view num-buffers=60 empty-frames=25 \
+      rig-export=pairs/rig.yaml \
+      s.left ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-left-%05d.png" \
+      s.right ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-right-%05d.png"
+  done
+  "$pipelines/demo.sh" --input pairs --fps 8 --frames 15 --out demo --port 22020
+  check_report demo 15 2
+  check_picture demo/avatar.png
+}
+
+test_demo_says_what_is_wrong () {
+  expect_error "--views" "$pipelines/demo.sh" --views 99 --out demo
+  expect_error "--size" "$pipelines/demo.sh" --size big --out demo
+  expect_error "rig.yaml" "$pipelines/demo.sh" --input nowhere --out demo
+  echo "this is no model" >bad.glb
+  expect_error "bad.glb" "$pipelines/demo.sh" --input avatar=bad.glb --out demo
+}
+
+test_demo_says_when_a_port_is_in_use () {
+  need_gl
+  python3 -c 'import socket, time
+s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 22031)); time.sleep(40)' &
+  local blocker=$!
+  sleep 1
+  expect_error "22031" "$pipelines/demo.sh" --views 2 --frames 5 --size 160x120 --out demo --port 22030
+  kill "$blocker"
+}

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Bad input to launch strings: one clear error each, and an end.
+
+run () { gst-launch-1.0 -q "$@"; }
+pair () { # caps of left, caps of right, stereodepth's properties...
+  local left=$1 right=$2
+  shift 2
+  run stereodepth name=d "$@" ! fakesink videotestsrc num-buffers=2 ! "$left" ! d.left \
+    videotestsrc num-buffers=2 ! "$right" ! d.right
+}
+vga=video/x-raw,format=RGB,width=640,height=480
+
+make_rig () { run avatartestsrc views=2 num-buffers=1 rig-export=rig.yaml ! fakesink; }
+
+test_missing_rig_file_is_named () { expect_error "nowhere.yaml" pair $vga $vga rig=nowhere.yaml view-id=0; }
+
+test_malformed_rig_file_is_named () {
+  echo "views: [[[" >bad.yaml
+  expect_error "bad.yaml" pair $vga $vga rig=bad.yaml view-id=0
+}
+
+test_unknown_view_id_is_named () {
+  make_rig
+  expect_error "view-id" pair $vga $vga rig=rig.yaml view-id=7
+}
+
+test_pictures_that_do_not_match_the_rig_are_named () {
+  make_rig
+  expect_error "320x240" pair $vga $vga rig=rig.yaml view-id=0
+}
+
+test_left_and_right_of_different_size_are_named () {
+  expect_error "640x480" pair $vga video/x-raw,format=RGB,width=320,height=240 focal-length=500 baseline=0.1
+}
+
+test_model_that_is_not_one_is_named () {
+  echo "no model" >bad.glb
+  expect_error "bad.glb" run avatartestsrc location=bad.glb num-buffers=1 ! fakesink
+  expect_error "nowhere.obj" run avatartestsrc location=nowhere.obj num-buffers=1 ! fakesink
+}
+
+test_file_that_is_no_recording_is_refused () {
+  head -c 100000 /dev/urandom >noise.rcnc
+  expect_error "neighbour" run filesrc location=noise.rcnc ! neighbourcodeparse ! neighbourcodedec ! fakesink
+}
+
+test_corrupted_recording_plays_on () {
+  "$pipelines/record.sh" good.rcnc --frames 10 --size 160x120 --views 2
+  python3 -c '
+import random
+random.seed(1)
+data = bytearray(open("good.rcnc", "rb").read())
+for i in range(200):
+    data[random.randrange(2000, len(data))] ^= 1 << random.randrange(8)
+open("bad.rcnc", "wb").write(data)
+open("short.rcnc", "wb").write(open("good.rcnc", "rb").read()[: len(data) * 2 // 3])'
+  run filesrc location=bad.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink location=bad-%05d.ply
+  [ "$(find . -name 'bad-*.ply' | wc -l)" -ge 5 ] || fail "a few flipped bits cost more than half the frame sets: $(ls)"
+  run filesrc location=short.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink location=short-%05d.ply
+  [ "$(find . -name 'short-*.ply' | wc -l)" -ge 6 ] || fail "a cut file lost more than its end: $(ls)"
+}
+
+test_port_in_use_is_an_error () {
+  python3 -c 'import socket, time
+s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 22200)); time.sleep(20)' &
+  local blocker=$!
+  sleep 1
+  expect_error "22200" "$pipelines/viewer-host.sh" --listen 22200
+  expect_error "22200" "$pipelines/parent-host.sh" --views 1 --listen 22200 --to 127.0.0.1:22201
+  kill "$blocker"
+}
+
+test_scripts_name_the_bad_option () {
+  expect_error "--to" "$pipelines/camera-host.sh" --view 0 --rig x --to nowhere
+  expect_error "--view" "$pipelines/camera-host.sh" --view 99 --rig x --to 127.0.0.1:1
+  expect_error "--listen" "$pipelines/parent-host.sh" --views 2 --listen x --to 127.0.0.1:1
+  expect_error "--size" "$pipelines/viewer-host.sh" --listen 22201 --size 640
+}

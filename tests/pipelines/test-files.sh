@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The scripts that read and write files.
+
+# Prints "VERTICES SIZE_OK" of a binary PLY.
+ply_vertices () {
+  python3 - "$1" <<'END'
+import sys
+data = open(sys.argv[1], "rb").read()
+head, body = data.split(b"end_header\n", 1)
+assert head.startswith(b"ply\nformat binary_little_endian 1.0\n"), head[:60]
+sizes = {b"float": 4, b"uchar": 1}
+count = stride = 0
+for line in head.split(b"\n"):
+    words = line.split()
+    if words[:2] == [b"element", b"vertex"]:
+        count = int(words[2])
+    if words[:1] == [b"property"]:
+        stride += sizes[words[1]]
+assert len(body) == count * stride, (len(body), count, stride)
+print(count)
+END
+}
+
+test_recording_plays_again_and_becomes_ply () {
+  "$pipelines/record.sh" recording.rcnc --frames 12 --size 160x120
+  expect_file recording.rcnc 10000
+  "$pipelines/range-to-ply.sh" recording.rcnc cloud-%05d.ply
+  [ "$(find . -name 'cloud-*.ply' | wc -l)" = 12 ] || fail "expected 12 PLY files: $(ls)"
+  [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
+}
+
+test_recording_plays_to_a_film () {
+  need_gl
+  "$pipelines/record.sh" recording.rcnc --frames 8 --size 160x120
+  "$pipelines/play.sh" recording.rcnc --film film.webm --size 320x240
+  expect_file film.webm 1000
+}
+
+test_rgbd_pictures_become_a_point_cloud () {
+  need_data open3d_rgbd/depth
+  "$pipelines/rgbd-to-ply.sh" "$(find "$data/open3d_rgbd/color" -name '*.jpg' | sort | head -n 1)" \
+    "$(find "$data/open3d_rgbd/depth" -name '*.png' | sort | head -n 1)" cloud.ply --focal-length 525
+  [ "$(ply_vertices cloud.ply)" -gt 200000 ] || fail "few points: $(ply_vertices cloud.ply)"
+}
+
+test_rgbd_pictures_are_rendered () {
+  need_gl
+  gst-launch-1.0 -q avatartestsrc num-buffers=1 view-id=0 ! video/x-range,width=160,height=120 ! rangesplit name=s \
+    s.colour ! videoconvert ! jpegenc ! filesink location=colour.jpg s.depth ! pngenc ! filesink location=depth.png
+  "$pipelines/rgbd-to-ply.sh" colour.jpg depth.png picture.png --depth-scale 0.0001 --near 0.3 --far 2
+  expect_file picture.png 5000
+}
+
+test_stereo_pair_is_rendered () {
+  need_gl
+  gst-launch-1.0 -q avatartestsrc name=s num-buffers=1 \
+    s.left ! video/x-raw,format=RGB,width=320,height=240 ! queue ! pngenc ! filesink location=left.png \
+    s.right ! video/x-raw,format=RGB,width=320,height=240 ! queue ! pngenc ! filesink location=right.png
+  "$pipelines/stereo-to-png.sh" left.png right.png picture.png --focal-length 320 --baseline 0.1 --near 0.45 --far 1.3
+  expect_file picture.png 20000
+}
+
+test_aloe_pair_is_rendered () {
+  need_gl
+  local folder
+  folder=$(dirname "$(dpkg -L opencv-doc 2>/dev/null | grep -m 1 'aloeL.jpg')" 2>/dev/null) || folder=
+  [ -f "$folder/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"
+  "$pipelines/stereo-to-png.sh" "$folder/aloeL.jpg" "$folder/aloeR.jpg" aloe.png \
+    --focal-length 3740 --baseline 0.16 --near 2.6 --far 20
+  expect_file aloe.png 100000
+}
+
+test_bunny_scans_go_through_everything () {
+  need_gl
+  need_data stanford_bunny_range/bun000.ply.gz
+  python3 -c 'import numpy' 2>/dev/null || skip "no numpy"
+  python3 "$pipelines/bunny-to-range.py" "$data/stanford_bunny_range" --out bunny
+  local mux=() view
+  for view in 0 1 2 3 4 5; do
+    mux+=(filesrc "location=bunny/view$view-colour.png" ! pngdec ! videoconvert ! "combine$view.colour"
+      filesrc "location=bunny/view$view-depth.png" ! pngdec ! "combine$view.depth"
+      rangecombine "name=combine$view" rig=bunny/rig.yaml "view-id=$view" depth-scale=0.00005 ! neighbourcodeenc ! mux.)
+  done
+  gst-launch-1.0 -q -e "${mux[@]}" rangemux name=mux ! neighbourcodedec ! cylinderfilter name=cylinder ! tee name=t \
+    t. ! queue ! plyenc ! filesink location=bunny.ply \
+    t. ! queue ! striprender ! 'video/x-raw(memory:GLMemory),width=640,height=480' ! gldownload ! videoconvert ! pngenc ! filesink location=bunny.png
+  expect_file bunny.png 5000
+  [ "$(ply_vertices bunny.ply)" -gt 50000 ] || fail "few points: $(ply_vertices bunny.ply)"
+}
