@@ -7,7 +7,7 @@ cd "$(dirname "$0")"
 
 packages=(
   # build
-  g++ meson ninja-build pkg-config git ca-certificates
+  gcc g++ meson ninja-build pkg-config git ca-certificates
   libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev
   libopencv-dev libassimp-dev libturbojpeg0-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display

@@ -29,6 +29,13 @@ test_recording_plays_again_and_becomes_ply () {
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
 }
 
+test_application_reads_a_recording () {
+  "$pipelines/record.sh" recording.rcnc --frames 3 --size 160x120 --views 2
+  "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt
+  [ "$(grep -c '^frame set' points.txt)" = 3 ] || fail "$(cat points.txt)"
+  [ "$(grep -cE '^  view [01]: [0-9]{4,} points, centre' points.txt)" = 6 ] || fail "$(cat points.txt)"
+}
+
 test_recording_plays_to_a_film () {
   need_gl
   "$pipelines/record.sh" recording.rcnc --frames 8 --size 160x120
