@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-plyenc
+ * @title: plyenc
+ *
+ * Writes each frame set as a point cloud: one binary PLY file a buffer, in world coordinates and
+ * metres, for multifilesink.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=1 ! plyenc ! multifilesink location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstplyenc.h"
+
+#include <atomic>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
+
+GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
+#define GST_CAT_DEFAULT gst_ply_enc_debug
+
+enum { PROP_0, PROP_VIEW_ID };
+
+struct GstPlyEncPrivate {
+  std::atomic<bool> with_view_id{false};
+  gstrange::RangeInfo info; /* streaming thread only */
+};
+
+struct _GstPlyEnc {
+  GstBaseTransform parent;
+  GstPlyEncPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply"));
+
+G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, GST_TYPE_PLY_ENC)
+
+/* ---- streaming ---- */
+
+static GstCaps *
+gst_ply_enc_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *, GstCaps *filter)
+{
+  GstCaps *other =
+      gst_static_pad_template_get_caps (direction == GST_PAD_SINK ? &src_template : &sink_template);
+  if (!filter)
+    return other;
+  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (other);
+  return filtered;
+}
+
+static gboolean
+gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+{
+  auto self = GST_PLY_ENC (base);
+  const rangecast::Status status = gstrange::parse_caps (in, self->priv->info);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* The output's size depends on the points, so the file is written here, where its buffer is made.
+ */
+static GstFlowReturn
+gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
+{
+  auto self = GST_PLY_ENC (base);
+  gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), frame.status ());
+
+  const rangecast::PlyWriter writer (self->priv->with_view_id);
+  std::size_t points = 0;
+  for (const auto &view : frame.views ())
+    points += rangecast::count_points (view);
+  GstBuffer *buffer = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
+  GstMapInfo map;
+  if (!buffer || !gst_buffer_map (buffer, &map, GST_MAP_WRITE)) {
+    gst_clear_buffer (&buffer);
+    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
+        ("no memory for a PLY file of %" G_GSIZE_FORMAT " points", points));
+    return GST_FLOW_ERROR;
+  }
+  const auto status = writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
+  gst_buffer_unmap (buffer, &map);
+  const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
+  if (flow != GST_FLOW_OK) {
+    gst_buffer_unref (buffer);
+    return flow;
+  }
+  GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, buffer);
+  *output = buffer;
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn
+gst_ply_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_OK; /* prepare_output_buffer has written it */
+}
+
+/* The views' places mean nothing in a PLY; when they were taken still does. */
+static gboolean
+gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+/* ---- life ---- */
+
+static void
+gst_ply_enc_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto self = GST_PLY_ENC (object);
+  if (id == PROP_VIEW_ID)
+    self->priv->with_view_id = g_value_get_boolean (value);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_ply_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto self = GST_PLY_ENC (object);
+  if (id == PROP_VIEW_ID)
+    g_value_set_boolean (value, self->priv->with_view_id);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_ply_enc_finalize (GObject *object)
+{
+  delete GST_PLY_ENC (object)->priv;
+  G_OBJECT_CLASS (gst_ply_enc_parent_class)->finalize (object);
+}
+
+static void
+gst_ply_enc_init (GstPlyEnc *self)
+{
+  self->priv = new GstPlyEncPrivate;
+}
+
+static void
+gst_ply_enc_class_init (GstPlyEncClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_ply_enc_set_property;
+  object_class->get_property = gst_ply_enc_get_property;
+  object_class->finalize = gst_ply_enc_finalize;
+
+  g_object_class_install_property (object_class, PROP_VIEW_ID,
+      g_param_spec_boolean ("view-id", "View id",
+          "Give each point the view-id of the camera that saw it, as property view_id (default: "
+          "false)",
+          FALSE,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
+      "Writes each range frame set as a binary PLY point cloud", "gst-rangecast");
+
+  transform_class->transform_caps = gst_ply_enc_transform_caps;
+  transform_class->set_caps = gst_ply_enc_set_caps;
+  transform_class->prepare_output_buffer = gst_ply_enc_prepare_output_buffer;
+  transform_class->transform = gst_ply_enc_transform;
+  transform_class->transform_meta = gst_ply_enc_transform_meta;
+
+  GST_DEBUG_CATEGORY_INIT (gst_ply_enc_debug, "plyenc", 0, "PLY encoder");
+}
