@@ -1,0 +1,574 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rangecombine
+ * @title: rangecombine
+ *
+ * Makes range images of any depth camera: colour and depth, registered pixel to pixel, become one
+ * view. Depth is GRAY16_LE in any unit (default: millimetres).
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 rangecombine name=c focal-length=525 ! plyenc ! filesink location=cloud.ply
+ * filesrc location=colour.jpg ! jpegdec ! videoconvert ! c.colour filesrc location=depth.png !
+ * pngdec ! c.depth
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrangecombine.h"
+
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <cmath>
+#include <gstrange/gstrange.h>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangepairing.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/geometry/point_cloud.hpp>
+#include <string>
+
+using rangecast::RangeImage;
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::View;
+
+GST_DEBUG_CATEGORY_STATIC (gst_range_combine_debug);
+#define GST_CAT_DEFAULT gst_range_combine_debug
+
+enum {
+  PROP_0,
+  PROP_RIG,
+  PROP_VIEW_ID,
+  PROP_FOCAL_LENGTH,
+  PROP_PRINCIPAL_X,
+  PROP_PRINCIPAL_Y,
+  PROP_DEPTH_SCALE,
+  PROP_DEPTH_UNIT,
+  PROP_NEAR,
+  PROP_FAR,
+  PROP_STATS
+};
+
+static constexpr double kDefaultDepthScale = 0.001;
+static constexpr double kDefaultDepthUnit = 0.0001;
+/* Of an ordinary RGB-D camera, whose horizontal field of view is about 63 degrees. */
+static constexpr double kDefaultFocalOfWidth = 0.82;
+
+struct CombineSettings {
+  std::string rig;
+  int view_id = 0;
+  double focal_length = 0; /* pixels; 0: kDefaultFocalOfWidth of the width */
+  double principal_x = -1; /* pixels; -1: the centre */
+  double principal_y = -1;
+  double depth_scale = kDefaultDepthScale; /* metres per unit of the input */
+  double depth_unit = 0;                   /* metres; 0: the rig's, or kDefaultDepthUnit */
+  double near = 0, far = 0;                /* metres; 0: the rig's */
+};
+
+struct GstRangeCombinePrivate {
+  std::mutex lock; /* guards settings and the counter; never held across a push or message */
+  CombineSettings settings;
+  guint64 frames = 0;
+
+  /* streaming thread only */
+  GstAggregatorPad *colour_pad = nullptr, *depth_pad = nullptr; /* owned by the element */
+  gstrange::PairMatcher *matcher = nullptr;
+  GstVideoInfo colour, depth;
+  bool have_colour = false, have_depth = false;
+  bool negotiate = true;
+  View view; /* what the output's caps say */
+  double depth_scale = kDefaultDepthScale;
+  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
+  GstBufferPool *pool = nullptr;
+  GstVideoConverter *converter = nullptr;
+  GstVideoInfo rgbx; /* what the converter writes */
+};
+
+struct _GstRangeCombine {
+  GstAggregator parent;
+  GstRangeCombinePrivate *priv;
+};
+
+static GstStaticPadTemplate colour_template = GST_STATIC_PAD_TEMPLATE ("colour", GST_PAD_SINK,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
+static GstStaticPadTemplate depth_template = GST_STATIC_PAD_TEMPLATE (
+    "depth", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("GRAY16_LE")));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstRangeCombine, gst_range_combine, GST_TYPE_AGGREGATOR)
+GST_ELEMENT_REGISTER_DEFINE (rangecombine, "rangecombine", GST_RANK_NONE, GST_TYPE_RANGE_COMBINE)
+
+/* ---- the view ---- */
+
+static std::string
+size_text (int width, int height)
+{
+  return std::to_string (width) + "x" + std::to_string (height);
+}
+
+static Status
+view_from_rig (const CombineSettings &settings, int width, int height, View &view)
+{
+  rangecast::Rig rig;
+  if (Status s = rangecast::load_rig (settings.rig, rig); !s.ok ())
+    return s;
+  const View *found = rig.find (settings.view_id);
+  if (!found)
+    return {StatusCode::kNotFound, settings.rig + ": has no view-id " +
+                                       std::to_string (settings.view_id) +
+                                       ", which property view-id names"};
+  if (found->width != width || found->height != height)
+    return {StatusCode::kBadSize, settings.rig + ": view " + std::to_string (found->id) + " is " +
+                                      size_text (found->width, found->height) +
+                                      ", the pictures are " + size_text (width, height)};
+  if (!found->distortion.empty ())
+    return {StatusCode::kUnsupported,
+        settings.rig + ": view " + std::to_string (found->id) +
+            " has lens distortion; expected pictures without, as most depth cameras give them"};
+  view = *found;
+  view.right.reset ();
+  view.third.reset ();
+  return {};
+}
+
+static View
+view_from_settings (const CombineSettings &settings, int width, int height)
+{
+  View view;
+  view.id = settings.view_id;
+  view.width = width;
+  view.height = height;
+  const double f = settings.focal_length > 0 ? settings.focal_length : kDefaultFocalOfWidth * width;
+  view.intrinsics = {f, f, settings.principal_x >= 0 ? settings.principal_x : (width - 1) / 2.0,
+      settings.principal_y >= 0 ? settings.principal_y : (height - 1) / 2.0};
+  view.depth_unit_m = kDefaultDepthUnit;
+  view.near_m = 0.3;
+  view.far_m = 6.0;
+  return view;
+}
+
+static Status
+make_view (const CombineSettings &settings, int width, int height, View &view)
+{
+  if (settings.rig.empty ())
+    view = view_from_settings (settings, width, height);
+  else if (Status s = view_from_rig (settings, width, height, view); !s.ok ())
+    return s;
+  if (settings.depth_unit > 0)
+    view.depth_unit_m = settings.depth_unit;
+  if (settings.near > 0)
+    view.near_m = settings.near;
+  if (settings.far > 0)
+    view.far_m = settings.far;
+  return rangecast::validate ({{view}});
+}
+
+/* ---- negotiation ---- */
+
+static void
+drop_pool_and_converter (GstRangeCombinePrivate *priv)
+{
+  if (priv->pool)
+    gst_buffer_pool_set_active (priv->pool, FALSE);
+  gst_clear_object (&priv->pool);
+  if (priv->converter)
+    gst_video_converter_free (priv->converter);
+  priv->converter = nullptr;
+}
+
+static bool
+make_converter (GstRangeCombinePrivate *priv)
+{
+  gst_video_info_set_format (&priv->rgbx, GST_VIDEO_FORMAT_RGBx,
+      guint (GST_VIDEO_INFO_WIDTH (&priv->colour)), guint (GST_VIDEO_INFO_HEIGHT (&priv->colour)));
+  priv->rgbx.fps_n = priv->colour.fps_n;
+  priv->rgbx.fps_d = priv->colour.fps_d;
+  priv->rgbx.interlace_mode = priv->colour.interlace_mode;
+  if (GST_VIDEO_INFO_FORMAT (&priv->colour) == GST_VIDEO_FORMAT_RGBx)
+    priv->rgbx.colorimetry = priv->colour.colorimetry;
+  priv->converter = gst_video_converter_new (&priv->colour, &priv->rgbx, nullptr);
+  return priv->converter;
+}
+
+static GstFlowReturn
+negotiate (GstRangeCombine *self)
+{
+  GstRangeCombinePrivate *priv = self->priv;
+  const int width = GST_VIDEO_INFO_WIDTH (&priv->colour);
+  const int height = GST_VIDEO_INFO_HEIGHT (&priv->colour);
+  if (width != GST_VIDEO_INFO_WIDTH (&priv->depth) ||
+      height != GST_VIDEO_INFO_HEIGHT (&priv->depth))
+    return gst_range_flow_return (GST_ELEMENT (self),
+        {StatusCode::kBadSize, "pad depth is " +
+                                   size_text (GST_VIDEO_INFO_WIDTH (&priv->depth),
+                                       GST_VIDEO_INFO_HEIGHT (&priv->depth)) +
+                                   " but pad colour is " + size_text (width, height) +
+                                   "; expected the same size, registered pixel to pixel"});
+  CombineSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  const GstFlowReturn flow =
+      gst_range_flow_return (GST_ELEMENT (self), make_view (settings, width, height, priv->view));
+  if (flow != GST_FLOW_OK)
+    return flow;
+  priv->depth_scale = settings.depth_scale;
+
+  const auto info = gstrange::make_info ({{priv->view}}, priv->colour.fps_n, priv->colour.fps_d);
+  priv->frame_duration = info.frame_duration ();
+  GstCaps *caps = gstrange::make_range_caps (info);
+  drop_pool_and_converter (priv);
+  priv->pool = gst_range_buffer_pool_new ();
+  const bool good = gst_range_buffer_pool_configure (priv->pool, caps, 2, 0) &&
+                    gst_buffer_pool_set_active (priv->pool, TRUE) && make_converter (priv);
+  gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
+  gst_caps_unref (caps);
+  if (!good) {
+    GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
+        ("pad colour: cannot convert %s to RGBx",
+            gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&priv->colour))),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  priv->negotiate = false;
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn
+gst_range_combine_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+{
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with the first pair, see negotiate() */
+}
+
+static gboolean
+gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    GstVideoInfo info;
+    gst_event_parse_caps (event, &caps);
+    if (!gst_video_info_from_caps (&info, caps)) {
+      gst_event_unref (event);
+      return FALSE;
+    }
+    (pad == priv->colour_pad ? priv->colour : priv->depth) = info;
+    (pad == priv->colour_pad ? priv->have_colour : priv->have_depth) = true;
+    priv->negotiate = true;
+  }
+  return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
+}
+
+/* ---- data ---- */
+
+/* Converts straight into the colour plane of the output. */
+static bool
+convert_colour (GstRangeCombinePrivate *priv, GstBuffer *colour, const RangeImage &image)
+{
+  GstVideoFrame from, to = {};
+  if (!gst_video_frame_map (&from, &priv->colour, colour, GST_MAP_READ))
+    return false;
+  to.info = priv->rgbx;
+  to.info.stride[0] = static_cast<gint> (image.colour.stride);
+  to.data[0] = image.colour.data;
+  gst_video_converter_frame (priv->converter, &from, &to);
+  gst_video_frame_unmap (&from);
+  return true;
+}
+
+static Status
+convert_depth (GstRangeCombinePrivate *priv, GstBuffer *depth, const RangeImage &image)
+{
+  GstVideoFrame from;
+  if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
+    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps say"};
+  const auto in = rangecast::ImageView<const std::uint16_t>{
+      static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)), image.depth.width,
+      image.depth.height, GST_VIDEO_FRAME_PLANE_STRIDE (&from, 0)};
+  const double unit = priv->view.depth_unit_m;
+  const auto limit = [unit] (double metres) {
+    return static_cast<std::uint16_t> (std::clamp (metres / unit, 1.0, 65535.0));
+  };
+  const Status status = rangecast::rescale_depth (in, priv->depth_scale / unit,
+      limit (priv->view.near_m), limit (priv->view.far_m), image.depth);
+  gst_video_frame_unmap (&from);
+  return status;
+}
+
+static Status
+combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstBuffer *output)
+{
+  gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  const RangeImage &image = frame.views ()[0];
+  if (!convert_colour (priv, colour, image))
+    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+  return convert_depth (priv, depth, image);
+}
+
+static GstFlowReturn
+push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
+{
+  GstRangeCombinePrivate *priv = self->priv;
+  auto aggregator = GST_AGGREGATOR (self);
+  GstBuffer *output = nullptr;
+  GstFlowReturn flow = gst_buffer_pool_acquire_buffer (priv->pool, &output, nullptr);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  const GstClockTime capture = gstrange::capture_time_of (priv->colour_pad, pair.first, live);
+  gst_range_buffer_add_view (output, guint (priv->view.id), 0, 0, guint (priv->view.width),
+      guint (priv->view.height), capture);
+  flow =
+      gst_range_flow_return (GST_ELEMENT (self), combine (priv, pair.first, pair.second, output));
+  if (flow != GST_FLOW_OK) {
+    gst_buffer_unref (output);
+    return flow;
+  }
+  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (pair.first)
+                                    ? GST_BUFFER_DURATION (pair.first)
+                                    : priv->frame_duration;
+  gstrange::stamp (aggregator, output, gstrange::running_time_of (priv->colour_pad, pair.first),
+      duration, capture);
+  if (GST_BUFFER_IS_DISCONT (pair.first))
+    GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
+  {
+    std::lock_guard guard (priv->lock);
+    priv->frames++;
+  }
+  return gst_aggregator_finish_buffer (aggregator, output);
+}
+
+static GstFlowReturn
+gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
+{
+  auto self = GST_RANGE_COMBINE (aggregator);
+  GstRangeCombinePrivate *priv = self->priv;
+  GstClockTime duration = GST_CLOCK_TIME_NONE;
+  if (priv->have_colour && priv->colour.fps_n > 0)
+    duration = gst_util_uint64_scale_int (GST_SECOND, priv->colour.fps_d, priv->colour.fps_n);
+
+  gstrange::PairMatcher::Pair pair;
+  GstFlowReturn flow = priv->matcher->take (duration, pair);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (priv->negotiate)
+    flow = negotiate (self);
+  if (flow == GST_FLOW_OK)
+    flow = push_pair (self, pair);
+  gst_buffer_unref (pair.first);
+  gst_buffer_unref (pair.second);
+  return flow;
+}
+
+/* ---- life ---- */
+
+static gboolean
+gst_range_combine_start (GstAggregator *aggregator)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  priv->have_colour = priv->have_depth = false;
+  priv->negotiate = true;
+  priv->matcher->reset ();
+  std::lock_guard guard (priv->lock);
+  priv->frames = 0;
+  return TRUE;
+}
+
+static gboolean
+gst_range_combine_stop (GstAggregator *aggregator)
+{
+  drop_pool_and_converter (GST_RANGE_COMBINE (aggregator)->priv);
+  return TRUE;
+}
+
+static void
+gst_range_combine_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
+  std::lock_guard guard (priv->lock);
+  CombineSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_RIG:
+      settings.rig = g_value_get_string (value) ? g_value_get_string (value) : "";
+      break;
+    case PROP_VIEW_ID:
+      settings.view_id = g_value_get_int (value);
+      break;
+    case PROP_FOCAL_LENGTH:
+      settings.focal_length = g_value_get_double (value);
+      break;
+    case PROP_PRINCIPAL_X:
+      settings.principal_x = g_value_get_double (value);
+      break;
+    case PROP_PRINCIPAL_Y:
+      settings.principal_y = g_value_get_double (value);
+      break;
+    case PROP_DEPTH_SCALE:
+      settings.depth_scale = g_value_get_double (value);
+      break;
+    case PROP_DEPTH_UNIT:
+      settings.depth_unit = g_value_get_double (value);
+      break;
+    case PROP_NEAR:
+      settings.near = g_value_get_double (value);
+      break;
+    case PROP_FAR:
+      settings.far = g_value_get_double (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_range_combine_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
+  std::lock_guard guard (priv->lock);
+  const CombineSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_RIG:
+      g_value_set_string (value, settings.rig.empty () ? nullptr : settings.rig.c_str ());
+      break;
+    case PROP_VIEW_ID:
+      g_value_set_int (value, settings.view_id);
+      break;
+    case PROP_FOCAL_LENGTH:
+      g_value_set_double (value, settings.focal_length);
+      break;
+    case PROP_PRINCIPAL_X:
+      g_value_set_double (value, settings.principal_x);
+      break;
+    case PROP_PRINCIPAL_Y:
+      g_value_set_double (value, settings.principal_y);
+      break;
+    case PROP_DEPTH_SCALE:
+      g_value_set_double (value, settings.depth_scale);
+      break;
+    case PROP_DEPTH_UNIT:
+      g_value_set_double (value, settings.depth_unit);
+      break;
+    case PROP_NEAR:
+      g_value_set_double (value, settings.near);
+      break;
+    case PROP_FAR:
+      g_value_set_double (value, settings.far);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (
+          value, gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
+                     priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
+                     "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_range_combine_finalize (GObject *object)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
+  drop_pool_and_converter (priv);
+  delete priv->matcher;
+  delete priv;
+  G_OBJECT_CLASS (gst_range_combine_parent_class)->finalize (object);
+}
+
+static GstAggregatorPad *
+add_sink_pad (GstRangeCombine *self, const char *name)
+{
+  GstPadTemplate *pad_template =
+      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), name);
+  auto pad = static_cast<GstPad *> (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
+      "direction", GST_PAD_SINK, "template", pad_template, nullptr));
+  gst_element_add_pad (GST_ELEMENT (self), pad);
+  return GST_AGGREGATOR_PAD (pad);
+}
+
+static void
+gst_range_combine_init (GstRangeCombine *self)
+{
+  self->priv = new GstRangeCombinePrivate;
+  self->priv->colour_pad = add_sink_pad (self, "colour");
+  self->priv->depth_pad = add_sink_pad (self, "depth");
+  self->priv->matcher = new gstrange::PairMatcher (self->priv->colour_pad, self->priv->depth_pad);
+}
+
+static void
+install_properties (GObjectClass *object_class)
+{
+  const auto ready =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  const auto install_double = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                                  double minimum, double maximum, double fallback) {
+    g_object_class_install_property (object_class, id,
+        g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, ready));
+  };
+  g_object_class_install_property (object_class, PROP_RIG,
+      g_param_spec_string ("rig", "Rig",
+          "Rig file with the view that view-id names (default: none, a camera at the origin that "
+          "focal-length describes)",
+          nullptr, ready));
+  g_object_class_install_property (object_class, PROP_VIEW_ID,
+      g_param_spec_int ("view-id", "View id", "View-id of the output (0 to 63, default 0)", 0,
+          rangecast::kMaxViews - 1, 0, ready));
+  install_double (PROP_FOCAL_LENGTH, "focal-length", "Focal length",
+      "Without a rig: focal length in pixels (default 0: 0.82 of the width)", 0, 1e6, 0);
+  install_double (PROP_PRINCIPAL_X, "principal-x", "Principal point x",
+      "Without a rig: principal point in pixels from the left (default -1: the centre)", -1, 1e6,
+      -1);
+  install_double (PROP_PRINCIPAL_Y, "principal-y", "Principal point y",
+      "Without a rig: principal point in pixels from the top (default -1: the centre)", -1, 1e6,
+      -1);
+  install_double (PROP_DEPTH_SCALE, "depth-scale", "Depth scale",
+      "Metres per unit of pad depth (1e-7 to 1, default 0.001: millimetres)", 1e-7, 1,
+      kDefaultDepthScale);
+  install_double (PROP_DEPTH_UNIT, "depth-unit", "Depth unit",
+      "Metres per depth unit of the output (0 to 1, default 0: the rig's, or 0.0001)", 0, 1, 0);
+  install_double (PROP_NEAR, "near", "Near",
+      "Nearest valid depth in metres (default 0: the rig's, or 0.3)", 0, 1e4, 0);
+  install_double (PROP_FAR, "far", "Far",
+      "Farthest valid depth in metres (default 0: the rig's, or 6)", 0, 1e4, 0);
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, dropped-colour, dropped-depth", GST_TYPE_STRUCTURE,
+          GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}
+
+static void
+gst_range_combine_class_init (GstRangeCombineClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
+
+  object_class->set_property = gst_range_combine_set_property;
+  object_class->get_property = gst_range_combine_get_property;
+  object_class->finalize = gst_range_combine_finalize;
+  install_properties (object_class);
+
+  gst_element_class_add_static_pad_template_with_gtype (
+      element_class, &colour_template, GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype (
+      element_class, &depth_template, GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype (
+      element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
+      "Combines colour and depth of a depth camera into range images", "gst-rangecast");
+
+  aggregator_class->start = gst_range_combine_start;
+  aggregator_class->stop = gst_range_combine_stop;
+  aggregator_class->sink_event = gst_range_combine_sink_event;
+  aggregator_class->update_src_caps = gst_range_combine_update_src_caps;
+  aggregator_class->aggregate = gst_range_combine_aggregate;
+
+  GST_DEBUG_CATEGORY_INIT (gst_range_combine_debug, "rangecombine", 0, "Range image combiner");
+}

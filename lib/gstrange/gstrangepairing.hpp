@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/base/gstaggregator.h>
+
+#include <atomic>
+
+#include "gstrange-prelude.h"
+
+namespace gstrange {
+
+/** Pairs the buffers of two pads of one aggregator by running time; for the streaming thread. */
+class GST_RANGE_API PairMatcher {
+public:
+  PairMatcher (GstAggregatorPad *first, GstAggregatorPad *second) : pads_{first, second} {}
+
+  struct Pair {
+    GstBuffer *first = nullptr;  ///< transfer full
+    GstBuffer *second = nullptr; ///< transfer full
+  };
+
+  /** Takes the next pair. Buffers whose running times differ by no more than half the frame
+   *  duration belong together; the older of two that do not is dropped and counted. Buffers
+   *  without PTS are paired as they come.
+   *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE: then only equal running times match
+   *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
+   *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has nothing */
+  GstFlowReturn take (GstClockTime frame_duration, Pair &pair);
+
+  [[nodiscard]] guint64 dropped_first () const { return dropped_[0]; }
+  [[nodiscard]] guint64 dropped_second () const { return dropped_[1]; }
+  void reset () { dropped_[0] = dropped_[1] = 0; }
+
+private:
+  GstAggregatorPad *pads_[2];
+  std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
+};
+
+/** Running time of a buffer on this pad, or GST_CLOCK_TIME_NONE. */
+GST_RANGE_API GstClockTime running_time_of (GstAggregatorPad *pad, GstBuffer *buffer);
+
+/** When a buffer was captured: what its GstReferenceTimestampMeta says; else, in a live pipeline,
+ *  the clock time of its running time; else its running time. */
+GST_RANGE_API GstClockTime capture_time_of (GstAggregatorPad *pad, GstBuffer *buffer, bool live);
+
+/** Gives a combined buffer PTS and duration in the aggregator's output segment, which begins at
+ *  the first buffer's running time, and its capture time.
+ *  @param running_time  may be GST_CLOCK_TIME_NONE (no PTS) */
+GST_RANGE_API void stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
+    GstClockTime duration, GstClockTime capture_time);
+
+} // namespace gstrange

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rangecast-check.hpp"
+
+#include <gst/video/video.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+struct Combine {
+  GstHarness *colour, *depth;
+  GstBus *bus = gst_bus_new ();
+
+  explicit Combine (const char *colour_caps = "video/x-raw,format=RGB,width=5,height=3,"
+                                              "framerate=10/1",
+      const char *depth_caps = "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
+      const char *properties = "")
+  {
+    GstElement *element =
+        gst_parse_launch ((std::string ("rangecombine ") + properties).c_str (), nullptr);
+    colour = gst_harness_new_with_element (element, "colour", "src");
+    depth = gst_harness_new_with_element (element, "depth", nullptr);
+    gst_element_set_bus (element, bus);
+    gst_object_unref (element);
+    gst_harness_set_src_caps_str (colour, colour_caps);
+    gst_harness_set_src_caps_str (depth, depth_caps);
+  }
+  ~Combine ()
+  {
+    gst_element_set_bus (colour->element, nullptr);
+    gst_object_unref (bus);
+    gst_harness_teardown (depth);
+    gst_harness_teardown (colour);
+  }
+  void push_colour (GstClockTime pts, guint8 value)
+  {
+    GstBuffer *buffer = gst_buffer_new_allocate (nullptr, 16 * 3, nullptr); /* rows of 15 + 1 */
+    gst_buffer_memset (buffer, 0, value, 16 * 3);
+    GST_BUFFER_PTS (buffer) = pts;
+    gst_harness_push (colour, buffer);
+  }
+  void push_depth (GstClockTime pts, guint16 millimetres)
+  {
+    guint16 rows[3][6]; /* rows of 10 + 2 bytes */
+    for (auto &row : rows)
+      for (guint16 &d : row)
+        d = GUINT16_TO_LE (millimetres);
+    rows[2][4] = 0;
+    GstBuffer *buffer = gst_buffer_new_memdup (rows, sizeof rows);
+    GST_BUFFER_PTS (buffer) = pts;
+    gst_harness_push (depth, buffer);
+  }
+};
+
+GST_START_TEST (test_millimetres_become_depth_units_and_colour_stays)
+{
+  Combine c;
+  c.push_colour (0, 77);
+  c.push_depth (0, 1234);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ().size (), 1);
+    const RangeImage &image = frame.views ()[0];
+    fail_unless (image.roi == (Roi{0, 0, 5, 3}));
+    fail_unless_equals_int (image.depth.at (3, 2), 12340);
+    fail_unless_equals_int (image.depth.at (4, 2), 0);
+    fail_unless_equals_int (image.colour.at (4, 2).r, 77);
+    fail_unless_equals_int (image.colour.at (0, 0).b, 77);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "near=0.5 far=2");
+  for (guint16 millimetres : {499, 500, 2000, 2001}) {
+    c.push_colour (GST_SECOND * millimetres, 0);
+    c.push_depth (GST_SECOND * millimetres, millimetres);
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      const bool valid = millimetres >= 500 && millimetres <= 2000;
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), valid ? 10 * millimetres : 0);
+    }
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pairs_by_pts_and_drops_what_has_no_partner)
+{
+  Combine c;
+  c.push_depth (100 * GST_MSECOND, 1000);
+  c.push_colour (0, 1);                 /* older than any depth: dropped */
+  c.push_colour (130 * GST_MSECOND, 2); /* within half a frame of 100 ms */
+  c.push_depth (200 * GST_MSECOND, 1001);
+  c.push_depth (300 * GST_MSECOND, 1002);
+  c.push_colour (300 * GST_MSECOND, 3);
+  for (int expected : {1000, 1002}) {
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * expected);
+      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, expected == 1000 ? 2 : 3);
+    }
+    gst_buffer_unref (output);
+  }
+  GstStructure *stats;
+  guint64 dropped_colour = 0, dropped_depth = 0;
+  g_object_get (c.colour->element, "stats", &stats, nullptr);
+  gst_structure_get (stats, "dropped-colour", G_TYPE_UINT64, &dropped_colour, "dropped-depth",
+      G_TYPE_UINT64, &dropped_depth, nullptr);
+  fail_unless_equals_uint64 (dropped_colour, 1);
+  fail_unless_equals_uint64 (dropped_depth, 1);
+  gst_structure_free (stats);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_time_comes_from_the_colour_camera)
+{
+  Combine c;
+  GstBuffer *colour = gst_buffer_new_allocate (nullptr, 48, nullptr);
+  gst_buffer_memset (colour, 0, 9, 48);
+  GST_BUFFER_PTS (colour) = GST_SECOND;
+  gst_range_buffer_set_capture_time (colour, 123456789);
+  gst_harness_push (c.colour, colour);
+  c.push_depth (GST_SECOND, 1000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 123456789);
+  fail_unless_equals_uint64 (gst_buffer_get_range_meta (output, 0)->capture_time, 123456789);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
+  fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), GST_SECOND / 10);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pictures_of_different_size_are_one_error)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=6,height=3,framerate=10/1");
+  c.push_colour (0, 1);
+  c.push_depth (0, 1);
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("pad depth is 6x3") != std::string::npos, text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_missing_rig_is_one_error_that_names_it)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "rig=/nowhere/rig.yaml");
+  c.push_colour (0, 1);
+  c.push_depth (0, 1);
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("/nowhere/rig.yaml") != std::string::npos, text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_end_of_one_pad_ends_the_stream)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 1000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  fail_unless (gst_harness_push_event (c.depth, gst_event_new_eos ()));
+  c.push_colour (GST_SECOND, 1);
+  bool eos = false;
+  while (!eos) {
+    GstEvent *event = gst_harness_pull_event (c.colour);
+    fail_unless (event != nullptr);
+    eos = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+    gst_event_unref (event);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_size_in_the_stream_is_taken)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 1000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  gst_harness_set_src_caps_str (
+      c.colour, "video/x-raw,format=GRAY8,width=4,height=2,framerate=10/1");
+  gst_harness_set_src_caps_str (
+      c.depth, "video/x-raw,format=GRAY16_LE,width=4,height=2,framerate=10/1");
+  GstBuffer *colour = gst_buffer_new_memdup ("abcdefgh", 8);
+  GstBuffer *depth = gst_buffer_new_allocate (nullptr, 16, nullptr);
+  gst_buffer_memset (depth, 0, 4, 16);
+  GST_BUFFER_PTS (colour) = GST_BUFFER_PTS (depth) = GST_SECOND;
+  gst_harness_push (c.colour, colour);
+  gst_harness_push (c.depth, depth);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless (frame.views ()[0].roi == (Roi{0, 0, 4, 2}));
+    fail_unless_equals_int (frame.views ()[0].depth.at (3, 1), 10280);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_changes_states_twice)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("videotestsrc num-buffers=3 ! video/x-raw,format=GRAY16_LE ! c.depth "
+                        "videotestsrc num-buffers=3 ! c.colour rangecombine name=c ! fakesink",
+          nullptr);
+  for (int i = 0; i < 2; i++) {
+    fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    GstMessage *message = gst_bus_timed_pop_filtered (
+        bus, 10 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
+    gst_message_unref (message);
+    gst_object_unref (bus);
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+  }
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+static Suite *
+rangecombine_suite ()
+{
+  Suite *suite = suite_create ("rangecombine");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
+  tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
+  tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
+  tcase_add_test (tc, test_capture_time_comes_from_the_colour_camera);
+  tcase_add_test (tc, test_pictures_of_different_size_are_one_error);
+  tcase_add_test (tc, test_missing_rig_is_one_error_that_names_it);
+  tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
+  tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
+  tcase_add_test (tc, test_changes_states_twice);
+  return suite;
+}
+
+GST_CHECK_MAIN (rangecombine);
