@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "axis.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+namespace rangecast {
+
+/* Below this ratio of the two largest variances the points are as good as round. */
+constexpr double kLeastSpreadRatio = 1.3;
+/* Share of the new frame's axis. A person moves at up to a metre a second, but turns slowly. */
+constexpr double kFollowPosition = 0.3, kFollowDirection = 0.1;
+
+void
+Moments::add (const WorldPoints &cloud, WorldPoints::Part part)
+{
+  constexpr std::size_t kBlock = 256; /* floats add up exactly enough over this many */
+  for (std::size_t begin = part.begin; begin < part.end; begin += kBlock) {
+    const auto count = static_cast<int> (std::min (kBlock, part.end - begin));
+    const float *x = cloud.x.data () + begin, *y = cloud.y.data () + begin,
+                *z = cloud.z.data () + begin;
+    float lanes[9][4] = {};
+    for (int i = 0; i < count; i++) {
+      const int l = i & 3;
+      lanes[0][l] += x[i], lanes[1][l] += y[i], lanes[2][l] += z[i];
+      lanes[3][l] += x[i] * x[i], lanes[4][l] += x[i] * y[i], lanes[5][l] += x[i] * z[i];
+      lanes[6][l] += y[i] * y[i], lanes[7][l] += y[i] * z[i], lanes[8][l] += z[i] * z[i];
+    }
+    for (int k = 0; k < 9; k++)
+      (k < 3 ? sum[k] : product[k - 3]) +=
+          double{lanes[k][0]} + lanes[k][1] + lanes[k][2] + lanes[k][3];
+  }
+  n += static_cast<double> (part.size ());
+}
+
+Moments &
+Moments::operator+= (const Moments &other)
+{
+  n += other.n;
+  for (int k = 0; k < 3; k++)
+    sum[k] += other.sum[k];
+  for (int k = 0; k < 6; k++)
+    product[k] += other.product[k];
+  return *this;
+}
+
+Vec3
+Moments::centroid () const
+{
+  return n > 0 ? Vec3{sum[0] / n, sum[1] / n, sum[2] / n} : Vec3{};
+}
+
+/* One Jacobi rotation that makes a[p][q] zero; v collects the eigenvectors in its columns. */
+static void
+rotate (double (&a)[3][3], double (&v)[3][3], int p, int q)
+{
+  if (a[p][q] == 0)
+    return;
+  const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+  const double t = (theta >= 0 ? 1 : -1) / (std::abs (theta) + std::sqrt (theta * theta + 1));
+  const double c = 1 / std::sqrt (t * t + 1), s = t * c;
+  for (auto &row : a)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+  for (int k = 0; k < 3; k++)
+    std::tie (a[p][k], a[q][k]) = std::pair (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+  for (auto &row : v)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+}
+
+void
+eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
+{
+  double a[3][3] = {{m[0], m[1], m[2]}, {m[1], m[3], m[4]}, {m[2], m[4], m[5]}};
+  double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int sweep = 0; sweep < 12; sweep++)
+    for (auto [p, q] : {std::pair (0, 1), std::pair (0, 2), std::pair (1, 2)})
+      rotate (a, v, p, q);
+  int order[3] = {0, 1, 2};
+  std::sort (order, order + 3, [&] (int i, int j) { return a[i][i] > a[j][j]; });
+  for (int k = 0; k < 3; k++) {
+    values[k] = a[order[k]][order[k]];
+    vectors[k] = {v[0][order[k]], v[1][order[k]], v[2][order[k]]};
+  }
+}
+
+/* How nearly a camera looks along that direction: the largest |cosine| of all. */
+static double
+end_on (Vec3 direction, std::span<const PixelRays> cameras)
+{
+  double most = 0;
+  for (const PixelRays &camera : cameras) {
+    const float *a = camera.optical_axis;
+    most = std::max (most, std::abs (dot (direction, {a[0], a[1], a[2]})));
+  }
+  return most;
+}
+
+Axis
+axis_of_points (AxisMode mode, const Moments &moments, std::span<const PixelRays> cameras)
+{
+  Axis axis;
+  axis.position = moments.centroid ();
+  if (mode != AxisMode::kPrincipal || moments.n < 3)
+    return axis;
+  const Vec3 c = axis.position;
+  const double n = moments.n, *p = moments.product;
+  const double covariance[6] = {p[0] / n - c.x * c.x, p[1] / n - c.x * c.y, p[2] / n - c.x * c.z,
+      p[3] / n - c.y * c.y, p[4] / n - c.y * c.z, p[5] / n - c.z * c.z};
+  double values[3];
+  Vec3 vectors[3];
+  eigen_symmetric (covariance, values, vectors);
+  if (!(values[0] > kLeastSpreadRatio * values[1]) || !(values[0] > 1e-12))
+    return axis;
+  const Vec3 direction = vectors[0].y < 0 ? -1.0 * vectors[0] : vectors[0];
+  const double along = end_on (direction, cameras);
+  if (along > 0.8 && along > end_on (axis.direction, cameras))
+    return axis;
+  axis.direction = direction;
+  return axis;
+}
+
+const Axis &
+AxisTracker::follow (const Axis &measured)
+{
+  if (!started_) {
+    started_ = true;
+    axis_ = measured;
+    return axis_;
+  }
+  axis_.position = axis_.position + kFollowPosition * (measured.position - axis_.position);
+  /* A nearly level axis may come back the other way round; it is the same line. */
+  const double sign = dot (axis_.direction, measured.direction) < 0 ? -1 : 1;
+  const Vec3 blend =
+      (1 - kFollowDirection) * axis_.direction + sign * kFollowDirection * measured.direction;
+  axis_.direction = 1 / norm (blend) * blend;
+  return axis_;
+}
+
+} // namespace rangecast

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+#include "../geometry/rig.hpp"
+#include "../status.hpp"
+#include "axis.hpp"
+#include "units.hpp"
+#include "world_points.hpp"
+
+namespace rangecast {
+
+struct CylinderSettings {
+  AxisMode axis = AxisMode::kPrincipal;
+  Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
+  UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
+  int threads = 1;    ///< views at a time in the passes over pixels; 0 = number of cores
+};
+
+/** What one frame came to. */
+struct CylinderResult {
+  std::uint64_t points_in = 0;    ///< valid pixels before
+  std::uint64_t points_out = 0;   ///< valid pixels after
+  std::uint64_t units = 0;        ///< units with points
+  std::uint64_t units_shared = 0; ///< units with points of more than one view
+  Axis axis;                      ///< the cylinder's
+};
+
+/** Clears the points that several views see of the same place, all but those of the view that sees
+ * it most squarely.
+ *
+ *  All points go onto the inner wall of a cylinder about the object's axis, which is cut into units
+ * of equal height and angle. In a unit with points of several views, let T be the mean of the
+ * views' tangents in the slice, weighted by their numbers of points (Units). The view whose optical
+ * axis has the smallest inner product with T stays; the others' points there become invalid.
+ *
+ *  Beyond that plain rule:
+ *  - Points of a unit with a gap in radius between them are different surfaces and do not compete.
+ *  - T is summed over a neighbourhood, and a view competes in a unit that it has no point in, but
+ *    points on both sides of. Without either, winners along a seam are a matter of chance.
+ *  - Optical axes need not lie in the slice plane. What is compared is |N . a| (N: normal of T in
+ *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
+ *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
+ *    being shorter in the plane.
+ *  - Views that look squarely at opposite sides of a thin thing see different surfaces: both stay.
+ *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
+ *  Coordinates and colours are never changed. */
+class CylinderFilter {
+public:
+  /** Takes the cameras and forgets the stream. All views must be range views. */
+  Status set_rig (const Rig &rig);
+  /** Forgets where the axis was. */
+  void reset () { tracker_.reset (); }
+
+  /** Clears depths in place. A frame set of less than two images with points is left alone.
+   *  Nothing is allocated once the largest frame set has been seen.
+   *  @return kBadValue for settings out of range, kNotFound for a view that the rig has not,
+   *  kBadSize for more than kMaxViews images; depth is then untouched. */
+  Status process (
+      std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
+
+private:
+  Status take_cameras (std::span<const RangeImage> images);
+  void make_points (std::span<const RangeImage> images, int threads);
+  void choose_axis (const CylinderSettings &settings, std::size_t images);
+  void unroll (int columns, int threads);
+  std::uint64_t clear_losers (std::span<const RangeImage> images);
+  [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
+
+  std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
+  std::uint64_t rig_views_ = 0;               /* bit i: view-id i is in the rig */
+  AxisTracker tracker_;
+
+  /* Of the present frame; kept for their memory. By number of the image. */
+  std::array<PixelRays, kMaxViews> rays_;
+  std::array<Moments, kMaxViews> moments_;
+  std::array<WallRange, kMaxViews> ranges_;
+  std::array<std::array<float, 2>, kMaxViews> optical_; /* x, z of the optical axis */
+  Axis axis_;
+  WorldPoints cloud_;
+  std::vector<float> radius_;
+  std::vector<std::int32_t> column_;
+  Units units_;
+};
+
+} // namespace rangecast

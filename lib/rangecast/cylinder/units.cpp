@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "units.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace rangecast {
+
+void
+Units::sort (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, WallRange range, const UnitSettings &settings)
+{
+  settings_ = settings;
+  const double most = kMaxUnits / settings.columns - 2;
+  const double height = std::max (0.0, double{range.y_max} - range.y_min);
+  const double step = std::max (settings.unit_height_m, height / most);
+  /* Slices begin at multiples of their height from the axis' origin, not at the lowest point. */
+  const double first = std::floor (range.y_min / step);
+  first_y_ = static_cast<float> (first * step);
+  slices_per_metre_ = static_cast<float> (1 / step);
+  slices_ = std::max (1, static_cast<int> (std::floor (range.y_max / step) - first) + 1);
+  count_units (cloud, column);
+  scatter (cloud, radius);
+  cut_into_layers (cloud);
+}
+
+void
+Units::count_units (const WorldPoints &cloud, std::span<const std::int32_t> column)
+{
+  if (unit_of_.size () < cloud.x.size ())
+    unit_of_.resize (cloud.x.size ());
+  begin_.assign (static_cast<std::size_t> (slices_) * settings_.columns + 1, 0);
+  for (const WorldPoints::Part &part : cloud.parts ())
+    for (std::size_t i = part.begin; i < part.end; i++) {
+      const int slice = static_cast<int> ((cloud.y[i] - first_y_) * slices_per_metre_);
+      const int unit = std::clamp (slice, 0, slices_ - 1) * settings_.columns + column[i];
+      unit_of_[i] = static_cast<std::uint32_t> (unit);
+      begin_[unit]++;
+    }
+}
+
+void
+Units::scatter (const WorldPoints &cloud, std::span<const float> radius)
+{
+  std::uint32_t total = 0;
+  for (std::uint32_t &begin : begin_) {
+    const std::uint32_t count = begin;
+    begin = total;
+    total += count;
+  }
+  if (points.size () < total)
+    points.resize (total);
+  for (const WorldPoints::Part &part : cloud.parts ())
+    for (std::size_t i = part.begin; i < part.end; i++)
+      points[begin_[unit_of_[i]]++] = {
+          radius[i], cloud.x[i], cloud.z[i], static_cast<std::uint32_t> (i)};
+  /* Now each element is its unit's end, which is the next one's begin. */
+}
+
+/* Whether all radii lie within a gap: then there is one layer, and nothing to sort. */
+static bool
+is_one_layer (std::span<const Units::Point> points, float gap)
+{
+  float low = points[0].radius, high = low;
+  for (const Units::Point &point : points) {
+    low = std::min (low, point.radius);
+    high = std::max (high, point.radius);
+  }
+  return high - low <= gap;
+}
+
+void
+Units::cut_into_layers (const WorldPoints &cloud)
+{
+  const auto gap = static_cast<float> (settings_.layer_gap_m);
+  auto by_radius = [] (const Point &a, const Point &b) {
+    return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
+  };
+  auto by_index = [] (const Point &a, const Point &b) { return a.index < b.index; };
+  layers.clear ();
+  entries.clear ();
+  occupied = shared = 0;
+  std::uint32_t begin = 0;
+  for (std::uint32_t unit = 0; unit + 1 < begin_.size (); unit++) {
+    const std::uint32_t end = begin_[unit];
+    begin_[unit] = static_cast<std::uint32_t> (layers.size ());
+    if (begin == end)
+      continue;
+    Point *first = &points[begin];
+    if (is_one_layer ({first, end - begin}, gap)) {
+      add_layer (cloud, unit, begin, end);
+    } else {
+      std::sort (first, first + (end - begin), by_radius);
+      for (std::uint32_t from = begin, to = begin + 1; to <= end; to++)
+        if (to == end || points[to].radius - points[to - 1].radius > gap) {
+          std::sort (&points[from], &points[from] + (to - from), by_index);
+          add_layer (cloud, unit, from, to);
+          from = to;
+        }
+    }
+    std::uint64_t views = 0;
+    for (std::size_t i = begin_[unit]; i < layers.size (); i++)
+      views |= layers[i].views;
+    occupied++;
+    shared += (views & (views - 1)) != 0;
+    begin = end;
+  }
+  begin_.back () = static_cast<std::uint32_t> (layers.size ());
+}
+
+/* The points come in the order of the cloud, so view after view. */
+void
+Units::add_layer (
+    const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end)
+{
+  const auto parts = cloud.parts ();
+  UnitLayer layer;
+  layer.unit = unit;
+  layer.first_entry = static_cast<std::uint32_t> (entries.size ());
+  std::uint32_t view = 0;
+  float radii = 0;
+  for (std::uint32_t i = begin; i < end;) {
+    UnitEntry entry;
+    while (points[i].index >= parts[view].end)
+      view++;
+    entry.view = view;
+    entry.first_point = i;
+    for (; i < end && points[i].index < parts[view].end; i++) {
+      entry.x += points[i].x;
+      entry.z += points[i].z;
+      entry.radius += points[i].radius;
+    }
+    radii += entry.radius;
+    entry.point_count = i - entry.first_point;
+    const float share = 1 / static_cast<float> (entry.point_count);
+    entry.x *= share, entry.z *= share, entry.radius *= share;
+    layer.views |= std::uint64_t{1} << view;
+    entries.push_back (entry);
+  }
+  layer.covering = layer.views;
+  layer.radius = radii / static_cast<float> (end - begin);
+  layers.push_back (layer);
+}
+
+/* The layer of that unit whose radius is nearest, unless a gap lies between. */
+UnitLayer *
+Units::find_layer (int slice, int column, float radius)
+{
+  const int columns = settings_.columns;
+  column += column < 0 ? columns : column >= columns ? -columns : 0;
+  const std::size_t unit = static_cast<std::size_t> (slice) * columns + column;
+  UnitLayer *best = nullptr;
+  auto least = static_cast<float> (settings_.layer_gap_m);
+  for (std::uint32_t i = begin_[unit]; i < begin_[unit + 1]; i++)
+    if (const float d = std::abs (layers[i].radius - radius); d <= least) {
+      least = d;
+      best = &layers[i];
+    }
+  return best;
+}
+
+UnitEntry *
+Units::next_entry (const UnitLayer &layer, const UnitEntry &entry)
+{
+  const int slice = static_cast<int> (layer.unit) / settings_.columns;
+  const int column = static_cast<int> (layer.unit) % settings_.columns;
+  const std::uint64_t bit = std::uint64_t{1} << entry.view;
+  for (int step = 1; step <= std::min (kReach, settings_.columns / 4); step++) {
+    const UnitLayer *next = find_layer (slice, column + step, entry.radius);
+    if (next && (next->views & bit))
+      return &entries[next->first_entry +
+                      static_cast<std::uint32_t> (std::popcount (next->views & (bit - 1)))];
+  }
+  return nullptr;
+}
+
+static std::span<UnitEntry>
+entries_of (std::vector<UnitEntry> &entries, const UnitLayer &layer)
+{
+  return {&entries[layer.first_entry], static_cast<std::size_t> (std::popcount (layer.views))};
+}
+
+void
+Units::find_tangents ()
+{
+  for (const UnitLayer &layer : layers)
+    for (UnitEntry &entry : entries_of (entries, layer)) {
+      UnitEntry *next = next_entry (layer, entry);
+      if (!next)
+        continue;
+      const float dx = next->x - entry.x, dz = next->z - entry.z;
+      const float length = std::sqrt (dx * dx + dz * dz);
+      if (!(length > 1e-9f))
+        continue;
+      entry.tangent[0] = dx / length;
+      entry.tangent[1] = dz / length;
+      if (next->tangent[0] == 0 && next->tangent[1] == 0)
+        std::copy_n (entry.tangent, 2, next->tangent);
+    }
+  for (UnitLayer &layer : layers)
+    for (const UnitEntry &entry : entries_of (entries, layer))
+      for (int k = 0; k < 2; k++)
+        layer.tangent[k] += static_cast<float> (entry.point_count) * entry.tangent[k];
+}
+
+/* Sums over the neighbours of a layer, and the views before and after it. */
+struct Units::Neighbourhood {
+  std::array<float, 2> sum{};
+  std::uint64_t before = 0, after = 0;
+
+  void add (const UnitLayer &layer, std::array<float, 2> tangent, int side)
+  {
+    sum[0] += tangent[0];
+    sum[1] += tangent[1];
+    (side < 0 ? before : after) |= layer.views;
+  }
+};
+
+void
+Units::sum_along_slice (UnitLayer &layer, int reach)
+{
+  const int slice = static_cast<int> (layer.unit) / settings_.columns;
+  const int column = static_cast<int> (layer.unit) % settings_.columns;
+  Neighbourhood around{{layer.tangent[0], layer.tangent[1]}};
+  for (int step = -reach; step <= reach; step++)
+    if (const UnitLayer *other = step ? find_layer (slice, column + step, layer.radius) : nullptr)
+      around.add (*other, {other->tangent[0], other->tangent[1]}, step);
+  layer.covering |= around.before & around.after;
+  sums_[static_cast<std::size_t> (&layer - layers.data ())] = around.sum;
+}
+
+void
+Units::sum_across_slices (UnitLayer &layer, int reach)
+{
+  const int slice = static_cast<int> (layer.unit) / settings_.columns;
+  const int column = static_cast<int> (layer.unit) % settings_.columns;
+  const auto self = static_cast<std::size_t> (&layer - layers.data ());
+  Neighbourhood around{sums_[self]};
+  for (int to = std::max (0, slice - reach); to <= std::min (slices_ - 1, slice + reach); to++)
+    if (const UnitLayer *other = to != slice ? find_layer (to, column, layer.radius) : nullptr)
+      around.add (*other, sums_[static_cast<std::size_t> (other - layers.data ())], to - slice);
+  layer.covering |= around.before & around.after;
+  std::copy_n (around.sum.begin (), 2, layer.tangent);
+}
+
+void
+Units::smooth ()
+{
+  if (settings_.smoothing_m <= 0)
+    return;
+  sums_.resize (std::max (sums_.size (), layers.size ()));
+  /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
+   */
+  constexpr double kMostColumns = 8, kMostSlices = 8;
+  const double columns_per_radian = settings_.columns / (2 * M_PI);
+  for (UnitLayer &layer : layers) {
+    const double across = settings_.smoothing_m / std::max (1e-6, double{layer.radius});
+    sum_along_slice (layer, static_cast<int> (std::min ({across * columns_per_radian, kMostColumns,
+                                settings_.columns / 4.0})));
+  }
+  const double slices = std::min (settings_.smoothing_m * slices_per_metre_, kMostSlices);
+  for (UnitLayer &layer : layers)
+    sum_across_slices (layer, static_cast<int> (slices + 0.5));
+}
+
+} // namespace rangecast

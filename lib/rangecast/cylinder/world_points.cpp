@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "world_points.hpp"
+
+namespace rangecast {
+
+static void
+store (float *out, Vec3 v)
+{
+  out[0] = static_cast<float> (v.x);
+  out[1] = static_cast<float> (v.y);
+  out[2] = static_cast<float> (v.z);
+}
+
+PixelRays::PixelRays (const View &view)
+{
+  const Intrinsics &k = view.intrinsics;
+  const Mat3 &r = view.world_from_view.rotation;
+  const double unit = view.depth_unit_m;
+  store (origin, view.world_from_view.translation);
+  store (corner, unit * (r * k.unproject (0, 0, 1)));
+  store (right, unit / k.fx * (r * Vec3{1, 0, 0}));
+  store (down, unit / k.fy * (r * Vec3{0, 1, 0}));
+  store (optical_axis, r * Vec3{0, 0, 1});
+}
+
+Status
+WorldPoints::reset (std::span<const RangeImage> images)
+{
+  std::size_t pixels = 0;
+  parts_.clear ();
+  for (const RangeImage &image : images) {
+    parts_.push_back ({pixels, pixels});
+    if (!image.depth.empty ())
+      pixels += static_cast<std::size_t> (image.depth.width) * image.depth.height;
+  }
+  if (pixels > UINT32_MAX) {
+    parts_.clear ();
+    return {StatusCode::kBadSize,
+        "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
+  }
+  if (x.size () < pixels) {
+    for (auto *array : {&x, &y, &z})
+      array->resize (pixels);
+    pixel.resize (pixels);
+  }
+  return {};
+}
+
+/* Appends the valid pixels of a row: their place, and their depth as a number. */
+static std::size_t
+compact_row (
+    const std::uint16_t *depth, int width, std::uint32_t row, std::uint32_t *pixel, float *depths)
+{
+  std::size_t n = 0;
+  for (int u = 0; u < width; u++) {
+    /* Always written, kept only if valid: a branch here would be a coin toss at every edge. At
+     * most `width` elements, so this never leaves the part. */
+    pixel[n] = row << 16 | static_cast<std::uint32_t> (u);
+    depths[n] = depth[u];
+    n += depth[u] != kInvalidDepth;
+  }
+  return n;
+}
+
+void
+WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)
+{
+  Part &part = parts_[index];
+  part.end = part.begin;
+  for (int row = 0; row < image.depth.height && !image.depth.empty (); row++) {
+    float *__restrict px = x.data () + part.end, *__restrict py = y.data () + part.end,
+                      *__restrict pz = z.data () + part.end;
+    const std::uint32_t *__restrict place = pixel.data () + part.end;
+    const auto n = static_cast<int> (compact_row (image.depth.row (row), image.depth.width,
+        static_cast<std::uint32_t> (row), pixel.data () + part.end, px));
+    const float v = static_cast<float> (image.roi.y + row), u0 = static_cast<float> (image.roi.x);
+    float base[3];
+    for (int k = 0; k < 3; k++)
+      base[k] = rays.corner[k] + v * rays.down[k] + u0 * rays.right[k];
+    for (int i = 0; i < n; i++) {
+      const float d = px[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
+      px[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
+      py[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
+      pz[i] = rays.origin[2] + d * (base[2] + u * rays.right[2]);
+    }
+    part.end += static_cast<std::size_t> (n);
+  }
+}
+
+std::size_t
+WorldPoints::size () const
+{
+  std::size_t n = 0;
+  for (const Part &part : parts_)
+    n += part.size ();
+  return n;
+}
+
+} // namespace rangecast
