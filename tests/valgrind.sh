@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Runs element tests under valgrind: memory errors and definite leaks fail.
+# usage: tests/valgrind.sh [ELEMENT...]   (default: all; striprender's OpenGL driver is left out)
+set -uo pipefail
+cd "$(dirname "$0")/.."
+build=${RANGECAST_BUILD:-build}
+elements=("$@")
+if [ ${#elements[@]} = 0 ]; then
+  for program in "$build"/tests/check/check_*; do
+    [ -x "$program" ] && [ -f "$program" ] && [[ "$program" != *_striprender ]] && elements+=("${program##*check_}")
+  done
+fi
+export GST_PLUGIN_PATH=$PWD/$build/gst GST_REGISTRY=$PWD/$build/test-registry.bin RANGECAST_SOURCE=$PWD
+export CK_FORK=no CK_DEFAULT_TIMEOUT=0 G_SLICE=always-malloc G_DEBUG=gc-friendly GST_REGISTRY_FORK=no
+gst-inspect-1.0 >/dev/null 2>&1 # fills the registry outside valgrind
+failed=0
+for element in "${elements[@]}"; do
+  if valgrind --quiet --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite \
+    --show-leak-kinds=definite --num-callers=30 --suppressions=tests/valgrind.supp \
+    "$build/tests/check/check_$element" >"$build/valgrind-$element.log" 2>&1; then
+    echo "ok $element"
+  else
+    echo "not ok $element: see $build/valgrind-$element.log"
+    failed=1
+  fi
+done
+exit $failed
