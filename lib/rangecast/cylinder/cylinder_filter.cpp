@@ -143,6 +143,18 @@ CylinderFilter::process (
     return status;
   if (Status status = take_cameras (images); !status.ok ())
     return status;
+  /* No exception leaves the core: neither ours for memory nor OpenCV's. */
+  try {
+    return work (images, settings, result);
+  } catch (const std::exception &error) {
+    return {StatusCode::kNoSpace, std::string ("cylinder: ") + error.what ()};
+  }
+}
+
+Status
+CylinderFilter::work (
+    std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
+{
   if (Status status = cloud_.reset (images); !status.ok ())
     return status;
   make_points (images, settings.threads);

@@ -65,6 +65,8 @@ public:
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
 private:
+  Status work (
+      std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
   void choose_axis (const CylinderSettings &settings, std::size_t images);

@@ -1,0 +1,456 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-cylinderfilter
+ * @title: cylinderfilter
+ *
+ * Clears the points that several views of a frame set see of the same place, all but those of the
+ * view that sees it most squarely. No point ever moves or changes colour.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc views=4 num-buffers=30 ! cylinderfilter ! plyenc ! multifilesink
+ * location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstcylinderfilter.h"
+
+#include <cmath>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/cylinder/cylinder_filter.hpp>
+
+GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
+#define GST_CAT_DEFAULT gst_cylinder_filter_debug
+
+enum {
+  PROP_0,
+  PROP_MODE,
+  PROP_AXIS,
+  PROP_AXIS_POSITION,
+  PROP_AXIS_DIRECTION,
+  PROP_UNIT_HEIGHT,
+  PROP_COLUMNS,
+  PROP_LAYER_GAP,
+  PROP_SMOOTHING,
+  PROP_N_THREADS,
+  PROP_STATS,
+};
+
+enum GstCylinderFilterMode { GST_CYLINDER_FILTER_OFF, GST_CYLINDER_FILTER_WINNER };
+
+static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
+                        kDefaultSmoothing = 0.01;
+static constexpr int kDefaultColumns = 360;
+
+struct CylinderCounts {
+  guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0;
+  rangecast::Axis axis;
+};
+
+struct GstCylinderFilterPrivate {
+  std::mutex lock; /* guards mode, settings and counts; never held while working on a frame */
+  GstCylinderFilterMode mode = GST_CYLINDER_FILTER_WINNER;
+  rangecast::CylinderSettings settings;
+  CylinderCounts counts;
+
+  rangecast::CylinderFilter core; /* streaming thread only */
+};
+
+struct _GstCylinderFilter {
+  GstBaseTransform parent;
+  GstCylinderFilterPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
+
+/* ---- enums ---- */
+
+#define GST_TYPE_CYLINDER_FILTER_MODE (gst_cylinder_filter_mode_get_type ())
+static GType
+gst_cylinder_filter_mode_get_type (void)
+{
+  static const GEnumValue values[] = {
+      {GST_CYLINDER_FILTER_OFF, "Let everything pass", "off"},
+      {GST_CYLINDER_FILTER_WINNER, "One view keeps its points, the others' are cleared", "winner"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_AXIS (gst_cylinder_filter_axis_get_type ())
+static GType
+gst_cylinder_filter_axis_get_type (void)
+{
+  using rangecast::AxisMode;
+  static const GEnumValue values[] = {
+      {int (AxisMode::kPrincipal), "Along the direction in which the points spread most",
+          "principal"},
+      {int (AxisMode::kVertical), "World y, through the middle of all points", "vertical"},
+      {int (AxisMode::kFixed), "As axis-position and axis-direction say", "fixed"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterAxis", values);
+  return type;
+}
+
+/* ---- streaming ---- */
+
+static gboolean
+gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  gstrange::RangeInfo info;
+  rangecast::Status status = gstrange::parse_caps (in, info);
+  if (status.ok ())
+    status = self->priv->core.set_rig (info.rig);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* Controlled properties take their values of this buffer's time; the mode may be one of them. */
+static void
+gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  const GstClockTime time =
+      gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  if (GST_CLOCK_TIME_IS_VALID (time))
+    gst_object_sync_values (GST_OBJECT (base), time);
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  guard.unlock ();
+  gst_base_transform_set_passthrough (base, off);
+}
+
+static void
+gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
+{
+  const std::lock_guard guard (priv->lock);
+  CylinderCounts &counts = priv->counts;
+  counts.frames++;
+  counts.points_in += result.points_in;
+  counts.points_out += result.points_out;
+  counts.units += result.units;
+  counts.units_shared += result.units_shared;
+  counts.axis = result.axis;
+}
+
+static GstFlowReturn
+gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  const rangecast::CylinderSettings settings = priv->settings;
+  guard.unlock ();
+  if (off)
+    return GST_FLOW_OK;
+
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  rangecast::CylinderResult result;
+  rangecast::Status status = frame.status ();
+  if (status.ok ())
+    status = priv->core.process (frame.views (), settings, result);
+  if (status.ok ())
+    gst_cylinder_filter_count (priv, result);
+  GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
+      result.points_out, result.points_in);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+static gboolean
+gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  /* Serialised with the data: the axis starts anew after a seek. */
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    GST_CYLINDER_FILTER (base)->priv->core.reset ();
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_cylinder_filter_start (GstBaseTransform *base)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  const std::lock_guard guard (priv->lock);
+  priv->counts = {};
+  priv->core.reset ();
+  return TRUE;
+}
+
+static gboolean
+gst_cylinder_filter_stop (GstBaseTransform *base)
+{
+  /* With the stream its memory goes too. */
+  GST_CYLINDER_FILTER (base)->priv->core = {};
+  return TRUE;
+}
+
+/* ---- properties ---- */
+
+/* A GstValueArray of three doubles. */
+static bool
+get_vector (const GValue *value, rangecast::Vec3 &vector)
+{
+  double v[3];
+  if (gst_value_array_get_size (value) != 3)
+    return false;
+  for (guint i = 0; i < 3; i++) {
+    const GValue *item = gst_value_array_get_value (value, i);
+    GValue number = G_VALUE_INIT;
+    g_value_init (&number, G_TYPE_DOUBLE);
+    if (!g_value_transform (item, &number) || !std::isfinite (g_value_get_double (&number)))
+      return false;
+    v[i] = g_value_get_double (&number);
+  }
+  vector = {v[0], v[1], v[2]};
+  return true;
+}
+
+static void
+set_vector (GValue *array, rangecast::Vec3 vector)
+{
+  for (double number : {vector.x, vector.y, vector.z}) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, G_TYPE_DOUBLE);
+    g_value_set_double (&value, number);
+    gst_value_array_append_and_take_value (array, &value);
+  }
+}
+
+static void
+gst_cylinder_filter_set_axis_vector (GstCylinderFilter *self, guint id, const GValue *value)
+{
+  rangecast::Vec3 vector;
+  const bool direction = id == PROP_AXIS_DIRECTION;
+  if (!get_vector (value, vector) || (direction && norm (vector) < 1e-6)) {
+    GST_WARNING_OBJECT (self, "%s: expected three finite numbers%s; not changed",
+        direction ? "axis-direction" : "axis-position", direction ? ", not all 0" : "");
+    return;
+  }
+  const std::lock_guard guard (self->priv->lock);
+  rangecast::Axis &axis = self->priv->settings.fixed_axis;
+  (direction ? axis.direction : axis.position) = vector;
+}
+
+static void
+gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto self = GST_CYLINDER_FILTER (object);
+  if (id == PROP_AXIS_POSITION || id == PROP_AXIS_DIRECTION)
+    return gst_cylinder_filter_set_axis_vector (self, id, value);
+  const std::lock_guard guard (self->priv->lock);
+  rangecast::CylinderSettings &settings = self->priv->settings;
+  switch (id) {
+    case PROP_MODE: /* before_transform sets passthrough to match */
+      self->priv->mode = static_cast<GstCylinderFilterMode> (g_value_get_enum (value));
+      break;
+    case PROP_AXIS:
+      settings.axis = static_cast<rangecast::AxisMode> (g_value_get_enum (value));
+      break;
+    case PROP_UNIT_HEIGHT:
+      settings.units.unit_height_m = g_value_get_double (value);
+      break;
+    case PROP_COLUMNS:
+      settings.units.columns = g_value_get_int (value);
+      break;
+    case PROP_LAYER_GAP:
+      settings.units.layer_gap_m = g_value_get_double (value);
+      break;
+    case PROP_SMOOTHING:
+      settings.units.smoothing_m = g_value_get_double (value);
+      break;
+    case PROP_N_THREADS:
+      settings.threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static GstStructure *
+gst_cylinder_filter_stats (const CylinderCounts &counts)
+{
+  GstStructure *stats = gst_structure_new ("application/x-cylinderfilter-stats", "frames",
+      G_TYPE_UINT64, counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out",
+      G_TYPE_UINT64, counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared",
+      G_TYPE_UINT64, counts.units_shared, nullptr);
+  const char *names[] = {"axis-position", "axis-direction"};
+  const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
+  for (int i = 0; i < 2; i++) {
+    GValue array = G_VALUE_INIT;
+    g_value_init (&array, GST_TYPE_ARRAY);
+    set_vector (&array, vectors[i]);
+    gst_structure_take_value (stats, names[i], &array);
+  }
+  return stats;
+}
+
+static void
+gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto priv = GST_CYLINDER_FILTER (object)->priv;
+  const std::lock_guard guard (priv->lock);
+  const rangecast::CylinderSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_MODE:
+      g_value_set_enum (value, priv->mode);
+      break;
+    case PROP_AXIS:
+      g_value_set_enum (value, int (settings.axis));
+      break;
+    case PROP_AXIS_POSITION:
+      set_vector (value, settings.fixed_axis.position);
+      break;
+    case PROP_AXIS_DIRECTION:
+      set_vector (value, settings.fixed_axis.direction);
+      break;
+    case PROP_UNIT_HEIGHT:
+      g_value_set_double (value, settings.units.unit_height_m);
+      break;
+    case PROP_COLUMNS:
+      g_value_set_int (value, settings.units.columns);
+      break;
+    case PROP_LAYER_GAP:
+      g_value_set_double (value, settings.units.layer_gap_m);
+      break;
+    case PROP_SMOOTHING:
+      g_value_set_double (value, settings.units.smoothing_m);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, settings.threads);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, gst_cylinder_filter_stats (priv->counts));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+/* ---- life ---- */
+
+static void
+gst_cylinder_filter_finalize (GObject *object)
+{
+  delete GST_CYLINDER_FILTER (object)->priv;
+  G_OBJECT_CLASS (gst_cylinder_filter_parent_class)->finalize (object);
+}
+
+static void
+gst_cylinder_filter_init (GstCylinderFilter *self)
+{
+  self->priv = new GstCylinderFilterPrivate;
+  self->priv->settings.units = {
+      kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
+  self->priv->settings.threads = 0;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static GParamSpec *
+vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags flags)
+{
+  return gst_param_spec_array (name, nick, blurb,
+      g_param_spec_double ("number", "Number", "One of x, y, z", -G_MAXDOUBLE, G_MAXDOUBLE, 0,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
+      flags);
+}
+
+static void
+install_axis_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_MODE,
+      g_param_spec_enum ("mode", "Mode", "What happens to points seen twice (default: winner)",
+          GST_TYPE_CYLINDER_FILTER_MODE, GST_CYLINDER_FILTER_WINNER, controllable));
+  g_object_class_install_property (object_class, PROP_AXIS,
+      g_param_spec_enum ("axis", "Axis", "Where the cylinder's axis lies (default: principal)",
+          GST_TYPE_CYLINDER_FILTER_AXIS, int (rangecast::AxisMode::kPrincipal), controllable));
+  g_object_class_install_property (object_class, PROP_AXIS_POSITION,
+      vector_spec ("axis-position", "Axis position",
+          "For axis=fixed: a point of the axis, <x, y, z> in the world, metres (default: <0, 0, "
+          "0>)",
+          flags));
+  g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
+      vector_spec ("axis-direction", "Axis direction",
+          "For axis=fixed: its direction, <x, y, z> in the world, any length (default: <0, 1, 0>)",
+          flags));
+}
+
+static void
+install_unit_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_UNIT_HEIGHT,
+      g_param_spec_double ("unit-height", "Unit height",
+          "Height of a slice, metres, 0.0002 to 10 (default: 0.004)", 0.0002, 10,
+          kDefaultUnitHeight, controllable));
+  g_object_class_install_property (object_class, PROP_COLUMNS,
+      g_param_spec_int ("columns", "Columns", "Units round a slice, 8 to 3600 (default: 360)", 8,
+          3600, kDefaultColumns, controllable));
+  g_object_class_install_property (object_class, PROP_LAYER_GAP,
+      g_param_spec_double ("layer-gap", "Layer gap",
+          "Points of a unit whose radii lie further apart belong to different surfaces, metres, 0 "
+          "to 100 (default: 0.03)",
+          0, 100, kDefaultLayerGap, controllable));
+  g_object_class_install_property (object_class, PROP_SMOOTHING,
+      g_param_spec_double ("smoothing", "Smoothing",
+          "How far neighbours count in a unit's decision, metres, 0 to 1; 0 decides each unit "
+          "alone (default: 0.01)",
+          0, 1, kDefaultSmoothing, controllable));
+}
+
+static void
+gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  const auto flags =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+  object_class->set_property = gst_cylinder_filter_set_property;
+  object_class->get_property = gst_cylinder_filter_get_property;
+  object_class->finalize = gst_cylinder_filter_finalize;
+
+  install_axis_properties (object_class, flags);
+  install_unit_properties (object_class, flags);
+  g_object_class_install_property (object_class, PROP_N_THREADS,
+      g_param_spec_int ("n-threads", "Threads",
+          "Views worked on at the same time, 0 to 64; 0 = number of cores (default: 0)", 0, 64, 0,
+          flags));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "frames, points-in, points-out, units, units-shared since READY; axis-position, "
+          "axis-direction of the last frame",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
+      "Clears the points that several views see of the same place, but for the best view's",
+      "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));
+
+  transform_class->set_caps = gst_cylinder_filter_set_caps;
+  transform_class->before_transform = gst_cylinder_filter_before_transform;
+  transform_class->transform_ip = gst_cylinder_filter_transform_ip;
+  transform_class->transform_ip_on_passthrough = FALSE;
+  transform_class->sink_event = gst_cylinder_filter_sink_event;
+  transform_class->start = gst_cylinder_filter_start;
+  transform_class->stop = gst_cylinder_filter_stop;
+
+  GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
+}
