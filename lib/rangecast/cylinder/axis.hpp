@@ -27,7 +27,7 @@ struct Moments {
   double sum[3] = {};     ///< x y z
   double product[6] = {}; ///< xx xy xz yy yz zz
 
-  void add (const WorldPoints &cloud, WorldPoints::Part part);
+  void add (const WorldPoints &points, WorldPoints::Part part);
   Moments &operator+= (const Moments &other);
   [[nodiscard]] Vec3 centroid () const;
 };

@@ -2,7 +2,6 @@
 #include "units.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace rangecast {
@@ -116,7 +115,8 @@ Units::add_layer (
 {
   const auto parts = cloud.parts ();
   UnitLayer layer;
-  layer.unit = unit;
+  layer.slice = static_cast<int> (unit) / settings_.columns;
+  layer.column = static_cast<int> (unit) % settings_.columns;
   layer.first_entry = static_cast<std::uint32_t> (entries.size ());
   std::uint32_t view = 0;
   float radii = 0;
@@ -139,18 +139,17 @@ Units::add_layer (
     entries.push_back (entry);
   }
   layer.covering = layer.views;
+  layer.entry_count = static_cast<std::uint32_t> (entries.size ()) - layer.first_entry;
   layer.radius = radii / static_cast<float> (end - begin);
   layers.push_back (layer);
 }
 
 /* The layer of that unit whose radius is nearest, unless a gap lies between. */
-UnitLayer *
-Units::find_layer (int slice, int column, float radius)
+const UnitLayer *
+Units::find_layer (int slice, int column, float radius) const
 {
-  const int columns = settings_.columns;
-  column += column < 0 ? columns : column >= columns ? -columns : 0;
-  const std::size_t unit = static_cast<std::size_t> (slice) * columns + column;
-  UnitLayer *best = nullptr;
+  const std::size_t unit = static_cast<std::size_t> (slice) * settings_.columns + column;
+  const UnitLayer *best = nullptr;
   auto least = static_cast<float> (settings_.layer_gap_m);
   for (std::uint32_t i = begin_[unit]; i < begin_[unit + 1]; i++)
     if (const float d = std::abs (layers[i].radius - radius); d <= least) {
@@ -160,88 +159,109 @@ Units::find_layer (int slice, int column, float radius)
   return best;
 }
 
-UnitEntry *
-Units::next_entry (const UnitLayer &layer, const UnitEntry &entry)
+/* Calls work for the layers of the other columns of the slice, up to `reach` columns to one side
+ * (1: the way phi grows, -1) and across 2 pi, nearest first, until it returns true. Layers lie in
+ * the order of their columns, so empty units cost nothing. */
+template <typename Work>
+void
+Units::along_slice (const UnitLayer &from, int reach, int side, const Work &work) const
 {
-  const int slice = static_cast<int> (layer.unit) / settings_.columns;
-  const int column = static_cast<int> (layer.unit) % settings_.columns;
-  const std::uint64_t bit = std::uint64_t{1} << entry.view;
-  for (int step = 1; step <= std::min (kReach, settings_.columns / 4); step++) {
-    const UnitLayer *next = find_layer (slice, column + step, entry.radius);
-    if (next && (next->views & bit))
-      return &entries[next->first_entry +
-                      static_cast<std::uint32_t> (std::popcount (next->views & (bit - 1)))];
+  const int columns = settings_.columns;
+  const std::size_t unit = static_cast<std::size_t> (from.slice) * columns;
+  const UnitLayer *first = layers.data () + begin_[unit];
+  const UnitLayer *last = layers.data () + begin_[unit + columns] - 1;
+  const UnitLayer *other = &from;
+  for (;;) {
+    other = side > 0 ? (other == last ? first : other + 1) : (other == first ? last : other - 1);
+    if (other == &from)
+      return;
+    int distance = side * (other->column - from.column);
+    distance += distance < 0 ? columns : 0;
+    if (distance > reach || (distance > 0 && work (*other)))
+      return;
   }
-  return nullptr;
 }
 
-static std::span<UnitEntry>
-entries_of (std::vector<UnitEntry> &entries, const UnitLayer &layer)
+const UnitEntry *
+Units::next_entry (const UnitLayer &layer, const UnitEntry &entry) const
 {
-  return {&entries[layer.first_entry], static_cast<std::size_t> (std::popcount (layer.views))};
+  const std::uint64_t bit = std::uint64_t{1} << entry.view;
+  const auto gap = static_cast<float> (settings_.layer_gap_m);
+  const UnitEntry *next = nullptr;
+  along_slice (layer, std::min (kReach, settings_.columns / 4), 1, [&] (const UnitLayer &other) {
+    if (!(other.views & bit) || std::abs (other.radius - entry.radius) > gap)
+      return false;
+    next = &entries[other.first_entry];
+    while (next->view != entry.view)
+      next++;
+    return true;
+  });
+  return next;
 }
 
 void
 Units::find_tangents ()
 {
   for (const UnitLayer &layer : layers)
-    for (UnitEntry &entry : entries_of (entries, layer)) {
-      UnitEntry *next = next_entry (layer, entry);
-      if (!next)
+    for (UnitEntry &entry : entries_of (layer)) {
+      const UnitEntry *found = next_entry (layer, entry);
+      if (!found)
         continue;
-      const float dx = next->x - entry.x, dz = next->z - entry.z;
+      UnitEntry &next = entries[static_cast<std::size_t> (found - entries.data ())];
+      const float dx = next.x - entry.x, dz = next.z - entry.z;
       const float length = std::sqrt (dx * dx + dz * dz);
       if (!(length > 1e-9f))
         continue;
       entry.tangent[0] = dx / length;
       entry.tangent[1] = dz / length;
-      if (next->tangent[0] == 0 && next->tangent[1] == 0)
-        std::copy_n (entry.tangent, 2, next->tangent);
+      if (next.tangent[0] == 0 && next.tangent[1] == 0)
+        std::copy_n (entry.tangent, 2, next.tangent);
     }
   for (UnitLayer &layer : layers)
-    for (const UnitEntry &entry : entries_of (entries, layer))
+    for (const UnitEntry &entry : entries_of (layer))
       for (int k = 0; k < 2; k++)
         layer.tangent[k] += static_cast<float> (entry.point_count) * entry.tangent[k];
 }
 
-/* Sums over the neighbours of a layer, and the views before and after it. */
-struct Units::Neighbourhood {
-  std::array<float, 2> sum{};
-  std::uint64_t before = 0, after = 0;
-
-  void add (const UnitLayer &layer, std::array<float, 2> tangent, int side)
-  {
-    sum[0] += tangent[0];
-    sum[1] += tangent[1];
-    (side < 0 ? before : after) |= layer.views;
-  }
-};
-
 void
 Units::sum_along_slice (UnitLayer &layer, int reach)
 {
-  const int slice = static_cast<int> (layer.unit) / settings_.columns;
-  const int column = static_cast<int> (layer.unit) % settings_.columns;
-  Neighbourhood around{{layer.tangent[0], layer.tangent[1]}};
-  for (int step = -reach; step <= reach; step++)
-    if (const UnitLayer *other = step ? find_layer (slice, column + step, layer.radius) : nullptr)
-      around.add (*other, {other->tangent[0], other->tangent[1]}, step);
-  layer.covering |= around.before & around.after;
-  sums_[static_cast<std::size_t> (&layer - layers.data ())] = around.sum;
+  const auto gap = static_cast<float> (settings_.layer_gap_m);
+  float x = layer.tangent[0], z = layer.tangent[1];
+  std::uint64_t around[2] = {};
+  for (int side : {0, 1})
+    along_slice (layer, reach, side ? 1 : -1, [&] (const UnitLayer &other) {
+      if (std::abs (other.radius - layer.radius) <= gap) {
+        x += other.tangent[0];
+        z += other.tangent[1];
+        around[side] |= other.views;
+      }
+      return false;
+    });
+  layer.covering |= around[0] & around[1];
+  sums_[static_cast<std::size_t> (&layer - layers.data ())] = {x, z};
 }
 
 void
 Units::sum_across_slices (UnitLayer &layer, int reach)
 {
-  const int slice = static_cast<int> (layer.unit) / settings_.columns;
-  const int column = static_cast<int> (layer.unit) % settings_.columns;
-  const auto self = static_cast<std::size_t> (&layer - layers.data ());
-  Neighbourhood around{sums_[self]};
-  for (int to = std::max (0, slice - reach); to <= std::min (slices_ - 1, slice + reach); to++)
-    if (const UnitLayer *other = to != slice ? find_layer (to, column, layer.radius) : nullptr)
-      around.add (*other, sums_[static_cast<std::size_t> (other - layers.data ())], to - slice);
-  layer.covering |= around.before & around.after;
-  std::copy_n (around.sum.begin (), 2, layer.tangent);
+  std::array<float, 2> sum = sums_[static_cast<std::size_t> (&layer - layers.data ())];
+  std::uint64_t below = 0, above = 0;
+  const int bottom = std::max (0, layer.slice - reach);
+  const int top = std::min (slices_ - 1, layer.slice + reach);
+  for (int slice = bottom; slice <= top; slice++) {
+    if (slice == layer.slice)
+      continue;
+    const UnitLayer *other = find_layer (slice, layer.column, layer.radius);
+    if (!other)
+      continue;
+    const auto &part = sums_[static_cast<std::size_t> (other - layers.data ())];
+    sum[0] += part[0];
+    sum[1] += part[1];
+    (slice < layer.slice ? below : above) |= other->views;
+  }
+  layer.covering |= below & above;
+  std::copy_n (sum.begin (), 2, layer.tangent);
 }
 
 void

@@ -37,14 +37,15 @@ struct UnitEntry {
 struct UnitLayer {
   float radius = 0;              ///< mean of the points, metres
   std::uint32_t first_entry = 0; ///< in Units::entries, one for each bit of views, in their order
-  std::uint32_t unit = 0;        ///< slice * columns + column
-  std::uint64_t views = 0;       ///< bit i: image i has points here
-  std::uint64_t covering = 0;    ///< bit i: image i has points here or around here
-  float tangent[2] = {};         ///< x, z; sum over points; after smooth() over the neighbourhood
+  std::uint32_t entry_count = 0;
+  int slice = 0, column = 0;
+  std::uint64_t views = 0;    ///< bit i: image i has points here
+  std::uint64_t covering = 0; ///< bit i: image i has points here or around here
+  float tangent[2] = {};      ///< x, z; sum over points; after smooth() over the neighbourhood
 };
 
 /** The points of a frame set, sorted into the units of a cylinder's inner wall. Keeps its memory
- * from frame to frame: 28 bytes a point, 4 a unit and at most 84 an occupied unit. */
+ * from frame to frame: 20 bytes a point, 4 a unit, 64 a layer and 36 an entry. */
 class Units {
 public:
   struct Point {
@@ -82,17 +83,21 @@ public:
   std::uint64_t shared = 0;   ///< units with points of more than one view
 
 private:
-  struct Neighbourhood;
-
   void count_units (const WorldPoints &cloud, std::span<const std::int32_t> column);
   void scatter (const WorldPoints &cloud, std::span<const float> radius);
   void cut_into_layers (const WorldPoints &cloud);
   void add_layer (
       const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end);
-  [[nodiscard]] UnitLayer *find_layer (int slice, int column, float radius);
-  [[nodiscard]] UnitEntry *next_entry (const UnitLayer &layer, const UnitEntry &entry);
+  [[nodiscard]] const UnitLayer *find_layer (int slice, int column, float radius) const;
+  template <typename Work>
+  void along_slice (const UnitLayer &from, int reach, int side, const Work &work) const;
+  [[nodiscard]] const UnitEntry *next_entry (const UnitLayer &layer, const UnitEntry &entry) const;
   void sum_along_slice (UnitLayer &layer, int reach);
   void sum_across_slices (UnitLayer &layer, int reach);
+  [[nodiscard]] std::span<UnitEntry> entries_of (const UnitLayer &layer)
+  {
+    return {entries.data () + layer.first_entry, layer.entry_count};
+  }
 
   UnitSettings settings_;
   int slices_ = 0;
