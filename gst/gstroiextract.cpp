@@ -1,0 +1,639 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-roiextract
+ * @title: roiextract
+ *
+ * Clears the background of range images and crops them to what is left. The background of each
+ * view is learnt over the first frames, on #GstRoiExtract::capture-background, or loaded.
+ *
+ * While it learns, views come out with an empty ROI.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract background-frames=30 !
+ * rangesplit name=s s.depth ! videoconvert ! autovideosink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstroiextract.h"
+
+#include <array>
+#include <atomic>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <memory>
+#include <mutex>
+#include <opencv2/core/utility.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/roi/background.hpp>
+#include <rangecast/roi/bounding_box.hpp>
+#include <rangecast/roi/segmentation.hpp>
+#include <string>
+
+using rangecast::BackgroundModel;
+using rangecast::RangeImage;
+using rangecast::Roi;
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::View;
+
+GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
+#define GST_CAT_DEFAULT gst_roi_extract_debug
+
+enum {
+  PROP_0,
+  PROP_BACKGROUND_FRAMES,
+  PROP_BACKGROUND_FILE,
+  PROP_SAVE_BACKGROUND,
+  PROP_CUE,
+  PROP_NOISE_FACTOR,
+  PROP_DEPTH_THRESHOLD,
+  PROP_COLOUR_THRESHOLD,
+  PROP_SHADOW,
+  PROP_HIGHLIGHT,
+  PROP_MIN_AREA,
+  PROP_MAX_HOLE,
+  PROP_MARGIN,
+  PROP_N_THREADS,
+  PROP_STATS
+};
+enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
+static guint signals[N_SIGNALS];
+
+static constexpr int kDefaultBackgroundFrames = 30;
+static constexpr rangecast::SegmentationSettings kDefaults;
+/* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
+ * fits it no more. */
+static constexpr int kAnnouncedMargin = 16;
+
+struct RoiSettings {
+  int background_frames = kDefaultBackgroundFrames;
+  std::string background_file, save_background;
+  rangecast::SegmentationSettings segmentation;
+  int margin = 0;
+  int n_threads = 0;
+};
+
+/* What is kept of one view. */
+struct ViewState {
+  BackgroundModel background;
+  rangecast::Segmenter segmenter;
+  bool learnt = false;
+  int learning_target = 0;
+  Roi announced;
+  guint64 points_in = 0, points_out = 0; /* of the present frame */
+  Roi box;
+  Status status;
+};
+
+struct GstRoiExtractPrivate {
+  std::mutex lock; /* guards settings and stats; never held across a push, event or message */
+  RoiSettings settings;
+  guint64 frames = 0, points_in = 0, points_out = 0;
+  Roi last_roi;
+
+  std::atomic<bool> relearn{false};
+
+  /* streaming thread only */
+  gstrange::RangeInfo info;
+  std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
+};
+
+struct _GstRoiExtract {
+  GstBaseTransform parent;
+  GstRoiExtractPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
+
+#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())
+static GType
+gst_roi_extract_cue_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (rangecast::Cue::kBoth), "Nearer than the background or of another colour", "both"},
+        {int (rangecast::Cue::kColour), "Of another colour", "colour"},
+        {int (rangecast::Cue::kDepth), "Nearer than the background", "depth"}, {}};
+    return g_enum_register_static ("GstRoiExtractCue", values);
+  }();
+  return type;
+}
+
+/* ---- the background ---- */
+
+static RoiSettings
+copy_settings (GstRoiExtractPrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->settings;
+}
+
+static void
+begin_learning (ViewState &state, const View &view, int frames)
+{
+  state.background.reset (view.width, view.height);
+  state.learning_target = frames;
+  state.learnt = false;
+  state.announced = {};
+}
+
+/* Each view of the caps gets a state; backgrounds of views that keep their size stay. */
+static void
+prepare_views (GstRoiExtractPrivate *priv, int background_frames)
+{
+  for (int id = 0; id < rangecast::kMaxViews; id++) {
+    const View *view = priv->info.rig.find (id);
+    auto &state = priv->views[id];
+    if (!view) {
+      state.reset ();
+      continue;
+    }
+    if (!state)
+      state = std::make_unique<ViewState> ();
+    if (state->background.width () != view->width || state->background.height () != view->height)
+      begin_learning (*state, *view, background_frames);
+  }
+}
+
+static Status
+load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
+{
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  if (Status s = rangecast::load_backgrounds (path, loaded); !s.ok ())
+    return s;
+  for (const View &view : priv->info.rig.views) {
+    const auto found = std::find_if (
+        loaded.begin (), loaded.end (), [&] (const auto &entry) { return entry.first == view.id; });
+    if (found == loaded.end ())
+      return {
+          StatusCode::kNotFound, path + ": has no background of view " + std::to_string (view.id)};
+    if (found->second.width () != view.width || found->second.height () != view.height)
+      return {StatusCode::kBadSize, path + ": the background of view " + std::to_string (view.id) +
+                                        " is " + std::to_string (found->second.width ()) + "x" +
+                                        std::to_string (found->second.height ()) + ", expected " +
+                                        std::to_string (view.width) + "x" +
+                                        std::to_string (view.height)};
+    ViewState &state = *priv->views[view.id];
+    state.background = std::move (found->second);
+    state.learnt = true;
+  }
+  return {};
+}
+
+static void
+save_when_all_learnt (GstRoiExtract *self, const std::string &path)
+{
+  if (path.empty ())
+    return;
+  std::vector<std::pair<int, const BackgroundModel *>> models;
+  for (const View &view : self->priv->info.rig.views) {
+    const ViewState &state = *self->priv->views[view.id];
+    if (!state.learnt)
+      return;
+    models.emplace_back (view.id, &state.background);
+  }
+  gst_range_post_warning (GST_ELEMENT (self), rangecast::save_backgrounds (path, models));
+}
+
+static gboolean
+gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  GstRoiExtractPrivate *priv = self->priv;
+  const RoiSettings settings = copy_settings (priv);
+  Status status = gstrange::parse_caps (caps, priv->info);
+  if (status.ok ()) {
+    prepare_views (priv, settings.background_frames);
+    if (!settings.background_file.empty ())
+      status = load_background_file (priv, settings.background_file);
+  }
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* ---- one frame set ---- */
+
+static void
+process_view (
+    ViewState &state, const View &view, const RangeImage &image, const RoiSettings &settings)
+{
+  state.points_in = rangecast::count_points (image);
+  state.points_out = 0;
+  state.box = {};
+  if (!state.learnt) {
+    state.status = state.background.learn (image);
+    return;
+  }
+  state.status = state.segmenter.clear_background (
+      image, state.background, view.depth_unit_m, settings.segmentation);
+  if (!state.status.ok ())
+    return;
+  state.points_out = rangecast::count_points (image);
+  state.box = rangecast::bounding_box (image, settings.margin);
+}
+
+/* Tells upstream (stereodepth) which part of the picture is still wanted. */
+static void
+announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
+{
+  const Roi &box = state.box, &told = state.announced;
+  const bool inside = !told.empty () && box.x >= told.x && box.y >= told.y &&
+                      box.x + box.width <= told.x + told.width &&
+                      box.y + box.height <= told.y + told.height;
+  const bool fits = told.width <= box.width + 3 * kAnnouncedMargin &&
+                    told.height <= box.height + 3 * kAnnouncedMargin;
+  if (box.empty () ? told.empty () : inside && fits)
+    return;
+  const View *view = self->priv->info.rig.find (view_id);
+  Roi &roi = state.announced;
+  roi = {};
+  if (!box.empty ()) {
+    roi.x = std::max (0, box.x - kAnnouncedMargin);
+    roi.y = std::max (0, box.y - kAnnouncedMargin);
+    roi.width = std::min (view->width, box.x + box.width + kAnnouncedMargin) - roi.x;
+    roi.height = std::min (view->height, box.y + box.height + kAnnouncedMargin) - roi.y;
+  }
+  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
+      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
+      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
+  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+}
+
+/* A view that has seen enough of the empty scene is ready. */
+static bool
+finish_learning (ViewState &state)
+{
+  if (state.learnt || state.background.frames () < state.learning_target)
+    return false;
+  state.background.finish ();
+  state.learnt = true;
+  return true;
+}
+
+static void
+relearn_all (GstRoiExtract *self, int frames)
+{
+  for (const View &view : self->priv->info.rig.views)
+    begin_learning (*self->priv->views[view.id], view, frames);
+}
+
+static Status
+check_views (GstRoiExtractPrivate *priv, const gstrange::RangeFrameMap &frame)
+{
+  for (const RangeImage &image : frame.views ())
+    if (!priv->views[image.view_id])
+      return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
+                                         " is not in the rig of the caps"};
+  return {};
+}
+
+static Status
+process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSettings &settings)
+{
+  GstRoiExtractPrivate *priv = self->priv;
+  const auto images = frame.views ();
+  if (Status s = frame.status (); !s.ok ())
+    return s;
+  if (Status s = check_views (priv, frame); !s.ok ())
+    return s;
+  cv::parallel_for_ (
+      cv::Range (0, static_cast<int> (images.size ())),
+      [&] (const cv::Range &range) {
+        for (int i = range.start; i < range.end; i++)
+          process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
+              images[i], settings);
+      },
+      settings.n_threads > 0 ? settings.n_threads : -1);
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const ViewState &state = *priv->views[images[i].view_id];
+    if (!state.status.ok ())
+      return state.status;
+    frame.crop (i, state.box);
+  }
+  return {};
+}
+
+static void
+after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const RoiSettings &settings)
+{
+  GstRoiExtractPrivate *priv = self->priv;
+  bool learnt_now = false;
+  guint64 points_in = 0, points_out = 0;
+  for (const RangeImage &image : frame.views ()) {
+    ViewState &state = *priv->views[image.view_id];
+    points_in += state.points_in;
+    points_out += state.points_out;
+    if (state.learnt)
+      announce_roi (self, state, image.view_id);
+    learnt_now |= finish_learning (state);
+  }
+  if (learnt_now)
+    save_when_all_learnt (self, settings.save_background);
+  std::lock_guard guard (priv->lock);
+  priv->frames++;
+  priv->points_in += points_in;
+  priv->points_out += points_out;
+  if (!frame.views ().empty ())
+    priv->last_roi = frame.views ()[0].roi;
+}
+
+static GstFlowReturn
+gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  if (GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (buffer)))
+    gst_object_sync_values (GST_OBJECT (self),
+        gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)));
+  const RoiSettings settings = copy_settings (self->priv);
+  if (self->priv->relearn.exchange (false))
+    relearn_all (self, settings.background_frames);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  const Status status = process_frame (self, frame, settings);
+  if (status.ok ())
+    after_frame (self, frame, settings);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+/* ---- life ---- */
+
+static gboolean
+gst_roi_extract_start (GstBaseTransform *base)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  std::lock_guard guard (priv->lock);
+  priv->frames = priv->points_in = priv->points_out = 0;
+  priv->last_roi = {};
+  return TRUE;
+}
+
+static gboolean
+gst_roi_extract_stop (GstBaseTransform *base)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  priv->info = {};
+  for (auto &state : priv->views)
+    state.reset ();
+  return TRUE;
+}
+
+static void
+gst_roi_extract_capture_background (GstRoiExtract *self)
+{
+  self->priv->relearn = true;
+}
+
+static void
+gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
+  std::lock_guard guard (priv->lock);
+  RoiSettings &settings = priv->settings;
+  const auto text = [value] {
+    const gchar *string = g_value_get_string (value);
+    return std::string (string ? string : "");
+  };
+  switch (id) {
+    case PROP_BACKGROUND_FRAMES:
+      settings.background_frames = g_value_get_int (value);
+      break;
+    case PROP_BACKGROUND_FILE:
+      settings.background_file = text ();
+      break;
+    case PROP_SAVE_BACKGROUND:
+      settings.save_background = text ();
+      break;
+    case PROP_CUE:
+      settings.segmentation.cue = rangecast::Cue (g_value_get_enum (value));
+      break;
+    case PROP_NOISE_FACTOR:
+      settings.segmentation.noise_factor = g_value_get_double (value);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      settings.segmentation.depth_threshold_m = g_value_get_double (value);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      settings.segmentation.colour_threshold = g_value_get_double (value);
+      break;
+    case PROP_SHADOW:
+      settings.segmentation.shadow = g_value_get_double (value);
+      break;
+    case PROP_HIGHLIGHT:
+      settings.segmentation.highlight = g_value_get_double (value);
+      break;
+    case PROP_MIN_AREA:
+      settings.segmentation.min_area = g_value_get_int (value);
+      break;
+    case PROP_MAX_HOLE:
+      settings.segmentation.max_hole = g_value_get_int (value);
+      break;
+    case PROP_MARGIN:
+      settings.margin = g_value_get_int (value);
+      break;
+    case PROP_N_THREADS:
+      settings.n_threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static GstStructure *
+make_stats (const GstRoiExtractPrivate *priv)
+{
+  const Roi &roi = priv->last_roi;
+  return gst_structure_new ("application/x-roiextract-stats", "frames", G_TYPE_UINT64, priv->frames,
+      "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64, priv->points_out,
+      "roi-x", G_TYPE_INT, roi.x, "roi-y", G_TYPE_INT, roi.y, "roi-width", G_TYPE_INT, roi.width,
+      "roi-height", G_TYPE_INT, roi.height, nullptr);
+}
+
+static void
+gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
+  std::lock_guard guard (priv->lock);
+  const RoiSettings &settings = priv->settings;
+  const auto set_text = [value] (const std::string &text) {
+    g_value_set_string (value, text.empty () ? nullptr : text.c_str ());
+  };
+  switch (id) {
+    case PROP_BACKGROUND_FRAMES:
+      g_value_set_int (value, settings.background_frames);
+      break;
+    case PROP_BACKGROUND_FILE:
+      set_text (settings.background_file);
+      break;
+    case PROP_SAVE_BACKGROUND:
+      set_text (settings.save_background);
+      break;
+    case PROP_CUE:
+      g_value_set_enum (value, int (settings.segmentation.cue));
+      break;
+    case PROP_NOISE_FACTOR:
+      g_value_set_double (value, settings.segmentation.noise_factor);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      g_value_set_double (value, settings.segmentation.depth_threshold_m);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      g_value_set_double (value, settings.segmentation.colour_threshold);
+      break;
+    case PROP_SHADOW:
+      g_value_set_double (value, settings.segmentation.shadow);
+      break;
+    case PROP_HIGHLIGHT:
+      g_value_set_double (value, settings.segmentation.highlight);
+      break;
+    case PROP_MIN_AREA:
+      g_value_set_int (value, settings.segmentation.min_area);
+      break;
+    case PROP_MAX_HOLE:
+      g_value_set_int (value, settings.segmentation.max_hole);
+      break;
+    case PROP_MARGIN:
+      g_value_set_int (value, settings.margin);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, settings.n_threads);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, make_stats (priv));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_roi_extract_finalize (GObject *object)
+{
+  delete GST_ROI_EXTRACT (object)->priv;
+  G_OBJECT_CLASS (gst_roi_extract_parent_class)->finalize (object);
+}
+
+static void
+gst_roi_extract_init (GstRoiExtract *self)
+{
+  self->priv = new GstRoiExtractPrivate;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+install_background_properties (GObjectClass *object_class)
+{
+  const auto ready =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  const auto playing =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  g_object_class_install_property (object_class, PROP_BACKGROUND_FRAMES,
+      g_param_spec_int ("background-frames", "Background frames",
+          "Frames of the empty scene from which a background is learnt (1 to 10000, default 30)", 1,
+          10000, kDefaultBackgroundFrames, playing));
+  g_object_class_install_property (object_class, PROP_BACKGROUND_FILE,
+      g_param_spec_string ("background-file", "Background file",
+          "Take the background from this file instead of learning it (default: none)", nullptr,
+          ready));
+  g_object_class_install_property (object_class, PROP_SAVE_BACKGROUND,
+      g_param_spec_string ("save-background", "Save background",
+          "Write the background to this file (.yml, .yaml, .json or .xml, with .gz if wanted) "
+          "whenever one is learnt (default: none)",
+          nullptr, playing));
+}
+
+static void
+install_segmentation_properties (GObjectClass *object_class)
+{
+  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+  const auto install_double = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                                  double minimum, double maximum, double fallback) {
+    g_object_class_install_property (object_class, id,
+        g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, live));
+  };
+  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                               int maximum, int fallback) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_int (name, nick, blurb, 0, maximum, fallback, live));
+  };
+  g_object_class_install_property (object_class, PROP_CUE,
+      g_param_spec_enum ("cue", "Cue", "What speaks for a pixel (default: both)",
+          GST_TYPE_ROI_EXTRACT_CUE, int (rangecast::Cue::kBoth), live));
+  install_double (PROP_NOISE_FACTOR, "noise-factor", "Noise factor",
+      "A difference counts from so many standard deviations of the background (0 to 100, default "
+      "4)",
+      0, 100, kDefaults.noise_factor);
+  install_double (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
+      "and from so many metres nearer than the background (0 to 10, default 0.02)", 0, 10,
+      kDefaults.depth_threshold_m);
+  install_double (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
+      "and from so many grey levels of chromatic distortion (0 to 255, default 18)", 0, 255,
+      kDefaults.colour_threshold);
+  install_double (PROP_SHADOW, "shadow", "Shadow",
+      "A pixel darker than this share of the background is no shadow (0 to 1, default 0.5)", 0, 1,
+      kDefaults.shadow);
+  install_double (PROP_HIGHLIGHT, "highlight", "Highlight",
+      "A pixel brighter than this share of the background is no change of light (1 to 10, default "
+      "1.35)",
+      1, 10, kDefaults.highlight);
+  install_int (PROP_MIN_AREA, "min-area", "Minimum area",
+      "Smaller islands are cleared, pixels (0 to 1000000, default 150)", 1000000,
+      kDefaults.min_area);
+  install_int (PROP_MAX_HOLE, "max-hole", "Maximum hole",
+      "Smaller holes are closed, pixels (0 to 1000000, default 100)", 1000000, kDefaults.max_hole);
+  install_int (PROP_MARGIN, "margin", "Margin",
+      "The ROI is this much larger than what is left, pixels each side (0 to 1000, default 0)",
+      1000, 0);
+  install_int (PROP_N_THREADS, "n-threads", "Threads",
+      "Views worked on at the same time (0 to 64, default 0: as many as there are cores)", 64, 0);
+}
+
+static void
+gst_roi_extract_class_init (GstRoiExtractClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_roi_extract_set_property;
+  object_class->get_property = gst_roi_extract_get_property;
+  object_class->finalize = gst_roi_extract_finalize;
+  install_background_properties (object_class);
+  install_segmentation_properties (object_class);
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, points-in, points-out; and the last ROI of the first view",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  /**
+   * GstRoiExtract::capture-background:
+   *
+   * Forgets the background and learns it anew from the next frames, in which the scene should be
+   * empty.
+   */
+  signals[SIGNAL_CAPTURE_BACKGROUND] = g_signal_new_class_handler ("capture-background",
+      G_TYPE_FROM_CLASS (klass), GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
+      G_CALLBACK (gst_roi_extract_capture_background), nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Region of interest extractor",
+      "Filter/Effect/Video", "Clears the background of range images and crops them to what is left",
+      "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_ROI_EXTRACT_CUE, GstPluginAPIFlags (0));
+
+  transform_class->start = gst_roi_extract_start;
+  transform_class->stop = gst_roi_extract_stop;
+  transform_class->set_caps = gst_roi_extract_set_caps;
+  transform_class->transform_ip = gst_roi_extract_transform_ip;
+
+  GST_DEBUG_CATEGORY_INIT (gst_roi_extract_debug, "roiextract", 0, "Region of interest extractor");
+}

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "background.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+namespace rangecast {
+
+static_assert (sizeof (BackgroundPixel) == 7 * sizeof (float));
+
+constexpr int kFileVersion = 1;
+
+void
+BackgroundModel::reset (int width, int height)
+{
+  width_ = width;
+  height_ = height;
+  frames_ = 0;
+  const auto pixels = static_cast<std::size_t> (width) * static_cast<std::size_t> (height);
+  pixels_.assign (pixels, {});
+  sums_.assign (pixels, {});
+}
+
+Status
+BackgroundModel::learn (const ConstRangeImage &image)
+{
+  const Roi &roi = image.roi;
+  if (roi.x < 0 || roi.y < 0 || roi.x + roi.width > width_ || roi.y + roi.height > height_)
+    return {StatusCode::kBadSize, "view " + std::to_string (image.view_id) +
+                                      ": the ROI does not lie in the image of the background"};
+  for (int y = 0; y < roi.height; y++) {
+    const std::size_t first = static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
+    const Rgbx *colour = image.colour.row (y);
+    const std::uint16_t *depth = image.depth.row (y);
+    for (int x = 0; x < roi.width; x++) {
+      BackgroundPixel &pixel = pixels_[first + x];
+      Sums &sums = sums_[first + x];
+      const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
+      const float weight = 1.f / float (++sums.colour_n);
+      for (int c = 0; c < 3; c++) {
+        const float before = rgb[c] - pixel.mean[c];
+        pixel.mean[c] += before * weight;
+        sums.colour_m2 += before * (rgb[c] - pixel.mean[c]);
+      }
+      if (depth[x] != kInvalidDepth) {
+        const float before = depth[x] - pixel.depth;
+        pixel.depth += before / float (++sums.depth_n);
+        sums.depth_m2 += before * (depth[x] - pixel.depth);
+      }
+    }
+  }
+  frames_++;
+  return {};
+}
+
+void
+BackgroundModel::finish ()
+{
+  for (std::size_t i = 0; i < pixels_.size (); i++) {
+    BackgroundPixel &pixel = pixels_[i];
+    const Sums &sums = sums_[i];
+    pixel.spread = sums.colour_n ? std::sqrt (sums.colour_m2 / (3.f * float (sums.colour_n))) : -1;
+    pixel.depth_spread = sums.depth_n ? std::sqrt (sums.depth_m2 / float (sums.depth_n)) : 0;
+    pixel.depth_share = frames_ ? float (sums.depth_n) / float (frames_) : 0;
+  }
+}
+
+Status
+save_backgrounds (
+    const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views)
+{
+  try {
+    cv::FileStorage file (path, cv::FileStorage::WRITE | cv::FileStorage::BASE64);
+    if (!file.isOpened ())
+      return {StatusCode::kNotFound, path + ": cannot be opened for writing"};
+    file << "rangecast_background" << kFileVersion;
+    file.startWriteStruct ("views", cv::FileNode::SEQ);
+    for (const auto &[id, model] : views) {
+      const cv::Mat pixels (model->height_, model->width_, CV_32FC (7),
+          const_cast<BackgroundPixel *> (model->pixels_.data ()));
+      file.startWriteStruct ("", cv::FileNode::MAP);
+      file << "id" << id << "frames" << model->frames_ << "pixels" << pixels;
+      file.endWriteStruct ();
+    }
+    file.endWriteStruct ();
+    file.release ();
+  } catch (const std::exception &) {
+    return {StatusCode::kBadValue,
+        path + ": cannot be written; expected a name that ends in .yml, .yaml, .json or .xml"};
+  }
+  return {};
+}
+
+Status
+load_backgrounds (const std::string &path, std::vector<std::pair<int, BackgroundModel>> &views)
+{
+  const Status bad = {
+      StatusCode::kBadData, path + ": is not a background file (rangecast_background " +
+                                std::to_string (kFileVersion) + ")"};
+  std::error_code error;
+  if (!std::filesystem::is_regular_file (path, error))
+    return {StatusCode::kNotFound, path + ": no such file; expected a background file"};
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  try {
+    const cv::FileStorage file (path, cv::FileStorage::READ);
+    const cv::FileNode version = file["rangecast_background"];
+    if (!file.isOpened () || !version.isInt () || static_cast<int> (version) != kFileVersion)
+      return bad;
+    for (const cv::FileNode &node : file["views"]) {
+      cv::Mat pixels;
+      node["pixels"] >> pixels;
+      const int id = static_cast<int> (node["id"]);
+      if (pixels.type () != CV_32FC (7) || !pixels.isContinuous () || pixels.empty () || id < 0 ||
+          id >= kMaxViews || loaded.size () >= kMaxViews)
+        return bad;
+      BackgroundModel model;
+      model.reset (pixels.cols, pixels.rows);
+      const auto first = reinterpret_cast<const BackgroundPixel *> (pixels.data);
+      model.pixels_.assign (first, first + pixels.total ());
+      model.frames_ = std::max (1, static_cast<int> (node["frames"]));
+      loaded.emplace_back (id, std::move (model));
+    }
+  } catch (const std::exception &) {
+    return bad;
+  }
+  views = std::move (loaded);
+  return {};
+}
+
+} // namespace rangecast

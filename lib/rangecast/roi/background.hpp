@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+#include "../status.hpp"
+
+namespace rangecast {
+
+/** What one pixel of the empty scene looks like. */
+struct BackgroundPixel {
+  float mean[3] = {};     ///< R, G, B, 0 .. 255
+  float spread = 0;       ///< standard deviation of colour, root of the mean over R, G, B
+  float depth = 0;        ///< mean of the valid depths, depth units; 0 = never valid
+  float depth_spread = 0; ///< standard deviation of depth, depth units
+  float depth_share = 0;  ///< share of the frames in which depth was valid, 0 .. 1
+};
+
+/** Mean and spread of colour, and of depth where it is valid, of one view's empty scene.
+ *  Learnt by running sums (B. P. Welford, "Note on a method for calculating corrected sums of
+ *  squares and products", Technometrics 4, 1962). Rows and columns are those of the full image, so
+ *  that range images of any ROI can be compared. */
+class BackgroundModel {
+public:
+  /** Forgets everything. @param width, height  of the view's full image, pixels */
+  void reset (int width, int height);
+
+  /** Adds one picture of the empty scene; only pixels in its ROI learn.
+   *  @return kBadSize if the ROI does not lie in the full image */
+  Status learn (const ConstRangeImage &image);
+
+  [[nodiscard]] int frames () const { return frames_; }
+  [[nodiscard]] int width () const { return width_; }
+  [[nodiscard]] int height () const { return height_; }
+  /** A pixel that never learnt has depth 0, and any colour differs from it: spread is negative. */
+  [[nodiscard]] const BackgroundPixel *row (int y) const
+  {
+    return pixels_.data () + static_cast<std::size_t> (y) * static_cast<std::size_t> (width_);
+  }
+
+  /** Makes means and spreads of what was learnt. */
+  void finish ();
+
+private:
+  friend Status save_backgrounds (
+      const std::string &, const std::vector<std::pair<int, const BackgroundModel *>> &);
+  friend Status load_backgrounds (
+      const std::string &, std::vector<std::pair<int, BackgroundModel>> &);
+
+  struct Sums {
+    float colour_m2 = 0, depth_m2 = 0;
+    int colour_n = 0, depth_n = 0;
+  };
+  int width_ = 0, height_ = 0, frames_ = 0;
+  std::vector<BackgroundPixel> pixels_;
+  std::vector<Sums> sums_;
+};
+
+/** @name The file form
+ *  YAML, JSON or XML (with .gz if wanted) by the file's ending, as cv::FileStorage writes it: for
+ *  each view a matrix of width x height x 7 floats, the fields of BackgroundPixel in their order.
+ *  Messages begin with the path. @{ */
+Status save_backgrounds (
+    const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views);
+Status load_backgrounds (
+    const std::string &path, std::vector<std::pair<int, BackgroundModel>> &views);
+/** @} */
+
+} // namespace rangecast

@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "segmentation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace rangecast {
+namespace {
+
+constexpr std::uint8_t kForeground = 255;
+/* The background's depth is known where it was valid in at least this share of its frames. */
+constexpr float kKnownShare = 0.5f;
+
+/* Thresholds in the units of the pixels. */
+struct Limits {
+  bool use_colour, use_depth;
+  float noise_factor, colour, shadow, highlight;
+  float nearness; /* depth units */
+};
+
+bool
+is_nearer (std::uint16_t depth, const BackgroundPixel &background, const Limits &limits)
+{
+  if (depth == kInvalidDepth || background.depth_share < kKnownShare)
+    return false;
+  const float noise = std::max (limits.nearness, limits.noise_factor * background.depth_spread);
+  return float (depth) < background.depth - noise;
+}
+
+bool
+has_other_colour (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
+{
+  if (background.spread < 0)
+    return true;
+  const float *mean = background.mean;
+  const float rgb[] = {float (colour.r), float (colour.g), float (colour.b)};
+  /* One is added to all, so that black has a brightness to compare. */
+  float mixed = 0, square = 0;
+  for (int c = 0; c < 3; c++) {
+    mixed += (rgb[c] + 1) * (mean[c] + 1);
+    square += (mean[c] + 1) * (mean[c] + 1);
+  }
+  const float brightness = mixed / square;
+  float distortion = 0;
+  for (int c = 0; c < 3; c++) {
+    const float d = rgb[c] + 1 - brightness * (mean[c] + 1);
+    distortion += d * d;
+  }
+  const float chroma = std::max (limits.colour, limits.noise_factor * background.spread);
+  if (distortion > chroma * chroma)
+    return true;
+  /* Darker or brighter beyond shadow and light; noise of dark pixels is no change of light. */
+  const float noise = limits.noise_factor * std::max (background.spread, 2.f) / std::sqrt (square);
+  return brightness < limits.shadow - noise || brightness > limits.highlight + noise;
+}
+
+} // namespace
+
+void
+Segmenter::classify (const RangeImage &image, const BackgroundModel &background,
+    double depth_unit_m, const SegmentationSettings &settings)
+{
+  const Limits limits = {settings.cue != Cue::kDepth, settings.cue != Cue::kColour,
+      float (settings.noise_factor), float (settings.colour_threshold), float (settings.shadow),
+      float (settings.highlight), float (settings.depth_threshold_m / depth_unit_m)};
+  mask_.create (image.roi.height, image.roi.width, CV_8U);
+  for (int y = 0; y < image.roi.height; y++) {
+    const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
+    const std::uint16_t *depth = image.depth.row (y);
+    const Rgbx *colour = image.colour.row (y);
+    auto mask = mask_.ptr<std::uint8_t> (y);
+    for (int x = 0; x < image.roi.width; x++) {
+      const bool stays = (limits.use_depth && is_nearer (depth[x], behind[x], limits)) ||
+                         (limits.use_colour && has_other_colour (colour[x], behind[x], limits));
+      mask[x] = stays ? kForeground : 0;
+    }
+  }
+}
+
+void
+Segmenter::remove_small (cv::Mat &mask, int min_area)
+{
+  if (min_area <= 1)
+    return;
+  const int count = cv::connectedComponentsWithStats (mask, labels_, stats_, centroids_, 8, CV_32S);
+  bool any = false;
+  for (int i = 1; i < count; i++)
+    any |= stats_.at<int> (i, cv::CC_STAT_AREA) < min_area;
+  if (!any)
+    return;
+  for (int y = 0; y < mask.rows; y++) {
+    auto row = mask.ptr<std::uint8_t> (y);
+    const int *label = labels_.ptr<int> (y);
+    for (int x = 0; x < mask.cols; x++)
+      if (row[x] && stats_.at<int> (label[x], cv::CC_STAT_AREA) < min_area)
+        row[x] = 0;
+  }
+}
+
+Status
+Segmenter::clear_background (const RangeImage &image, const BackgroundModel &background,
+    double depth_unit_m, const SegmentationSettings &settings)
+{
+  const Roi &roi = image.roi;
+  if (roi.empty ())
+    return {};
+  if (roi.x < 0 || roi.y < 0 || roi.x + roi.width > background.width () ||
+      roi.y + roi.height > background.height ())
+    return {StatusCode::kBadSize, "view " + std::to_string (image.view_id) +
+                                      ": the ROI does not lie in the image of the background"};
+  try {
+    classify (image, background, depth_unit_m, settings);
+    remove_small (mask_, settings.min_area);
+    cv::bitwise_not (mask_, inverse_);
+    remove_small (inverse_, settings.max_hole);
+  } catch (const cv::Exception &) {
+    return {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
+  }
+  for (int y = 0; y < roi.height; y++) {
+    const auto background_row = inverse_.ptr<std::uint8_t> (y);
+    std::uint16_t *depth = image.depth.row (y);
+    for (int x = 0; x < roi.width; x++)
+      if (background_row[x])
+        depth[x] = kInvalidDepth;
+  }
+  return {};
+}
+
+} // namespace rangecast

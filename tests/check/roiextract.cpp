@@ -1,0 +1,236 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rangecast-check.hpp"
+
+#include <glib/gstdio.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+/* A wall 1.2 m away; with somebody, a red box of 60 x 80 pixels 0.7 m away before it. */
+static GstBuffer *
+scene (const Rig &rig, GstClockTime pts, bool somebody)
+{
+  GstBuffer *buffer = make_frame_set (rig, pts);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  for (const RangeImage &image : frame.views ())
+    for (int y = 0; y < image.roi.height; y++)
+      for (int x = 0; x < image.roi.width; x++) {
+        const bool person = somebody && x >= 100 && x < 160 && y >= 90 && y < 170;
+        image.depth.at (x, y) = person ? 7000 : 12000;
+        image.colour.at (x, y) = person ? Rgbx{200, 60, 50, 0} : Rgbx{110, 115, 120, 0};
+      }
+  return buffer;
+}
+
+static GstHarness *
+roi_harness (const Rig &rig, const char *launch)
+{
+  GstHarness *h = gst_harness_new_parse (launch);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  return h;
+}
+
+static Roi
+roi_of (GstBuffer *buffer, guint view_id)
+{
+  const GstRangeMeta *meta = gst_buffer_get_range_meta (buffer, view_id);
+  return {int (meta->x), int (meta->y), int (meta->width), int (meta->height)};
+}
+
+/* Pushes one and gives the ROI of view 0 that came out. */
+static Roi
+push (GstHarness *h, GstBuffer *buffer)
+{
+  GstBuffer *output = gst_harness_push_and_pull (h, buffer);
+  const Roi roi = roi_of (output, 0);
+  gst_buffer_unref (output);
+  return roi;
+}
+
+GST_START_TEST (test_learns_then_crops_to_the_person_without_copying)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=3");
+  for (int i = 0; i < 3; i++)
+    fail_unless (push (h, scene (rig, i, false)).empty ());
+  GstBuffer *input = scene (rig, 3, true);
+  GstMemory *memory = gst_buffer_peek_memory (input, 0);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  fail_unless (gst_buffer_peek_memory (output, 0) == memory);
+  fail_unless (roi_of (output, 0) == (Roi{100, 90, 60, 80}));
+  fail_unless (roi_of (output, 1) == (Roi{100, 90, 60, 80}));
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 3);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 3);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ()[1].depth.at (0, 0), 7000);
+    fail_unless_equals_int (frame.views ()[1].colour.at (59, 79).r, 200);
+  }
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_nobody_is_an_empty_roi_and_no_error)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=2");
+  for (int i = 0; i < 5; i++)
+    fail_unless (push (h, scene (rig, i, false)).empty ());
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_margin_grows_the_roi)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1 margin=5");
+  push (h, scene (rig, 0, false));
+  fail_unless (push (h, scene (rig, 1, true)) == (Roi{95, 85, 70, 90}));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_background_learns_anew)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=2");
+  for (int i = 0; i < 2; i++)
+    push (h, scene (rig, i, false));
+  fail_if (push (h, scene (rig, 2, true)).empty ());
+  GstElement *element = gst_harness_find_element (h, "roiextract");
+  g_signal_emit_by_name (element, "capture-background");
+  gst_object_unref (element);
+  for (int i = 3; i < 5; i++)
+    fail_unless (push (h, scene (rig, i, true)).empty ());
+  fail_unless (push (h, scene (rig, 5, true)).empty ());
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_background_is_saved_and_loaded)
+{
+  const Rig rig = ring_rig (1);
+  gchar *path = g_strdup_printf ("%s/roi-%d.yml.gz", g_get_tmp_dir (), int (getpid ()));
+  gchar *save = g_strdup_printf ("roiextract background-frames=2 save-background=%s", path);
+  gchar *load = g_strdup_printf ("roiextract background-file=%s", path);
+  GstHarness *h = roi_harness (rig, save);
+  for (int i = 0; i < 2; i++)
+    push (h, scene (rig, i, false));
+  gst_harness_teardown (h);
+  h = roi_harness (rig, load);
+  fail_unless (push (h, scene (rig, 0, true)) == (Roi{100, 90, 60, 80}));
+  gst_harness_teardown (h);
+  g_unlink (path);
+  g_free (path);
+  g_free (save);
+  g_free (load);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_missing_background_file_is_one_error_that_names_it)
+{
+  GstHarness *h = gst_harness_new_parse ("roiextract background-file=/nowhere/b.yml");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  gst_harness_set_src_caps (
+      h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
+  fail_unless (
+      next_message_text (bus, GST_MESSAGE_ERROR).find ("/nowhere/b.yml") != std::string::npos);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_tells_upstream_the_roi_once_for_a_person_who_stays)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  for (int i = 1; i < 4; i++)
+    push (h, scene (rig, i, true));
+  int told = 0;
+  while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
+    const GstStructure *s = gst_event_get_structure (event);
+    if (s && gst_structure_has_name (s, "GstRangeRoi")) {
+      guint view, x, y, width, height;
+      fail_unless (gst_structure_get (s, "view-id", G_TYPE_UINT, &view, "x", G_TYPE_UINT, &x, "y",
+          G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr));
+      fail_unless (view == 0 && x == 84 && y == 74 && width == 92 && height == 112);
+      told++;
+    }
+    gst_event_unref (event);
+  }
+  fail_unless_equals_int (told, 1);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_size_is_learnt_anew_and_same_size_keeps_the_background)
+{
+  const Rig rig = ring_rig (1), larger = ring_rig (1, 640, 480);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 60, 1)));
+  fail_if (push (h, scene (rig, 1, true)).empty ());
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (larger, 30, 1)));
+  fail_unless (push (h, scene (larger, 2, true)).empty ());
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stats_count_points)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  push (h, scene (rig, 1, true));
+  GstElement *element = gst_harness_find_element (h, "roiextract");
+  GstStructure *stats;
+  guint64 in = 0, out = 0, frames = 0;
+  g_object_get (element, "stats", &stats, nullptr);
+  gst_structure_get (stats, "points-in", G_TYPE_UINT64, &in, "points-out", G_TYPE_UINT64, &out,
+      "frames", G_TYPE_UINT64, &frames, nullptr);
+  fail_unless_equals_uint64 (in, 2 * 320 * 240);
+  fail_unless_equals_uint64 (out, 60 * 80);
+  fail_unless_equals_uint64 (frames, 2);
+  gst_structure_free (stats);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_forgets_the_background_in_null)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  gst_element_set_state (h->element, GST_STATE_NULL);
+  gst_harness_play (h);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  fail_unless (push (h, scene (rig, 1, true)).empty ());
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static Suite *
+roiextract_suite ()
+{
+  Suite *suite = suite_create ("roiextract");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_learns_then_crops_to_the_person_without_copying);
+  tcase_add_test (tc, test_nobody_is_an_empty_roi_and_no_error);
+  tcase_add_test (tc, test_margin_grows_the_roi);
+  tcase_add_test (tc, test_capture_background_learns_anew);
+  tcase_add_test (tc, test_background_is_saved_and_loaded);
+  tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
+  tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);
+  tcase_add_test (tc, test_new_size_is_learnt_anew_and_same_size_keeps_the_background);
+  tcase_add_test (tc, test_stats_count_points);
+  tcase_add_test (tc, test_forgets_the_background_in_null);
+  return suite;
+}
+
+GST_CHECK_MAIN (roiextract);

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The background model and what is separated by it. */
+#include "test-support.hpp"
+
+#include <fstream>
+#include <random>
+#include <rangecast/roi/background.hpp>
+#include <rangecast/roi/segmentation.hpp>
+#include <unistd.h>
+
+using namespace rangecast;
+using rangecast::testing::Image;
+
+namespace {
+
+constexpr int kWidth = 64, kHeight = 48;
+
+/* A grey wall 2 m away (20000 units) with noise, and whatever a test puts before it. */
+struct Frame {
+  Image<std::uint16_t> depth{kWidth, kHeight};
+  Image<Rgbx> colour{kWidth, kHeight};
+
+  explicit Frame (unsigned seed, double brightness = 1)
+  {
+    std::mt19937 random (seed);
+    std::normal_distribution<double> grey (0, 2), range (0, 40);
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 0; x < kWidth; x++) {
+        depth.view ().at (x, y) = static_cast<std::uint16_t> (20000 + range (random));
+        const auto level = [&] (double base) {
+          return static_cast<std::uint8_t> (base * brightness + grey (random));
+        };
+        colour.view ().at (x, y) = {level (120), level (125), level (110), 0};
+      }
+  }
+  void put (int x0, int y0, int width, int height, std::uint16_t z, Rgbx c)
+  {
+    for (int y = y0; y < y0 + height; y++)
+      for (int x = x0; x < x0 + width; x++) {
+        depth.view ().at (x, y) = z;
+        colour.view ().at (x, y) = c;
+      }
+  }
+  RangeImage image () { return {0, {0, 0, kWidth, kHeight}, depth.view (), colour.view (), 0}; }
+  int valid (int x0, int y0, int width, int height)
+  {
+    int n = 0;
+    for (int y = y0; y < y0 + height; y++)
+      for (int x = x0; x < x0 + width; x++)
+        n += depth.view ().at (x, y) != kInvalidDepth;
+    return n;
+  }
+  int valid () { return valid (0, 0, kWidth, kHeight); }
+};
+
+BackgroundModel
+learnt_wall ()
+{
+  BackgroundModel model;
+  model.reset (kWidth, kHeight);
+  for (unsigned i = 0; i < 20; i++)
+    EXPECT_TRUE (model.learn (Frame (i).image ()).ok ());
+  model.finish ();
+  return model;
+}
+
+void
+segment (Frame &frame, const SegmentationSettings &settings = {})
+{
+  Segmenter segmenter;
+  ASSERT_TRUE (segmenter.clear_background (frame.image (), learnt_wall (), 1e-4, settings).ok ());
+}
+
+} // namespace
+
+TEST (Background, mean_and_spread_are_those_of_the_samples)
+{
+  BackgroundModel model;
+  model.reset (1, 1);
+  Image<std::uint16_t> depth (1, 1);
+  Image<Rgbx> colour (1, 1);
+  const std::uint16_t depths[] = {1000, 0, 1004, 1002};
+  for (int i = 0; i < 4; i++) {
+    depth.view ().at (0, 0) = depths[i];
+    const auto c = static_cast<std::uint8_t> (100 + 2 * i);
+    colour.view ().at (0, 0) = {c, c, c, 0};
+    ASSERT_TRUE (model.learn ({0, {0, 0, 1, 1}, depth.view (), colour.view (), 0}).ok ());
+  }
+  model.finish ();
+  const BackgroundPixel &pixel = model.row (0)[0];
+  EXPECT_FLOAT_EQ (pixel.mean[0], 103);
+  EXPECT_NEAR (pixel.spread, std::sqrt (5.0), 1e-5);
+  EXPECT_FLOAT_EQ (pixel.depth, 1002);
+  EXPECT_NEAR (pixel.depth_spread, std::sqrt (8.0 / 3), 1e-4);
+  EXPECT_FLOAT_EQ (pixel.depth_share, 0.75);
+}
+
+TEST (Background, empty_scene_leaves_nothing)
+{
+  Frame frame (99);
+  segment (frame);
+  EXPECT_EQ (frame.valid (), 0);
+}
+
+TEST (Background, nearer_thing_of_the_same_colour_stays)
+{
+  Frame frame (99);
+  frame.put (20, 10, 20, 20, 12000, {120, 125, 110, 0});
+  segment (frame);
+  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
+  EXPECT_EQ (frame.valid (), 400);
+}
+
+TEST (Background, other_colour_at_the_same_depth_stays_and_depth_alone_loses_it)
+{
+  Frame frame (99), depth_only (99);
+  for (Frame *f : {&frame, &depth_only})
+    f->put (20, 10, 20, 20, 20000, {190, 90, 80, 0});
+  segment (frame);
+  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
+  SegmentationSettings settings;
+  settings.cue = Cue::kDepth;
+  segment (depth_only, settings);
+  EXPECT_EQ (depth_only.valid (), 0);
+}
+
+TEST (Background, shadow_and_light_on_the_wall_are_background)
+{
+  for (double brightness : {0.6, 0.8, 1.2}) {
+    Frame frame (99, brightness);
+    segment (frame);
+    EXPECT_EQ (frame.valid (), 0) << brightness;
+  }
+}
+
+TEST (Background, much_darker_thing_is_no_shadow)
+{
+  Frame frame (99);
+  frame.put (20, 10, 20, 20, 20000, {20, 21, 18, 0});
+  segment (frame);
+  EXPECT_EQ (frame.valid (), 400);
+}
+
+TEST (Background, small_island_goes_and_small_hole_closes)
+{
+  Frame frame (99);
+  frame.put (5, 5, 6, 6, 12000, {200, 60, 60, 0});
+  frame.put (20, 10, 30, 30, 12000, {200, 60, 60, 0});
+  frame.put (30, 20, 4, 4, 20000, {120, 125, 110, 0});
+  segment (frame);
+  EXPECT_EQ (frame.valid (5, 5, 6, 6), 0);
+  EXPECT_EQ (frame.valid (30, 20, 4, 4), 16);
+}
+
+TEST (Background, closing_a_hole_makes_no_depth)
+{
+  Frame frame (99);
+  frame.put (20, 10, 30, 30, 12000, {200, 60, 60, 0});
+  frame.put (30, 20, 4, 4, kInvalidDepth, {120, 125, 110, 0});
+  segment (frame);
+  EXPECT_EQ (frame.valid (30, 20, 4, 4), 0);
+  EXPECT_EQ (frame.valid (), 900 - 16);
+}
+
+TEST (Background, roi_is_compared_with_its_own_part_of_the_background)
+{
+  Frame frame (99);
+  frame.put (20, 10, 20, 20, 12000, {200, 60, 60, 0});
+  const RangeImage part = {0, {15, 8, 40, 35}, frame.depth.view ().crop (15, 8, 40, 35),
+      frame.colour.view ().crop (15, 8, 40, 35), 0};
+  Segmenter segmenter;
+  ASSERT_TRUE (segmenter.clear_background (part, learnt_wall (), 1e-4, {}).ok ());
+  EXPECT_EQ (frame.valid (15, 8, 40, 35), 400);
+  EXPECT_EQ (frame.valid (0, 0, 15, 48), 15 * 48) << "outside the ROI nothing may be written";
+}
+
+TEST (Background, roi_outside_the_background_is_refused)
+{
+  Frame frame (99);
+  RangeImage image = frame.image ();
+  image.roi.x = 1;
+  Segmenter segmenter;
+  EXPECT_EQ (
+      segmenter.clear_background (image, learnt_wall (), 1e-4, {}).code (), StatusCode::kBadSize);
+  BackgroundModel model;
+  model.reset (kWidth, kHeight);
+  EXPECT_EQ (model.learn (image).code (), StatusCode::kBadSize);
+}
+
+TEST (Background, file_gives_the_same_decisions)
+{
+  const std::string path =
+      ::testing::TempDir () + "background-" + std::to_string (getpid ()) + ".yml.gz";
+  const BackgroundModel model = learnt_wall ();
+  ASSERT_TRUE (save_backgrounds (path, {{3, &model}}).ok ());
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  const Status status = load_backgrounds (path, loaded);
+  std::filesystem::remove (path);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  ASSERT_EQ (loaded.size (), 1u);
+  EXPECT_EQ (loaded[0].first, 3);
+  EXPECT_EQ (loaded[0].second.frames (), 20);
+  for (int x = 0; x < kWidth; x++)
+    EXPECT_FLOAT_EQ (loaded[0].second.row (7)[x].depth, model.row (7)[x].depth);
+}
+
+TEST (Background, bad_files_are_named)
+{
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  EXPECT_EQ (load_backgrounds ("/nowhere.yml", loaded).code (), StatusCode::kNotFound);
+  const std::string path = ::testing::TempDir () + "bad-" + std::to_string (getpid ()) + ".yml";
+  for (const char *text : {"", "hello", "%YAML:1.0\n---\nrangecast_background: 2\n",
+           "%YAML:1.0\n---\nrangecast_background: 1\nviews:\n  - id: 0\n"}) {
+    std::ofstream (path) << text;
+    const Status status = load_backgrounds (path, loaded);
+    EXPECT_EQ (status.code (), StatusCode::kBadData) << text;
+    EXPECT_TRUE (status.message ().starts_with (path));
+  }
+  std::filesystem::remove (path);
+}
