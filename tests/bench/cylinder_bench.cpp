@@ -212,6 +212,35 @@ count (const FrameSet &set)
   return n;
 }
 
+/** Of the points there were, how far (mm) all but one in a thousand are at most from one that is
+ * left; 10 at most. Shows holes. */
+double
+hole_mm (FrameSet &set)
+{
+  constexpr double kCell = 0.01;
+  auto key = [] (Vec3 p, int k) {
+    auto cell = [] (double v) { return std::uint64_t (std::floor (v / kCell) + (1 << 20)); };
+    return (cell (p.x) + k % 3 - 1) << 42 | (cell (p.y) + k / 3 % 3 - 1) << 21 |
+           (cell (p.z) + k / 9 - 1);
+  };
+  std::unordered_map<std::uint64_t, std::vector<Vec3>> left;
+  for (const Spot &spot : spots_of (set))
+    left[key (spot.point, 13)].push_back (spot.point);
+  FrameSet before = set;
+  before.restore ();
+  std::vector<double> far;
+  for (const Spot &spot : spots_of (before)) {
+    double nearest = kCell;
+    for (int k = 0; k < 27; k++)
+      if (auto found = left.find (key (spot.point, k)); found != left.end ())
+        for (Vec3 p : found->second)
+          nearest = std::min (nearest, norm (p - spot.point));
+    far.push_back (nearest * 1000);
+  }
+  std::sort (far.begin (), far.end ());
+  return far.empty () ? 0 : far[far.size () * 999 / 1000];
+}
+
 template <typename Work>
 double
 median_ms (FrameSet &set, int rounds, const Work &work)
@@ -234,8 +263,11 @@ measure (const std::string &name, FrameSet set, int rounds)
 {
   const std::size_t before = count (set);
   auto line = [&] (const char *what, double ms) {
-    std::printf ("%-26s %-22s %9.2f ms  %8zu -> %8zu points\n", name.c_str (), what, ms, before,
-        count (set));
+    std::printf (
+        "%-26s %-22s %9.2f ms  %8zu -> %8zu points", name.c_str (), what, ms, before, count (set));
+    if (before < 150000) /* counting holes takes long */
+      std::printf ("  holes %5.2f mm", hole_mm (set));
+    std::printf ("\n");
   };
   for (int threads : {1, 0}) {
     CylinderFilter filter;
