@@ -428,8 +428,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   install_unit_properties (object_class, flags);
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
-          "Views worked on at the same time, 0 to 64; 0 = number of cores (default: 0)", 0, 64, 0,
-          flags));
+          "Views and slices worked on at the same time, 0 to 64; 0 = number of cores (default: 0)",
+          0, 64, 0, flags));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared since READY; axis-position, "

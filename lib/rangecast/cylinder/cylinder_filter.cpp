@@ -171,8 +171,8 @@ CylinderFilter::work (
     range.y_max = std::max (range.y_max, ranges_[i].y_max);
   }
   units_.sort (cloud_, radius_, column_, range, settings.units);
-  units_.find_tangents ();
-  units_.smooth ();
+  units_.find_tangents (settings.threads);
+  units_.smooth (settings.threads);
   result.units = units_.occupied;
   result.units_shared = units_.shared;
   result.points_out -= clear_losers (images);

@@ -19,7 +19,7 @@ struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
   UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
-  int threads = 1;    ///< views at a time in the passes over pixels; 0 = number of cores
+  int threads = 1;    ///< views, and slices, at a time; 0 = number of cores
 };
 
 /** What one frame came to. */

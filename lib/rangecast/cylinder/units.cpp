@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 
 namespace rangecast {
 
@@ -200,27 +201,54 @@ Units::next_entry (const UnitLayer &layer, const UnitEntry &entry) const
 }
 
 void
-Units::find_tangents ()
+Units::find_tangents_of (const UnitLayer &layer)
 {
-  for (const UnitLayer &layer : layers)
-    for (UnitEntry &entry : entries_of (layer)) {
-      const UnitEntry *found = next_entry (layer, entry);
-      if (!found)
-        continue;
-      UnitEntry &next = entries[static_cast<std::size_t> (found - entries.data ())];
-      const float dx = next.x - entry.x, dz = next.z - entry.z;
-      const float length = std::sqrt (dx * dx + dz * dz);
-      if (!(length > 1e-9f))
-        continue;
-      entry.tangent[0] = dx / length;
-      entry.tangent[1] = dz / length;
-      if (next.tangent[0] == 0 && next.tangent[1] == 0)
-        std::copy_n (entry.tangent, 2, next.tangent);
+  for (UnitEntry &entry : entries_of (layer)) {
+    const UnitEntry *found = next_entry (layer, entry);
+    if (!found)
+      continue;
+    UnitEntry &next = entries[static_cast<std::size_t> (found - entries.data ())];
+    const float dx = next.x - entry.x, dz = next.z - entry.z;
+    const float length = std::sqrt (dx * dx + dz * dz);
+    if (!(length > 1e-9f))
+      continue;
+    entry.tangent[0] = dx / length;
+    entry.tangent[1] = dz / length;
+    if (next.tangent[0] == 0 && next.tangent[1] == 0)
+      std::copy_n (entry.tangent, 2, next.tangent);
+  }
+}
+
+/* Runs work (layers) for the layers of each slice, several slices at a time if that is wanted. */
+template <typename Work>
+void
+Units::for_each_slice (int threads, const Work &work)
+{
+  auto some = [&] (const cv::Range &range) {
+    for (int slice = range.start; slice < range.end; slice++) {
+      const std::size_t unit = static_cast<std::size_t> (slice) * settings_.columns;
+      const std::uint32_t begin = begin_[unit], end = begin_[unit + settings_.columns];
+      work (std::span<UnitLayer> (layers.data () + begin, end - begin));
     }
-  for (UnitLayer &layer : layers)
-    for (const UnitEntry &entry : entries_of (layer))
-      for (int k = 0; k < 2; k++)
-        layer.tangent[k] += static_cast<float> (entry.point_count) * entry.tangent[k];
+  };
+  if (threads == 1)
+    return some ({0, slices_});
+  /* More stripes than threads: slices hold very different numbers of points. */
+  const int stripes = threads > 0 ? threads : 4 * cv::getNumThreads ();
+  cv::parallel_for_ ({0, slices_}, some, stripes);
+}
+
+void
+Units::find_tangents (int threads)
+{
+  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
+    for (const UnitLayer &layer : slice)
+      find_tangents_of (layer);
+    for (UnitLayer &layer : slice)
+      for (const UnitEntry &entry : entries_of (layer))
+        for (int k = 0; k < 2; k++)
+          layer.tangent[k] += static_cast<float> (entry.point_count) * entry.tangent[k];
+  });
 }
 
 void
@@ -265,7 +293,7 @@ Units::sum_across_slices (UnitLayer &layer, int reach)
 }
 
 void
-Units::smooth ()
+Units::smooth (int threads)
 {
   if (settings_.smoothing_m <= 0)
     return;
@@ -273,15 +301,19 @@ Units::smooth ()
   /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
    */
   constexpr double kMostColumns = 8, kMostSlices = 8;
+  const double most = std::min (kMostColumns, settings_.columns / 4.0);
   const double columns_per_radian = settings_.columns / (2 * M_PI);
-  for (UnitLayer &layer : layers) {
-    const double across = settings_.smoothing_m / std::max (1e-6, double{layer.radius});
-    sum_along_slice (layer, static_cast<int> (std::min ({across * columns_per_radian, kMostColumns,
-                                settings_.columns / 4.0})));
-  }
+  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
+    for (UnitLayer &layer : slice) {
+      const double radians = settings_.smoothing_m / std::max (1e-6, double{layer.radius});
+      sum_along_slice (layer, static_cast<int> (std::min (radians * columns_per_radian, most)));
+    }
+  });
   const double slices = std::min (settings_.smoothing_m * slices_per_metre_, kMostSlices);
-  for (UnitLayer &layer : layers)
-    sum_across_slices (layer, static_cast<int> (slices + 0.5));
+  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
+    for (UnitLayer &layer : slice)
+      sum_across_slices (layer, static_cast<int> (slices + 0.5));
+  });
 }
 
 } // namespace rangecast

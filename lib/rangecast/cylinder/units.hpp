@@ -64,14 +64,15 @@ public:
    *  Rows of a range image need not lie along slices, and a unit often holds one point of a view or
    *  none. So "successive" means: the view's mean points in successive occupied units of the slice,
    *  at most kReach columns apart and not across a layer gap, in the order of phi, across 2 pi too.
-   *  The last one of such a run has the tangent of the one before it. */
-  void find_tangents ();
+   *  The last one of such a run has the tangent of the one before it.
+   *  @param threads  slices worked on at the same time; 0 = number of cores */
+  void find_tangents (int threads);
 
   /** Adds up tangents over the neighbourhood of each layer (smoothing_m each way along the slice,
    *  then across slices, not across layer gaps), so that winners do not change from unit to unit by
    *  chance; and finds the views that cover a layer without a point in it: those with points on
    *  both sides of it (in angle or in height) in that neighbourhood. */
-  void smooth ();
+  void smooth (int threads);
 
   /** Columns over which a view's points are still successive. */
   static constexpr int kReach = 6;
@@ -88,6 +89,8 @@ private:
   void cut_into_layers (const WorldPoints &cloud);
   void add_layer (
       const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end);
+  template <typename Work> void for_each_slice (int threads, const Work &work);
+  void find_tangents_of (const UnitLayer &layer);
   [[nodiscard]] const UnitLayer *find_layer (int slice, int column, float radius) const;
   template <typename Work>
   void along_slice (const UnitLayer &from, int reach, int side, const Work &work) const;
