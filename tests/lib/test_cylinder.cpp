@@ -2,12 +2,38 @@
 #include "test-support.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <map>
+#include <new>
 #include <random>
 #include <rangecast/cylinder/cylinder_filter.hpp>
+
+/* Counts what is allocated, for the test that nothing is. Not inlined, or compilers see a free that
+ * has no malloc and warn. */
+static std::atomic<int> allocations;
+
+[[gnu::noinline]] void *
+operator new (std::size_t size)
+{
+  allocations++;
+  if (void *memory = std::malloc (size ? size : 1))
+    return memory;
+  throw std::bad_alloc ();
+}
+[[gnu::noinline]] void
+operator delete (void *memory) noexcept
+{
+  std::free (memory);
+}
+[[gnu::noinline]] void
+operator delete (void *memory, std::size_t) noexcept
+{
+  std::free (memory);
+}
 
 using namespace rangecast;
 using rangecast::testing::Image;
@@ -505,6 +531,26 @@ TEST (Filter, one_view_or_none_is_left_alone)
   EXPECT_TRUE (filter.process (images, {}, result).ok ());
   EXPECT_EQ (result.points_in, points);
   EXPECT_EQ (result.points_out, points);
+}
+
+TEST (Filter, allocates_nothing_once_it_has_seen_the_largest_frame)
+{
+  Shots shots (ring_rig (4), bust (), 0.001);
+  Shots fresh = shots;
+  CylinderFilter filter;
+  CylinderResult result;
+  ASSERT_TRUE (filter.set_rig (shots.rig).ok ());
+  const std::vector<RangeImage> images = shots.images ();
+  ASSERT_TRUE (filter.process (images, {}, result).ok ());
+  for (std::size_t i = 0; i < images.size (); i++)
+    for (int v = 0; v < images[i].depth.height; v++)
+      std::memcpy (images[i].depth.row (v), fresh.depth[i].view ().row (v),
+          2 * std::size_t (images[i].depth.width));
+  const int before = allocations;
+  const Status status = filter.process (images, {}, result);
+  EXPECT_EQ (allocations, before);
+  EXPECT_TRUE (status.ok ());
+  EXPECT_LT (result.points_out, result.points_in);
 }
 
 TEST (Filter, takes_64_views_single_pixels_and_extreme_depths)

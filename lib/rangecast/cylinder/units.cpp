@@ -115,34 +115,30 @@ Units::add_layer (
     const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end)
 {
   const auto parts = cloud.parts ();
-  UnitLayer layer;
+  UnitLayer &layer = layers.emplace_back ();
   layer.slice = static_cast<int> (unit) / settings_.columns;
   layer.column = static_cast<int> (unit) % settings_.columns;
   layer.first_entry = static_cast<std::uint32_t> (entries.size ());
   std::uint32_t view = 0;
   float radii = 0;
   for (std::uint32_t i = begin; i < end;) {
-    UnitEntry entry;
+    float x = 0, z = 0, radius = 0;
+    const std::uint32_t first = i;
     while (points[i].index >= parts[view].end)
       view++;
-    entry.view = view;
-    entry.first_point = i;
     for (; i < end && points[i].index < parts[view].end; i++) {
-      entry.x += points[i].x;
-      entry.z += points[i].z;
-      entry.radius += points[i].radius;
+      x += points[i].x;
+      z += points[i].z;
+      radius += points[i].radius;
     }
-    radii += entry.radius;
-    entry.point_count = i - entry.first_point;
-    const float share = 1 / static_cast<float> (entry.point_count);
-    entry.x *= share, entry.z *= share, entry.radius *= share;
+    radii += radius;
+    const float share = 1 / static_cast<float> (i - first);
     layer.views |= std::uint64_t{1} << view;
-    entries.push_back (entry);
+    entries.push_back ({x * share, z * share, radius * share, {}, first, i - first, view});
   }
   layer.covering = layer.views;
   layer.entry_count = static_cast<std::uint32_t> (entries.size ()) - layer.first_entry;
   layer.radius = radii / static_cast<float> (end - begin);
-  layers.push_back (layer);
 }
 
 /* The layer of that unit whose radius is nearest, unless a gap lies between. */
