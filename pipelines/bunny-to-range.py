@@ -208,7 +208,7 @@ def main():
             cameras.append((name, rotation, position))
         write_rig(os.path.join(options.out, "rig.yaml"), cameras)
     except (OSError, ValueError, StopIteration) as error:
-        sys.exit(f"bunny-to-range: {error or 'a scan ends too early'}")
+        sys.exit(f"bunny-to-range: {str(error) or 'a scan ends too early'}")
 
 
 if __name__ == "__main__":

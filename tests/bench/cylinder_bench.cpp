@@ -135,7 +135,7 @@ spots_of (FrameSet &set)
         if (const int d = image.depth.at (u, v)) {
           const Vec3 p =
               view.world_from_view * view.intrinsics.unproject (u, v, d * view.depth_unit_m);
-          spots.push_back ({image.view_id, u, v, p, std::atan2 (p.z, p.x) + M_PI});
+          spots.push_back ({image.view_id, u, v, p, 0});
         }
   }
   return spots;
@@ -148,8 +148,15 @@ plain_rule (FrameSet &set)
 {
   std::vector<RangeImage> images = set.images ();
   std::map<int, std::map<int, std::vector<Spot>>> slices; /* slice -> view -> points */
-  for (const Spot &spot : spots_of (set))
-    slices[int (std::floor (spot.point.y / 0.004))][spot.view].push_back (spot);
+  std::vector<Spot> all = spots_of (set);
+  Vec3 middle;
+  for (const Spot &spot : all)
+    middle = middle + 1.0 / double (all.size ()) * spot.point;
+  for (Spot &spot : all) {
+    const Vec3 p = spot.point - middle;
+    spot.phi = std::atan2 (p.z, p.x) + M_PI;
+    slices[int (std::floor (p.y / 0.004))][spot.view].push_back (spot);
+  }
   struct Share {
     Vec3 tangent;
     std::vector<const Spot *> spots;
@@ -212,10 +219,14 @@ count (const FrameSet &set)
   return n;
 }
 
-/** Of the points there were, how far (mm) all but one in a thousand are at most from one that is
- * left; 10 at most. Shows holes. */
-double
-hole_mm (FrameSet &set)
+struct Quality {
+  double
+      hole_mm; ///< of the points there were, all but 1 in 1000 have one left this near; 10 at most
+  double mixed_percent; ///< of the points left, those with one of another view within 3 mm
+};
+
+Quality
+quality_of (FrameSet &set)
 {
   constexpr double kCell = 0.01;
   auto key = [] (Vec3 p, int k) {
@@ -223,22 +234,30 @@ hole_mm (FrameSet &set)
     return (cell (p.x) + k % 3 - 1) << 42 | (cell (p.y) + k / 3 % 3 - 1) << 21 |
            (cell (p.z) + k / 9 - 1);
   };
-  std::unordered_map<std::uint64_t, std::vector<Vec3>> left;
-  for (const Spot &spot : spots_of (set))
-    left[key (spot.point, 13)].push_back (spot.point);
+  const std::vector<Spot> left = spots_of (set);
+  std::unordered_map<std::uint64_t, std::vector<const Spot *>> cells;
+  for (const Spot &spot : left)
+    cells[key (spot.point, 13)].push_back (&spot);
+  auto nearest = [&] (const Spot &spot, bool of_another_view) {
+    double least = kCell;
+    for (int k = 0; k < 27; k++)
+      if (auto found = cells.find (key (spot.point, k)); found != cells.end ())
+        for (const Spot *other : found->second)
+          if (!of_another_view || other->view != spot.view)
+            least = std::min (least, norm (other->point - spot.point));
+    return least;
+  };
   FrameSet before = set;
   before.restore ();
   std::vector<double> far;
-  for (const Spot &spot : spots_of (before)) {
-    double nearest = kCell;
-    for (int k = 0; k < 27; k++)
-      if (auto found = left.find (key (spot.point, k)); found != left.end ())
-        for (Vec3 p : found->second)
-          nearest = std::min (nearest, norm (p - spot.point));
-    far.push_back (nearest * 1000);
-  }
+  for (const Spot &spot : spots_of (before))
+    far.push_back (nearest (spot, false) * 1000);
   std::sort (far.begin (), far.end ());
-  return far.empty () ? 0 : far[far.size () * 999 / 1000];
+  std::size_t mixed = 0;
+  for (const Spot &spot : left)
+    mixed += nearest (spot, true) < 0.003;
+  return {far.empty () ? 0 : far[far.size () * 999 / 1000],
+      100.0 * double (mixed) / double (std::max<std::size_t> (1, left.size ()))};
 }
 
 template <typename Work>
@@ -265,8 +284,10 @@ measure (const std::string &name, FrameSet set, int rounds)
   auto line = [&] (const char *what, double ms) {
     std::printf (
         "%-26s %-22s %9.2f ms  %8zu -> %8zu points", name.c_str (), what, ms, before, count (set));
-    if (before < 150000) /* counting holes takes long */
-      std::printf ("  holes %5.2f mm", hole_mm (set));
+    if (before < 150000) { /* takes long */
+      const Quality q = quality_of (set);
+      std::printf ("  holes %5.2f mm, %4.1f %% mixed", q.hole_mm, q.mixed_percent);
+    }
     std::printf ("\n");
   };
   for (int threads : {1, 0}) {
@@ -279,6 +300,17 @@ measure (const std::string &name, FrameSet set, int rounds)
     const double ms = median_ms (
         set, rounds, [&] { (void)filter.process (set.images (), settings, result).ok (); });
     line (threads == 1 ? "cylinder, 1 thread" : "cylinder, all cores", ms);
+  }
+  {
+    CylinderFilter filter;
+    CylinderResult result;
+    CylinderSettings settings;
+    settings.units.smoothing_m = 0;
+    if (!filter.set_rig (set.rig).ok ())
+      return;
+    const double ms = median_ms (
+        set, rounds, [&] { (void)filter.process (set.images (), settings, result).ok (); });
+    line ("cylinder, smoothing 0", ms);
   }
   const int few = std::max (3, rounds / 10);
   line ("plain rule", median_ms (set, few, [&] { plain_rule (set); }));

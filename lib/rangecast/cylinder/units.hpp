@@ -45,7 +45,7 @@ struct UnitLayer {
 };
 
 /** The points of a frame set, sorted into the units of a cylinder's inner wall. Keeps its memory
- * from frame to frame: 20 bytes a point, 4 a unit, 64 a layer and 36 an entry. */
+ * from frame to frame: 20 bytes a point, 4 a unit, 56 a layer and 32 an entry. */
 class Units {
 public:
   struct Point {
