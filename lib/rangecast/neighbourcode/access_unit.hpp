@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "decoder.hpp"
+#include "encoder.hpp"
+
+namespace rangecast {
+
+/** Codes whole frame sets; views in parallel. */
+class AccessUnitEncoder {
+public:
+  Status configure (const Rig &rig, const EncoderSettings &settings);
+
+  /** Codes a frame set. Its bytes are those of parts() in order, valid until the next call.
+   *  @param threads  views at a time; 0 = number of cores
+   *  @return kNotFound for a view that the rig has not, kBadSize for a ROI outside its view */
+  Status encode (std::span<const RangeImage> images, std::uint32_t frame_number, int threads,
+      EncoderResult &result);
+
+  [[nodiscard]] std::size_t parts () const { return count_; }
+  [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return work_[i].bytes; }
+  [[nodiscard]] std::size_t size () const;
+  /** Metres by which quantisation changes a depth at most, over all views. Thresholds come on top:
+   *  depth-threshold codes of that view. */
+  [[nodiscard]] double max_depth_error_m () const { return max_depth_error_m_; }
+
+private:
+  struct Work { /* of one image of the frame set */
+    std::vector<std::uint8_t> bytes;
+    EncoderResult result;
+    Status status;
+  };
+  Rig rig_;
+  EncoderSettings settings_;
+  double max_depth_error_m_ = 0;
+  std::array<ViewEncoder, kMaxViews> views_; /* by view-id */
+  std::array<Work, kMaxViews> work_;
+  std::size_t count_ = 0;
+};
+
+struct DecoderResult {
+  std::uint64_t slices = 0;     ///< decoded
+  std::uint64_t bad_slices = 0; ///< damaged, of another rig or version, or at odds with the others
+  std::uint64_t missing_pixels = 0; ///< of the views' ROIs, in slices that did not come
+  std::uint64_t points = 0;         ///< valid pixels
+  std::uint64_t raw_bits = 0;       ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+};
+
+/** Decodes whole frame sets in two steps: plan() finds which views there are and how large, so that
+ *  the caller can make room; decode() fills it, views in parallel. No input makes it write outside
+ *  the images, and a damaged slice costs that slice. */
+class AccessUnitDecoder {
+public:
+  struct PlannedView {
+    int view_id = 0;
+    Roi roi;
+    std::uint64_t capture_time_ns = 0;
+    std::size_t first_slice = 0, slice_count = 0; ///< in the order of views
+  };
+
+  Status set_rig (const Rig &rig);
+  [[nodiscard]] const Rig &rig () const { return rig_; }
+
+  /** Reads all headers. Views are sorted by view-id; the first slice of a view says its ROI and
+   *  bits, others that differ are bad. `bytes` must live until decode() is done. */
+  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result);
+  [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
+  /** Pixels of a view's ROI that no slice holds. */
+  [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
+
+  /** @param images  one for each of views(), with its ROI; pixels without a slice are left as they
+   *  are, those of damaged slices become invalid.
+   *  @param threads  views at a time; 0 = number of cores */
+  void decode (std::span<const RangeImage> images, int threads, DecoderResult &result);
+
+private:
+  struct PlannedSlice {
+    std::span<const std::uint8_t> unit;
+    SliceHeader header;
+  };
+  void decode_view (std::size_t index, const RangeImage &image);
+
+  Rig rig_;
+  SliceDecoder header_reader_;
+  std::array<SliceDecoder, kMaxViews> decoders_; /* by view-id */
+  std::array<PlannedView, kMaxViews> planned_;
+  std::array<DecoderResult, kMaxViews> results_; /* by planned view */
+  std::size_t count_ = 0;
+  std::vector<PlannedSlice> slices_;
+};
+
+/** Fills an image from an older one of the same view: where their ROIs overlap its pixels,
+ * elsewhere invalid ones. For views of which slices are missing. */
+void fill_from (const ConstRangeImage &older, const RangeImage &image);
+
+} // namespace rangecast

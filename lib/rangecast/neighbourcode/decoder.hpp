@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "../geometry/quantiser.hpp"
+#include "../geometry/range_image.hpp"
+#include "unit.hpp"
+
+namespace rangecast {
+
+/** Decodes slices of profile plain into range images, and keeps tables and memory between them. */
+class SliceDecoder {
+public:
+  /** The cameras whose views may come. Forgets the tables. */
+  Status set_rig (const Rig &rig);
+  [[nodiscard]] const Rig &rig () const { return rig_; }
+
+  /** Reads a slice's header and checks that its view is in the rig and its ROI in that view. */
+  Status read_header (std::span<const std::uint8_t> unit, SliceHeader &header) const;
+
+  /** Decodes one slice into the planes of its view. Writes only pixels of its own rows and
+   *  columns; where it returns an error, those may be partly written: see invalidate().
+   *  @param unit    the whole unit
+   *  @param header  as read_header() gave it
+   *  @param image   has the slice's ROI
+   *  @param[out] points  grows by the valid pixels
+   *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
+  Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
+      const RangeImage &image, std::uint64_t &points);
+
+  /** Clears the depths of a slice's rows and columns. */
+  static void invalidate (const SliceHeader &header, const RangeImage &image);
+
+private:
+  struct ViewTables {
+    DepthQuantiser depth;
+    int depth_bits = 0;
+  };
+  const DepthQuantiser *depth_of (const SliceHeader &header);
+
+  Rig rig_;
+  std::array<std::unique_ptr<ViewTables>, kMaxViews> views_;
+  std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
+      ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
+  std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
+};
+
+} // namespace rangecast

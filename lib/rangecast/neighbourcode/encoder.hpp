@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/quantiser.hpp"
+#include "../geometry/range_image.hpp"
+#include "unit.hpp"
+
+namespace rangecast {
+
+struct EncoderSettings {
+  int depth_bits = 12;       ///< 6 to 16
+  int colour_bits = 8;       ///< 4 to 8
+  int depth_threshold = 6;   ///< codes; 0 to 65535
+  int colour_threshold = 10; ///< codes of each of R, G, B; 0 to 255
+  int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
+
+  friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
+};
+
+Status validate (const EncoderSettings &settings);
+
+/** What one view came to. */
+struct EncoderResult {
+  std::uint64_t points = 0;      ///< valid pixels
+  std::uint64_t full_pixels = 0; ///< of these, written in full
+  std::uint64_t slices = 0;
+  std::uint64_t raw_bits = 0; ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+};
+
+/** Codes range images of one view, profile plain, and keeps its memory from frame to frame. */
+class ViewEncoder {
+public:
+  /** Sets up for a view. Builds tables only if something changed. */
+  Status configure (const View &view, const EncoderSettings &settings);
+
+  /** Appends the slices of one range image.
+   *
+   *  Pixels are scanned row by row. A valid one is compared with its left, upper-left, upper and
+   *  upper-right neighbours, as they are after quantisation and replacement; the first that is near
+   *  enough in depth and in each of R, G, B replaces it. Neighbours outside the slice do not exist.
+   *  An empty ROI gives one slice without pixels. Depths outside near..far are invalid.
+   *  @return kBadSize if the ROI does not lie in the view's image */
+  Status encode (const ConstRangeImage &image, std::uint32_t frame_number,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
+
+  [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
+
+private:
+  void load_row (const ConstRangeImage &image, int y, int first_column, int columns);
+  std::size_t code_row (bool has_upper, std::size_t symbols_at, std::size_t full_at);
+  void code_piece (const ConstRangeImage &image, int first_column, int columns, SliceHeader header,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
+  void close_slice (const SliceHeader &header, std::size_t pixels, std::size_t full,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
+  [[nodiscard]] std::size_t slice_size (std::size_t pixels, std::size_t full) const;
+
+  View view_;
+  EncoderSettings settings_;
+  bool configured_ = false;
+  DepthQuantiser depth_;
+  ColourQuantiser colour_;
+
+  /* Rows as four int32 a pixel (depth, R, G, B), with one invalid pixel on each side. */
+  std::vector<std::int32_t> row_, upper_;
+  std::vector<std::uint8_t> symbols_; /* of the open slice, one a byte */
+  std::vector<std::uint64_t> full_;   /* of the open slice */
+  int columns_ = 0;
+};
+
+} // namespace rangecast

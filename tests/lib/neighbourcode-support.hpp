@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "test-support.hpp"
+
+#include <random>
+#include <rangecast/neighbourcode/access_unit.hpp>
+
+namespace rangecast::testing {
+
+/** One view that owns its pixels: a noisy bump with a hole, in colours that vary. */
+struct Picture {
+  Image<std::uint16_t> depth;
+  Image<Rgbx> colour;
+  Roi roi;
+  int view_id = 0;
+
+  Picture (int id, Roi r, unsigned seed = 1, double noise = 3)
+      : depth (r.width, r.height), colour (r.width, r.height), roi (r), view_id (id)
+  {
+    std::mt19937 random (seed);
+    std::normal_distribution<double> n (0, noise);
+    const auto clip = [] (double v) {
+      return static_cast<std::uint8_t> (std::clamp (v, 0.0, 255.0));
+    };
+    for (int y = 0; y < r.height; y++)
+      for (int x = 0; x < r.width; x++) {
+        const double u = 2.0 * x / r.width - 1, v = 2.0 * y / r.height - 1, d = u * u + v * v;
+        const bool valid = d < 0.9 && !(std::abs (u - 0.3) < 0.05 && std::abs (v) < 0.1);
+        depth.view ().at (x, y) =
+            valid ? static_cast<std::uint16_t> (6000 + 3000 * d + n (random)) : 0;
+        colour.view ().at (x, y) = {clip (150 + 60 * u + n (random)),
+            clip (120 + 50 * v + n (random)), clip (100 + 40 * u * v + n (random)), 0};
+      }
+  }
+  RangeImage image () { return {view_id, roi, depth.view (), colour.view (), 77}; }
+};
+
+inline std::vector<std::uint8_t>
+encode (const Rig &rig, std::vector<Picture> &pictures, const EncoderSettings &settings,
+    EncoderResult *result = nullptr, std::uint32_t frame = 5)
+{
+  AccessUnitEncoder encoder;
+  EXPECT_TRUE (encoder.configure (rig, settings).ok ());
+  std::vector<RangeImage> images;
+  for (Picture &picture : pictures)
+    images.push_back (picture.image ());
+  EncoderResult own;
+  const Status status = encoder.encode (images, frame, 1, result ? *result : own);
+  EXPECT_TRUE (status.ok ()) << status.message ();
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t i = 0; i < encoder.parts (); i++)
+    bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+  return bytes;
+}
+
+struct Decoded {
+  std::vector<Picture> pictures;
+  DecoderResult result;
+};
+
+inline Decoded
+decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes)
+{
+  Decoded decoded;
+  decoder.plan (bytes, decoded.result);
+  for (const auto &view : decoder.views ()) {
+    Picture &picture = decoded.pictures.emplace_back (view.view_id, view.roi);
+    for (int y = 0; y < view.roi.height; y++)
+      for (int x = 0; x < view.roi.width; x++)
+        picture.depth.view ().at (x, y) = kInvalidDepth;
+  }
+  std::vector<RangeImage> images;
+  for (Picture &picture : decoded.pictures)
+    images.push_back (picture.image ());
+  decoder.decode (images, 1, decoded.result);
+  return decoded;
+}
+
+/** The units of an access unit, apart. */
+inline std::vector<std::vector<std::uint8_t>>
+units_of (std::span<const std::uint8_t> bytes)
+{
+  std::vector<std::vector<std::uint8_t>> units;
+  UnitReader reader (bytes);
+  UnitHeader header;
+  while (const auto unit = reader.next (header))
+    units.emplace_back (unit->begin (), unit->end ());
+  EXPECT_TRUE (reader.status ().ok ());
+  return units;
+}
+
+} // namespace rangecast::testing
