@@ -1,0 +1,435 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-neighbourcodedec
+ * @title: neighbourcodedec
+ *
+ * Decodes range images from the neighbour code. Slices that are lost or damaged leave invalid
+ * pixels (or, by #GstNeighbourCodeDec:conceal, the last ones), never an error.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
+ * multifilesink location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstneighbourcodedec.h"
+
+#include <gst/base/base.h>
+
+#include <gstrange/gstrange.h>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/neighbourcode/access_unit.hpp>
+
+using rangecast::ConstRangeImage;
+using rangecast::DecoderResult;
+using rangecast::RangeImage;
+using rangecast::Status;
+
+GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
+#define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
+
+enum { PROP_0, PROP_CONCEAL, PROP_N_THREADS, PROP_STATS };
+
+enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
+
+struct GstNeighbourCodeDecPrivate {
+  std::mutex lock; /* guards what follows; never held across a push or message */
+  GstNeighbourCodeConceal conceal = CONCEAL_INVALID;
+  int n_threads = 0;
+  guint64 frames = 0, coded_bytes = 0;
+  DecoderResult totals;
+
+  /* streaming thread only */
+  rangecast::AccessUnitDecoder decoder;
+  GstBufferPool *pool = nullptr;
+  GstBuffer *last = nullptr; /* what conceal=last takes pixels from */
+};
+
+struct _GstNeighbourCodeDec {
+  GstBaseTransform parent;
+  GstNeighbourCodeDecPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_DEC)
+
+#define GST_TYPE_NEIGHBOUR_CODE_CONCEAL (gst_neighbour_code_conceal_get_type ())
+static GType
+gst_neighbour_code_conceal_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {CONCEAL_INVALID, "Pixels of lost slices are invalid", "invalid"},
+        {CONCEAL_LAST, "Pixels of lost slices are those of the last frame set", "last"}, {}};
+    return g_enum_register_static ("GstNeighbourCodeConceal", values);
+  }();
+  return type;
+}
+
+/* ---- caps ---- */
+
+static GstCaps *
+gst_neighbour_code_dec_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
+{
+  const bool to_src = direction == GST_PAD_SINK;
+  GstCaps *other = gst_caps_new_empty ();
+  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
+    GstStructure *s = gst_structure_copy (gst_caps_get_structure (caps, i));
+    if (to_src) {
+      gst_structure_set_name (s, GST_RANGE_MEDIA_TYPE);
+      gst_structure_remove_fields (s, "version", "alignment", nullptr);
+      gst_structure_set (s, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
+    } else {
+      gst_structure_set_name (s, GST_NEIGHBOUR_CODE_MEDIA_TYPE);
+      gst_structure_remove_field (s, "format");
+      gst_structure_set (
+          s, "version", G_TYPE_INT, 1, "alignment", G_TYPE_STRING, "access-unit", nullptr);
+    }
+    gst_caps_append_structure (other, s);
+  }
+  if (!filter)
+    return other;
+  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (other);
+  return filtered;
+}
+
+static void
+forget_stream (GstNeighbourCodeDecPrivate *priv)
+{
+  gst_clear_buffer (&priv->last);
+}
+
+static void
+drop_pool (GstNeighbourCodeDecPrivate *priv)
+{
+  if (priv->pool)
+    gst_buffer_pool_set_active (priv->pool, FALSE);
+  gst_clear_object (&priv->pool);
+}
+
+static gboolean
+gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
+{
+  auto self = GST_NEIGHBOUR_CODE_DEC (base);
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  gstrange::RangeInfo info;
+  Status status = gstrange::parse_caps (in, info);
+  if (status.ok ())
+    status = priv->decoder.set_rig (info.rig);
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+    return FALSE;
+  forget_stream (priv);
+  drop_pool (priv);
+  priv->pool = gst_range_buffer_pool_new ();
+  return gst_range_buffer_pool_configure (priv->pool, out, 2, 0) &&
+         gst_buffer_pool_set_active (priv->pool, TRUE);
+}
+
+/* ---- data ---- */
+
+/* Lays out the planned views in a fresh buffer; views of the rig that did not come are left out. */
+static GstBuffer *
+make_frame_set (GstNeighbourCodeDecPrivate *priv)
+{
+  GstBuffer *buffer = nullptr;
+  if (gst_buffer_pool_acquire_buffer (priv->pool, &buffer, nullptr) != GST_FLOW_OK)
+    return nullptr;
+  for (const auto &view : priv->decoder.views ())
+    gst_range_buffer_add_view (buffer, guint (view.view_id), guint (view.roi.x), guint (view.roi.y),
+        guint (view.roi.width), guint (view.roi.height), view.capture_time_ns);
+  /* Memories beyond the planned views hold nothing. */
+  for (guint i = guint (priv->decoder.views ().size ()); i < gst_buffer_n_memory (buffer); i++)
+    gst_memory_resize (gst_buffer_peek_memory (buffer, i), 0, 0);
+  return buffer;
+}
+
+/* Pixels that no slice holds: invalid, or the last frame set's. */
+static void
+fill_missing (const RangeImage &image, const gstrange::RangeFrameMap *older)
+{
+  ConstRangeImage from; /* an empty one: everything becomes invalid */
+  if (older)
+    for (const RangeImage &view : older->views ())
+      if (view.view_id == image.view_id)
+        from = view;
+  rangecast::fill_from (from, image);
+}
+
+static Status
+decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, int n_threads,
+    DecoderResult &result)
+{
+  gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  bool missing = false;
+  for (std::size_t i = 0; i < frame.views ().size (); i++)
+    missing |= priv->decoder.missing_pixels (i) > 0;
+  if (missing && conceal && priv->last) {
+    gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
+    for (std::size_t i = 0; i < frame.views ().size (); i++)
+      if (priv->decoder.missing_pixels (i) > 0)
+        fill_missing (frame.views ()[i], &older);
+  } else {
+    for (std::size_t i = 0; i < frame.views ().size (); i++)
+      if (priv->decoder.missing_pixels (i) > 0)
+        fill_missing (frame.views ()[i], nullptr);
+  }
+  priv->decoder.decode (frame.views (), n_threads, result);
+  return {};
+}
+
+static void
+count_frame (GstNeighbourCodeDecPrivate *priv, const DecoderResult &result, gsize size)
+{
+  std::lock_guard guard (priv->lock);
+  priv->frames++;
+  priv->coded_bytes += size;
+  DecoderResult &totals = priv->totals;
+  totals.slices += result.slices;
+  totals.bad_slices += result.bad_slices;
+  totals.missing_pixels += result.missing_pixels;
+  totals.points += result.points;
+  totals.raw_bits += result.raw_bits;
+}
+
+static GstFlowReturn
+decode_buffer (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  bool conceal;
+  int n_threads;
+  {
+    std::lock_guard guard (priv->lock);
+    conceal = priv->conceal == CONCEAL_LAST;
+    n_threads = priv->n_threads;
+  }
+  GstMapInfo map;
+  if (!gst_buffer_map (input, &map, GST_MAP_READ)) {
+    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+    return GST_FLOW_ERROR;
+  }
+  DecoderResult result;
+  priv->decoder.plan ({map.data, map.size}, result);
+  GstBuffer *buffer = make_frame_set (priv);
+  Status status;
+  if (buffer)
+    status = decode_into (priv, buffer, conceal, n_threads, result);
+  count_frame (priv, result, map.size);
+  gst_buffer_unmap (input, &map);
+  if (!buffer)
+    return GST_FLOW_FLUSHING;
+  if (result.bad_slices)
+    GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
+  if (!status.ok ()) {
+    gst_buffer_unref (buffer);
+    return gst_range_flow_return (GST_ELEMENT (self), status);
+  }
+  *output = buffer;
+  return GST_FLOW_OK;
+}
+
+/* Whoever writes to the output from here on gets a copy of what we hold. */
+static void
+keep_for_concealment (GstNeighbourCodeDecPrivate *priv, GstBuffer *output)
+{
+  bool conceal;
+  {
+    std::lock_guard guard (priv->lock);
+    conceal = priv->conceal == CONCEAL_LAST;
+  }
+  gst_buffer_replace (&priv->last, conceal ? output : nullptr);
+}
+
+static GstFlowReturn
+gst_neighbour_code_dec_prepare_output_buffer (
+    GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_DEC (base);
+  if (!self->priv->pool) {
+    GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, (nullptr), ("no caps before the first buffer"));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
+  if (GST_BUFFER_IS_DISCONT (input))
+    forget_stream (self->priv);
+  const GstFlowReturn flow = decode_buffer (self, input, output);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, *output);
+  GstClockTime capture = gst_range_buffer_get_capture_time (input);
+  if (!GST_CLOCK_TIME_IS_VALID (capture) && !self->priv->decoder.views ().empty ())
+    capture = self->priv->decoder.views ()[0].capture_time_ns;
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (*output, capture);
+  GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT);
+  keep_for_concealment (self->priv, *output);
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn
+gst_neighbour_code_dec_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_OK; /* prepare_output_buffer has decoded it */
+}
+
+static gboolean
+gst_neighbour_code_dec_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+static gboolean
+gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    forget_stream (GST_NEIGHBOUR_CODE_DEC (base)->priv);
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event);
+}
+
+/* ---- life ---- */
+
+static gboolean
+gst_neighbour_code_dec_start (GstBaseTransform *base)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
+  std::lock_guard guard (priv->lock);
+  priv->frames = priv->coded_bytes = 0;
+  priv->totals = {};
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_dec_stop (GstBaseTransform *base)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
+  forget_stream (priv);
+  drop_pool (priv);
+  return TRUE;
+}
+
+static void
+gst_neighbour_code_dec_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  switch (id) {
+    case PROP_CONCEAL:
+      priv->conceal = GstNeighbourCodeConceal (g_value_get_enum (value));
+      break;
+    case PROP_N_THREADS:
+      priv->n_threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static GstStructure *
+make_stats (const GstNeighbourCodeDecPrivate *priv)
+{
+  const DecoderResult &totals = priv->totals;
+  return gst_structure_new ("application/x-neighbourcodedec-stats", "frames", G_TYPE_UINT64,
+      priv->frames, "points", G_TYPE_UINT64, guint64{totals.points}, "slices", G_TYPE_UINT64,
+      guint64{totals.slices}, "bad-slices", G_TYPE_UINT64, guint64{totals.bad_slices},
+      "missing-pixels", G_TYPE_UINT64, guint64{totals.missing_pixels}, "raw-bytes", G_TYPE_UINT64,
+      guint64{totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
+}
+
+static void
+gst_neighbour_code_dec_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  switch (id) {
+    case PROP_CONCEAL:
+      g_value_set_enum (value, priv->conceal);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, priv->n_threads);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, make_stats (priv));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_neighbour_code_dec_finalize (GObject *object)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
+  forget_stream (priv);
+  drop_pool (priv);
+  delete priv;
+  G_OBJECT_CLASS (gst_neighbour_code_dec_parent_class)->finalize (object);
+}
+
+static void
+gst_neighbour_code_dec_init (GstNeighbourCodeDec *self)
+{
+  self->priv = new GstNeighbourCodeDecPrivate;
+  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  const auto playing =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+  object_class->set_property = gst_neighbour_code_dec_set_property;
+  object_class->get_property = gst_neighbour_code_dec_get_property;
+  object_class->finalize = gst_neighbour_code_dec_finalize;
+
+  g_object_class_install_property (object_class, PROP_CONCEAL,
+      g_param_spec_enum ("conceal", "Conceal",
+          "What becomes of pixels whose slices are lost (default: invalid)",
+          GST_TYPE_NEIGHBOUR_CODE_CONCEAL, CONCEAL_INVALID, playing));
+  g_object_class_install_property (object_class, PROP_N_THREADS,
+      g_param_spec_int ("n-threads", "Threads",
+          "Views decoded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64,
+          0, playing));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, points, slices, bad-slices, missing-pixels, raw-bytes, "
+          "coded-bytes",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Neighbour code decoder",
+      "Codec/Decoder/Video", "Decodes range images from the neighbour code", "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CONCEAL, GstPluginAPIFlags (0));
+
+  transform_class->start = gst_neighbour_code_dec_start;
+  transform_class->stop = gst_neighbour_code_dec_stop;
+  transform_class->transform_caps = gst_neighbour_code_dec_transform_caps;
+  transform_class->set_caps = gst_neighbour_code_dec_set_caps;
+  transform_class->sink_event = gst_neighbour_code_dec_sink_event;
+  transform_class->prepare_output_buffer = gst_neighbour_code_dec_prepare_output_buffer;
+  transform_class->transform = gst_neighbour_code_dec_transform;
+  transform_class->transform_meta = gst_neighbour_code_dec_transform_meta;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_neighbour_code_dec_debug, "neighbourcodedec", 0, "Neighbour code decoder");
+}

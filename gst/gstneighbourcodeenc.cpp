@@ -1,0 +1,448 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-neighbourcodeenc
+ * @title: neighbourcodeenc
+ *
+ * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
+ * decode without one another. The format is specified in docs/bitstream.md.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
+ * multifilesink location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstneighbourcodeenc.h"
+
+#include <gst/base/base.h>
+
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/neighbourcode/access_unit.hpp>
+
+using rangecast::EncoderResult;
+using rangecast::EncoderSettings;
+using rangecast::Status;
+
+GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
+#define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
+
+enum {
+  PROP_0,
+  PROP_PROFILE,
+  PROP_DEPTH_BITS,
+  PROP_COLOUR_BITS,
+  PROP_DEPTH_THRESHOLD,
+  PROP_COLOUR_THRESHOLD,
+  PROP_MAX_SLICE_SIZE,
+  PROP_N_THREADS,
+  PROP_MAX_DEPTH_ERROR,
+  PROP_STATS
+};
+
+static constexpr EncoderSettings kDefaults;
+
+struct GstNeighbourCodeEncPrivate {
+  std::mutex lock; /* guards what follows; never held across a push or message */
+  EncoderSettings settings;
+  int n_threads = 0;
+  double max_depth_error_m = 0;
+  guint64 frames = 0, coded_bytes = 0;
+  EncoderResult totals;
+
+  /* streaming thread only */
+  gstrange::RangeInfo info;
+  rangecast::AccessUnitEncoder encoder;
+  EncoderSettings configured;
+  bool is_configured = false;
+  std::uint32_t frame_number = 0;
+  GstBufferPool *pool = nullptr;
+  gsize pool_size = 0;
+};
+
+struct _GstNeighbourCodeEnc {
+  GstBaseTransform parent;
+  GstNeighbourCodeEncPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+
+G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
+
+#define GST_TYPE_NEIGHBOUR_CODE_PROFILE (gst_neighbour_code_profile_get_type ())
+static GType
+gst_neighbour_code_profile_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"}, {}};
+    return g_enum_register_static ("GstNeighbourCodeProfile", values);
+  }();
+  return type;
+}
+
+/* ---- caps ---- */
+
+/* Both sides share size, rate, views and rig; media type and what goes with it differ. */
+static GstCaps *
+gst_neighbour_code_enc_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
+{
+  const bool to_src = direction == GST_PAD_SINK;
+  GstCaps *other = gst_caps_new_empty ();
+  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
+    GstStructure *s = gst_structure_copy (gst_caps_get_structure (caps, i));
+    if (to_src) {
+      gst_structure_set_name (s, GST_NEIGHBOUR_CODE_MEDIA_TYPE);
+      gst_structure_remove_field (s, "format");
+      gst_structure_set (
+          s, "version", G_TYPE_INT, 1, "alignment", G_TYPE_STRING, "access-unit", nullptr);
+    } else {
+      gst_structure_set_name (s, GST_RANGE_MEDIA_TYPE);
+      gst_structure_remove_fields (s, "version", "alignment", nullptr);
+      gst_structure_set (s, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
+    }
+    gst_caps_append_structure (other, s);
+  }
+  if (!filter)
+    return other;
+  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (other);
+  return filtered;
+}
+
+static gboolean
+gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  const Status status = gstrange::parse_caps (in, priv->info);
+  priv->is_configured = false;
+  return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
+}
+
+/* ---- data ---- */
+
+/* Takes over settings that changed. */
+static Status
+configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
+{
+  if (priv->is_configured && settings == priv->configured)
+    return {};
+  if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
+    return s;
+  priv->configured = settings;
+  priv->is_configured = true;
+  std::lock_guard guard (priv->lock);
+  priv->max_depth_error_m = priv->encoder.max_depth_error_m ();
+  return {};
+}
+
+static void
+drop_pool (GstNeighbourCodeEncPrivate *priv)
+{
+  if (priv->pool)
+    gst_buffer_pool_set_active (priv->pool, FALSE);
+  gst_clear_object (&priv->pool);
+  priv->pool_size = 0;
+}
+
+/* A recycled buffer of that size. The pool grows to the largest access unit seen. */
+static GstBuffer *
+acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
+{
+  if (size > priv->pool_size) {
+    drop_pool (priv);
+    priv->pool = gst_buffer_pool_new ();
+    priv->pool_size = size + size / 2;
+    GstStructure *config = gst_buffer_pool_get_config (priv->pool);
+    gst_buffer_pool_config_set_params (config, nullptr, guint (priv->pool_size), 0, 0);
+    gst_buffer_pool_set_config (priv->pool, config);
+    gst_buffer_pool_set_active (priv->pool, TRUE);
+  }
+  GstBuffer *buffer = nullptr;
+  if (gst_buffer_pool_acquire_buffer (priv->pool, &buffer, nullptr) == GST_FLOW_OK)
+    gst_buffer_set_size (buffer, gssize (size));
+  return buffer;
+}
+
+static Status
+encode_frame (
+    GstNeighbourCodeEncPrivate *priv, GstBuffer *input, int n_threads, EncoderResult &result)
+{
+  gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  return priv->encoder.encode (frame.views (), priv->frame_number++, n_threads, result);
+}
+
+static void
+count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
+{
+  std::lock_guard guard (priv->lock);
+  priv->frames++;
+  priv->coded_bytes += size;
+  priv->totals.points += result.points;
+  priv->totals.full_pixels += result.full_pixels;
+  priv->totals.slices += result.slices;
+  priv->totals.raw_bits += result.raw_bits;
+}
+
+/* The size is known only when it is coded, so that happens where the output buffer is made. */
+static GstFlowReturn
+gst_neighbour_code_enc_prepare_output_buffer (
+    GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_ENC (base);
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  if (GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (input)))
+    gst_object_sync_values (GST_OBJECT (self),
+        gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
+  EncoderSettings settings;
+  int n_threads;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+    n_threads = priv->n_threads;
+  }
+  EncoderResult result;
+  Status status = configure (priv, settings);
+  if (status.ok ())
+    status = encode_frame (priv, input, n_threads, result);
+  if (!status.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), status);
+
+  const gsize size = priv->encoder.size ();
+  GstBuffer *buffer = acquire (priv, size);
+  if (!buffer) {
+    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
+        ("no memory for an access unit of %" G_GSIZE_FORMAT " bytes", size));
+    return GST_FLOW_ERROR;
+  }
+  gsize offset = 0;
+  for (std::size_t i = 0; i < priv->encoder.parts (); i++) {
+    const auto part = priv->encoder.part (i);
+    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
+  }
+  count_frame (priv, result, size);
+  GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, buffer);
+  const GstClockTime capture = gst_range_buffer_get_capture_time (input);
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (buffer, capture);
+  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  *output = buffer;
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn
+gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_OK; /* prepare_output_buffer has coded it */
+}
+
+static gboolean
+gst_neighbour_code_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+/* ---- life ---- */
+
+static gboolean
+gst_neighbour_code_enc_start (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->frame_number = 0;
+  std::lock_guard guard (priv->lock);
+  priv->frames = priv->coded_bytes = 0;
+  priv->totals = {};
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_enc_stop (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->is_configured = false;
+  drop_pool (priv);
+  return TRUE;
+}
+
+static void
+gst_neighbour_code_enc_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  EncoderSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_PROFILE: /* there is one so far, and the enum refuses others */
+      break;
+    case PROP_DEPTH_BITS:
+      settings.depth_bits = g_value_get_int (value);
+      break;
+    case PROP_COLOUR_BITS:
+      settings.colour_bits = g_value_get_int (value);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      settings.depth_threshold = g_value_get_int (value);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      settings.colour_threshold = g_value_get_int (value);
+      break;
+    case PROP_MAX_SLICE_SIZE:
+      settings.max_slice_size = g_value_get_int (value);
+      break;
+    case PROP_N_THREADS:
+      priv->n_threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static GstStructure *
+make_stats (const GstNeighbourCodeEncPrivate *priv)
+{
+  return gst_structure_new ("application/x-neighbourcodeenc-stats", "frames", G_TYPE_UINT64,
+      priv->frames, "points", G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels",
+      G_TYPE_UINT64, guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64,
+      guint64{priv->totals.slices}, "raw-bytes", G_TYPE_UINT64, guint64{priv->totals.raw_bits / 8},
+      "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
+}
+
+static void
+gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  const EncoderSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_PROFILE:
+      g_value_set_enum (value, int (rangecast::Profile::kPlain));
+      break;
+    case PROP_DEPTH_BITS:
+      g_value_set_int (value, settings.depth_bits);
+      break;
+    case PROP_COLOUR_BITS:
+      g_value_set_int (value, settings.colour_bits);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      g_value_set_int (value, settings.depth_threshold);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      g_value_set_int (value, settings.colour_threshold);
+      break;
+    case PROP_MAX_SLICE_SIZE:
+      g_value_set_int (value, settings.max_slice_size);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, priv->n_threads);
+      break;
+    case PROP_MAX_DEPTH_ERROR:
+      g_value_set_double (value, priv->max_depth_error_m);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, make_stats (priv));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_neighbour_code_enc_finalize (GObject *object)
+{
+  drop_pool (GST_NEIGHBOUR_CODE_ENC (object)->priv);
+  delete GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  G_OBJECT_CLASS (gst_neighbour_code_enc_parent_class)->finalize (object);
+}
+
+static void
+gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
+{
+  self->priv = new GstNeighbourCodeEncPrivate;
+}
+
+static void
+install_properties (GObjectClass *object_class)
+{
+  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+  const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                               int minimum, int maximum, int fallback) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, live));
+  };
+  g_object_class_install_property (object_class, PROP_PROFILE,
+      g_param_spec_enum ("profile", "Profile", "How symbols are written (default: plain)",
+          GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (rangecast::Profile::kPlain), live));
+  install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
+      "Bits of a depth code; linear between the view's near and far (6 to 16, default 12)", 6, 16,
+      kDefaults.depth_bits);
+  install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits",
+      "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits);
+  install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
+      "A neighbour replaces a pixel if their depths differ by no more than so many codes (0 to "
+      "65535; 0 and colour-threshold 0: lossless after quantisation)",
+      0, 65535, kDefaults.depth_threshold);
+  install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
+      "and if R, G and B each differ by no more than so many codes (0 to 255)", 0, 255,
+      kDefaults.colour_threshold);
+  install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
+      "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
+      int (rangecast::kMaxUnitSize), kDefaults.max_slice_size);
+  install_int (PROP_N_THREADS, "n-threads", "Threads",
+      "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0);
+  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
+      g_param_spec_double ("max-depth-error", "Maximum depth error",
+          "Metres by which quantisation alone changes a depth at most, of the present stream", 0,
+          G_MAXDOUBLE, 0, readable));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, points, full-pixels, slices, raw-bytes, coded-bytes",
+          GST_TYPE_STRUCTURE, readable));
+}
+
+static void
+gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_neighbour_code_enc_set_property;
+  object_class->get_property = gst_neighbour_code_enc_get_property;
+  object_class->finalize = gst_neighbour_code_enc_finalize;
+  install_properties (object_class);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
+      "Codec/Encoder/Video",
+      "Codes depth and colour of range images together, in slices that decode alone",
+      "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
+
+  transform_class->start = gst_neighbour_code_enc_start;
+  transform_class->stop = gst_neighbour_code_enc_stop;
+  transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
+  transform_class->set_caps = gst_neighbour_code_enc_set_caps;
+  transform_class->prepare_output_buffer = gst_neighbour_code_enc_prepare_output_buffer;
+  transform_class->transform = gst_neighbour_code_enc_transform;
+  transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");
+}
