@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "model.hpp"
+
+namespace rangecast {
+
+Status
+load_model (const std::string &path, const std::string &, Mesh &)
+{
+  return {StatusCode::kUnsupported,
+      path + ": this gst-rangecast was built without models (meson option avatar-models)"};
+}
+
+} // namespace rangecast

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <string>
+
+#include "../status.hpp"
+#include "mesh.hpp"
+
+namespace rangecast {
+
+/** Loads a textured figure, and scales and centres it as fit_figure() says.
+ *  @param path     glTF (.glb, .gltf), OBJ or whatever else assimp reads
+ *  @param texture  JPEG or PNG; empty: the one that the material names, else a picture beside the
+ *                  model whose name says that it is a colour map, else plain skin
+ *  @return kUnsupported if built without assimp, kNotFound or kBadData naming the file */
+Status load_model (const std::string &path, const std::string &texture, Mesh &mesh);
+
+} // namespace rangecast

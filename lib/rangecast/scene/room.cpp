@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "room.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pattern.hpp"
+
+namespace rangecast {
+
+static constexpr double kFloor = -1.0, kCeiling = 1.4; ///< metres
+
+static Vec3
+hit_point (Vec3 from, Vec3 direction, double radius_m)
+{
+  const double a = direction.x * direction.x + direction.z * direction.z;
+  const double b = from.x * direction.x + from.z * direction.z;
+  const double c = from.x * from.x + from.z * from.z - radius_m * radius_m;
+  double t = a > 1e-12 ? (-b + std::sqrt (std::max (0.0, b * b - a * c))) / a : 1e12;
+  if (direction.y < 0)
+    t = std::min (t, (kFloor - from.y) / direction.y);
+  else if (direction.y > 0)
+    t = std::min (t, (kCeiling - from.y) / direction.y);
+  return from + t * direction;
+}
+
+/** Blue-grey plaster with boards, so that it looks like neither skin nor shirt. */
+static Vec3
+room_colour (Vec3 p, double radius_m, std::uint32_t seed)
+{
+  const double fine = smooth_noise (p, 0.12, 3, seed + 20);
+  const double coarse = smooth_noise (p, 0.5, 2, seed + 30);
+  const double light = 1 + 0.35 * fine + 0.25 * coarse;
+  if (p.y < kFloor + 1e-6)
+    return light * Vec3{104, 108, 100};
+  if (p.y > kCeiling - 1e-6)
+    return light * Vec3{150, 156, 160};
+  const double along = std::atan2 (p.x, p.z) * radius_m / 0.31;
+  const double board = along - std::floor (along);
+  const double tone =
+      0.85 +
+      0.3 *
+          double (
+              mix64 (static_cast<std::uint64_t> (std::int64_t (std::floor (along)) + seed)) >> 40) /
+          (1 << 24);
+  const double gap = 1 - 0.5 * (smooth_step (0.05, 0.01, board) + smooth_step (0.95, 0.99, board));
+  return light * tone * gap * Vec3{96, 124, 140};
+}
+
+void
+draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,
+    std::uint32_t seed, ImageView<Rgbx> colour)
+{
+  const auto byte = [] (double v) {
+    return static_cast<std::uint8_t> (std::lround (std::clamp (v / 4, 0.0, 255.0)));
+  };
+  for (int y = 0; y < colour.height; y++)
+    for (int x = 0; x < colour.width; x++) {
+      Vec3 sum;
+      for (const double dy : {-0.25, 0.25})
+        for (const double dx : {-0.25, 0.25}) {
+          const Vec3 ray = world_from_camera.rotation * camera.unproject (x + dx, y + dy, 1);
+          sum = sum + room_colour (
+                          hit_point (world_from_camera.translation, ray, radius_m), radius_m, seed);
+        }
+      colour.at (x, y) = {byte (sum.x), byte (sum.y), byte (sum.z), 0};
+    }
+}
+
+} // namespace rangecast

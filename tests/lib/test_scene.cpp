@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "test-support.hpp"
+
+#include <cstring>
+#include <rangecast/scene/scene.hpp>
+
+using namespace rangecast;
+using rangecast::testing::Image;
+
+struct Picture {
+  Image<Rgbx> colour{320, 240};
+  Image<std::uint16_t> depth{320, 240};
+  Image<std::uint8_t> mask{320, 240};
+};
+
+static std::unique_ptr<Scene>
+make_scene (SceneSettings settings = {})
+{
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  EXPECT_TRUE (status.ok ()) << status.message ();
+  return scene;
+}
+
+static void
+render (Scene &scene, int view, SceneCamera camera, double time_s, Picture &out, bool empty = false)
+{
+  const Status status = scene.render (
+      view, camera, time_s, empty, out.colour.view (), out.depth.view (), out.mask.view ());
+  ASSERT_TRUE (status.ok ()) << status.message ();
+}
+
+static int
+different_pixels (Picture &a, Picture &b)
+{
+  int n = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      n += std::memcmp (&a.colour.view ().at (x, y), &b.colour.view ().at (x, y), 3) != 0;
+  return n;
+}
+
+TEST (Scene, test_rigs_are_valid_and_view_0_stands_on_z)
+{
+  const auto scene = make_scene ();
+  EXPECT_TRUE (validate (scene->rig ()).ok ());
+  ASSERT_EQ (scene->range_rig ().views.size (), 4u);
+  EXPECT_TRUE (scene->range_rig ().views[3].is_range_view ());
+  const View &front = scene->rig ().views[0];
+  EXPECT_NEAR (front.world_from_view.translation.z, 0.8, 1e-12);
+  ASSERT_TRUE (front.right && front.third);
+  EXPECT_NEAR (front.right->partner_from_left.translation.x, -0.1, 1e-12);
+}
+
+TEST (Scene, test_same_settings_and_time_give_the_same_picture)
+{
+  const auto a = make_scene (), b = make_scene ();
+  Picture first, second;
+  render (*a, 1, SceneCamera::kLeft, 9.0, first); /* its past must not matter */
+  render (*a, 1, SceneCamera::kLeft, 0.7, first);
+  render (*b, 1, SceneCamera::kLeft, 0.7, second);
+  EXPECT_EQ (different_pixels (first, second), 0);
+}
+
+TEST (Scene, test_figure_moves_unless_motion_is_0)
+{
+  SceneSettings settings;
+  settings.noise_sigma = 0;
+  Picture first, second;
+  auto scene = make_scene (settings);
+  render (*scene, 0, SceneCamera::kLeft, 0, first);
+  render (*scene, 0, SceneCamera::kLeft, 1, second);
+  EXPECT_GT (different_pixels (first, second), 5000);
+  settings.motion = 0;
+  scene = make_scene (settings);
+  render (*scene, 0, SceneCamera::kLeft, 0, first);
+  render (*scene, 0, SceneCamera::kLeft, 1, second);
+  EXPECT_EQ (different_pixels (first, second), 0);
+}
+
+TEST (Scene, test_empty_room_has_no_person_and_no_depth)
+{
+  const auto scene = make_scene ();
+  Picture picture;
+  render (*scene, 0, SceneCamera::kLeft, 0, picture, true);
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      ASSERT_EQ (picture.mask.view ().at (x, y) + picture.depth.view ().at (x, y), 0);
+}
+
+/* What left and right see agrees through exact depth: x_right = x_left - fx * baseline / z. */
+TEST (Scene, test_depth_of_left_and_right_agree_by_disparity)
+{
+  const auto scene = make_scene ();
+  Picture left, right;
+  render (*scene, 0, SceneCamera::kLeft, 0.4, left);
+  render (*scene, 0, SceneCamera::kRight, 0.4, right);
+  int compared = 0, agree = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const double z = left.depth.view ().at (x, y) * 1e-4;
+      const int xr = z > 0 ? int (std::lround (x - 320 * 0.1 / z)) : -1;
+      if (xr < 0 || right.depth.view ().at (xr, y) == 0)
+        continue;
+      compared++;
+      agree += std::abs (right.depth.view ().at (xr, y) - z * 1e4) < 60; /* 6 mm: slopes */
+    }
+  EXPECT_GT (compared, 15000);
+  EXPECT_GT (agree, compared * 9 / 10);
+}
+
+/* No holes inside the figure: a row of the mask has at most the gaps of neck and shoulders. */
+TEST (Scene, test_mesh_has_no_cracks)
+{
+  SceneSettings settings;
+  settings.motion = 0;
+  const auto scene = make_scene (settings);
+  Picture picture;
+  render (*scene, 0, SceneCamera::kLeft, 0, picture);
+  for (int y = 0; y < 240; y++) {
+    int runs = 0;
+    for (int x = 1; x < 320; x++)
+      runs += picture.mask.view ().at (x, y) > picture.mask.view ().at (x - 1, y);
+    EXPECT_LE (runs, 1) << "row " << y;
+  }
+}
+
+TEST (Scene, test_bounding_boxes_hold_all_depth)
+{
+  const auto scene = make_scene ();
+  Picture pictures[2];
+  RangeImage images[2];
+  Roi boxes[2];
+  for (int i = 0; i < 2; i++)
+    images[i] = {i, {0, 0, 320, 240}, pictures[i].depth.view (), pictures[i].colour.view (), 0};
+  ASSERT_TRUE (scene->render_range (images, 1.0, false, boxes, 2).ok ());
+  for (int i = 0; i < 2; i++) {
+    const Roi box = boxes[i];
+    EXPECT_FALSE (box.empty ());
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++)
+        if (x < box.x || y < box.y || x >= box.x + box.width || y >= box.y + box.height) {
+          ASSERT_EQ (images[i].depth.at (x, y), 0);
+        }
+  }
+}
+
+TEST (Scene, test_bad_settings_are_named)
+{
+  SceneSettings settings;
+  settings.distance_m = 3;
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  EXPECT_EQ (status.code (), StatusCode::kBadValue);
+  EXPECT_NE (status.message ().find ("distance"), std::string::npos);
+  EXPECT_FALSE (scene);
+}
+
+TEST (Scene, test_wrong_view_and_size_are_refused)
+{
+  const auto scene = make_scene ();
+  Image<Rgbx> small (100, 100), right (320, 240);
+  EXPECT_EQ (scene->render (4, SceneCamera::kLeft, 0, false, right.view (), {}, {}).code (),
+      StatusCode::kNotFound);
+  EXPECT_EQ (scene->render (0, SceneCamera::kLeft, 0, false, small.view (), {}, {}).code (),
+      StatusCode::kBadSize);
+}
+
+TEST (Scene, test_model_that_cannot_be_read_is_named)
+{
+  SceneSettings settings;
+  settings.model = "/nowhere/head.glb";
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  EXPECT_FALSE (status.ok ());
+  EXPECT_NE (status.message ().find ("/nowhere/head.glb"), std::string::npos);
+}
