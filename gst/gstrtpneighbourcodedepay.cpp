@@ -1,0 +1,322 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rtpneighbourcodedepay
+ * @title: rtpneighbourcodedepay
+ *
+ * Takes coded frame sets out of RTP packets. What arrived of a frame set goes on, also when packets
+ * are lost; damaged packets are counted and dropped. The rig comes with the caps (from SDP) or in
+ * band; nothing is put out before it is known. The format is specified in docs/rtp-payload.md.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 udpsrc port=5004
+ * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec ! cylinderfilter ! striprender !
+ * glimagesink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrtpneighbourcodedepay.h"
+
+#include <gst/rtp/rtp.h>
+
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/neighbourcode/unit.hpp>
+#include <vector>
+
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::UnitHeader;
+using rangecast::UnitReader;
+using rangecast::UnitType;
+
+GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
+#define GST_CAT_DEFAULT gst_rtp_neighbour_code_depay_debug
+
+enum { PROP_0, PROP_UNIT_STATS };
+
+/* An access unit that grows beyond this is hostile; what is too much is dropped. */
+static constexpr std::size_t kMaxAccessUnit = 32u << 20;
+
+struct DepayCounters {
+  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0;
+};
+
+struct GstRtpNeighbourCodeDepayPrivate {
+  std::mutex lock; /* guards counters */
+  DepayCounters counters;
+
+  /* streaming thread only */
+  rangecast::RigCollector collector;
+  unsigned used_generation = 0;
+  bool have_caps = false;
+  std::vector<guint8> access_unit; /* slices that arrived so far */
+  guint32 timestamp = 0;           /* RTP time of them */
+  GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
+};
+
+struct _GstRtpNeighbourCodeDepay {
+  GstRTPBaseDepayload parent;
+  GstRtpNeighbourCodeDepayPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+                         "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE"));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+
+G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
+GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,
+    GST_TYPE_RTP_NEIGHBOUR_CODE_DEPAY)
+
+static void
+forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
+{
+  priv->access_unit.clear ();
+  priv->pts = priv->capture_time = GST_CLOCK_TIME_NONE;
+}
+
+/* ---- caps ---- */
+
+static void
+set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
+{
+  const auto info = gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d);
+  GstCaps *caps = gstrange::make_neighbour_code_caps (info, "access-unit");
+  gst_pad_set_caps (GST_RTP_BASE_DEPAYLOAD_SRCPAD (base), caps);
+  gst_caps_unref (caps);
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
+}
+
+static Status
+rig_from_caps (const GstStructure *structure, rangecast::StreamInfo &stream)
+{
+  gsize size = 0;
+  guchar *blob = g_base64_decode (gst_structure_get_string (structure, "rig"), &size);
+  Status status = rangecast::decode_rig ({blob, size}, stream.rig);
+  g_free (blob);
+  if (!status.ok ())
+    return {status.code (), "RTP caps: field \"rig\" (base64): " + status.message ()};
+  for (const rangecast::View &view : stream.rig.views)
+    if (!view.is_range_view ())
+      return {StatusCode::kBadData,
+          "RTP caps: field \"rig\": view " + std::to_string (view.id) + " is not rectified"};
+  const gchar *rate = gst_structure_get_string (structure, "framerate");
+  int n = 0, d = 1;
+  if (rate && sscanf (rate, "%d/%d", &n, &d) == 2 && n >= 0 && d > 0) {
+    stream.fps_n = n;
+    stream.fps_d = d;
+  }
+  return {};
+}
+
+static gboolean
+gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv;
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  const gchar *version = gst_structure_get_string (structure, "version");
+  base->clock_rate = 90000;
+  forget_access_unit (priv);
+  if (version && g_strcmp0 (version, "1") != 0) {
+    gst_range_flow_return (GST_ELEMENT (base),
+        {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 1"});
+    return FALSE;
+  }
+  if (!gst_structure_has_field_typed (structure, "rig", G_TYPE_STRING))
+    return TRUE; /* it will come in band */
+  rangecast::StreamInfo stream;
+  const Status status = rig_from_caps (structure, stream);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  set_source_caps (base, stream);
+  return TRUE;
+}
+
+/* ---- packets ---- */
+
+/* The access unit as a buffer; nullptr if there is none or its rig is not known. */
+static GstBuffer *
+take_access_unit (GstRtpNeighbourCodeDepay *self)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  GstBuffer *buffer = nullptr;
+  if (!priv->access_unit.empty ()) {
+    std::lock_guard guard (priv->lock);
+    if (priv->have_caps) {
+      buffer = gst_buffer_new_memdup (priv->access_unit.data (), priv->access_unit.size ());
+      GST_BUFFER_PTS (buffer) = priv->pts;
+      priv->counters.access_units++;
+    } else {
+      priv->counters.without_rig++;
+    }
+  }
+  if (buffer && GST_CLOCK_TIME_IS_VALID (priv->capture_time))
+    gst_range_buffer_set_capture_time (buffer, priv->capture_time);
+  forget_access_unit (priv);
+  return buffer;
+}
+
+/* Earliest of its slices: views of one frame set may differ by parts of a frame. */
+static void
+note_capture_time (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
+{
+  rangecast::SliceHeader slice;
+  if (!rangecast::read_slice_header (unit, slice).ok ())
+    return;
+  if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
+    priv->capture_time = slice.capture_time_ns;
+}
+
+static void
+take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  UnitReader reader (payload);
+  UnitHeader header;
+  guint64 good = 0, bad = 0;
+  while (const auto unit = reader.next (header)) {
+    if (header.type == static_cast<guint8> (UnitType::kRigView)) {
+      bad += !priv->collector.add (*unit).ok ();
+    } else if (priv->access_unit.size () + unit->size () > kMaxAccessUnit) {
+      bad++;
+    } else {
+      good++;
+      if (header.type == static_cast<guint8> (UnitType::kSlice))
+        note_capture_time (priv, *unit);
+      priv->access_unit.insert (priv->access_unit.end (), unit->begin (), unit->end ());
+    }
+  }
+  bad += !reader.status ().ok ();
+  if (bad)
+    GST_DEBUG_OBJECT (self, "%" G_GUINT64_FORMAT " damaged units", bad);
+  std::lock_guard guard (priv->lock);
+  priv->counters.packets++;
+  priv->counters.units += good;
+  priv->counters.bad_units += bad;
+}
+
+static GstBuffer *
+gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *rtp)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
+  if (!priv->access_unit.empty () && timestamp != priv->timestamp) {
+    /* The packet with the marker was lost: what came of the last frame set goes out now. */
+    {
+      std::lock_guard guard (priv->lock);
+      priv->counters.unmarked++;
+    }
+    if (GstBuffer *earlier = take_access_unit (self))
+      gst_rtp_base_depayload_push (base, earlier);
+  }
+  if (priv->access_unit.empty ()) {
+    priv->timestamp = timestamp;
+    priv->pts = GST_BUFFER_PTS (rtp->buffer);
+  }
+  take_units (self, {static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+                        gst_rtp_buffer_get_payload_len (rtp)});
+  if (priv->collector.generation () != priv->used_generation) {
+    priv->used_generation = priv->collector.generation ();
+    set_source_caps (base, priv->collector.info ());
+  }
+  return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self) : nullptr;
+}
+
+static gboolean
+gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
+  return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
+      ->handle_event (base, event);
+}
+
+/* ---- life ---- */
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_depay_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    forget_access_unit (priv);
+    priv->collector.reset ();
+    priv->used_generation = 0;
+    priv->have_caps = false;
+    std::lock_guard guard (priv->lock);
+    priv->counters = {};
+  }
+  return result;
+}
+
+static void
+gst_rtp_neighbour_code_depay_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  if (id != PROP_UNIT_STATS) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  const DepayCounters &c = priv->counters;
+  g_value_take_boxed (value,
+      gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
+          c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
+          "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
+          "without-rig", G_TYPE_UINT64, c.without_rig, nullptr));
+}
+
+static void
+gst_rtp_neighbour_code_depay_finalize (GObject *object)
+{
+  delete GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  G_OBJECT_CLASS (gst_rtp_neighbour_code_depay_parent_class)->finalize (object);
+}
+
+static void
+gst_rtp_neighbour_code_depay_init (GstRtpNeighbourCodeDepay *self)
+{
+  self->priv = new GstRtpNeighbourCodeDepayPrivate;
+}
+
+static void
+gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS (klass);
+
+  object_class->get_property = gst_rtp_neighbour_code_depay_get_property;
+  object_class->finalize = gst_rtp_neighbour_code_depay_finalize;
+
+  g_object_class_install_property (object_class, PROP_UNIT_STATS,
+      g_param_spec_boxed ("unit-stats", "Unit statistics",
+          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "RTP neighbour code depayloader",
+      "Codec/Depayloader/Network/RTP", "Takes coded range frame sets out of RTP packets",
+      "gst-rangecast");
+
+  element_class->change_state = gst_rtp_neighbour_code_depay_change_state;
+  depayload_class->set_caps = gst_rtp_neighbour_code_depay_set_caps;
+  depayload_class->process_rtp_packet = gst_rtp_neighbour_code_depay_process;
+  depayload_class->handle_event = gst_rtp_neighbour_code_depay_handle_event;
+
+  GST_DEBUG_CATEGORY_INIT (gst_rtp_neighbour_code_depay_debug, "rtpneighbourcodedepay", 0,
+      "RTP neighbour code depayloader");
+}

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rtpneighbourcodepay
+ * @title: rtpneighbourcodepay
+ *
+ * Puts coded frame sets into RTP packets. Each packet holds whole units, so that it decodes alone.
+ * The format is specified in docs/rtp-payload.md.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc is-live=true num-buffers=100 ! neighbourcodeenc !
+ * rtpneighbourcodepay ! udpsink host=127.0.0.1 port=5004
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrtpneighbourcodepay.h"
+
+#include <gst/rtp/rtp.h>
+
+#include <atomic>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <rangecast/neighbourcode/unit.hpp>
+#include <string>
+#include <vector>
+
+using rangecast::Status;
+using rangecast::UnitHeader;
+using rangecast::UnitReader;
+
+GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
+#define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
+
+enum { PROP_0, PROP_CONFIG_INTERVAL };
+
+static constexpr int kDefaultConfigInterval = 1;
+
+struct GstRtpNeighbourCodePayPrivate {
+  std::atomic<int> config_interval{kDefaultConfigInterval};
+
+  /* streaming thread only */
+  std::vector<guint8> rig_units;
+  GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
+};
+
+struct _GstRtpNeighbourCodePay {
+  GstRTPBasePayload parent;
+  GstRtpNeighbourCodePayPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+                         "payload = (int) [ 96, 127 ], clock-rate = (int) 90000, "
+                         "encoding-name = (string) X-NEIGHBOUR-CODE"));
+
+G_DEFINE_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST_TYPE_RTP_BASE_PAYLOAD)
+GST_ELEMENT_REGISTER_DEFINE (
+    rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY, GST_TYPE_RTP_NEIGHBOUR_CODE_PAY)
+
+/* ---- caps ---- */
+
+/* What goes into SDP as fmtp parameters; all values are strings there. */
+static gboolean
+set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
+{
+  const std::vector<guint8> blob = rangecast::encode_rig (info.rig);
+  gchar *rig = g_base64_encode (blob.data (), blob.size ());
+  const std::string rate = std::to_string (info.fps_n) + "/" + std::to_string (info.fps_d);
+  gst_rtp_base_payload_set_options (base, "application", TRUE, "X-NEIGHBOUR-CODE", 90000);
+  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "1",
+      "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
+      std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
+      std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",
+      G_TYPE_STRING, rig, nullptr);
+  g_free (rig);
+  return set;
+}
+
+static gboolean
+gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv;
+  gstrange::RangeInfo info;
+  const Status status = gstrange::parse_caps (caps, info);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->rig_units.clear ();
+  rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, priv->rig_units);
+  priv->last_config = GST_CLOCK_TIME_NONE;
+  return set_output_caps (base, info);
+}
+
+/* ---- packets ---- */
+
+/* Packets of one access unit that share its bytes. */
+struct Packer {
+  GstRTPBasePayload *base;
+  GstBufferList *packets;
+  gsize room; /* payload bytes of a packet */
+  GstClockTime pts, dts;
+
+  void add (GstBuffer *units, gsize offset, gsize size)
+  {
+    GstBuffer *packet = gst_rtp_base_payload_allocate_output_buffer (base, 0, 0, 0);
+    GST_BUFFER_PTS (packet) = pts;
+    GST_BUFFER_DTS (packet) = dts;
+    GstBuffer *payload = gst_buffer_copy_region (units, GST_BUFFER_COPY_MEMORY, offset, size);
+    gst_buffer_list_add (packets, gst_buffer_append (packet, payload));
+  }
+
+  /* @return the first unit's size that is too long for a packet, or 0 */
+  gsize pack (GstBuffer *buffer)
+  {
+    GstMapInfo map;
+    if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+      return 0;
+    UnitReader reader ({map.data, map.size});
+    UnitHeader header;
+    gsize begin = 0, end = 0, too_long = 0;
+    while (const auto unit = reader.next (header)) {
+      if (unit->size () > room) {
+        too_long = unit->size ();
+        break;
+      }
+      if (end - begin + unit->size () > room) {
+        add (buffer, begin, end - begin);
+        begin = end;
+      }
+      end += unit->size ();
+    }
+    gst_buffer_unmap (buffer, &map);
+    if (!too_long && end > begin)
+      add (buffer, begin, end - begin);
+    return too_long;
+  }
+};
+
+static bool
+config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
+{
+  GstRtpNeighbourCodePayPrivate *priv = self->priv;
+  const int interval = priv->config_interval;
+  if (interval == 0)
+    return false;
+  const bool due = interval < 0 || !GST_CLOCK_TIME_IS_VALID (priv->last_config) ||
+                   !GST_CLOCK_TIME_IS_VALID (running) || running < priv->last_config ||
+                   running - priv->last_config >= GstClockTime (interval) * GST_SECOND;
+  if (due)
+    priv->last_config = running;
+  return due;
+}
+
+static void
+set_marker (GstBufferList *packets)
+{
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  GstBuffer *last = gst_buffer_list_get_writable (packets, gst_buffer_list_length (packets) - 1);
+  if (gst_rtp_buffer_map (last, GST_MAP_WRITE, &rtp)) {
+    gst_rtp_buffer_set_marker (&rtp, TRUE);
+    gst_rtp_buffer_unmap (&rtp);
+  }
+  GST_BUFFER_FLAG_SET (last, GST_BUFFER_FLAG_MARKER);
+}
+
+static GstFlowReturn
+gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *buffer)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_PAY (base);
+  const guint mtu = GST_RTP_BASE_PAYLOAD_MTU (base);
+  const gsize header = gst_rtp_buffer_calc_header_len (0);
+  Packer packer = {base, gst_buffer_list_new (), mtu > header ? mtu - header : 0,
+      GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
+  const GstClockTime running =
+      gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  gsize too_long = 0;
+  if (config_is_due (self, running)) {
+    GstBuffer *rig =
+        gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
+    too_long = packer.pack (rig);
+    gst_buffer_unref (rig);
+  }
+  if (!too_long)
+    too_long = packer.pack (buffer);
+  gst_buffer_unref (buffer);
+  if (too_long) {
+    gst_buffer_list_unref (packer.packets);
+    GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
+        ("a unit of %" G_GSIZE_FORMAT " bytes does not fit into RTP packets of mtu=%u; expected a "
+         "smaller max-slice-size of neighbourcodeenc, at most %" G_GSIZE_FORMAT,
+            too_long, mtu, packer.room),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  if (gst_buffer_list_length (packer.packets) == 0) {
+    gst_buffer_list_unref (packer.packets);
+    return GST_FLOW_OK;
+  }
+  set_marker (packer.packets);
+  return gst_rtp_base_payload_push_list (base, packer.packets);
+}
+
+/* ---- life ---- */
+
+static void
+gst_rtp_neighbour_code_pay_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_CONFIG_INTERVAL)
+    GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval = g_value_get_int (value);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rtp_neighbour_code_pay_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_CONFIG_INTERVAL)
+    g_value_set_int (value, GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval);
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rtp_neighbour_code_pay_finalize (GObject *object)
+{
+  delete GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
+  G_OBJECT_CLASS (gst_rtp_neighbour_code_pay_parent_class)->finalize (object);
+}
+
+static void
+gst_rtp_neighbour_code_pay_init (GstRtpNeighbourCodePay *self)
+{
+  self->priv = new GstRtpNeighbourCodePayPrivate;
+}
+
+static void
+gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto payload_class = GST_RTP_BASE_PAYLOAD_CLASS (klass);
+
+  object_class->set_property = gst_rtp_neighbour_code_pay_set_property;
+  object_class->get_property = gst_rtp_neighbour_code_pay_get_property;
+  object_class->finalize = gst_rtp_neighbour_code_pay_finalize;
+
+  g_object_class_install_property (object_class, PROP_CONFIG_INTERVAL,
+      g_param_spec_int ("config-interval", "Config interval",
+          "Seconds after which the rig is sent again in band (0: never, -1: with every frame set; "
+          "-1 to 3600, default 1)",
+          -1, 3600, kDefaultConfigInterval,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "RTP neighbour code payloader",
+      "Codec/Payloader/Network/RTP", "Puts coded range frame sets into RTP packets",
+      "gst-rangecast");
+
+  payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
+  payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_rtp_neighbour_code_pay_debug, "rtpneighbourcodepay", 0, "RTP neighbour code payloader");
+}
