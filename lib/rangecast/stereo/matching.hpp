@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <opencv2/calib3d.hpp>
+
+#include "../status.hpp"
+
+namespace rangecast {
+
+enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way };
+
+struct MatchSettings {
+  MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
+  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 5 for the others
+  int uniqueness_ratio = 8;          ///< per cent by which the best match must beat the second
+  int speckle_window_size = 60;      ///< pixels; smaller patches of like disparity go; 0 = off
+  int speckle_range = 2;             ///< pixels of disparity within a patch
+  int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
+
+  friend bool operator== (const MatchSettings &, const MatchSettings &) = default;
+};
+
+/** Matches rectified pairs with OpenCV's block matching (K. Konolige, "Small vision systems", 1998)
+ *  or semi-global matching (H. Hirschmueller, "Stereo processing by semiglobal matching and mutual
+ *  information", PAMI 30, 2008), in all five or three directions. */
+class Matcher {
+public:
+  /** @param min_disparity, max_disparity  pixels, inclusive; left x minus right x; may be negative
+   */
+  Status set (const MatchSettings &settings, int min_disparity, int max_disparity);
+
+  [[nodiscard]] int min_disparity () const { return min_disparity_; }
+  /** Columns left of a pixel that its match can need. */
+  [[nodiscard]] int reach () const
+  {
+    return min_disparity_ + disparities_ > 0 ? min_disparity_ + disparities_ : 0;
+  }
+
+  /** @param left, right  8 bit grey, the same size, rows agree
+   *  @param[out] disparity  CV_16S, 1/16 pixel; below 16 * min_disparity() = no match
+   *  @return kNoSpace if OpenCV failed */
+  Status match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
+
+private:
+  cv::Ptr<cv::StereoMatcher> matcher_;
+  int min_disparity_ = 0, disparities_ = 0;
+};
+
+} // namespace rangecast
