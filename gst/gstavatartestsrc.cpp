@@ -557,7 +557,12 @@ static void
 end_stream (GstAvatarTestSrc *self, const SourcePads &pads, GstFlowReturn flow)
 {
   GST_INFO_OBJECT (self, "pausing: %s", gst_flow_get_name (flow));
-  gst_task_pause (self->priv->task);
+  {
+    std::lock_guard guard (self->priv->lock);
+    if (!self->priv
+             ->stopping) /* a task told to stop must not be told to pause: it would never end */
+      gst_task_pause (self->priv->task);
+  }
   if (flow == GST_FLOW_FLUSHING)
     return;
   if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED)
@@ -761,10 +766,10 @@ start_task (GstAvatarTestSrc *self)
 static void
 ask_to_stop (GstAvatarTestSrc *self)
 {
-  if (self->priv->task)
-    gst_task_stop (self->priv->task);
   std::lock_guard guard (self->priv->lock);
   self->priv->stopping = true;
+  if (self->priv->task)
+    gst_task_stop (self->priv->task);
   wake_up (self->priv);
 }
 
