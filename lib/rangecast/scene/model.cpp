@@ -7,7 +7,7 @@ Status
 load_model (const std::string &path, const std::string &, Mesh &)
 {
   return {StatusCode::kUnsupported,
-      path + ": this gst-rangecast was built without models (meson option avatar-models)"};
+      path + ": this version loads no models; expected no location (the built-in figure)"};
 }
 
 } // namespace rangecast
