@@ -94,7 +94,8 @@ StereoDepth::take_disparities (const RangeImage &image)
     auto to = disparity_.ptr<std::uint16_t> (y);
     for (int x = 0; x < roi.width; x++) {
       const int d = from[x] + offset;
-      to[x] = from[x] >= least && d > 0 ? static_cast<std::uint16_t> (d) : 0;
+      const bool seen = 16 * (roi.x + x) >= from[x]; /* not in the repeated edge of the right picture */
+      to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
 }

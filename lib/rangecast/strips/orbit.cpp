@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "orbit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangecast {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+
+Vec3
+normalised (Vec3 v)
+{
+  const double length = norm (v);
+  return length > 0 ? 1 / length * v : Vec3{0, 0, 1};
+}
+
+Vec3
+column (const Mat3 &m, int i)
+{
+  return {m[i], m[3 + i], m[6 + i]};
+}
+
+/* Solves a 3x3 system by Cramer's rule. */
+bool
+solve (const Mat3 &a, Vec3 b, Vec3 &x)
+{
+  const Vec3 c0 = column (a, 0), c1 = column (a, 1), c2 = column (a, 2);
+  const double determinant = dot (c0, cross (c1, c2));
+  if (std::abs (determinant) < 1e-6)
+    return false;
+  x = {dot (b, cross (c1, c2)) / determinant, dot (c0, cross (b, c2)) / determinant,
+      dot (c0, cross (c1, b)) / determinant};
+  return true;
+}
+
+/* The point with the least sum of squared distances to all optical axes. */
+bool
+meeting_point (const Rig &rig, Vec3 &point)
+{
+  Mat3 a{};
+  Vec3 b;
+  for (const View &view : rig.views) {
+    const Vec3 d = column (view.world_from_view.rotation, 2);
+    const double axis[] = {d.x, d.y, d.z};
+    Mat3 off = kIdentity3; /* takes the part of a vector that is off the axis */
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        off[3 * i + j] -= axis[i] * axis[j];
+    for (int i = 0; i < 9; i++)
+      a[i] += off[i] / double (rig.views.size ());
+    b = b + 1.0 / double (rig.views.size ()) * (off * view.world_from_view.translation);
+  }
+  return rig.views.size () > 1 && solve (a, b, point);
+}
+
+/* Column-major product. */
+Mat4
+product (const std::array<double, 16> &a, const std::array<double, 16> &b)
+{
+  Mat4 c{};
+  for (int i = 0; i < 4; i++)
+    for (int j = 0; j < 4; j++) {
+      double sum = 0;
+      for (int k = 0; k < 4; k++)
+        sum += a[4 * k + i] * b[4 * j + k];
+      c[4 * j + i] = static_cast<float> (sum);
+    }
+  return c;
+}
+
+} // namespace
+
+SceneFrame
+scene_frame (const Rig &rig)
+{
+  SceneFrame scene;
+  if (rig.views.empty ())
+    return scene;
+  const View &first = *std::ranges::min_element (rig.views, {}, &View::id);
+  const Mat3 &r = first.world_from_view.rotation;
+  const Vec3 position = first.world_from_view.translation, forward = column (r, 2);
+  scene.fov_deg = 2 * std::atan (first.height / (2 * first.intrinsics.fy)) / kDegree;
+  const bool met = meeting_point (rig, scene.target) &&
+                   dot (scene.target - position, forward) > first.near_m / 2;
+  scene.up = met ? Vec3{0, 1, 0} : -1.0 * column (r, 1);
+  if (!met)
+    scene.target = position + 2 / (1 / first.near_m + 1 / first.far_m) * forward;
+  const Vec3 to_first = position - scene.target;
+  scene.distance_m = norm (to_first);
+  const double height = dot (to_first, scene.up);
+  scene.elevation_deg = std::asin (std::clamp (height / scene.distance_m, -1.0, 1.0)) / kDegree;
+  const Vec3 level = to_first - height * scene.up;
+  scene.to_first =
+      norm (level) > 1e-3 * scene.distance_m ? normalised (level) : -1.0 * column (r, 1);
+  return scene;
+}
+
+OrbitMatrices
+orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y)
+{
+  const Vec3 right = normalised (cross (scene.up, scene.to_first));
+  const double azimuth = orbit.azimuth_deg * kDegree;
+  const double elevation =
+      std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
+  const double distance = orbit.distance_m > 0 ? orbit.distance_m : scene.distance_m;
+  const Vec3 level = std::cos (azimuth) * scene.to_first + std::sin (azimuth) * right;
+  const Vec3 back = std::cos (elevation) * level + std::sin (elevation) * scene.up;
+  const Vec3 target =
+      scene.target + orbit.pan.x * right + orbit.pan.y * scene.up + orbit.pan.z * scene.to_first;
+  const Vec3 eye = target + distance * back;
+  const Vec3 x = normalised (cross (scene.up, back)), y = cross (back, x);
+  const std::array<double, 16> eye_from_world = {x.x, y.x, back.x, 0, x.y, y.y, back.y, 0, x.z, y.z,
+      back.z, 0, -dot (x, eye), -dot (y, eye), -dot (back, eye), 1};
+
+  const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
+  const double f = 1 / std::tan (fov / 2), near = distance / 50, far = distance * 20;
+  const std::array<double, 16> clip_from_eye = {f / aspect, 0, 0, 0, 0, flip_y ? -f : f, 0, 0, 0, 0,
+      (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0};
+  return {product (clip_from_eye, eye_from_world), distance};
+}
+
+} // namespace rangecast

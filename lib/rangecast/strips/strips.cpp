@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "strips.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+namespace rangecast {
+namespace {
+
+bool
+same_colour (Rgbx a, Rgbx b)
+{
+  return a.r == b.r && a.g == b.g && a.b == b.b;
+}
+
+class Builder {
+public:
+  Builder (const ConstRangeImage &image, const StripSettings &settings,
+      std::vector<StripVertex> &to, StripResult &result)
+      : image_ (image), settings_ (settings), to_ (to), result_ (result),
+        width_ (std::min (image.depth.width, kMaxStripSide)),
+        height_ (std::min (image.depth.height, kMaxStripSide)),
+        step_ (static_cast<int> (settings.depth_step * 65536))
+  {
+  }
+
+  void build ()
+  {
+    for (int y = 0; y < height_; y++) {
+      depth_ = image_.depth.row (y);
+      below_ = y + 1 < height_ ? image_.depth.row (y + 1) : nullptr;
+      row_ = y;
+      if (settings_.mode == StripMode::kStrips)
+        bands_of_row ();
+      else
+        pixels_of_row ();
+    }
+  }
+
+private:
+  [[nodiscard]] bool near (int a, int b) const
+  {
+    return static_cast<std::int64_t> (std::abs (a - b)) * 65536 <=
+           static_cast<std::int64_t> (std::min (a, b)) * step_;
+  }
+
+  [[nodiscard]] bool joins_below (int x) const
+  {
+    return below_ && below_[x] != kInvalidDepth && near (depth_[x], below_[x]);
+  }
+
+  /* The next pixel of the band after x, or -1. */
+  [[nodiscard]] int next_in_band (int x) const
+  {
+    const int last = std::min (width_ - 1, x + 1 + settings_.max_gap);
+    for (int n = x + 1; n <= last; n++)
+      if (depth_[n] != kInvalidDepth)
+        return near (depth_[x], depth_[n]) ? n : -1;
+    return -1;
+  }
+
+  /* Whether the vertices of two pixels of this row are alike but for their column. */
+  [[nodiscard]] bool same_pair (int a, int b) const
+  {
+    if (depth_[a] != depth_[b] ||
+        !same_colour (image_.colour.at (a, row_), image_.colour.at (b, row_)))
+      return false;
+    const bool joined = joins_below (a);
+    if (joined != joins_below (b))
+      return false;
+    return !joined || (below_[a] == below_[b] && same_colour (image_.colour.at (a, row_ + 1),
+                                                     image_.colour.at (b, row_ + 1)));
+  }
+
+  /* Begins a piece at v: two equal vertices and the last one's repetition join it to what is
+   * there. */
+  void begin_piece (StripVertex v)
+  {
+    if (to_.empty ())
+      return;
+    to_.push_back (to_.back ());
+    to_.push_back (v);
+  }
+
+  void pair (int x)
+  {
+    to_.push_back (strip_vertex (x, row_, kCentre, kCentre));
+    to_.push_back (joins_below (x) ? strip_vertex (x, row_ + 1, kCentre, kCentre)
+                                   : strip_vertex (x, row_, kCentre, kAfter));
+  }
+
+  void rectangle (int x)
+  {
+    begin_piece (strip_vertex (x, row_, kBefore, kBefore));
+    to_.push_back (strip_vertex (x, row_, kBefore, kBefore));
+    to_.push_back (strip_vertex (x, row_, kBefore, kAfter));
+    to_.push_back (strip_vertex (x, row_, kAfter, kBefore));
+    to_.push_back (strip_vertex (x, row_, kAfter, kAfter));
+    result_.triangles += 2;
+  }
+
+  /* @return the column after the band */
+  int band (int first)
+  {
+    int x = first, next = next_in_band (first);
+    result_.points++;
+    if (next < 0) {
+      rectangle (first);
+      result_.isolated++;
+      return first + 1;
+    }
+    begin_piece (strip_vertex (first, row_, kCentre, kCentre));
+    pair (first);
+    int previous = first;
+    while (next >= 0) {
+      x = next;
+      next = next_in_band (x);
+      result_.points++;
+      const bool inside_piece = settings_.merge && next == x + 1 && previous == x - 1 &&
+                                same_pair (previous, x) && same_pair (x, next);
+      previous = x;
+      if (inside_piece)
+        continue;
+      pair (x);
+      result_.triangles += 2;
+    }
+    result_.strips++;
+    return x + 1;
+  }
+
+  void bands_of_row ()
+  {
+    for (int x = 0; x < width_;)
+      x = depth_[x] == kInvalidDepth ? x + 1 : band (x);
+  }
+
+  void pixels_of_row ()
+  {
+    for (int x = 0; x < width_; x++) {
+      if (depth_[x] == kInvalidDepth)
+        continue;
+      result_.points++;
+      if (settings_.mode == StripMode::kRectangles)
+        rectangle (x);
+      else
+        to_.push_back (strip_vertex (x, row_, kCentre, kCentre));
+    }
+  }
+
+  const ConstRangeImage &image_;
+  const StripSettings &settings_;
+  std::vector<StripVertex> &to_;
+  StripResult &result_;
+  const int width_, height_;
+  const int step_; /* of 65536 */
+  const std::uint16_t *depth_ = nullptr, *below_ = nullptr;
+  int row_ = 0;
+};
+
+} // namespace
+
+void
+build_strips (const ConstRangeImage &image, const StripSettings &settings,
+    std::vector<StripVertex> &to, StripResult &result)
+{
+  to.clear ();
+  if (!image.roi.empty ())
+    Builder (image, settings, to, result).build ();
+}
+
+} // namespace rangecast
