@@ -369,7 +369,12 @@ draw_frame (GstStripRender *self, const gstrange::RangeFrameMap &frame, GstBuffe
   }
   DrawJob job = {self, make_picture (priv, settings, running), {layers.data (), count},
       GST_GL_MEMORY_CAST (memory)};
-  gst_gl_context_thread_add (GST_GL_BASE_FILTER (self)->context, draw_in_gl_thread, &job);
+  GstMapInfo map; /* tells whoever reads it on the CPU that the texture has changed */
+  const auto flags = GstMapFlags (GST_MAP_WRITE | GST_MAP_GL);
+  if (gst_memory_map (memory, &map, flags)) {
+    gst_gl_context_thread_add (GST_GL_BASE_FILTER (self)->context, draw_in_gl_thread, &job);
+    gst_memory_unmap (memory, &map);
+  }
   if (!job.drawn) {
     GST_ELEMENT_ERROR (self, RESOURCE, WRITE, ("OpenGL could not draw into the output"), (nullptr));
     return GST_FLOW_ERROR;

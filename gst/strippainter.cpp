@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "strippainter.hpp"
 
-#include <gst/gl/gstglfuncs.h>
-
 #include <cstring>
 
 using rangecast::StripMode;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <gst/gl/gl.h>
+#include <gst/gl/gstglfuncs.h>
 
 #include <array>
 #include <rangecast/geometry/rig.hpp>

@@ -23,13 +23,20 @@ struct StripSettings {
 };
 
 /** A vertex that the GPU unprojects itself: the pixel whose depth and colour it has, and where
- *  about that pixel it lies. Bits 0-12: column, 13-25: row (both of the ROI), 26-27: horizontal,
- *  28-30: vertical place. */
+ *  about that pixel it lies. Bits 0-12: column, 13-25: row (both of the ROI), 26-28: horizontal,
+ *  29-31: vertical StripPlace. */
 using StripVertex = std::uint32_t;
 
-/** Offsets from the pixel's centre, in pixels, by the number in the vertex. */
-inline constexpr float kStripOffsets[] = {0.f, -0.5f, 0.5f};
-enum StripPlace : std::uint32_t { kCentre = 0, kBefore = 1, kAfter = 2 };
+/** Where a vertex lies about its pixel, on the surface that the pixel and its neighbours make. */
+enum StripPlace : std::uint32_t {
+  kCentre = 0,
+  kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
+  kAfter = 2,     ///< half a pixel right or down
+  kFarBefore = 3, ///< three quarters: an end of a band, so that it meets what another camera saw
+  kFarAfter = 4,
+};
+/** Offsets in pixels, by StripPlace. */
+inline constexpr float kStripOffsets[] = {0.f, -0.5f, 0.5f, -0.75f, 0.75f};
 /** No image that is drawn is larger, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -37,7 +44,7 @@ constexpr StripVertex
 strip_vertex (int column, int row, StripPlace horizontal, StripPlace vertical)
 {
   return static_cast<StripVertex> (column) | static_cast<StripVertex> (row) << 13 |
-         static_cast<StripVertex> (horizontal) << 26 | static_cast<StripVertex> (vertical) << 28;
+         static_cast<StripVertex> (horizontal) << 26 | static_cast<StripVertex> (vertical) << 29;
 }
 
 struct StripResult {
@@ -51,12 +58,12 @@ struct StripResult {
  *
  *  kStrips: successive valid pixels of a row form a band, one triangle strip with two vertices a
  *  pixel: its own place, and that of the pixel below if that is valid and near in depth, so that
- *  bands join and no cracks open when the view turns; else half a pixel below at its own depth. A
- *  pixel whose pair of vertices equals both neighbours' in depth and colour is left out: the piece
- *  becomes longer. A gap of invalid pixels is bridged if its ends are near in depth; a depth step
- *  ends the band; a pixel with nothing beside it becomes a rectangle of its own size.
- *  Bands are joined by degenerate triangles to one triangle strip.
- *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
+ *  bands join and no cracks open when the view turns; else a little below on its own surface. Both
+ *  ends of a band reach a little beyond their pixels. A pixel whose pair of vertices equals both
+ * neighbours' in depth and colour is left out: the piece becomes longer. A gap of invalid pixels is
+ * bridged if its ends are near in depth; a depth step ends the band; a pixel with nothing beside it
+ * becomes a rectangle of its own size. Bands are joined by degenerate triangles to one triangle
+ * strip. kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn
  *  @param[out] to    replaced; keeps its memory
  *  Reentrant. */
