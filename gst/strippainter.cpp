@@ -20,7 +20,7 @@ using rangecast::StripVertex;
 #endif
 
 /* A vertex names its pixel; depth and colour are fetched here, and the pixel's ray unprojected.
- * In mode rectangles corners lie on the plane through the pixel and its neighbours. */
+ * Vertices that lie beside their pixel follow the plane through it and its neighbours. */
 static const char *const kVertexShader = R"(
 precision highp float;
 precision highp int;
@@ -31,7 +31,6 @@ uniform mat4 u_clip_from_world;
 uniform mat4 u_world_from_view;
 uniform vec4 u_intrinsics; /* fx, fy, cx, cy of the ROI */
 uniform float u_unit;
-uniform int u_slope; /* 1: corners follow the surface */
 uniform float u_step;
 uniform float u_point_size;
 in uint a_vertex;
@@ -53,14 +52,14 @@ float slope (ivec2 p, ivec2 way, float depth)
 }
 float place (uint n)
 {
-  return n == 1u ? -0.5 : n == 2u ? 0.5 : 0.0;
+  return n == 0u ? 0.0 : n == 1u ? -0.5 : n == 2u ? 0.5 : n == 3u ? -0.75 : 0.75;
 }
 void main ()
 {
   ivec2 pixel = ivec2 (int (a_vertex & 8191u), int (a_vertex >> 13u & 8191u));
-  vec2 offset = vec2 (place (a_vertex >> 26u & 3u), place (a_vertex >> 28u & 7u));
+  vec2 offset = vec2 (place (a_vertex >> 26u & 7u), place (a_vertex >> 29u));
   float depth = depth_at (pixel);
-  if (u_slope == 1)
+  if (offset != vec2 (0.0))
     depth += offset.x * slope (pixel, ivec2 (1, 0), depth) + offset.y * slope (pixel, ivec2 (0, 1), depth);
   float z = depth * u_unit;
   vec2 ray = (vec2 (pixel) + offset - u_intrinsics.zw) / u_intrinsics.xy;
@@ -232,7 +231,6 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
       shader_, "u_clip_from_world", 1, FALSE, picture.clip_from_world.data ());
   gst_gl_shader_set_uniform_1i (shader_, "u_depth", 0);
   gst_gl_shader_set_uniform_1i (shader_, "u_colour", 1);
-  gst_gl_shader_set_uniform_1i (shader_, "u_slope", picture.mode == StripMode::kRectangles);
   gst_gl_shader_set_uniform_1f (shader_, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
       shader_, "u_point_size", picture.point_size * picture.pixels_per_unit);

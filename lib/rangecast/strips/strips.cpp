@@ -83,11 +83,12 @@ private:
     to_.push_back (v);
   }
 
-  void pair (int x)
+  /* The two vertices of a pixel, or of an end of the band beside it. */
+  void pair (int x, StripPlace horizontal = kCentre)
   {
-    to_.push_back (strip_vertex (x, row_, kCentre, kCentre));
-    to_.push_back (joins_below (x) ? strip_vertex (x, row_ + 1, kCentre, kCentre)
-                                   : strip_vertex (x, row_, kCentre, kAfter));
+    to_.push_back (strip_vertex (x, row_, horizontal, kCentre));
+    to_.push_back (joins_below (x) ? strip_vertex (x, row_ + 1, horizontal, kCentre)
+                                   : strip_vertex (x, row_, horizontal, kFarAfter));
   }
 
   void rectangle (int x)
@@ -110,7 +111,8 @@ private:
       result_.isolated++;
       return first + 1;
     }
-    begin_piece (strip_vertex (first, row_, kCentre, kCentre));
+    begin_piece (strip_vertex (first, row_, kFarBefore, kCentre));
+    pair (first, kFarBefore);
     pair (first);
     int previous = first;
     while (next >= 0) {
@@ -125,6 +127,8 @@ private:
       pair (x);
       result_.triangles += 2;
     }
+    pair (x, kFarAfter);
+    result_.triangles += 4;
     result_.strips++;
     return x + 1;
   }
