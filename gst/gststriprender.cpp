@@ -98,6 +98,7 @@ struct GstStripRenderPrivate {
   gstrange::RangeInfo info;
   rangecast::SceneFrame scene;
   GstVideoInfo out;
+  GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GstGLFramebuffer *framebuffer = nullptr;
   StripPainter painter;
   std::array<std::vector<StripVertex>, rangecast::kMaxViews> vertices; /* by number in the buffer */
@@ -305,8 +306,12 @@ make_picture (GstStripRenderPrivate *priv, const RenderSettings &settings, GstCl
   const double aspect = double (width) * GST_VIDEO_INFO_PAR_N (&priv->out) /
                         (double (height) * GST_VIDEO_INFO_PAR_D (&priv->out));
   Orbit orbit = settings.orbit;
-  if (GST_CLOCK_TIME_IS_VALID (running))
+  if (GST_CLOCK_TIME_IS_VALID (running)) {
+    if (!GST_CLOCK_TIME_IS_VALID (priv->first_running) || running < priv->first_running)
+      priv->first_running = running;
+    running -= priv->first_running;
     orbit.azimuth_deg += std::fmod (settings.auto_orbit * double (running) / GST_SECOND, 360.0);
+  }
   const auto matrices = rangecast::orbit_matrices (priv->scene, orbit, aspect, true);
   const double fov = orbit.fov_deg > 0 ? orbit.fov_deg : priv->scene.fov_deg;
   StripPainter::Picture picture = {};
@@ -538,6 +543,7 @@ static gboolean
 gst_strip_render_start (GstBaseTransform *base)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (base)->priv;
+  priv->first_running = GST_CLOCK_TIME_NONE;
   {
     std::lock_guard guard (priv->lock);
     priv->stats = {};
@@ -705,7 +711,8 @@ install_camera_properties (GObjectClass *c)
   install_double (c, PROP_PAN_Z, "pan-z", "Pan z",
       "Metres by which what is looked at moves towards the first view (default 0)", -1000, 1000, 0);
   install_double (c, PROP_AUTO_ORBIT, "auto-orbit", "Auto orbit",
-      "Degrees a second of running time by which the azimuth grows by itself (-3600 to 3600, "
+      "Degrees a second by which the azimuth grows by itself from the first frame on (-3600 to "
+      "3600, "
       "default 0)",
       -3600, 3600, 0);
 }

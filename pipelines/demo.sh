@@ -66,7 +66,7 @@ esac
 
 pids=()
 stop_hosts () {
-  [ ${#pids[@]} = 0 ] || kill -INT "${pids[@]}" 2>/dev/null || true
+  [ ${#pids[@]} = 0 ] || kill -TERM "${pids[@]}" 2>/dev/null || true
 }
 trap stop_hosts EXIT
 

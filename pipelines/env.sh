@@ -13,7 +13,7 @@ if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
 fi
 
 # What runs the launch strings; demo.sh replaces it by rangecast-run, which measures.
-launch () { ${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q} "$@"; }
+launch () { exec ${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q} "$@"; }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 

@@ -26,14 +26,10 @@ start_camera () { # view port
     --to 127.0.0.1:$(($2 + $1)) >"camera$1.log" 2>&1 &
   camera[$1]=$!
 }
-# Ends a script and what it runs.
-stop_tree () {
-  local pid
-  for pid in "$@"; do
-    pkill -INT -P "$pid" 2>/dev/null || true
-    kill -INT "$pid" 2>/dev/null || true
-    wait "$pid" 2>/dev/null || true
-  done
+# The scripts become what they run (exec), so their process is the pipeline's.
+stop_all () {
+  kill -TERM "$@" 2>/dev/null || true
+  wait "$@" 2>/dev/null || true
 }
 
 test_three_scripts_join_over_udp () {
@@ -43,7 +39,7 @@ test_three_scripts_join_over_udp () {
   start_camera 0 22100
   start_camera 1 22100
   wait_for_size all.rcnc 60000 40
-  stop_tree "$recorder" "${camera[@]}" "$parent"
+  stop_all "$recorder" "${camera[@]}" "$parent"
   "$pipelines/range-to-ply.sh" all.rcnc cloud-%05d.ply
   [ "$(find . -name 'cloud-*.ply' | wc -l)" -ge 5 ] || fail "few frame sets: $(ls; cat *.log)"
 }
@@ -55,15 +51,14 @@ test_parent_goes_on_without_a_killed_camera_and_takes_it_back () {
   start_camera 0 22120
   start_camera 1 22120
   wait_for_size all.rcnc 40000 40
-  pkill -KILL -P "${camera[1]}" || true
-  kill -KILL "${camera[1]}" 2>/dev/null || true
+  kill -KILL "${camera[1]}"
   local size
   size=$(stat -c %s all.rcnc)
   wait_for_size all.rcnc $((size + 40000)) 30
   start_camera 1 22120
   size=$(stat -c %s all.rcnc)
   wait_for_size all.rcnc $((size + 80000)) 30
-  stop_tree "$recorder" "${camera[@]}" "$parent"
+  stop_all "$recorder" "${camera[@]}" "$parent"
   # Points of view 1: some at first, none while it was dead, some again at the end.
   gst-launch-1.0 -q filesrc location=all.rcnc ! neighbourcodeparse ! neighbourcodedec ! rangesplit name=s \
     s.depth_1 ! multifilesink location=depth1-%05d.raw

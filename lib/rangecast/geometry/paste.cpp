@@ -43,8 +43,10 @@ paste_colour (const ConstRangeImage &image, bool only_valid, ImageView<Rgbx> ful
   paste (image.roi, full, [&] (int y, int begin, int end, Rgbx *to) {
     const Rgbx *from = image.colour.row (y);
     const std::uint16_t *depth = image.depth.row (y);
-    for (int x = begin; x < end; x++)
-      *to++ = only_valid && depth[x] == kInvalidDepth ? Rgbx{} : from[x];
+    for (int x = begin; x < end; x++) {
+      *to = only_valid && depth[x] == kInvalidDepth ? Rgbx{} : from[x];
+      (to++)->x = 255; /* opaque for those who take x for alpha */
+    }
   });
 }
 

@@ -65,16 +65,36 @@ Segmenter::classify (const RangeImage &image, const BackgroundModel &background,
       float (settings.noise_factor), float (settings.colour_threshold), float (settings.shadow),
       float (settings.highlight), float (settings.depth_threshold_m / depth_unit_m)};
   mask_.create (image.roi.height, image.roi.width, CV_8U);
+  nearer_only_.create (image.roi.height, image.roi.width, CV_8U);
   for (int y = 0; y < image.roi.height; y++) {
     const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
     const std::uint16_t *depth = image.depth.row (y);
     const Rgbx *colour = image.colour.row (y);
     auto mask = mask_.ptr<std::uint8_t> (y);
+    auto nearer_only = nearer_only_.ptr<std::uint8_t> (y);
     for (int x = 0; x < image.roi.width; x++) {
-      const bool stays = (limits.use_depth && is_nearer (depth[x], behind[x], limits)) ||
-                         (limits.use_colour && has_other_colour (colour[x], behind[x], limits));
-      mask[x] = stays ? kForeground : 0;
+      const bool nearer = limits.use_depth && is_nearer (depth[x], behind[x], limits);
+      const bool other = limits.use_colour && has_other_colour (colour[x], behind[x], limits);
+      mask[x] = other ? kForeground : 0;
+      nearer_only[x] = nearer && !other ? kForeground : 0;
     }
+  }
+}
+
+/* What only depth speaks for must be as wide as a thing is. Beside a silhouette stereo gives the
+ * background that one camera does not see the depth of what hides it: narrow fringes of the
+ * background's own colour. */
+void
+Segmenter::join_cues (Cue cue)
+{
+  constexpr int kFringe = 9; /* pixels */
+  if (cue == Cue::kBoth) {
+    if (kernel_.empty ())
+      kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (kFringe, kFringe));
+    cv::morphologyEx (nearer_only_, opened_, cv::MORPH_OPEN, kernel_);
+    cv::bitwise_or (mask_, opened_, mask_);
+  } else {
+    cv::bitwise_or (mask_, nearer_only_, mask_);
   }
 }
 
@@ -111,6 +131,7 @@ Segmenter::clear_background (const RangeImage &image, const BackgroundModel &bac
                                       ": the ROI does not lie in the image of the background"};
   try {
     classify (image, background, depth_unit_m, settings);
+    join_cues (settings.cue);
     remove_small (mask_, settings.min_area);
     cv::bitwise_not (mask_, inverse_);
     remove_small (inverse_, settings.max_hole);

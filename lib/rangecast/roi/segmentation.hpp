@@ -30,8 +30,9 @@ public:
    *  another colour. Colour is compared by chromatic distortion and brightness ratio (T.
    *  Horprasert, D. Harwood, L. S. Davis, "A statistical approach for real-time robust background
    *  subtraction and shadow detection", ICCV 1999), so that a pixel which is only darker (shadow)
-   *  or only brighter (light) stays background. Then small islands go and small holes close.
-   *  Closing a hole makes no depth; it decides which valid pixels stay.
+   *  or only brighter (light) stays background. Where only depth speaks for a pixel, the region
+   * must be at least 9 pixels wide, lest fringes beside silhouettes stay. Then small islands go and
+   * small holes close. Closing a hole makes no depth; it decides which valid pixels stay.
    *  @param image         depth is written, colour read
    *  @param depth_unit_m  metres per depth unit
    *  @return kBadSize if the ROI does not lie in the background's image */
@@ -41,8 +42,11 @@ public:
 private:
   void classify (const RangeImage &image, const BackgroundModel &background, double depth_unit_m,
       const SegmentationSettings &settings);
+  void join_cues (Cue cue);
   void remove_small (cv::Mat &mask, int min_area);
 
+  cv::Mat nearer_only_, opened_,
+      kernel_; /* what is nearer than the background, but not of another colour */
   cv::Mat mask_, inverse_, labels_, stats_, centroids_;
 };
 
