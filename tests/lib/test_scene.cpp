@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "test-support.hpp"
 
+#include <fstream>
+#include <unistd.h>
+
 #include <cstring>
 #include <rangecast/scene/scene.hpp>
 
@@ -174,4 +177,64 @@ TEST (Scene, test_model_that_cannot_be_read_is_named)
   const Status status = Scene::create (settings, scene);
   EXPECT_FALSE (status.ok ());
   EXPECT_NE (status.message ().find ("/nowhere/head.glb"), std::string::npos);
+}
+
+TEST (Scene, test_file_that_is_no_model_is_named)
+{
+  const std::string path =
+      ::testing::TempDir () + "no-model-" + std::to_string (getpid ()) + ".glb";
+  std::ofstream (path) << "this is no model";
+  SceneSettings settings;
+  settings.model = path;
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  std::filesystem::remove (path);
+  EXPECT_EQ (status.code (), StatusCode::kBadData);
+  EXPECT_TRUE (status.message ().starts_with (path)) << status.message ();
+}
+
+TEST (Scene, test_small_obj_is_fitted_and_drawn)
+{
+  const std::string path = ::testing::TempDir () + "small-" + std::to_string (getpid ()) + ".obj";
+  std::ofstream (path) << "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3\nf 1 3 4\n";
+  SceneSettings settings;
+  settings.model = path;
+  settings.motion = 0;
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  std::filesystem::remove (path);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  Image<Rgbx> colour (320, 240);
+  Image<std::uint16_t> depth (320, 240);
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), depth.view (), {}).ok ());
+  EXPECT_NEAR (depth.view ().at (160, 120), 8000, 40) << "a plane through the origin, 0.8 m away";
+}
+
+TEST (Scene, test_scanned_head_faces_the_first_view)
+{
+  RANGECAST_NEED_DATA ("lps_head");
+  SceneSettings settings;
+  settings.model = rangecast::testing::data_dir () + "/lps_head/LeePerrySmith.glb";
+  settings.motion = 0;
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  Image<Rgbx> colour (320, 240);
+  Image<std::uint16_t> front (320, 240), back (320, 240);
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), front.view (), {}).ok ());
+  ASSERT_TRUE (
+      scene->render (2, SceneCamera::kLeft, 0, false, colour.view (), back.view (), {}).ok ());
+  /* The nose is nearer to the front camera than the rest of its face's column. */
+  int nearest_row = 0;
+  for (int y = 30; y < 150; y++)
+    if (front.view ().at (160, y) &&
+        front.view ().at (160, y) < front.view ().at (160, nearest_row))
+      nearest_row = y;
+    else if (!front.view ().at (160, nearest_row))
+      nearest_row = y;
+  EXPECT_GT (nearest_row, 60);
+  EXPECT_LT (nearest_row, 130);
+  EXPECT_GT (back.view ().at (160, nearest_row), front.view ().at (160, nearest_row));
 }

@@ -1,13 +1,200 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "model.hpp"
 
+#ifdef RANGECAST_HAVE_ASSIMP
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <cctype>
+#include <cstring>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <utility>
+
+#include "../geometry/range_image.hpp"
+
+namespace fs = std::filesystem;
+
+namespace rangecast {
+namespace {
+
+/* More than any scan that a software rasteriser could draw live. */
+constexpr std::size_t kMaxVertices = 4'000'000;
+
+void
+add_mesh (const aiMesh &from, Mesh &mesh)
+{
+  const auto first = static_cast<std::uint32_t> (mesh.vertices.size ());
+  for (unsigned i = 0; i < from.mNumVertices; i++) {
+    const aiVector3D &p = from.mVertices[i];
+    MeshVertex vertex{p.x, p.y, p.z, 0, 0, 0, 0, 0, 0};
+    if (from.HasTextureCoords (0)) {
+      vertex.u = from.mTextureCoords[0][i].x;
+      vertex.v = 1 - from.mTextureCoords[0][i].y; /* assimp counts from the picture's bottom */
+    }
+    mesh.vertices.push_back (vertex);
+  }
+  for (unsigned i = 0; i < from.mNumFaces; i++) {
+    const aiFace &face = from.mFaces[i];
+    if (face.mNumIndices == 3) /* points and lines have no surface */
+      mesh.triangles.push_back (
+          {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+  }
+}
+
+std::string
+lower_case (std::string text)
+{
+  std::ranges::transform (text, text.begin (), [] (unsigned char c) { return std::tolower (c); });
+  return text;
+}
+
+/* A picture in the model's folder whose name says that it is a colour map, or nothing. */
+std::string
+colour_map_beside (const std::string &model)
+{
+  std::error_code error;
+  const fs::path folder = fs::path (model).parent_path ();
+  std::string found;
+  for (const auto &entry : fs::directory_iterator (folder.empty () ? "." : folder, error)) {
+    const std::string stem = lower_case (entry.path ().stem ().string ());
+    const std::string type = lower_case (entry.path ().extension ().string ());
+    const bool picture = type == ".jpg" || type == ".jpeg" || type == ".png";
+    bool named = false;
+    for (const char *word : {"albedo", "diffuse", "basecolor", "base_color", "colour", "color"})
+      named |= stem.find (word) != std::string::npos;
+    for (const char *word : {"_col", "-col", " col"}) /* Map-COL.jpg */
+      named |= stem.ends_with (word);
+    if (picture && named && (found.empty () || entry.path ().string () < found))
+      found = entry.path ().string ();
+  }
+  return found;
+}
+
+Status
+take_picture (const cv::Mat &bgr, const std::string &name, Mesh &mesh)
+{
+  if (bgr.empty () || bgr.type () != CV_8UC3 || bgr.cols > kMaxImageSide ||
+      bgr.rows > kMaxImageSide)
+    return {StatusCode::kBadData, name + ": cannot be read as a picture; expected JPEG or PNG"};
+  std::vector<Rgbx> pixels;
+  pixels.reserve (bgr.total ());
+  for (int y = 0; y < bgr.rows; y++)
+    for (int x = 0; x < bgr.cols; x++) {
+      const auto &p = bgr.at<cv::Vec3b> (y, x);
+      pixels.push_back ({p[2], p[1], p[0], 0});
+    }
+  mesh.texture = MipMap (bgr.cols, bgr.rows, std::move (pixels));
+  return {};
+}
+
+Status
+take_picture_file (const std::string &path, Mesh &mesh)
+{
+  std::error_code error;
+  if (!fs::is_regular_file (path, error))
+    return {StatusCode::kNotFound, path + ": no such file; expected a texture (JPEG or PNG)"};
+  return take_picture (cv::imread (path, cv::IMREAD_COLOR), path, mesh);
+}
+
+/* A picture that the model does not name. glTF counts v from the top of a picture that it names, as
+ * we do by now; pictures that come beside it are as a rule drawn for v from the bottom. */
+Status
+take_foreign_picture (const std::string &path, const std::string &model, Mesh &mesh)
+{
+  const std::string type = lower_case (fs::path (model).extension ().string ());
+  if (type == ".glb" || type == ".gltf")
+    for (MeshVertex &vertex : mesh.vertices)
+      vertex.v = 1 - vertex.v;
+  return take_picture_file (path, mesh);
+}
+
+/* A picture inside the model's own file: compressed, or plain BGRA. */
+Status
+take_embedded (const aiTexture &texture, const std::string &model, Mesh &mesh)
+{
+  if (texture.mHeight == 0) {
+    const cv::Mat bytes (1, static_cast<int> (texture.mWidth), CV_8U, texture.pcData);
+    return take_picture (cv::imdecode (bytes, cv::IMREAD_COLOR), model + " (its texture)", mesh);
+  }
+  cv::Mat bgr (static_cast<int> (texture.mHeight), static_cast<int> (texture.mWidth), CV_8UC3);
+  for (int y = 0; y < bgr.rows; y++)
+    for (int x = 0; x < bgr.cols; x++) {
+      const aiTexel &t = texture.pcData[y * bgr.cols + x];
+      bgr.at<cv::Vec3b> (y, x) = {t.b, t.g, t.r};
+    }
+  return take_picture (bgr, model + " (its texture)", mesh);
+}
+
+Status
+take_texture (
+    const aiScene &scene, const std::string &model, const std::string &texture, Mesh &mesh)
+{
+  if (!texture.empty ())
+    return take_foreign_picture (texture, model, mesh);
+  for (unsigned i = 0; i < scene.mNumMaterials; i++)
+    for (aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+      aiString name;
+      if (scene.mMaterials[i]->GetTexture (type, 0, &name) != AI_SUCCESS)
+        continue;
+      if (const aiTexture *embedded = scene.GetEmbeddedTexture (name.C_Str ()))
+        return take_embedded (*embedded, model, mesh);
+      return take_picture_file ((fs::path (model).parent_path () / name.C_Str ()).string (), mesh);
+    }
+  const std::string beside = colour_map_beside (model);
+  return beside.empty () ? Status{} : take_foreign_picture (beside, model, mesh);
+}
+
+} // namespace
+
+Status
+load_model (const std::string &path, const std::string &texture, Mesh &mesh)
+{
+  std::error_code error;
+  if (!fs::is_regular_file (path, error))
+    return {StatusCode::kNotFound, path + ": no such file; expected a model (glTF or OBJ)"};
+  Mesh loaded;
+  try {
+    Assimp::Importer importer;
+    const aiScene *scene =
+        importer.ReadFile (path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices |
+                                     aiProcess_PreTransformVertices | aiProcess_SortByPType);
+    if (!scene)
+      return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
+    for (unsigned i = 0; i < scene->mNumMeshes; i++) {
+      if (loaded.vertices.size () + scene->mMeshes[i]->mNumVertices > kMaxVertices)
+        return {StatusCode::kUnsupported, path + ": more than 4 million vertices"};
+      add_mesh (*scene->mMeshes[i], loaded);
+    }
+    if (loaded.triangles.empty ())
+      return {StatusCode::kBadData, path + ": a model without triangles"};
+    if (Status s = take_texture (*scene, path, texture, loaded); !s.ok ())
+      return s;
+  } catch (const std::exception &) { /* OpenCV's decoders and allocations */
+    return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
+  }
+  fit_figure (loaded);
+  compute_normals (loaded);
+  mesh = std::move (loaded);
+  return {};
+}
+
+} // namespace rangecast
+
+#else
+
 namespace rangecast {
 
 Status
 load_model (const std::string &path, const std::string &, Mesh &)
 {
   return {StatusCode::kUnsupported,
-      path + ": this version loads no models; expected no location (the built-in figure)"};
+      path + ": this build reads no models (built without assimp); expected no location"};
 }
 
 } // namespace rangecast
+
+#endif

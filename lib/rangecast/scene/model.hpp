@@ -12,7 +12,7 @@ namespace rangecast {
  *  @param path     glTF (.glb, .gltf), OBJ or whatever else assimp reads
  *  @param texture  JPEG or PNG; empty: the one that the material names, else a picture beside the
  *                  model whose name says that it is a colour map, else plain skin
- *  @return kUnsupported naming the file: this version loads no models */
+ *  @return kNotFound or kBadData naming the file; kUnsupported in a build without assimp */
 Status load_model (const std::string &path, const std::string &texture, Mesh &mesh);
 
 } // namespace rangecast
