@@ -8,6 +8,7 @@ pair () { # caps of left, caps of right, stereodepth's properties...
   run stereodepth name=d "$@" ! fakesink videotestsrc num-buffers=2 ! "$left" ! d.left \
     videotestsrc num-buffers=2 ! "$right" ! d.right
 }
+export -f run pair
 vga=video/x-raw,format=RGB,width=640,height=480
 
 make_rig () { run avatartestsrc views=2 num-buffers=1 rig-export=rig.yaml ! fakesink; }

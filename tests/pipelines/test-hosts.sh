@@ -57,7 +57,7 @@ test_parent_goes_on_without_a_killed_camera_and_takes_it_back () {
   wait_for_size all.rcnc $((size + 40000)) 30
   start_camera 1 22120
   size=$(stat -c %s all.rcnc)
-  wait_for_size all.rcnc $((size + 80000)) 30
+  wait_for_size all.rcnc $((size + 250000)) 60
   stop_all "$recorder" "${camera[@]}" "$parent"
   # Points of view 1: some at first, none while it was dead, some again at the end.
   gst-launch-1.0 -q filesrc location=all.rcnc ! neighbourcodeparse ! neighbourcodedec ! rangesplit name=s \
