@@ -3,7 +3,11 @@
 # The main job on one machine: N camera hosts, a parent and a viewer as separate processes, joined
 # by RTP over UDP on loopback. Measures it and leaves picture, film and report in the output folder.
 set -euo pipefail
+called_from=$PWD
 cd "$(dirname "$0")/.."
+
+# Paths are the caller's.
+absolute () { case "$1" in /*) echo "$1" ;; *) echo "$called_from/$1" ;; esac; }
 
 usage () {
   cat <<'END'
@@ -44,6 +48,12 @@ need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
 [ -n "$out" ] || die "--out: expected a folder"
+out=$(absolute "$out")
+case "$input" in
+  avatar) ;;
+  avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
+  *) input=$(absolute "$input") ;;
+esac
 mkdir -p "$out/log" || die "--out: cannot make '$out'"
 
 # The rig: written by the test source, or recorded with the pictures.
@@ -80,12 +90,11 @@ start () { # name command...
 }
 declare -A names=()
 
-# Recorded pictures have capture times from 0 on: all hosts begin them at the same clock time.
-epoch=0 run_options=
+# Recorded pictures must begin at the same clock time on all hosts.
+run_options=
 case "$input" in
   avatar | avatar=*) ;;
-  *) epoch=$(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')
-     run_options="--base-time $epoch" ;;
+  *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
 parent_port=$port viewer_port=$((port + views))
@@ -100,7 +109,7 @@ start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" -
 # The view turns once round while the frames last.
 orbit=$(awk -v f="$fps" -v n="$frames" 'BEGIN { printf "%.3f", 360 * f / n }')
 RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --timeout $((60 + 4 * frames / fps)) \
-  --capture-epoch $epoch --snapshot $out/avatar.png --report $out/log/viewer.json" \
+  --snapshot $out/avatar.png --report $out/log/viewer.json" \
   pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" --orbit "$orbit" $window &
 viewer=$!
 pids+=($viewer)

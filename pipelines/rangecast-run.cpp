@@ -20,7 +20,6 @@
 
 struct Options {
   gint64 base_time = -1;
-  gint64 capture_epoch = 0;
   gint frames = 0;
   gint timeout_s = 0;
   gboolean progress = FALSE;
@@ -176,9 +175,8 @@ count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   if (!GST_CLOCK_TIME_IS_VALID (runner->first_frame))
     runner->first_frame = now;
   runner->last_frame = now;
-  const double captured = double (capture) + double (runner->options.capture_epoch);
   runner->latencies_ms.push_back (
-      GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - captured) * 1e-6 : 0);
+      GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
   if (runner->options.frames > 0 && frames + 1 == runner->options.frames)
     g_idle_add (send_eos, runner);
   return GST_PAD_PROBE_OK;
@@ -300,10 +298,13 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
   GError *error = nullptr;
+  gchar *details = nullptr;
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
-      gst_message_parse_error (message, &error, nullptr);
-      g_printerr ("ERROR: %s: %s\n", GST_OBJECT_NAME (message->src), error->message);
+      gst_message_parse_error (message, &error, &details);
+      g_printerr ("ERROR: %s: %s\n%s\n", GST_OBJECT_NAME (message->src), error->message,
+          details ? details : "");
+      g_free (details);
       g_error_free (error);
       runner->failed = true;
       g_main_loop_quit (runner->loop);
@@ -374,8 +375,6 @@ parse_arguments (int *argc, char ***argv, Options &options)
   const GOptionEntry entries[] = {
       {"base-time", 0, 0, G_OPTION_ARG_INT64, &options.base_time,
           "Base time of the pipeline: that running time 0 is at this clock time", "NS"},
-      {"capture-epoch", 0, 0, G_OPTION_ARG_INT64, &options.capture_epoch,
-          "Clock time of capture time 0 (default 0: capture times are clock times)", "NS"},
       {"frames", 0, 0, G_OPTION_ARG_INT, &options.frames,
           "Stop after N frames at the element named rendered (default 0: run to the end)", "N"},
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
