@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Rectification, matching and depth: the way from a stereo pair to a range image. */
+#include "test-support.hpp"
+
+#include <random>
+#include <rangecast/scene/scene.hpp>
+#include <rangecast/stereo/stereo_depth.hpp>
+
+using namespace rangecast;
+using rangecast::testing::Image;
+using rangecast::testing::ring_view;
+
+namespace {
+
+View
+ideal_pair (int width = 320, int height = 240)
+{
+  View view = ring_view (0, 0, 0.8, width, height);
+  view.near_m = 0.45;
+  view.far_m = 1.3;
+  PartnerCamera right;
+  right.intrinsics = view.intrinsics;
+  right.partner_from_left.translation = {-0.1, 0, 0};
+  view.right = right;
+  return view;
+}
+
+/* Random dots, the right picture displaced by a whole number of pixels. */
+struct Dots {
+  Image<Rgbx> left{320, 240}, right{320, 240};
+  explicit Dots (int disparity)
+  {
+    std::mt19937 random (1);
+    for (int y = 0; y < 240; y++) {
+      std::vector<std::uint8_t> row (500);
+      for (auto &c : row)
+        c = static_cast<std::uint8_t> (random ());
+      for (int x = 0; x < 320; x++) {
+        left.view ().at (x, y) = {row[x + 100], row[x + 100], row[x + 100], 0};
+        const auto r = row[x + 100 + disparity];
+        right.view ().at (x, y) = {r, r, r, 0};
+      }
+    }
+  }
+};
+
+struct Output {
+  Image<std::uint16_t> depth;
+  Image<Rgbx> colour;
+  Roi roi;
+  explicit Output (Roi r) : depth (r.width, r.height), colour (r.width, r.height), roi (r) {}
+  RangeImage image () { return {0, roi, depth.view (), colour.view (), 0}; }
+};
+
+} // namespace
+
+TEST (Depth, is_focal_length_times_baseline_over_disparity)
+{
+  DisparityToDepth convert;
+  ASSERT_TRUE (convert.set (320, 0.1, 1e-4, 0.3, 3).ok ());
+  Image<std::uint16_t> disparity (4, 1), depth (4, 1);
+  const std::uint16_t d[] = {0, 40 * 16, 40 * 16 + 8, 5 * 16};
+  for (int i = 0; i < 4; i++)
+    disparity.view ().at (i, 0) = d[i];
+  ASSERT_TRUE (convert.convert (disparity.view (), depth.view ()).ok ());
+  EXPECT_EQ (depth.view ().at (0, 0), 0);
+  EXPECT_EQ (depth.view ().at (1, 0), 8000);
+  EXPECT_EQ (depth.view ().at (2, 0), 7901);
+  EXPECT_EQ (depth.view ().at (3, 0), 0) << "6.4 m is beyond far";
+  Image<std::uint16_t> other (3, 1);
+  EXPECT_EQ (convert.convert (disparity.view (), other.view ()).code (), StatusCode::kBadSize);
+}
+
+TEST (Depth, pixel_in_the_air_is_cleared_and_an_edge_stays)
+{
+  Image<std::uint16_t> in (6, 5), out (6, 5);
+  for (int y = 0; y < 5; y++)
+    for (int x = 0; x < 3; x++)
+      in.view ().at (x, y) = 8000;
+  in.view ().at (4, 2) = 9000;
+  ASSERT_TRUE (remove_flying_pixels (in.view (), 0.02, 4, out.view ()).ok ());
+  EXPECT_EQ (out.view ().at (4, 2), 0);
+  EXPECT_EQ (out.view ().at (2, 2), 8000);
+}
+
+TEST (Matching, every_algorithm_finds_the_disparity_of_displaced_dots)
+{
+  for (MatchAlgorithm algorithm :
+      {MatchAlgorithm::kBm, MatchAlgorithm::kSgbm, MatchAlgorithm::kSgbm3Way}) {
+    StereoSettings settings;
+    settings.match.algorithm = algorithm;
+    StereoDepth stereo;
+    ASSERT_TRUE (stereo.set (ideal_pair (), settings).ok ());
+    Dots dots (40);
+    Output output ({0, 0, 320, 240});
+    ASSERT_TRUE (stereo.process (dots.left.view (), dots.right.view (), output.image ()).ok ());
+    int right = 0, wrong = 0;
+    for (int y = 10; y < 230; y++)
+      for (int x = 60; x < 310; x++) {
+        const int d = stereo.disparity ().at (x, y);
+        right += std::abs (d - 640) <= 4;
+        wrong += d != 0 && std::abs (d - 640) > 4;
+      }
+    EXPECT_GT (right, 220 * 250 * 98 / 100);
+    EXPECT_LT (wrong, 220 * 250 / 200);
+    EXPECT_EQ (output.colour.view ().at (7, 9).g, dots.left.view ().at (7, 9).g);
+  }
+}
+
+TEST (Matching, part_of_the_picture_is_matched_as_in_the_whole)
+{
+  SceneSettings scene_settings;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (scene_settings, scene).ok ());
+  Image<Rgbx> left (320, 240), right (320, 240);
+  ASSERT_TRUE (scene->render (0, SceneCamera::kLeft, 0, false, left.view (), {}, {}).ok ());
+  ASSERT_TRUE (scene->render (0, SceneCamera::kRight, 0, false, right.view (), {}, {}).ok ());
+  StereoDepth stereo;
+  ASSERT_TRUE (stereo.set (scene->rig ().views[0], {}).ok ());
+  Output whole ({0, 0, 320, 240}), part ({50, 10, 220, 220});
+  ASSERT_TRUE (stereo.process (left.view (), right.view (), whole.image ()).ok ());
+  ASSERT_TRUE (stereo.process (left.view (), right.view (), part.image ()).ok ());
+  int both = 0, lost = 0, different = 0;
+  for (int y = 20; y < 200; y++)
+    for (int x = 20; x < 200; x++) {
+      const int a = whole.depth.view ().at (50 + x, 10 + y), b = part.depth.view ().at (x, y);
+      both += a && b;
+      lost += a && !b;
+      different += a && b && std::abs (a - b) > 100;
+    }
+  EXPECT_GT (both, 10000);
+  EXPECT_LT (lost, both / 50);
+  EXPECT_LT (different, both / 100);
+}
+
+TEST (Matching, depth_of_the_figure_is_near_the_true_one)
+{
+  SceneSettings scene_settings;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (scene_settings, scene).ok ());
+  Image<Rgbx> left (320, 240), right (320, 240);
+  Image<std::uint16_t> truth (320, 240);
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kLeft, 0, false, left.view (), truth.view (), {}).ok ());
+  ASSERT_TRUE (scene->render (0, SceneCamera::kRight, 0, false, right.view (), {}, {}).ok ());
+  StereoDepth stereo;
+  ASSERT_TRUE (stereo.set (scene->rig ().views[0], {}).ok ());
+  Output output ({0, 0, 320, 240});
+  ASSERT_TRUE (stereo.process (left.view (), right.view (), output.image ()).ok ());
+  std::vector<double> errors; /* pixels of disparity; 1/10 mm depth: d = 320 * 0.1 / z */
+  int visible = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const int t = truth.view ().at (x, y), z = output.depth.view ().at (x, y);
+      visible += t != 0;
+      if (t && z)
+        errors.push_back (std::abs (320000.0 / t - 320000.0 / z));
+    }
+  std::ranges::sort (errors);
+  EXPECT_GT (errors.size (), visible * 0.9);
+  EXPECT_LT (errors[errors.size () / 2], 0.25) << "median disparity error, pixels";
+  EXPECT_LT (errors[errors.size () * 95 / 100], 1.5);
+}
+
+TEST (Rectification, ideal_pair_stays_as_it_is)
+{
+  Rectifier rectifier;
+  ASSERT_TRUE (rectifier.set (ideal_pair ()).ok ());
+  EXPECT_TRUE (rectifier.is_identity ());
+  EXPECT_DOUBLE_EQ (rectifier.baseline_m (), 0.1);
+  EXPECT_TRUE (rectifier.range_view ().is_range_view ());
+}
+
+TEST (Rectification, turned_pair_gets_rows_that_agree_and_a_pose_that_fits)
+{
+  View view = ideal_pair ();
+  const double a = 0.05; /* the right camera is turned about its optical axis and tilted */
+  view.right->partner_from_left.rotation =
+      Mat3{std::cos (a), -std::sin (a), 0, std::sin (a), std::cos (a), 0, 0, 0, 1} *
+      Mat3{1, 0, 0, 0, std::cos (a), -std::sin (a), 0, std::sin (a), std::cos (a)};
+  view.distortion = {0.05, -0.02, 0, 0};
+  Rectifier rectifier;
+  ASSERT_TRUE (rectifier.set (view).ok ());
+  EXPECT_FALSE (rectifier.is_identity ());
+  EXPECT_NEAR (rectifier.baseline_m (), 0.1, 1e-9);
+  /* The optical centre does not move, and both optical axes become parallel: the baseline lies
+   * along the new x axis. */
+  const Pose &pose = rectifier.range_view ().world_from_view;
+  EXPECT_NEAR (norm (pose.translation - view.world_from_view.translation), 0, 1e-9);
+  const Pose left_from_right = view.right->partner_from_left.inverse ();
+  const Vec3 right_centre = pose.inverse () * (view.world_from_view * left_from_right.translation);
+  EXPECT_NEAR (right_centre.x, 0.1, 1e-6);
+  EXPECT_NEAR (right_centre.y, 0, 1e-6);
+  EXPECT_NEAR (right_centre.z, 0, 1e-6);
+}
+
+TEST (Rectification, swapped_vertical_and_single_cameras_are_named)
+{
+  Rectifier rectifier;
+  View view = ideal_pair ();
+  view.right->partner_from_left.translation = {0.1, 0, 0};
+  EXPECT_NE (rectifier.set (view).message ().find ("swapped"), std::string::npos);
+  view.right->partner_from_left.translation = {0, 0.1, 0};
+  EXPECT_NE (rectifier.set (view).message ().find ("above"), std::string::npos);
+  view.right.reset ();
+  EXPECT_EQ (rectifier.set (view).code (), StatusCode::kNotFound);
+}
+
+TEST (Rectification, near_that_needs_more_disparity_than_there_is_picture_is_named)
+{
+  View view = ideal_pair ();
+  view.near_m = 0.05;
+  StereoDepth stereo;
+  EXPECT_NE (stereo.set (view, {}).message ().find ("near"), std::string::npos);
+}
