@@ -395,10 +395,10 @@ install_properties (GObjectClass *object_class)
       "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits);
   install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
       "A neighbour replaces a pixel if their depths differ by no more than so many codes (0 to "
-      "65535; 0 and colour-threshold 0: lossless after quantisation)",
+      "65535, default 8; 0 and colour-threshold 0: lossless after quantisation)",
       0, 65535, kDefaults.depth_threshold);
   install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "and if R, G and B each differ by no more than so many codes (0 to 255)", 0, 255,
+      "and if R, G and B each differ by no more than so many codes (0 to 255, default 10)", 0, 255,
       kDefaults.colour_threshold);
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
       "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,

@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* stereodepth's way from a pair to disparities, beside OpenCV's matchers alone in the same run.
+ *
+ * usage: stereo_bench --left L --right R --ground-truth PNG [--scale S] --focal-length PX
+ *          --baseline M [--doffs PX] --near M --far M [--rounds N]
+ * Ground truth: 8 or 16 bit grey, S per pixel of disparity (default 1), 0 = unknown. Density,
+ * bad-1 and bad-2 are shares of the pixels whose truth is known; bad and median are over pixels
+ * that have a disparity. */
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <rangecast/stereo/stereo_depth.hpp>
+#include <string>
+#include <vector>
+
+using namespace rangecast;
+
+namespace {
+
+std::map<std::string, std::string> options;
+
+double
+number (const std::string &name, double fallback)
+{
+  return options.count (name) ? std::atof (options[name].c_str ()) : fallback;
+}
+
+double
+median_ms (int rounds, const std::function<void ()> &work)
+{
+  std::vector<double> times;
+  for (int i = 0; i < rounds; i++) {
+    const auto begin = std::chrono::steady_clock::now ();
+    work ();
+    times.push_back (
+        std::chrono::duration<double, std::milli> (std::chrono::steady_clock::now () - begin)
+            .count ());
+  }
+  std::ranges::nth_element (times, times.begin () + rounds / 2);
+  return times[rounds / 2];
+}
+
+/* Disparities in 1/16 pixel, at most 0 = none. */
+void
+report (const char *name, const cv::Mat &disparity16, const cv::Mat &truth, double ms)
+{
+  std::vector<double> errors;
+  int known = 0, bad1 = 0, bad2 = 0;
+  for (int y = 0; y < truth.rows; y++)
+    for (int x = 0; x < truth.cols; x++) {
+      const float t = truth.at<float> (y, x);
+      if (!(t > 0))
+        continue;
+      known++;
+      const double d = disparity16.at<std::int16_t> (y, x) / 16.0;
+      if (d <= 0)
+        continue;
+      const double error = std::abs (d - t);
+      errors.push_back (error);
+      bad1 += error > 1;
+      bad2 += error > 2;
+    }
+  if (errors.empty ())
+    errors.push_back (0);
+  std::ranges::nth_element (errors, errors.begin () + errors.size () / 2);
+  const double n = double (errors.size ());
+  std::printf ("%-28s %7.1f %% %6.1f %% %6.1f %% %8.3f %9.1f\n", name, 100 * n / known,
+      100 * bad1 / n, 100 * bad2 / n, errors[errors.size () / 2], ms);
+}
+
+ImageView<const Rgbx>
+view_of (const cv::Mat &m)
+{
+  return {reinterpret_cast<const Rgbx *> (m.data), m.cols, m.rows, std::ptrdiff_t (m.step)};
+}
+
+void
+run_ours (const View &view, const cv::Mat &left, const cv::Mat &right, const cv::Mat &truth,
+    MatchAlgorithm algorithm, const char *name, int rounds, double offset)
+{
+  StereoSettings settings;
+  settings.match.algorithm = algorithm;
+  StereoDepth stereo;
+  if (const Status s = stereo.set (view, settings); !s.ok ()) {
+    std::fprintf (stderr, "stereo_bench: %s\n", s.message ().c_str ());
+    std::exit (1);
+  }
+  cv::Mat depth (left.size (), CV_16U), colour (left.size (), CV_8UC4);
+  const RangeImage image = {0, {0, 0, left.cols, left.rows},
+      {depth.ptr<std::uint16_t> (), left.cols, left.rows, std::ptrdiff_t (depth.step)},
+      {reinterpret_cast<Rgbx *> (colour.data), left.cols, left.rows, std::ptrdiff_t (colour.step)},
+      0};
+  const double ms = median_ms (rounds, [&] {
+    if (!stereo.process (view_of (left), view_of (right), image).ok ())
+      std::abort ();
+  });
+  cv::Mat disparity (left.size (), CV_16S);
+  for (int y = 0; y < left.rows; y++)
+    for (int x = 0; x < left.cols; x++) /* what the range image keeps */
+      disparity.at<std::int16_t> (y, x) = std::int16_t (
+          depth.at<std::uint16_t> (y, x) ? stereo.disparity ().at (x, y) - 16 * offset : 0);
+  report (name, disparity, truth, ms);
+}
+
+void
+run_opencv (const cv::Ptr<cv::StereoMatcher> &matcher, const cv::Mat &left, const cv::Mat &right,
+    const cv::Mat &truth, const char *name, int rounds, int least)
+{
+  cv::Mat disparity;
+  matcher->setMinDisparity (least);
+  matcher->setDisp12MaxDiff (1);
+  matcher->setSpeckleWindowSize (60);
+  matcher->setSpeckleRange (2);
+  const double ms = median_ms (rounds, [&] { matcher->compute (left, right, disparity); });
+  disparity.setTo (0, disparity < 16 * least); /* OpenCV's mark for no match */
+  report (name, disparity, truth, ms);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  for (int i = 1; i + 1 < argc; i += 2)
+    options[argv[i]] = argv[i + 1];
+  cv::Mat left = cv::imread (options["--left"]), right = cv::imread (options["--right"]);
+  cv::Mat truth = cv::imread (options["--ground-truth"], cv::IMREAD_UNCHANGED);
+  const double focal = number ("--focal-length", 0), baseline = number ("--baseline", 0);
+  if (left.empty () || right.empty () || truth.empty () || left.size () != right.size () ||
+      left.size () != truth.size () || focal <= 0 || baseline <= 0) {
+    std::fprintf (stderr, "usage: stereo_bench --left L --right R --ground-truth PNG [--scale S] "
+                          "--focal-length PX --baseline M [--doffs PX] --near M --far M\n"
+                          "expected pictures that can be read and are of one size\n");
+    return 2;
+  }
+  if (truth.channels () > 1)
+    cv::cvtColor (truth, truth, cv::COLOR_BGR2GRAY);
+  truth.convertTo (truth, CV_32F, 1 / number ("--scale", 1));
+  View view;
+  view.width = left.cols;
+  view.height = left.rows;
+  view.intrinsics = {focal, focal, (left.cols - 1) / 2.0, (left.rows - 1) / 2.0};
+  view.near_m = number ("--near", 0.3);
+  view.far_m = number ("--far", 3);
+  view.depth_unit_m = std::max (1e-4, view.far_m / 65000);
+  const double offset = number ("--doffs", 0);
+  PartnerCamera partner;
+  partner.intrinsics = view.intrinsics;
+  partner.intrinsics.cx += offset;
+  partner.partner_from_left.translation.x = -baseline;
+  view.right = partner;
+
+  const int rounds = int (number ("--rounds", 5));
+  const int least = int (std::floor (focal * baseline / view.far_m - offset));
+  const int most = int (std::ceil (focal * baseline / view.near_m - offset));
+  const int count = (most - least + 1 + 15) / 16 * 16;
+  cv::Mat left_rgb, right_rgb, left_grey, right_grey;
+  cv::cvtColor (left, left_rgb, cv::COLOR_BGR2RGBA);
+  cv::cvtColor (right, right_rgb, cv::COLOR_BGR2RGBA);
+  cv::cvtColor (left, left_grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor (right, right_grey, cv::COLOR_BGR2GRAY);
+  std::printf (
+      "%-28s %9s %8s %8s %8s %9s\n", "matcher", "density", "bad-1", "bad-2", "median", "ms");
+  run_ours (view, left_rgb, right_rgb, truth, MatchAlgorithm::kSgbm3Way, "stereodepth sgbm-3way",
+      rounds, offset);
+  run_ours (
+      view, left_rgb, right_rgb, truth, MatchAlgorithm::kSgbm, "stereodepth sgbm", rounds, offset);
+  run_ours (
+      view, left_rgb, right_rgb, truth, MatchAlgorithm::kBm, "stereodepth bm", rounds, offset);
+  for (int mode : {cv::StereoSGBM::MODE_SGBM_3WAY, cv::StereoSGBM::MODE_SGBM})
+    run_opencv (cv::StereoSGBM::create (least, count, 5, 200, 800, 1, 31, 8, 60, 2, mode),
+        left_grey, right_grey, truth,
+        mode == cv::StereoSGBM::MODE_SGBM ? "OpenCV SGBM" : "OpenCV SGBM 3-way", rounds, least);
+  run_opencv (
+      cv::StereoBM::create (count, 15), left_grey, right_grey, truth, "OpenCV BM", rounds, least);
+  return 0;
+}
