@@ -44,8 +44,6 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_parse_debug);
 using Bytes = std::span<const guint8>;
 
 static constexpr gsize kPrefix = kStartCode.size () + kAccessUnitHeaderSize;
-/* An access unit that claims to be longer is damaged. */
-static constexpr gsize kMaxFrame = 32u << 20;
 /* More data is asked for in such steps while the end of an access unit is not in sight. */
 static constexpr guint kMore = 65536;
 /* The rig is written again after so much time. */
@@ -93,8 +91,7 @@ begins_access_unit (Bytes bytes, AccessUnitHeader &header)
          std::memcmp (bytes.data (), kStartCode.data (), kStartCode.size ()) == 0 &&
          rangecast::read_access_unit_header (
              bytes.subspan (kStartCode.size (), kAccessUnitHeaderSize), header)
-             .ok () &&
-         header.size <= kMaxFrame;
+             .ok ();
 }
 
 /* Where the next access unit begins, from `from` on; bytes.size () if none is in sight. Places too

@@ -5,8 +5,8 @@
  *
  * Draws range images with OpenGL as bands of triangles along their rows, without building a mesh.
  * The camera orbits what the rig's cameras look at: by properties, which are controllable, and by
- * mouse and keys (GstNavigation): drag to turn, drag with another button to move, wheel to zoom, a
- * double click or the key r to go back.
+ * mouse and keys (GstNavigation): drag to turn, drag with another button to move, wheel to zoom,
+ * arrows, + and -, and the key r to go back.
  *
  * ## Example launch line
  * |[

@@ -219,7 +219,7 @@ read_access_unit_header (std::span<const std::uint8_t> unit, AccessUnitHeader &h
   h.pts_ns = get<std::uint64_t> (&unit[8]);
   h.capture_time_ns = get<std::uint64_t> (&unit[16]);
   if (h.size > kMaxAccessUnitSize)
-    return {StatusCode::kBadData, "access unit: longer than 256 MiB"};
+    return {StatusCode::kBadData, "access unit: longer than 32 MiB"};
   return {};
 }
 

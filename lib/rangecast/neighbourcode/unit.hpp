@@ -108,8 +108,8 @@ struct AccessUnitHeader {
   bool key = true;
 };
 inline constexpr std::size_t kAccessUnitHeaderSize = 24;
-/** No access unit is longer: 64 views of 4 million pixels would be shorter in practice. */
-inline constexpr std::uint32_t kMaxAccessUnitSize = 256u << 20;
+/** No access unit is longer. */
+inline constexpr std::uint32_t kMaxAccessUnitSize = 32u << 20;
 /** Comes before each access-unit unit of a byte stream. */
 inline constexpr std::array<std::uint8_t, 4> kStartCode = {0x00, 0x52, 0x43, 0x55};
 

@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rangecast-check.hpp"
+
+#include <vector>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static constexpr GstClockTime kFrame = GST_SECOND / 25;
+static constexpr const char *kProperties = "focal-length=160 baseline=0.1 near=0.3 far=1.5";
+
+struct Stereo {
+  GstHarness *left, *right;
+  GstBus *bus = gst_bus_new ();
+
+  explicit Stereo (const std::string &properties = kProperties,
+      const char *left_caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1",
+      const char *right_caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1")
+  {
+    GstElement *element = gst_parse_launch (("stereodepth " + properties).c_str (), nullptr);
+    gst_element_set_bus (element, bus);
+    left = gst_harness_new_with_element (element, "left", "src");
+    right = gst_harness_new_with_element (element, "right", nullptr);
+    gst_harness_set_live (left, FALSE);
+    gst_harness_set_live (right, FALSE);
+    gst_object_unref (element);
+    gst_harness_set_src_caps_str (left, left_caps);
+    gst_harness_set_src_caps_str (right, right_caps);
+  }
+  ~Stereo ()
+  {
+    gst_element_set_bus (left->element, nullptr);
+    gst_object_unref (bus);
+    gst_harness_teardown (right);
+    gst_harness_teardown (left);
+  }
+  /* Random dots; the right picture sees them 20 pixels further left: 0.8 m away. */
+  static GstBuffer *dots (bool is_right, GstClockTime pts)
+  {
+    GRand *random = g_rand_new_with_seed (5);
+    std::vector<guint8> pixels (160 * 120 * 4);
+    for (int y = 0; y < 120; y++) {
+      guint8 row[180];
+      for (guint8 &c : row)
+        c = guint8 (g_rand_int (random));
+      for (int x = 0; x < 160; x++)
+        for (int c = 0; c < 4; c++)
+          pixels[4 * (160 * y + x) + c] = row[x + (is_right ? 20 : 0)];
+    }
+    g_rand_free (random);
+    GstBuffer *buffer = gst_buffer_new_memdup (pixels.data (), pixels.size ());
+    GST_BUFFER_PTS (buffer) = pts;
+    return buffer;
+  }
+  void push (GstHarness *h, GstClockTime pts) { gst_harness_push (h, dots (h == right, pts)); }
+  guint64 stat (const char *field)
+  {
+    GstStructure *stats;
+    guint64 value = G_MAXUINT64;
+    g_object_get (left->element, "stats", &stats, nullptr);
+    gst_structure_get_uint64 (stats, field, &value);
+    gst_structure_free (stats);
+    return value;
+  }
+};
+
+GST_START_TEST (test_depth_is_that_of_the_disparity)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  GstBuffer *output = gst_harness_pull (s.left);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    const RangeImage &image = frame.views ()[0];
+    fail_unless (image.roi == (Roi{0, 0, 160, 120}));
+    int right = 0;
+    for (int y = 10; y < 110; y++)
+      for (int x = 40; x < 150; x++)
+        right += std::abs (image.depth.at (x, y) - 8000) < 100;
+    fail_unless (right > 100 * 110 * 95 / 100, "%d pixels at 0.8 m", right);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pairs_by_pts_not_by_arrival)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  s.push (s.right, kFrame);     /* the right picture of frame 0 was lost */
+  s.push (s.left, kFrame + 10); /* within half a frame */
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), kFrame + 10);
+  fail_unless_equals_uint64 (s.stat ("dropped-left"), 1);
+  fail_unless_equals_uint64 (s.stat ("dropped-right"), 0);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_time_is_the_left_cameras)
+{
+  Stereo s;
+  GstBuffer *left = Stereo::dots (false, 0);
+  gst_range_buffer_set_capture_time (left, 987654321);
+  gst_harness_push (s.left, left);
+  s.push (s.right, 0);
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 987654321);
+  fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), kFrame);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_only_the_wanted_part_is_matched_until_the_refresh)
+{
+  Stereo s (std::string (kProperties) + " refresh-interval=3");
+  for (int i = 0; i < 5; i++) {
+    s.push (s.left, i * kFrame);
+    s.push (s.right, i * kFrame);
+    GstBuffer *output = gst_harness_pull (s.left);
+    const GstRangeMeta *meta = gst_buffer_get_range_meta (output, 0);
+    const bool full = i == 0 || i == 3;
+    fail_unless_equals_int (meta->width, full ? 160 : 60);
+    fail_unless_equals_int (meta->x, full ? 0 : 50);
+    gst_buffer_unref (output);
+    if (i == 0)
+      fail_unless (gst_harness_push_upstream_event (
+          s.left, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+                      gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT, 0, "x", G_TYPE_UINT,
+                          50, "y", G_TYPE_UINT, 20, "width", G_TYPE_UINT, 60, "height", G_TYPE_UINT,
+                          70, nullptr))));
+  }
+  fail_unless_equals_uint64 (s.stat ("restricted-frames"), 3);
+}
+GST_END_TEST;
+
+static std::string
+error_of (const std::string &properties, const char *right_caps)
+{
+  Stereo s (properties, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1", right_caps);
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  return next_message_text (s.bus, GST_MESSAGE_ERROR);
+}
+
+GST_START_TEST (test_bad_settings_are_one_error_that_names_them)
+{
+  const char *same = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
+  const char *larger = "video/x-raw,format=RGBx,width=80,height=240,framerate=25/1";
+  fail_unless (error_of (kProperties, larger).find ("pad right is 80x240") != std::string::npos);
+  fail_unless (error_of ("", same).find ("focal-length") != std::string::npos);
+  fail_unless (error_of ("rig=/no/rig.yaml", same).find ("/no/rig.yaml") != std::string::npos);
+  fail_unless (error_of ("focal-length=160 baseline=0.1 near=0.05", same).find ("near") !=
+               std::string::npos);
+  fail_unless (error_of (std::string (kProperties) + " block-size=4", same).find ("block size") !=
+               std::string::npos);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_end_of_one_pad_ends_the_stream)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  gst_buffer_unref (gst_harness_pull (s.left));
+  gst_harness_push_event (s.right, gst_event_new_eos ());
+  s.push (s.left, kFrame);
+  bool eos = false;
+  while (!eos) {
+    GstEvent *event = gst_harness_pull_event (s.left);
+    fail_unless (event != nullptr);
+    eos = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+    gst_event_unref (event);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_changes_states_twice)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "avatartestsrc name=c num-buffers=2 c.left ! queue ! d.left c.right ! queue ! "
+      "d.right stereodepth name=d focal-length=320 baseline=0.1 ! fakesink",
+      nullptr);
+  for (int i = 0; i < 2; i++) {
+    gst_element_set_state (pipeline, GST_STATE_PLAYING);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    GstMessage *message = gst_bus_timed_pop_filtered (
+        bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
+    gst_message_unref (message);
+    gst_object_unref (bus);
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+  }
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+static Suite *
+stereodepth_suite ()
+{
+  Suite *suite = suite_create ("stereodepth");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_depth_is_that_of_the_disparity);
+  tcase_add_test (tc, test_pairs_by_pts_not_by_arrival);
+  tcase_add_test (tc, test_capture_time_is_the_left_cameras);
+  tcase_add_test (tc, test_only_the_wanted_part_is_matched_until_the_refresh);
+  tcase_add_test (tc, test_bad_settings_are_one_error_that_names_them);
+  tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
+  tcase_add_test (tc, test_changes_states_twice);
+  return suite;
+}
+
+GST_CHECK_MAIN (stereodepth);
