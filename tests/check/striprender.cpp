@@ -25,10 +25,12 @@ render_harness (const Rig &rig, const char *properties = "")
   gst_object_unref (probe);
   if (!usable)
     return nullptr;
-  const std::string launch = std::string ("striprender name=r ") + properties +
-                             " ! video/x-raw(memory:GLMemory),width=320,height=240 ! gldownload ! "
-                             "video/x-raw,format=RGBA";
+  const std::string launch =
+      std::string ("striprender name=r ") + properties +
+      " ! capsfilter caps=\"video/x-raw(memory:GLMemory),width=320,height=240\" ! "
+      "gldownload";
   GstHarness *h = gst_harness_new_parse (launch.c_str ());
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBA");
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
   return h;
 }
