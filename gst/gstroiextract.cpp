@@ -45,6 +45,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
 enum {
   PROP_0,
   PROP_BACKGROUND_FRAMES,
+  PROP_SETTLE_FRAMES,
   PROP_BACKGROUND_FILE,
   PROP_SAVE_BACKGROUND,
   PROP_CUE,
@@ -70,6 +71,7 @@ static constexpr int kAnnouncedMargin = 16;
 
 struct RoiSettings {
   int background_frames = kDefaultBackgroundFrames;
+  int settle_frames = 0;
   std::string background_file, save_background;
   rangecast::SegmentationSettings segmentation;
   int margin = 0;
@@ -82,6 +84,7 @@ struct ViewState {
   rangecast::Segmenter segmenter;
   bool learnt = false;
   int learning_target = 0;
+  int settled = 0; /* frames seen before learning began */
   Roi announced;
   guint64 points_in = 0, points_out = 0; /* of the present frame */
   Roi box;
@@ -229,7 +232,11 @@ process_view (
   state.points_out = 0;
   state.box = {};
   if (!state.learnt) {
-    state.status = state.background.learn (image);
+    state.status = {};
+    if (state.settled < settings.settle_frames)
+      state.settled++;
+    else
+      state.status = state.background.learn (image);
     return;
   }
   state.status = state.segmenter.clear_background (
@@ -405,6 +412,9 @@ gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GP
     case PROP_BACKGROUND_FRAMES:
       settings.background_frames = g_value_get_int (value);
       break;
+    case PROP_SETTLE_FRAMES:
+      settings.settle_frames = g_value_get_int (value);
+      break;
     case PROP_BACKGROUND_FILE:
       settings.background_file = text ();
       break;
@@ -468,6 +478,9 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
   switch (id) {
     case PROP_BACKGROUND_FRAMES:
       g_value_set_int (value, settings.background_frames);
+      break;
+    case PROP_SETTLE_FRAMES:
+      g_value_set_int (value, settings.settle_frames);
       break;
     case PROP_BACKGROUND_FILE:
       set_text (settings.background_file);
@@ -538,6 +551,11 @@ install_background_properties (GObjectClass *object_class)
       g_param_spec_int ("background-frames", "Background frames",
           "Frames of the empty scene from which a background is learnt (1 to 10000, default 30)", 1,
           10000, kDefaultBackgroundFrames, playing));
+  g_object_class_install_property (object_class, PROP_SETTLE_FRAMES,
+      g_param_spec_int ("settle-frames", "Settle frames",
+          "Frames at the start from which nothing is learnt, while exposure settles (0 to 100000, "
+          "default 0)",
+          0, 100000, 0, ready));
   g_object_class_install_property (object_class, PROP_BACKGROUND_FILE,
       g_param_spec_string ("background-file", "Background file",
           "Take the background from this file instead of learning it (default: none)", nullptr,

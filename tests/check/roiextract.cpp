@@ -81,6 +81,18 @@ GST_START_TEST (test_nobody_is_an_empty_roi_and_no_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frames_before_the_camera_has_settled_teach_nothing)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract settle-frames=2 background-frames=1");
+  for (int i = 0; i < 2; i++)
+    fail_unless (push (h, scene (rig, i, true)).empty ());
+  fail_unless (push (h, scene (rig, 2, false)).empty ());
+  fail_unless (push (h, scene (rig, 3, true)) == (Roi{100, 90, 60, 80}));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_margin_grows_the_roi)
 {
   const Rig rig = ring_rig (1);
@@ -222,6 +234,7 @@ roiextract_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_learns_then_crops_to_the_person_without_copying);
   tcase_add_test (tc, test_nobody_is_an_empty_roi_and_no_error);
+  tcase_add_test (tc, test_frames_before_the_camera_has_settled_teach_nothing);
   tcase_add_test (tc, test_margin_grows_the_roi);
   tcase_add_test (tc, test_capture_background_learns_anew);
   tcase_add_test (tc, test_background_is_saved_and_loaded);
