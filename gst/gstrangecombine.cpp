@@ -10,7 +10,7 @@
  * |[
  * gst-launch-1.0 rangecombine name=c focal-length=525 ! plyenc ! filesink location=cloud.ply
  * filesrc location=colour.jpg ! jpegdec ! videoconvert ! c.colour filesrc location=depth.png !
- * pngdec ! c.depth
+ * pngdec ! videoconvert ! c.depth
  * ]|
  *
  * Since: 0.1
@@ -145,6 +145,7 @@ view_from_settings (const CombineSettings &settings, int width, int height)
   const double f = settings.focal_length > 0 ? settings.focal_length : kDefaultFocalOfWidth * width;
   view.intrinsics = {f, f, settings.principal_x >= 0 ? settings.principal_x : (width - 1) / 2.0,
       settings.principal_y >= 0 ? settings.principal_y : (height - 1) / 2.0};
+  view.world_from_view.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* level, looking along -z */
   view.depth_unit_m = kDefaultDepthUnit;
   view.near_m = 0.3;
   view.far_m = 6.0;

@@ -224,6 +224,7 @@ view_from_properties (const StereoProperties &p, int width, int height, View &vi
   view.id = p.view_id;
   view.width = width;
   view.height = height;
+  view.world_from_view.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* level, looking along -z */
   view.near_m = kDefaultNear;
   view.far_m = kDefaultFar;
   view.intrinsics = {p.focal_length, p.focal_length,
