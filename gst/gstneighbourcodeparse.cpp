@@ -347,7 +347,7 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame, gint *skip)
     return GST_FLOW_OK;
   }
   gst_base_parse_set_min_frame_size (base, guint (kPrefix));
-  if (!priv->src_caps_set) { /* of no use without its rig */
+  if (!priv->src_caps_set || priv->slices.empty ()) { /* of no use without its rig, or empty */
     *skip = gint (length);
     return GST_FLOW_OK;
   }
