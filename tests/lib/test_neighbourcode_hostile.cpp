@@ -214,3 +214,37 @@ TEST_F (Hostile, damaged_rig_units_are_refused)
     }
   }
 }
+
+TEST_F (Hostile, duplicate_of_one_slice_does_not_hide_the_loss_of_another)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
+  auto units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}));
+  ASSERT_GT (units.size (), 3u);
+  for (std::size_t lost = 0; lost < units.size (); lost++)
+    for (std::size_t twice = 0; twice < units.size (); twice++) {
+      auto sent = units;
+      sent[lost] = units[twice];
+      std::vector<std::uint8_t> bytes;
+      for (const auto &unit : sent)
+        bytes.insert (bytes.end (), unit.begin (), unit.end ());
+      DecoderResult result;
+      decoder.plan (bytes, result);
+      ASSERT_EQ (decoder.views ().size (), 1u);
+      EXPECT_EQ (decoder.missing_pixels (0) > 0, lost != twice) << lost << " " << twice;
+    }
+}
+
+TEST_F (Hostile, stray_slice_of_another_frame_clears_nothing)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
+  auto bytes = encode (rig (), pictures, {16, 8, 0, 0, 256});
+  const auto stray = encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77);
+  bytes.insert (bytes.end (), stray.begin (), stray.end ());
+  Decoded decoded = decode_exact (decoder, bytes);
+  EXPECT_EQ (decoded.result.missing_pixels, 0u);
+  for (int y = 0; y < 20; y++)
+    for (int x = 0; x < 24; x++)
+      ASSERT_EQ (decoded.pictures[0].depth.view ().at (x, y), pictures[0].depth.view ().at (x, y));
+}

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
+#include <utility>
 
 namespace rangecast {
 
@@ -118,9 +119,23 @@ AccessUnitDecoder::plan (std::span<const std::uint8_t> bytes, DecoderResult &res
   for (std::size_t i = 0; i < slices_.size (); i++) {
     const SliceHeader &header = slices_[i].header;
     if (count_ == 0 || planned_[count_ - 1].view_id != header.view_id)
-      planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns, i, 0};
+      planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns, i, 0, header};
     planned_[count_ - 1].slice_count++;
   }
+  for (std::size_t i = 0; i < count_; i++) {
+    const auto first = slices_.begin () + std::ptrdiff_t (planned_[i].first_slice);
+    std::ranges::sort (
+        first, first + std::ptrdiff_t (planned_[i].slice_count), {}, [] (const PlannedSlice &s) {
+          return std::pair{s.header.first_column, s.header.first_row};
+        });
+  }
+}
+
+static bool
+same_place (const SliceHeader &a, const SliceHeader &b)
+{
+  return a.first_row == b.first_row && a.rows == b.rows && a.first_column == b.first_column &&
+         a.columns == b.columns;
 }
 
 static bool
@@ -130,39 +145,59 @@ agrees (const SliceHeader &a, const SliceHeader &b)
          a.frame_number == b.frame_number;
 }
 
+/* The slices lie in the order of their columns, then rows. What an encoder makes is bands of
+ * columns side by side, each of rows without a gap; whatever else they are (some lost, overlapping,
+ * of other shapes) leaves pixels unwritten for all we know. */
 std::uint64_t
 AccessUnitDecoder::missing_pixels (std::size_t view) const
 {
   const PlannedView &planned = planned_[view];
+  const int width = planned.roi.width, height = planned.roi.height;
+  const SliceHeader *last = nullptr;
   std::uint64_t have = 0;
+  bool tiled = true;
   for (std::size_t i = 0; i < planned.slice_count; i++) {
-    const SliceHeader &header = slices_[planned.first_slice + i].header;
-    if (agrees (header, slices_[planned.first_slice].header))
-      have +=
-          static_cast<std::uint64_t> (header.rows) * static_cast<std::uint64_t> (header.columns);
+    const SliceHeader &h = slices_[planned.first_slice + i].header;
+    if (!agrees (h, planned.reference) || (last && same_place (h, *last)))
+      continue;
+    const bool below = last && h.first_column == last->first_column && h.columns == last->columns &&
+                       h.first_row == last->first_row + last->rows;
+    const bool beside =
+        h.first_row == 0 && (last ? h.first_column == last->first_column + last->columns &&
+                                        last->first_row + last->rows == height
+                                  : h.first_column == 0);
+    tiled &= below || beside;
+    have += static_cast<std::uint64_t> (h.rows) * static_cast<std::uint64_t> (h.columns);
+    last = &h;
   }
-  const auto all = static_cast<std::uint64_t> (planned.roi.width) *
-                   static_cast<std::uint64_t> (planned.roi.height);
-  return all > have ? all - have : 0; /* a duplicated slice must not make it negative */
+  if (planned.roi.empty () || (tiled && last && last->first_row + last->rows == height &&
+                                  last->first_column + last->columns == width))
+    return 0;
+  const auto all = static_cast<std::uint64_t> (width) * static_cast<std::uint64_t> (height);
+  return all > have ? all - have : 1;
 }
 
 void
 AccessUnitDecoder::decode_view (std::size_t index, const RangeImage &image)
 {
   const PlannedView &planned = planned_[index];
-  const SliceHeader &first = slices_[planned.first_slice].header;
+  const SliceHeader &first = planned.reference;
   DecoderResult &result = results_[index];
   result = {};
   for (std::size_t i = 0; i < planned.slice_count; i++) {
     const PlannedSlice &slice = slices_[planned.first_slice + i];
-    if (agrees (slice.header, first) &&
-        decoders_[planned.view_id].decode (slice.unit, slice.header, image, result.points).ok ()) {
-      result.slices++;
+    if (!agrees (slice.header, first)) { /* a stray one: nothing of it is written */
+      result.bad_slices++;
       continue;
     }
-    result.bad_slices++;
-    if (slice.header.roi == planned.roi)
+    std::uint64_t points = 0;
+    if (decoders_[planned.view_id].decode (slice.unit, slice.header, image, points).ok ()) {
+      result.slices++;
+      result.points += points;
+    } else {
+      result.bad_slices++;
       SliceDecoder::invalidate (slice.header, image);
+    }
   }
   result.missing_pixels = missing_pixels (index);
   result.raw_bits =

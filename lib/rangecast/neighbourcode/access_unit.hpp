@@ -60,6 +60,7 @@ public:
     Roi roi;
     std::uint64_t capture_time_ns = 0;
     std::size_t first_slice = 0, slice_count = 0; ///< in the order of views
+    SliceHeader reference; ///< the first slice that came: the others must agree with it
   };
 
   Status set_rig (const Rig &rig);
@@ -69,7 +70,7 @@ public:
    *  bits, others that differ are bad. `bytes` must live until decode() is done. */
   void plan (std::span<const std::uint8_t> bytes, DecoderResult &result);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
-  /** Pixels of a view's ROI that no slice holds. */
+  /** Pixels of a view's ROI that no slice holds; at least 1 unless the slices cover it for sure. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
 
   /** @param images  one for each of views(), with its ROI; pixels without a slice are left as they
