@@ -252,21 +252,26 @@ static void
 announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
 {
   const Roi &box = state.box, &told = state.announced;
-  const bool inside = !told.empty () && box.x >= told.x && box.y >= told.y &&
-                      box.x + box.width <= told.x + told.width &&
-                      box.y + box.height <= told.y + told.height;
+  /* Upstream gives nothing beyond what it was told, so a box that grows is told before it gets
+   * there: when it comes near an edge that is not the picture's. */
+  const View *full = self->priv->info.rig.find (view_id);
+  constexpr int kNear = kAnnouncedMargin / 2;
+  const int right = told.x + told.width, bottom = told.y + told.height;
+  const bool inside = !told.empty () && (told.x == 0 || box.x >= told.x + kNear) &&
+                      (told.y == 0 || box.y >= told.y + kNear) &&
+                      (right >= full->width || box.x + box.width <= right - kNear) &&
+                      (bottom >= full->height || box.y + box.height <= bottom - kNear);
   const bool fits = told.width <= box.width + 3 * kAnnouncedMargin &&
                     told.height <= box.height + 3 * kAnnouncedMargin;
   if (box.empty () ? told.empty () : inside && fits)
     return;
-  const View *view = self->priv->info.rig.find (view_id);
   Roi &roi = state.announced;
   roi = {};
   if (!box.empty ()) {
     roi.x = std::max (0, box.x - kAnnouncedMargin);
     roi.y = std::max (0, box.y - kAnnouncedMargin);
-    roi.width = std::min (view->width, box.x + box.width + kAnnouncedMargin) - roi.x;
-    roi.height = std::min (view->height, box.y + box.height + kAnnouncedMargin) - roi.y;
+    roi.width = std::min (full->width, box.x + box.width + kAnnouncedMargin) - roi.x;
+    roi.height = std::min (full->height, box.y + box.height + kAnnouncedMargin) - roi.y;
   }
   GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
       guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",

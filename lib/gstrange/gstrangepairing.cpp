@@ -25,6 +25,18 @@ PairMatcher::take (GstClockTime frame_duration, Pair &pair)
         gst_aggregator_pad_peek_buffer (pads_[0]), gst_aggregator_pad_peek_buffer (pads_[1])};
     GstFlowReturn flow = GST_FLOW_OK;
     int drop = -1;
+    bool gap = false; /* GstAggregator makes an empty buffer of a GAP event */
+    for (int i = 0; i < 2; i++)
+      if (buffers[i] && GST_BUFFER_FLAG_IS_SET (buffers[i], GST_BUFFER_FLAG_GAP) &&
+          gst_buffer_get_size (buffers[i]) == 0) {
+        gst_aggregator_pad_drop_buffer (pads_[i]);
+        gap = true;
+      }
+    if (gap) {
+      gst_clear_buffer (&buffers[0]);
+      gst_clear_buffer (&buffers[1]);
+      continue;
+    }
     for (int i = 0; i < 2; i++)
       if (!buffers[i] && gst_aggregator_pad_is_eos (pads_[i]))
         flow = GST_FLOW_EOS;

@@ -118,6 +118,19 @@ GST_START_TEST (test_pairs_by_pts_and_drops_what_has_no_partner)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_gap_costs_its_frame_and_nothing_else)
+{
+  Combine c;
+  gst_harness_push_event (c.depth, gst_event_new_gap (0, GST_SECOND / 10));
+  c.push_colour (0, 1);
+  c.push_colour (GST_SECOND, 2);
+  c.push_depth (GST_SECOND, 1000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_capture_time_comes_from_the_colour_camera)
 {
   Combine c;
@@ -231,6 +244,7 @@ rangecombine_suite ()
   tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
+  tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
   tcase_add_test (tc, test_capture_time_comes_from_the_colour_camera);
   tcase_add_test (tc, test_pictures_of_different_size_are_one_error);
   tcase_add_test (tc, test_missing_rig_is_one_error_that_names_it);
