@@ -15,48 +15,68 @@ running_time_of (GstAggregatorPad *pad, GstBuffer *buffer)
   return time;
 }
 
+/* GstAggregator makes an empty buffer of a GAP event. */
+static bool
+is_gap (GstBuffer *buffer)
+{
+  return GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size (buffer) == 0;
+}
+
+/* Which of the two fronts to drop (0, 1), or -1 where they are a pair. A gap stands for all that
+ * would have been captured in it: it takes its partners with it and goes when it is over. */
+static int
+without_partner (GstBuffer *const buffers[2], const GstClockTime times[2], GstClockTime tolerance)
+{
+  const bool timed = GST_CLOCK_TIME_IS_VALID (times[0]) && GST_CLOCK_TIME_IS_VALID (times[1]);
+  const bool gaps[2] = {is_gap (buffers[0]), is_gap (buffers[1])};
+  if (gaps[0] != gaps[1] && timed) {
+    const int gap = gaps[0] ? 0 : 1;
+    const GstClockTime length = GST_BUFFER_DURATION_IS_VALID (buffers[gap])
+                                    ? GST_BUFFER_DURATION (buffers[gap]) -
+                                          MIN (tolerance, GST_BUFFER_DURATION (buffers[gap]))
+                                    : tolerance;
+    return times[1 - gap] > times[gap] + length ? gap : 1 - gap;
+  }
+  if (gaps[0] || gaps[1])
+    return gaps[0] ? 0 : 1;
+  if (timed && (times[0] > times[1] ? times[0] - times[1] : times[1] - times[0]) > tolerance)
+    return times[0] < times[1] ? 0 : 1;
+  return -1;
+}
+
+GstFlowReturn
+PairMatcher::look (GstClockTime tolerance, int &drop)
+{
+  GstBuffer *buffers[2] = {
+      gst_aggregator_pad_peek_buffer (pads_[0]), gst_aggregator_pad_peek_buffer (pads_[1])};
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (!buffers[0] || !buffers[1])
+    flow = GST_AGGREGATOR_FLOW_NEED_DATA;
+  for (int i = 0; i < 2; i++)
+    if (!buffers[i] && gst_aggregator_pad_is_eos (pads_[i]))
+      flow = GST_FLOW_EOS;
+  if (flow == GST_FLOW_OK) {
+    const GstClockTime times[2] = {
+        running_time_of (pads_[0], buffers[0]), running_time_of (pads_[1], buffers[1])};
+    drop = without_partner (buffers, times, tolerance);
+    if (drop >= 0 && !is_gap (buffers[drop]))
+      dropped_[drop]++;
+  }
+  gst_clear_buffer (&buffers[0]);
+  gst_clear_buffer (&buffers[1]);
+  return flow;
+}
+
 GstFlowReturn
 PairMatcher::take (GstClockTime frame_duration, Pair &pair)
 {
   const GstClockTime tolerance =
       GST_CLOCK_TIME_IS_VALID (frame_duration) ? frame_duration / 2 : GstClockTime{0};
-  while (true) {
-    GstBuffer *buffers[2] = {
-        gst_aggregator_pad_peek_buffer (pads_[0]), gst_aggregator_pad_peek_buffer (pads_[1])};
-    GstFlowReturn flow = GST_FLOW_OK;
-    int drop = -1;
-    bool gap = false; /* GstAggregator makes an empty buffer of a GAP event */
-    for (int i = 0; i < 2; i++)
-      if (buffers[i] && GST_BUFFER_FLAG_IS_SET (buffers[i], GST_BUFFER_FLAG_GAP) &&
-          gst_buffer_get_size (buffers[i]) == 0) {
-        gst_aggregator_pad_drop_buffer (pads_[i]);
-        gap = true;
-      }
-    if (gap) {
-      gst_clear_buffer (&buffers[0]);
-      gst_clear_buffer (&buffers[1]);
-      continue;
-    }
-    for (int i = 0; i < 2; i++)
-      if (!buffers[i] && gst_aggregator_pad_is_eos (pads_[i]))
-        flow = GST_FLOW_EOS;
-    if (flow == GST_FLOW_OK && (!buffers[0] || !buffers[1]))
-      flow = GST_AGGREGATOR_FLOW_NEED_DATA;
-    if (flow == GST_FLOW_OK) {
-      const GstClockTime a = running_time_of (pads_[0], buffers[0]);
-      const GstClockTime b = running_time_of (pads_[1], buffers[1]);
-      const bool timed = GST_CLOCK_TIME_IS_VALID (a) && GST_CLOCK_TIME_IS_VALID (b);
-      if (timed && (a > b ? a - b : b - a) > tolerance)
-        drop = a < b ? 0 : 1;
-    }
-    gst_clear_buffer (&buffers[0]);
-    gst_clear_buffer (&buffers[1]);
-    if (flow != GST_FLOW_OK)
+  for (int drop = 0; drop >= 0;) {
+    if (const GstFlowReturn flow = look (tolerance, drop); flow != GST_FLOW_OK)
       return flow;
-    if (drop < 0)
-      break;
-    gst_aggregator_pad_drop_buffer (pads_[drop]);
-    dropped_[drop]++;
+    if (drop >= 0)
+      gst_aggregator_pad_drop_buffer (pads_[drop]);
   }
   pair.first = gst_aggregator_pad_pop_buffer (pads_[0]);
   pair.second = gst_aggregator_pad_pop_buffer (pads_[1]);

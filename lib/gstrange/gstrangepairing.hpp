@@ -21,7 +21,8 @@ public:
 
   /** Takes the next pair. Buffers whose running times differ by no more than half the frame
    *  duration belong together; the older of two that do not is dropped and counted. Buffers
-   *  without PTS are paired as they come.
+   *  without PTS are paired as they come. A GAP drops, and counts, what the other pad has for the
+   *  same time.
    *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE: then only equal running times match
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has nothing */
@@ -32,6 +33,8 @@ public:
   void reset () { dropped_[0] = dropped_[1] = 0; }
 
 private:
+  GstFlowReturn look (GstClockTime tolerance, int &drop);
+
   GstAggregatorPad *pads_[2];
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
