@@ -24,6 +24,8 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: columns, expected 8 to 3600");
   if (!(u.layer_gap_m >= 0 && u.layer_gap_m <= 100) || !(u.smoothing_m >= 0 && u.smoothing_m <= 1))
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
+  if (!(settings.hidden_gap_m >= 0 && settings.hidden_gap_m <= 100))
+    return bad ("cylinder: hidden gap, expected 0 to 100 metres");
   const double length = norm (settings.fixed_axis.direction);
   if (settings.axis == AxisMode::kFixed &&
       !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
@@ -42,6 +44,8 @@ CylinderFilter::set_rig (const Rig &rig)
       return {StatusCode::kBadValue,
           "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
     rig_rays_[view.id] = PixelRays (view);
+    rig_lookups_[view.id] = PixelLookup (view);
+    rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
     rig_views_ |= std::uint64_t{1} << view.id;
   }
   reset ();
@@ -176,6 +180,8 @@ CylinderFilter::work (
   result.units = units_.occupied;
   result.units_shared = units_.shared;
   result.points_out -= clear_losers (images);
+  if (settings.hidden_gap_m > 0)
+    result.points_out += restore_uncovered (images, settings);
   return {};
 }
 
@@ -208,28 +214,83 @@ CylinderFilter::winners (const UnitLayer &layer) const
   return -least >= greatest ? out : in;
 }
 
+void
+CylinderFilter::clear_entry (const RangeImage &image, const UnitEntry &entry, std::uint64_t rivals)
+{
+  for (std::uint32_t i = 0; i < entry.point_count; i++) {
+    const std::uint32_t pixel = cloud_.pixel[units_.points[entry.first_point + i].index];
+    std::uint16_t &depth =
+        image.depth.at (static_cast<int> (pixel & 0xffff), static_cast<int> (pixel >> 16));
+    losers_.push_back ({rivals, pixel, depth, static_cast<std::uint8_t> (entry.view)});
+    depth = kInvalidDepth;
+  }
+}
+
 std::uint64_t
 CylinderFilter::clear_losers (std::span<const RangeImage> images)
 {
-  std::uint64_t cleared = 0;
+  losers_.clear ();
+  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
   for (const UnitLayer &layer : units_.layers) {
     if (!(layer.covering & (layer.covering - 1)))
       continue;
     const std::uint64_t stay = winners (layer);
     const UnitEntry *entry = &units_.entries[layer.first_entry];
-    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++) {
-      if (stay >> entry->view & 1)
-        continue;
-      const ImageView<std::uint16_t> depth = images[entry->view].depth;
-      for (std::uint32_t i = 0; i < entry->point_count; i++) {
-        const std::uint32_t place = cloud_.pixel[units_.points[entry->first_point + i].index];
-        depth.at (static_cast<int> (place & 0xffff), static_cast<int> (place >> 16)) =
-            kInvalidDepth;
-      }
-      cleared += entry->point_count;
-    }
+    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++)
+      if (!(stay >> entry->view & 1))
+        clear_entry (
+            images[entry->view], *entry, layer.covering & ~(std::uint64_t{1} << entry->view));
   }
-  return cleared;
+  return losers_.size ();
+}
+
+/* Whether one of these views has a point left where it sees this one. A point well behind what a
+ * view sees is hidden from it: another place. A point well before it would have hidden that: one of
+ * both is wrong, and it is the loser's, up to errors that no stereo makes on the same surface. */
+bool
+CylinderFilter::is_covered (
+    std::span<const RangeImage> images, const float point[3], std::uint64_t rivals) const
+{
+  for (; rivals; rivals &= rivals - 1) {
+    const int i = std::countr_zero (rivals);
+    const RangeImage &image = images[i];
+    float u, v, z;
+    rig_lookups_[image.view_id].find (point, u, v, z);
+    const float x = u - static_cast<float> (image.roi.x) + 0.5f;
+    const float y = v - static_cast<float> (image.roi.y) + 0.5f;
+    if (!(z > 0 && x >= 0 && y >= 0 && x < static_cast<float> (image.depth.width) &&
+            y < static_cast<float> (image.depth.height)))
+      continue;
+    const std::uint16_t there = image.depth.at (static_cast<int> (x), static_cast<int> (y));
+    if (there != kInvalidDepth && z - there <= behind_[i] && there - z <= before_[i])
+      return true;
+  }
+  return false;
+}
+
+/* One after the other, so that of two losers at one place only the first comes back. */
+std::uint64_t
+CylinderFilter::restore_uncovered (
+    std::span<const RangeImage> images, const CylinderSettings &settings)
+{
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const double units_per_metre = rig_units_per_metre_[images[i].view_id];
+    behind_[i] = static_cast<float> (settings.hidden_gap_m * units_per_metre);
+    before_[i] = static_cast<float> (settings.units.layer_gap_m / 2 * units_per_metre);
+  }
+  std::uint64_t restored = 0;
+  for (const Loser &loser : losers_) {
+    const RangeImage &image = images[loser.image];
+    const int u = static_cast<int> (loser.pixel & 0xffff), v = static_cast<int> (loser.pixel >> 16);
+    float point[3];
+    rays_[loser.image].point (static_cast<float> (image.roi.x + u),
+        static_cast<float> (image.roi.y + v), loser.depth, point);
+    if (is_covered (images, point, loser.rivals))
+      continue;
+    image.depth.at (u, v) = loser.depth;
+    restored++;
+  }
+  return restored;
 }
 
 } // namespace rangecast

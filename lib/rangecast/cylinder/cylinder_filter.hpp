@@ -19,7 +19,10 @@ struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
   UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
-  int threads = 1;    ///< views, and slices, at a time; 0 = number of cores
+  /** A point further behind what the winner sees, along the winner's optical axis, is hidden from
+   *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
+  double hidden_gap_m = 0.006;
+  int threads = 1; ///< views, and slices, at a time; 0 = number of cores
 };
 
 /** What one frame came to. */
@@ -48,6 +51,11 @@ struct CylinderResult {
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
  *  - Views that look squarely at opposite sides of a thin thing see different surfaces: both stay.
+ *  - Points of losers stay where no winner is (hidden_gap_m > 0): a unit can be larger than what
+ *    its winner sees of it, above all where the surface lies across the axis (shoulders, crown), or
+ *    the winner has a hole there. A loser's point goes only if another view that competes has a
+ *    point left in the pixel where it sees the loser's: at most hidden_gap_m before it and half the
+ *    layer gap behind it.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
@@ -72,10 +80,17 @@ private:
   void choose_axis (const CylinderSettings &settings, std::size_t images);
   void unroll (int columns, int threads);
   std::uint64_t clear_losers (std::span<const RangeImage> images);
+  void clear_entry (const RangeImage &image, const UnitEntry &entry, std::uint64_t rivals);
+  std::uint64_t restore_uncovered (
+      std::span<const RangeImage> images, const CylinderSettings &settings);
+  [[nodiscard]] bool is_covered (
+      std::span<const RangeImage> images, const float point[3], std::uint64_t rivals) const;
   [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
-  std::uint64_t rig_views_ = 0;               /* bit i: view-id i is in the rig */
+  std::array<PixelLookup, kMaxViews> rig_lookups_;
+  std::array<float, kMaxViews> rig_units_per_metre_{};
+  std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
   AxisTracker tracker_;
 
   /* Of the present frame; kept for their memory. By number of the image. */
@@ -88,6 +103,17 @@ private:
   std::vector<float> radius_;
   std::vector<std::int32_t> column_;
   Units units_;
+
+  /* A point that was cleared because the views in rivals compete for its unit, too. */
+  struct Loser {
+    std::uint64_t rivals;
+    std::uint32_t pixel; /* as in WorldPoints */
+    std::uint16_t depth;
+    std::uint8_t image;
+  };
+  std::vector<Loser> losers_;
+  /* How far a point may lie behind, or before, what the image has there; in its depth units. */
+  std::array<float, kMaxViews> behind_{}, before_{};
 };
 
 } // namespace rangecast
