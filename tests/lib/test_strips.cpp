@@ -73,9 +73,9 @@ TEST (Strips, band_has_its_pixels_in_order_and_reaches_beyond_its_ends)
   StripSettings settings;
   settings.merge = false;
   EXPECT_EQ (vertices_of (Drawing ({"55", "5."}), settings),
-      (std::vector<Vertex>{{0, 0, kFarBefore, kCentre}, {0, 1, kFarBefore, kCentre},
-          {0, 0, kCentre, kCentre}, {0, 1, kCentre, kCentre}, {1, 0, kCentre, kCentre},
-          {1, 0, kCentre, kFarAfter}, {1, 0, kFarAfter, kCentre}, {1, 0, kFarAfter, kFarAfter},
+      (std::vector<Vertex>{{0, 0, kFarBefore, kFarBefore}, {0, 1, kFarBefore, kCentre},
+          {0, 0, kCentre, kFarBefore}, {0, 1, kCentre, kCentre}, {1, 0, kCentre, kFarBefore},
+          {1, 0, kCentre, kFarAfter}, {1, 0, kFarAfter, kFarBefore}, {1, 0, kFarAfter, kFarAfter},
           /* joined by degenerate triangles: the isolated pixel below */
           {1, 0, kFarAfter, kFarAfter}, {0, 1, kBefore, kBefore}, {0, 1, kBefore, kBefore},
           {0, 1, kBefore, kAfter}, {0, 1, kAfter, kBefore}, {0, 1, kAfter, kAfter}}));
@@ -108,37 +108,125 @@ TEST (Strips, gap_is_bridged_only_if_short_and_its_ends_are_near)
   EXPECT_EQ (step.strips, 2u);
 }
 
+TEST (Strips, band_starts_where_the_one_above_ends)
+{
+  StripSettings settings;
+  settings.merge = false;
+  const auto v = vertices_of (Drawing ({"555", "559"}), settings);
+  int met = 0, open = 0;
+  for (const Vertex &p : v)
+    if (p.y == 1 && p.vertical != kFarAfter && p.x < 2)
+      p.vertical == kCentre ? met++ : open++;
+  EXPECT_GT (met, 0);
+  EXPECT_EQ (open, 0);
+}
+
+namespace {
+
+/* Rows of random depths, some of them near one another in chains whose ends are not. */
+std::vector<std::string>
+random_rows (std::mt19937 &random, const char *depths)
+{
+  std::vector<std::string> rows (20, std::string (30, '.'));
+  for (auto &row : rows)
+    for (char &c : row)
+      c = random () % 4 == 0 ? '.' : depths[random () % 8];
+  return rows;
+}
+
+void
+expect_valid_pixels_drawn (const std::vector<std::string> &rows, const std::vector<Vertex> &v)
+{
+  std::vector<bool> drawn (600);
+  for (const Vertex &p : v) {
+    ASSERT_TRUE (p.x < 30 && p.y < 20);
+    drawn[30 * p.y + p.x] = true;
+  }
+  for (int i = 0; i < 600; i++)
+    ASSERT_EQ (drawn[i], rows[i / 30][i % 30] != '.') << "pixel " << i % 30 << ", " << i / 30;
+}
+
+void
+expect_triangles_within (
+    double depth_step, const std::vector<std::string> &rows, const std::vector<Vertex> &v)
+{
+  for (std::size_t i = 2; i < v.size (); i++) {
+    if (v[i - 2] == v[i - 1] || v[i - 1] == v[i] || v[i - 2] == v[i])
+      continue;
+    int least = 9, most = 0;
+    for (std::size_t k = i - 2; k <= i; k++) {
+      least = std::min (least, rows[v[k].y][v[k].x] - '0');
+      most = std::max (most, rows[v[k].y][v[k].x] - '0');
+    }
+    ASSERT_LE (most - least, depth_step * least) << "at " << v[i].x << ", " << v[i].y;
+  }
+}
+
+/* Whether a triangle has the point in its inside or on its edge, whichever way round it is. */
+bool
+covers (const Vertex (&t)[3], double x, double y)
+{
+  bool left = false, right = false;
+  for (int i = 0; i < 3; i++) {
+    const Vertex &a = t[i], &b = t[(i + 1) % 3];
+    const double ax = a.x + kStripOffsets[a.horizontal], ay = a.y + kStripOffsets[a.vertical];
+    const double bx = b.x + kStripOffsets[b.horizontal], by = b.y + kStripOffsets[b.vertical];
+    const double side = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+    left = left || side > 1e-9;
+    right = right || side < -1e-9;
+  }
+  return !(left && right);
+}
+
+/* In the view's own picture, near the corners of every valid pixel, there is a triangle. */
+void
+expect_no_cracks (const std::vector<std::string> &rows, const std::vector<Vertex> &v)
+{
+  constexpr double kCorners[][2] = {{-0.45, -0.4}, {0.4, -0.45}, {-0.4, 0.45}, {0.45, 0.4}};
+  std::vector<bool> covered (600 * 4);
+  for (std::size_t i = 2; i < v.size (); i++) {
+    const Vertex t[3] = {v[i - 2], v[i - 1], v[i]};
+    if (t[0] == t[1] || t[1] == t[2] || t[0] == t[2])
+      continue;
+    const auto [x0, x1] = std::minmax ({t[0].x, t[1].x, t[2].x});
+    const auto [y0, y1] = std::minmax ({t[0].y, t[1].y, t[2].y});
+    for (int y = std::max (0, y0 - 1); y <= std::min (19, y1 + 1); y++)
+      for (int x = std::max (0, x0 - 1); x <= std::min (29, x1 + 1); x++)
+        for (int k = 0; k < 4; k++)
+          if (covers (t, x + kCorners[k][0], y + kCorners[k][1]))
+            covered[4 * (30 * y + x) + k] = true;
+  }
+  for (int i = 0; i < 2400; i++)
+    ASSERT_TRUE (covered[i] || rows[i / 120][i / 4 % 30] == '.')
+        << "corner " << i % 4 << " of pixel " << i / 4 % 30 << ", " << i / 120;
+}
+
+} // namespace
+
 TEST (Strips, every_valid_pixel_is_drawn_and_no_triangle_spans_a_step)
 {
   std::mt19937 random (1);
-  for (int round = 0; round < 50; round++) {
-    std::vector<std::string> rows (20, std::string (30, '.'));
-    for (auto &row : rows)
-      for (char &c : row)
-        c = random () % 4 == 0 ? '.' : random () % 3 == 0 ? '7' : '5';
-    Drawing drawing (rows);
-    for (StripMode mode : {StripMode::kStrips, StripMode::kRectangles, StripMode::kPoints}) {
-      StripSettings settings;
-      settings.mode = mode;
-      settings.merge = false;
-      const auto v = vertices_of (drawing, settings);
-      std::vector<bool> drawn (600);
-      for (const Vertex &p : v) {
-        ASSERT_TRUE (p.x < 30 && p.y < 20);
-        ASSERT_NE (drawing.depth.view ().at (p.x, p.y), 0);
-        drawn[30 * p.y + p.x] = true;
-      }
-      for (int i = 0; i < 600; i++)
-        ASSERT_EQ (drawn[i], rows[i / 30][i % 30] != '.');
-      for (std::size_t i = 2; mode != StripMode::kPoints && i < v.size (); i++) {
-        const Vertex &a = v[i - 2], &b = v[i - 1], &c = v[i];
-        if (a == b || b == c || a == c)
-          continue;
-        ASSERT_EQ (rows[a.y][a.x], rows[b.y][b.x]);
-        ASSERT_EQ (rows[b.y][b.x], rows[c.y][c.x]);
-      }
+  for (const char *depths : {"55555577", "55566677", "56565677", "55667788"})
+    for (int round = 0; round < 50; round++) {
+      const auto rows = random_rows (random, depths);
+      for (bool merge : {false, true})
+        for (StripMode mode : {StripMode::kStrips, StripMode::kRectangles}) {
+          StripSettings settings;
+          settings.mode = mode;
+          settings.merge = merge;
+          settings.depth_step = 0.21; /* 5 and 6 are near, 6 and 7 are, 5 and 7 are not */
+          const auto v = vertices_of (Drawing (rows), settings);
+          ASSERT_NO_FATAL_FAILURE (expect_triangles_within (settings.depth_step, rows, v));
+          ASSERT_NO_FATAL_FAILURE (expect_no_cracks (rows, v));
+          if (!merge) {
+            ASSERT_NO_FATAL_FAILURE (expect_valid_pixels_drawn (rows, v));
+          }
+        }
+      StripSettings points;
+      points.mode = StripMode::kPoints;
+      ASSERT_NO_FATAL_FAILURE (
+          expect_valid_pixels_drawn (rows, vertices_of (Drawing (rows), points)));
     }
-  }
 }
 
 TEST (Strips, empty_view_has_no_vertices)
@@ -168,17 +256,88 @@ TEST (Orbit, one_camera_with_identity_pose_has_its_own_up)
   EXPECT_GT (scene.target.z, rig.views[0].near_m);
 }
 
+namespace {
+
+/* Where a world point is in a picture of 320x240, pixels. */
+Vec3
+project (const OrbitMatrices &matrices, Vec3 p)
+{
+  const Mat4 &m = matrices.clip_from_world;
+  const double w = m[3] * p.x + m[7] * p.y + m[11] * p.z + m[15];
+  const double x = (m[0] * p.x + m[4] * p.y + m[8] * p.z + m[12]) / w;
+  const double y = (m[1] * p.x + m[5] * p.y + m[9] * p.z + m[13]) / w;
+  return {(x + 1) / 2 * 320 - 0.5, (y + 1) / 2 * 240 - 0.5, 0};
+}
+
+void
+expect_default_picture_is_the_first_views_own (const Rig &rig)
+{
+  const View &view = rig.views[0];
+  const OrbitMatrices m = orbit_matrices (scene_frame (rig), {}, 320.0 / 240, true);
+  for (auto [u, v] : {std::pair{0.0, 0.0}, {319.0, 239.0}, {100.0, 50.0}}) {
+    const Vec3 p = project (m, view.world_from_view * view.intrinsics.unproject (u, v, 0.7));
+    EXPECT_NEAR (p.x, u, 2e-3);
+    EXPECT_NEAR (p.y, v, 2e-3);
+  }
+}
+
+} // namespace
+
 TEST (Orbit, default_picture_is_the_first_views_own)
 {
-  const Rig rig = ring_rig (4);
-  const View &view = rig.views[0];
-  const Mat4 m = orbit_matrices (scene_frame (rig), {}, 320.0 / 240, true).clip_from_world;
-  for (auto [u, v] : {std::pair{0.0, 0.0}, {319.0, 239.0}, {100.0, 50.0}}) {
-    const Vec3 p = view.world_from_view * view.intrinsics.unproject (u, v, 0.7);
-    const double w = m[3] * p.x + m[7] * p.y + m[11] * p.z + m[15];
-    const double x = (m[0] * p.x + m[4] * p.y + m[8] * p.z + m[12]) / w;
-    const double y = (m[1] * p.x + m[5] * p.y + m[9] * p.z + m[13]) / w;
-    EXPECT_NEAR ((x + 1) / 2 * 320 - 0.5, u, 1e-3);
-    EXPECT_NEAR ((y + 1) / 2 * 240 - 0.5, v, 1e-3);
-  }
+  expect_default_picture_is_the_first_views_own (ring_rig (4));
+  expect_default_picture_is_the_first_views_own (ring_rig (1));
+}
+
+TEST (Orbit, default_picture_keeps_a_principal_point_off_centre)
+{
+  Rig rig = ring_rig (4);
+  rig.views[0].intrinsics.cx += 21;
+  rig.views[0].intrinsics.cy -= 13;
+  expect_default_picture_is_the_first_views_own (rig);
+}
+
+TEST (Orbit, default_picture_looks_where_the_first_view_does)
+{
+  Rig rig = ring_rig (4); /* two axes miss the others */
+  rig.views[0].world_from_view.translation.x += 0.05;
+  rig.views[2].world_from_view.translation.y += 0.08;
+  expect_default_picture_is_the_first_views_own (rig);
+}
+
+TEST (Orbit, one_rolled_camera_gives_its_own_picture)
+{
+  Rig rig = ring_rig (1);
+  rig.views[0].world_from_view =
+      rig.views[0].world_from_view * Pose{{0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, {}};
+  expect_default_picture_is_the_first_views_own (rig);
+}
+
+TEST (Orbit, several_rolled_cameras_give_a_picture_with_the_world_upright)
+{
+  Rig rig = ring_rig (4);
+  rig.views[0].world_from_view = /* mounted on its side */
+      rig.views[0].world_from_view * Pose{{0, -1, 0, 1, 0, 0, 0, 0, 1}, {}};
+  const OrbitMatrices m = orbit_matrices (scene_frame (rig), {}, 320.0 / 240, true);
+  EXPECT_NEAR (project (m, {0, 0.1, 0}).x, project (m, {0, -0.1, 0}).x, 1e-3);
+  EXPECT_LT (project (m, {0, 0.1, 0}).y, project (m, {0, -0.1, 0}).y);
+}
+
+TEST (Orbit, panning_by_a_pictures_size_moves_the_target_so_far)
+{
+  const SceneFrame scene = scene_frame (ring_rig (4));
+  for (double azimuth : {0.0, 40.0, -110.0})
+    for (double elevation : {0.0, 30.0})
+      for (double fov : {0.0, 70.0}) {
+        Orbit orbit;
+        orbit.azimuth_deg = azimuth;
+        orbit.elevation_deg = elevation;
+        orbit.fov_deg = fov;
+        const OrbitMatrices before = orbit_matrices (scene, orbit, 320.0 / 240, true);
+        orbit.pan = -0.25 * before.pan_right + 0.125 * before.pan_down;
+        const OrbitMatrices after = orbit_matrices (scene, orbit, 320.0 / 240, true);
+        const Vec3 from = project (before, scene.target), to = project (after, scene.target);
+        EXPECT_NEAR (to.x - from.x, 80, 1e-2);
+        EXPECT_NEAR (to.y - from.y, -30, 1e-2);
+      }
 }

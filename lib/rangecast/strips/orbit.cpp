@@ -82,13 +82,15 @@ scene_frame (const Rig &rig)
   const Mat3 &r = first.world_from_view.rotation;
   const Vec3 position = first.world_from_view.translation, forward = column (r, 2);
   scene.fov_deg = 2 * std::atan (first.height / (2 * first.intrinsics.fy)) / kDegree;
+  scene.off_centre_x = (2 * first.intrinsics.cx + 1 - first.width) / first.height;
+  scene.off_centre_y = (2 * first.intrinsics.cy + 1 - first.height) / first.height;
   const bool met = meeting_point (rig, scene.target) &&
                    dot (scene.target - position, forward) > first.near_m / 2;
   scene.up = met ? Vec3{0, 1, 0} : -1.0 * column (r, 1);
-  if (!met)
-    scene.target = position + 2 / (1 / first.near_m + 1 / first.far_m) * forward;
+  scene.distance_m =
+      met ? dot (scene.target - position, forward) : 2 / (1 / first.near_m + 1 / first.far_m);
+  scene.target = position + scene.distance_m * forward;
   const Vec3 to_first = position - scene.target;
-  scene.distance_m = norm (to_first);
   const double height = dot (to_first, scene.up);
   scene.elevation_deg = std::asin (std::clamp (height / scene.distance_m, -1.0, 1.0)) / kDegree;
   const Vec3 level = to_first - height * scene.up;
@@ -105,20 +107,27 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
   const double elevation =
       std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
   const double distance = orbit.distance_m > 0 ? orbit.distance_m : scene.distance_m;
-  const Vec3 level = std::cos (azimuth) * scene.to_first + std::sin (azimuth) * right;
-  const Vec3 back = std::cos (elevation) * level + std::sin (elevation) * scene.up;
-  const Vec3 target =
-      scene.target + orbit.pan.x * right + orbit.pan.y * scene.up + orbit.pan.z * scene.to_first;
-  const Vec3 eye = target + distance * back;
-  const Vec3 x = normalised (cross (scene.up, back)), y = cross (back, x);
+  const auto world_from_pan = [&] (Vec3 p) {
+    return p.x * right + p.y * scene.up + p.z * scene.to_first;
+  };
+  /* the camera's axes, told as Orbit::pan is: to its right, up, and away from the target */
+  const double sa = std::sin (azimuth), ca = std::cos (azimuth);
+  const double se = std::sin (elevation), ce = std::cos (elevation);
+  const Vec3 pan_x{ca, 0, -sa}, pan_y{-se * sa, ce, -se * ca}, pan_z{ce * sa, se, ce * ca};
+  const Vec3 x = world_from_pan (pan_x), y = world_from_pan (pan_y), back = world_from_pan (pan_z);
+  const Vec3 eye = scene.target + world_from_pan (orbit.pan) + distance * back;
   const std::array<double, 16> eye_from_world = {x.x, y.x, back.x, 0, x.y, y.y, back.y, 0, x.z, y.z,
       back.z, 0, -dot (x, eye), -dot (y, eye), -dot (back, eye), 1};
 
   const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
-  const double f = 1 / std::tan (fov / 2), near = distance / 50, far = distance * 20;
-  const std::array<double, 16> clip_from_eye = {f / aspect, 0, 0, 0, 0, flip_y ? -f : f, 0, 0, 0, 0,
-      (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0};
-  return {product (clip_from_eye, eye_from_world), distance};
+  const double half = std::tan (fov / 2); /* of the picture's height, at a distance of 1 */
+  const double near = distance / 50, far = distance * 20, down = flip_y ? -1 : 1;
+  const std::array<double, 16> clip_from_eye = {1 / (half * aspect), 0, 0, 0, 0, down / half, 0, 0,
+      -scene.off_centre_x / aspect, down * scene.off_centre_y, (far + near) / (near - far), -1, 0,
+      0, 2 * far * near / (near - far), 0};
+  const double height = 2 * half * distance;
+  return {
+      product (clip_from_eye, eye_from_world), distance, height * aspect * pan_x, -height * pan_y};
 }
 
 } // namespace rangecast

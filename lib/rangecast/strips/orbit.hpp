@@ -15,11 +15,15 @@ struct SceneFrame {
   double distance_m = 1;    ///< of the first view from the target
   double elevation_deg = 0; ///< of the first view above the level through the target
   double fov_deg = 45;      ///< vertical field of view of the first view
+  double off_centre_x = 0;  ///< the first view's principal point, right of the picture's middle
+  double off_centre_y = 0;  ///< and below it, both in halves of the picture's height
 };
 
-/** Several views: the target is the point nearest to all optical axes, up is the world's y. One
- *  view (or axes that are parallel): the target lies on the first view's axis at the harmonic mean
- *  of near and far, up is that camera's own. The first view is the one with the lowest view-id. */
+/** Several views: the target is the point of the first view's axis that is nearest to where all
+ *  optical axes meet, up is the world's y. One view (or axes that are parallel): the target lies on
+ *  the first view's axis at the harmonic mean of near and far, up is that camera's own. The first
+ *  view is the one with the lowest view-id. So the orbit begins with the first view's own picture,
+ *  but upright if there are several views and the first is rolled. */
 SceneFrame scene_frame (const Rig &rig);
 
 /** Where an orbiting camera stands. */
@@ -36,7 +40,9 @@ using Mat4 = std::array<float, 16>;
 
 struct OrbitMatrices {
   Mat4 clip_from_world;
-  double distance_m = 0; ///< that is in force
+  double distance_m = 0;    ///< that is in force
+  Vec3 pan_right, pan_down; ///< the Orbit::pan that goes right by the picture's width, down by its
+                            ///< height, as seen at the target
 };
 
 /** @param aspect      width / height of the picture

@@ -2,6 +2,7 @@
 #include "strips.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 
@@ -31,14 +32,18 @@ public:
       depth_ = image_.depth.row (y);
       below_ = y + 1 < height_ ? image_.depth.row (y + 1) : nullptr;
       row_ = y;
-      if (settings_.mode == StripMode::kStrips)
+      if (settings_.mode == StripMode::kStrips) {
+        std::swap (met_, meets_);
+        std::fill_n (meets_->begin (), width_, false);
         bands_of_row ();
-      else
+      } else
         pixels_of_row ();
     }
   }
 
 private:
+  using Columns = std::array<bool, kMaxStripSide>;
+
   [[nodiscard]] bool near (int a, int b) const
   {
     return static_cast<std::int64_t> (std::abs (a - b)) * 65536 <=
@@ -63,7 +68,7 @@ private:
   /* Whether the vertices of two pixels of this row are alike but for their column. */
   [[nodiscard]] bool same_pair (int a, int b) const
   {
-    if (depth_[a] != depth_[b] ||
+    if (depth_[a] != depth_[b] || (*met_)[a] != (*met_)[b] ||
         !same_colour (image_.colour.at (a, row_), image_.colour.at (b, row_)))
       return false;
     const bool joined = joins_below (a);
@@ -71,6 +76,15 @@ private:
       return false;
     return !joined || (below_[a] == below_[b] && same_colour (image_.colour.at (a, row_ + 1),
                                                      image_.colour.at (b, row_ + 1)));
+  }
+
+  /* Whether the step from pixel a to b can use what lies below them: both of its triangles then
+   * have depths that are near, each to each. */
+  [[nodiscard]] bool step_fits_below (int a, int b) const
+  {
+    const int low_a = joins_below (a) ? below_[a] : depth_[a];
+    const int low_b = joins_below (b) ? below_[b] : depth_[b];
+    return near (low_a, depth_[b]) && near (low_a, low_b);
   }
 
   /* Begins a piece at v: two equal vertices and the last one's repetition join it to what is
@@ -83,12 +97,18 @@ private:
     to_.push_back (v);
   }
 
-  /* The two vertices of a pixel, or of an end of the band beside it. */
-  void pair (int x, StripPlace horizontal = kCentre)
+  /* A band begins where the one above ends, or as far beyond its pixels as its ends do. */
+  [[nodiscard]] StripVertex upper (int x, StripPlace horizontal) const
   {
-    to_.push_back (strip_vertex (x, row_, horizontal, kCentre));
-    to_.push_back (joins_below (x) ? strip_vertex (x, row_ + 1, horizontal, kCentre)
-                                   : strip_vertex (x, row_, horizontal, kFarAfter));
+    return strip_vertex (x, row_, horizontal, (*met_)[x] ? kCentre : kFarBefore);
+  }
+
+  /* The two vertices of a pixel, or of an end of the band beside it. */
+  void pair (int x, bool joined, StripPlace horizontal = kCentre)
+  {
+    to_.push_back (upper (x, horizontal));
+    to_.push_back (joined ? strip_vertex (x, row_ + 1, horizontal, kCentre)
+                          : strip_vertex (x, row_, horizontal, kFarAfter));
   }
 
   void rectangle (int x)
@@ -111,26 +131,36 @@ private:
       result_.isolated++;
       return first + 1;
     }
-    begin_piece (strip_vertex (first, row_, kFarBefore, kCentre));
-    pair (first, kFarBefore);
-    pair (first);
-    int previous = first;
-    while (next >= 0) {
-      x = next;
-      next = next_in_band (x);
+    begin_piece (upper (first, kFarBefore));
+    pair (first, joins_below (first), kFarBefore);
+    bool fits = true; /* the step before x */
+    for (int previous = -1;; previous = x, x = next, next = next_in_band (x)) {
+      const bool joined = joins_below (x), next_fits = next < 0 || step_fits_below (x, next);
+      (*meets_)[x] = joined && fits && next_fits;
+      const bool inside_piece = settings_.merge && x > first && next == x + 1 &&
+                                previous == x - 1 && same_pair (previous, x) && same_pair (x, next);
+      if (!inside_piece)
+        add_step (x, joined && fits);
+      if (joined && fits != next_fits) {
+        begin_piece (upper (x, kCentre));
+        pair (x, next_fits);
+      }
+      if (next < 0)
+        break;
       result_.points++;
-      const bool inside_piece = settings_.merge && next == x + 1 && previous == x - 1 &&
-                                same_pair (previous, x) && same_pair (x, next);
-      previous = x;
-      if (inside_piece)
-        continue;
-      pair (x);
-      result_.triangles += 2;
+      fits = next_fits;
     }
-    pair (x, kFarAfter);
-    result_.triangles += 4;
+    pair (x, joins_below (x), kFarAfter);
+    result_.triangles += 2;
     result_.strips++;
     return x + 1;
+  }
+
+  /* The next pair of a band, and the two triangles between it and the last. */
+  void add_step (int x, bool joined)
+  {
+    pair (x, joined);
+    result_.triangles += 2;
   }
 
   void bands_of_row ()
@@ -160,6 +190,9 @@ private:
   const int step_; /* of 65536 */
   const std::uint16_t *depth_ = nullptr, *below_ = nullptr;
   int row_ = 0;
+  Columns columns_[2] = {};
+  Columns *met_ = &columns_[0]; /* columns where the row above reaches down to this one's pixels */
+  Columns *meets_ = &columns_[1]; /* and where this row does to the next one's */
 };
 
 } // namespace
