@@ -10,8 +10,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc is-live=true ! cylinderfilter ! striprender auto-orbit=30 !
- * glimagesink
+ * gst-launch-1.0 avatartestsrc ! cylinderfilter ! striprender auto-orbit=30 ! glimagesink
  * ]|
  *
  * Without a display: `GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device`, and gldownload behind it.
@@ -20,10 +19,9 @@
  */
 #include "gststriprender.h"
 
-#include <gst/video/navigation.h>
+#include <gst/gl/gl.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <gstrange/gstrangeframe.hpp>
@@ -34,65 +32,25 @@
 #include <vector>
 
 #include "strippainter.hpp"
+#include "stripsettings.hpp"
 
-using rangecast::Orbit;
 using rangecast::RangeImage;
 using rangecast::Status;
 using rangecast::StatusCode;
-using rangecast::StripMode;
 using rangecast::StripVertex;
 
 GST_DEBUG_CATEGORY_STATIC (gst_strip_render_debug);
 #define GST_CAT_DEFAULT gst_strip_render_debug
-
-enum {
-  PROP_0,
-  PROP_MODE,
-  PROP_AZIMUTH,
-  PROP_ELEVATION,
-  PROP_DISTANCE,
-  PROP_FIELD_OF_VIEW,
-  PROP_PAN_X,
-  PROP_PAN_Y,
-  PROP_PAN_Z,
-  PROP_AUTO_ORBIT,
-  PROP_BACKGROUND,
-  PROP_DEPTH_STEP,
-  PROP_MAX_GAP,
-  PROP_POINT_SIZE,
-  PROP_STATS
-};
-
-static constexpr guint kDefaultBackground = 0xff20242a;
-static constexpr rangecast::StripSettings kDefaults;
-static constexpr double kZoomStep = 1.1;
-
-struct RenderSettings {
-  Orbit orbit;
-  double auto_orbit = 0; /* degrees a second */
-  guint background = kDefaultBackground;
-  double point_size = 1;
-  rangecast::StripSettings strips;
-};
 
 struct RenderStats {
   guint64 frames = 0, points = 0, vertices = 0, triangles = 0, strips = 0, isolated = 0,
           uploaded_bytes = 0;
 };
 
-/* The mouse, between its events. */
-struct Drag {
-  int button = 0; /* 0: none is down */
-  double x = 0, y = 0;
-};
-
 struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows; never held across a push, event or message */
-  RenderSettings settings;
+  StripRenderSettings settings;
   RenderStats stats;
-  Drag drag;
-  double distance_m = 1;                 /* in force, for zooming */
-  int out_width = 640, out_height = 480; /* for dragging */
 
   /* streaming thread only, or the GL thread while the streaming thread waits for it */
   gstrange::RangeInfo info;
@@ -100,6 +58,7 @@ struct GstStripRenderPrivate {
   GstVideoInfo out;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GstGLFramebuffer *framebuffer = nullptr;
+  GError *gl_error = nullptr; /* why OpenGL cannot be used */
   StripPainter painter;
   std::array<std::vector<StripVertex>, rangecast::kMaxViews> vertices; /* by number in the buffer */
 };
@@ -119,19 +78,7 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_GL_BASE_FILTER)
 GST_ELEMENT_REGISTER_DEFINE (striprender, "striprender", GST_RANK_NONE, GST_TYPE_STRIP_RENDER)
 
-#define GST_TYPE_STRIP_RENDER_MODE (gst_strip_render_mode_get_type ())
-static GType
-gst_strip_render_mode_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (StripMode::kStrips), "Bands of triangles along the rows", "strips"},
-        {int (StripMode::kRectangles), "One rectangle a pixel", "rectangles"},
-        {int (StripMode::kPoints), "One point a pixel", "points"}, {}};
-    return g_enum_register_static ("GstStripRenderMode", values);
-  }();
-  return type;
-}
+static guint prop_stats; /* after those of the settings */
 
 /* ---- caps ---- */
 
@@ -180,11 +127,6 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
       !gst_video_info_from_caps (&priv->out, out))
     return FALSE;
   priv->scene = rangecast::scene_frame (priv->info.rig);
-  {
-    std::lock_guard guard (priv->lock);
-    priv->out_width = GST_VIDEO_INFO_WIDTH (&priv->out);
-    priv->out_height = GST_VIDEO_INFO_HEIGHT (&priv->out);
-  }
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
 }
 
@@ -202,13 +144,10 @@ gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
   return TRUE;
 }
 
-/* Buffers downstream are OpenGL's, of our context. */
+/* A pool of OpenGL's buffers in our context: downstream's if it offers one. */
 static gboolean
-gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
+choose_pool (GstStripRender *self, GstQuery *query)
 {
-  if (!gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base)))
-    return FALSE;
-  GstGLContext *context = GST_GL_BASE_FILTER (base)->context;
   GstCaps *caps;
   GstBufferPool *pool = nullptr;
   guint size = 0, min = 0, max = 0;
@@ -219,8 +158,8 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
   if (pool && !GST_IS_GL_BUFFER_POOL (pool))
     gst_clear_object (&pool);
   if (!pool)
-    pool = gst_gl_buffer_pool_new (context);
-  size = guint (GST_VIDEO_INFO_SIZE (&GST_STRIP_RENDER (base)->priv->out));
+    pool = gst_gl_buffer_pool_new (GST_GL_BASE_FILTER (self)->context);
+  size = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
 
   GstStructure *config = gst_buffer_pool_get_config (pool);
   gst_buffer_pool_config_set_params (config, caps, size, min, max);
@@ -233,23 +172,36 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
   else
     gst_query_add_allocation_pool (query, pool, size, min, max);
   gst_object_unref (pool);
-  return configured &&
-         GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query);
+  return configured;
+}
+
+static gboolean
+gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
+{
+  auto self = GST_STRIP_RENDER (base);
+  if (!gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base)) ||
+      !choose_pool (self, query) ||
+      !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
+    return FALSE;
+  if (const GError *error = self->priv->gl_error) {
+    GST_ELEMENT_ERROR (
+        self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
+    return FALSE;
+  }
+  return TRUE;
 }
 
 /* ---- OpenGL's life ---- */
 
+/* TRUE even after a failure: the base class would post an error of its own, which does not say why.
+ * decide_allocation posts ours. */
 static gboolean
 gst_strip_render_gl_start (GstGLBaseFilter *filter)
 {
-  auto self = GST_STRIP_RENDER (filter);
-  GError *error = nullptr;
-  if (!self->priv->painter.start (filter->context, &error)) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-        ("OpenGL cannot be used: %s", error ? error->message : "no shader"), (nullptr));
-    g_clear_error (&error);
-    return FALSE;
-  }
+  GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
+  g_clear_error (&priv->gl_error);
+  if (!priv->painter.start (filter->context, &priv->gl_error) && !priv->gl_error)
+    priv->gl_error = g_error_new (GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, "no shader");
   return TRUE;
 }
 
@@ -279,6 +231,7 @@ struct DrawJob {
   StripPainter::Picture picture;
   std::span<const StripPainter::Layer> layers;
   GstGLMemory *target;
+  GstGLSyncMeta *sync; /* nullptr where downstream wants none */
   guint64 uploaded = 0;
   gboolean drawn = FALSE;
 };
@@ -292,26 +245,34 @@ draw_bound (gpointer user_data)
 }
 
 static void
-draw_in_gl_thread (GstGLContext *, gpointer user_data)
+draw_in_gl_thread (GstGLContext *context, gpointer user_data)
 {
   auto job = static_cast<DrawJob *> (user_data);
   job->drawn = gst_gl_framebuffer_draw_to_texture (
       job->self->priv->framebuffer, job->target, draw_bound, job);
+  if (job->drawn && job->sync) /* other contexts wait for our commands there */
+    gst_gl_sync_meta_set_sync_point (job->sync, context);
+}
+
+/* Time since the first picture, where auto-orbit began; a flush begins it anew. */
+static guint64
+orbit_time (GstStripRenderPrivate *priv, GstClockTime running)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return 0;
+  if (!GST_CLOCK_TIME_IS_VALID (priv->first_running) || running < priv->first_running)
+    priv->first_running = running;
+  return running - priv->first_running;
 }
 
 static StripPainter::Picture
-make_picture (GstStripRenderPrivate *priv, const RenderSettings &settings, GstClockTime running)
+make_picture (
+    GstStripRenderPrivate *priv, const StripRenderSettings &settings, GstClockTime running)
 {
   const int width = GST_VIDEO_INFO_WIDTH (&priv->out), height = GST_VIDEO_INFO_HEIGHT (&priv->out);
   const double aspect = double (width) * GST_VIDEO_INFO_PAR_N (&priv->out) /
                         (double (height) * GST_VIDEO_INFO_PAR_D (&priv->out));
-  Orbit orbit = settings.orbit;
-  if (GST_CLOCK_TIME_IS_VALID (running)) {
-    if (!GST_CLOCK_TIME_IS_VALID (priv->first_running) || running < priv->first_running)
-      priv->first_running = running;
-    running -= priv->first_running;
-    orbit.azimuth_deg += std::fmod (settings.auto_orbit * double (running) / GST_SECOND, 360.0);
-  }
+  const rangecast::Orbit orbit = settings.camera.at (orbit_time (priv, running));
   const auto matrices = rangecast::orbit_matrices (priv->scene, orbit, aspect, true);
   const double fov = orbit.fov_deg > 0 ? orbit.fov_deg : priv->scene.fov_deg;
   StripPainter::Picture picture = {};
@@ -326,7 +287,7 @@ make_picture (GstStripRenderPrivate *priv, const RenderSettings &settings, GstCl
   picture.width = width;
   picture.height = height;
   std::lock_guard guard (priv->lock);
-  priv->distance_m = matrices.distance_m;
+  priv->settings.camera.shown (matrices, width, height);
   return picture;
 }
 
@@ -348,12 +309,34 @@ build_all (GstStripRenderPrivate *priv, std::span<const RangeImage> images,
   }
 }
 
+static bool
+draw_into (GstStripRender *self, GstBuffer *out, DrawJob &job)
+{
+  GstMemory *memory = gst_buffer_peek_memory (out, 0);
+  if (!gst_is_gl_memory (memory)) {
+    GST_ELEMENT_ERROR (
+        self, CORE, NEGOTIATION, (nullptr), ("the output buffer is not OpenGL memory"));
+    return false;
+  }
+  job.target = GST_GL_MEMORY_CAST (memory);
+  job.sync = gst_buffer_get_gl_sync_meta (out);
+  GstMapInfo map; /* tells whoever reads it on the CPU that the texture has changed */
+  const auto flags = GstMapFlags (GST_MAP_WRITE | GST_MAP_GL);
+  if (gst_memory_map (memory, &map, flags)) {
+    gst_gl_context_thread_add (GST_GL_BASE_FILTER (self)->context, draw_in_gl_thread, &job);
+    gst_memory_unmap (memory, &map);
+  }
+  if (!job.drawn)
+    GST_ELEMENT_ERROR (self, RESOURCE, WRITE, ("OpenGL could not draw into the output"), (nullptr));
+  return job.drawn;
+}
+
 static GstFlowReturn
 draw_frame (GstStripRender *self, const gstrange::RangeFrameMap &frame, GstBuffer *out,
     GstClockTime running)
 {
   GstStripRenderPrivate *priv = self->priv;
-  RenderSettings settings;
+  StripRenderSettings settings;
   {
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
@@ -366,24 +349,12 @@ draw_frame (GstStripRender *self, const gstrange::RangeFrameMap &frame, GstBuffe
     if (const rangecast::View *view = priv->info.rig.find (frame.views ()[i].view_id))
       layers[count++] = {frame.views ()[i], view, priv->vertices[i]};
 
-  GstMemory *memory = gst_buffer_peek_memory (out, 0);
-  if (!gst_is_gl_memory (memory)) {
-    GST_ELEMENT_ERROR (
-        self, CORE, NEGOTIATION, (nullptr), ("the output buffer is not OpenGL memory"));
+  DrawJob job = {};
+  job.self = self;
+  job.picture = make_picture (priv, settings, running);
+  job.layers = {layers.data (), count};
+  if (!draw_into (self, out, job))
     return GST_FLOW_ERROR;
-  }
-  DrawJob job = {self, make_picture (priv, settings, running), {layers.data (), count},
-      GST_GL_MEMORY_CAST (memory)};
-  GstMapInfo map; /* tells whoever reads it on the CPU that the texture has changed */
-  const auto flags = GstMapFlags (GST_MAP_WRITE | GST_MAP_GL);
-  if (gst_memory_map (memory, &map, flags)) {
-    gst_gl_context_thread_add (GST_GL_BASE_FILTER (self)->context, draw_in_gl_thread, &job);
-    gst_memory_unmap (memory, &map);
-  }
-  if (!job.drawn) {
-    GST_ELEMENT_ERROR (self, RESOURCE, WRITE, ("OpenGL could not draw into the output"), (nullptr));
-    return GST_FLOW_ERROR;
-  }
   stats.uploaded_bytes = job.uploaded;
   std::lock_guard guard (priv->lock);
   stats.frames = priv->stats.frames + 1;
@@ -432,105 +403,18 @@ gst_strip_render_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta,
 
 /* ---- mouse and keys ---- */
 
-/* Turns half a circle over the width of the picture; moves as far as the hand does. */
-static void
-drag_to (GstStripRenderPrivate *priv, double x, double y)
-{
-  const double dx = (x - priv->drag.x) / priv->out_width,
-               dy = (y - priv->drag.y) / priv->out_height;
-  Orbit &orbit = priv->settings.orbit;
-  if (priv->drag.button == 1) {
-    orbit.azimuth_deg = std::fmod (orbit.azimuth_deg - 180 * dx, 360.0);
-    orbit.elevation_deg = std::clamp (orbit.elevation_deg + 90 * dy, -89.0, 89.0);
-  } else {
-    const double a = orbit.azimuth_deg * M_PI / 180;
-    orbit.pan.x -= std::cos (a) * dx * priv->distance_m;
-    orbit.pan.z += std::sin (a) * dx * priv->distance_m;
-    orbit.pan.y += dy * priv->distance_m;
-  }
-  priv->drag.x = x;
-  priv->drag.y = y;
-}
-
-static void
-zoom (GstStripRenderPrivate *priv, double factor)
-{
-  priv->settings.orbit.distance_m = std::clamp (priv->distance_m * factor, 0.01, 1000.0);
-  priv->distance_m = priv->settings.orbit.distance_m;
-}
-
-static void
-reset_view (GstStripRenderPrivate *priv)
-{
-  priv->settings.orbit = {};
-}
-
 static bool
-handle_key (GstStripRenderPrivate *priv, const gchar *key)
+handle_navigation (GstStripRenderPrivate *priv, GstEvent *event)
 {
-  Orbit &orbit = priv->settings.orbit;
-  if (g_str_equal (key, "r"))
-    reset_view (priv);
-  else if (g_str_equal (key, "Left"))
-    orbit.azimuth_deg -= 5;
-  else if (g_str_equal (key, "Right"))
-    orbit.azimuth_deg += 5;
-  else if (g_str_equal (key, "Up"))
-    orbit.elevation_deg = std::min (89.0, orbit.elevation_deg + 5);
-  else if (g_str_equal (key, "Down"))
-    orbit.elevation_deg = std::max (-89.0, orbit.elevation_deg - 5);
-  else if (g_str_equal (key, "plus"))
-    zoom (priv, 1 / kZoomStep);
-  else if (g_str_equal (key, "minus"))
-    zoom (priv, kZoomStep);
-  else
-    return false;
-  return true;
-}
-
-/* @return whether the event meant something to us */
-static bool
-handle_navigation (GstStripRender *self, GstEvent *event)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  double x = 0, y = 0, delta_x = 0, delta_y = 0;
-  gint button = 0;
-  const gchar *key = nullptr;
   std::lock_guard guard (priv->lock);
-  switch (gst_navigation_event_get_type (event)) {
-    case GST_NAVIGATION_EVENT_MOUSE_BUTTON_PRESS:
-      gst_navigation_event_parse_mouse_button_event (event, &button, &x, &y);
-      if (button == 4 || button == 5)
-        zoom (priv, button == 4 ? 1 / kZoomStep : kZoomStep);
-      else
-        priv->drag = {button, x, y};
-      return true;
-    case GST_NAVIGATION_EVENT_MOUSE_BUTTON_RELEASE:
-      priv->drag.button = 0;
-      return true;
-    case GST_NAVIGATION_EVENT_MOUSE_MOVE:
-      if (priv->drag.button == 0)
-        return false;
-      gst_navigation_event_parse_mouse_move_event (event, &x, &y);
-      drag_to (priv, x, y);
-      return true;
-    case GST_NAVIGATION_EVENT_MOUSE_SCROLL:
-      gst_navigation_event_parse_mouse_scroll_event (event, &x, &y, &delta_x, &delta_y);
-      if (delta_y != 0)
-        zoom (priv, delta_y > 0 ? 1 / kZoomStep : kZoomStep);
-      return true;
-    case GST_NAVIGATION_EVENT_KEY_PRESS:
-      return gst_navigation_event_parse_key_event (event, &key) && key && handle_key (priv, key);
-    default:
-      return false;
-  }
+  return priv->settings.camera.handle (event);
 }
 
 static gboolean
 gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_NAVIGATION &&
-      handle_navigation (GST_STRIP_RENDER (base), event)) {
+      handle_navigation (GST_STRIP_RENDER (base)->priv, event)) {
     gst_event_unref (event);
     return TRUE;
   }
@@ -547,7 +431,7 @@ gst_strip_render_start (GstBaseTransform *base)
   {
     std::lock_guard guard (priv->lock);
     priv->stats = {};
-    priv->drag = {};
+    priv->settings.camera.release ();
   }
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->start (base);
 }
@@ -557,50 +441,8 @@ gst_strip_render_set_property (GObject *object, guint id, const GValue *value, G
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   std::lock_guard guard (priv->lock);
-  RenderSettings &settings = priv->settings;
-  switch (id) {
-    case PROP_MODE:
-      settings.strips.mode = StripMode (g_value_get_enum (value));
-      break;
-    case PROP_AZIMUTH:
-      settings.orbit.azimuth_deg = g_value_get_double (value);
-      break;
-    case PROP_ELEVATION:
-      settings.orbit.elevation_deg = g_value_get_double (value);
-      break;
-    case PROP_DISTANCE:
-      settings.orbit.distance_m = g_value_get_double (value);
-      break;
-    case PROP_FIELD_OF_VIEW:
-      settings.orbit.fov_deg = g_value_get_double (value);
-      break;
-    case PROP_PAN_X:
-      settings.orbit.pan.x = g_value_get_double (value);
-      break;
-    case PROP_PAN_Y:
-      settings.orbit.pan.y = g_value_get_double (value);
-      break;
-    case PROP_PAN_Z:
-      settings.orbit.pan.z = g_value_get_double (value);
-      break;
-    case PROP_AUTO_ORBIT:
-      settings.auto_orbit = g_value_get_double (value);
-      break;
-    case PROP_BACKGROUND:
-      settings.background = g_value_get_uint (value);
-      break;
-    case PROP_DEPTH_STEP:
-      settings.strips.depth_step = g_value_get_double (value);
-      break;
-    case PROP_MAX_GAP:
-      settings.strips.max_gap = g_value_get_int (value);
-      break;
-    case PROP_POINT_SIZE:
-      settings.point_size = g_value_get_double (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!set_strip_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
@@ -617,59 +459,18 @@ gst_strip_render_get_property (GObject *object, guint id, GValue *value, GParamS
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   std::lock_guard guard (priv->lock);
-  const RenderSettings &settings = priv->settings;
-  switch (id) {
-    case PROP_MODE:
-      g_value_set_enum (value, int (settings.strips.mode));
-      break;
-    case PROP_AZIMUTH:
-      g_value_set_double (value, settings.orbit.azimuth_deg);
-      break;
-    case PROP_ELEVATION:
-      g_value_set_double (value, settings.orbit.elevation_deg);
-      break;
-    case PROP_DISTANCE:
-      g_value_set_double (value, settings.orbit.distance_m);
-      break;
-    case PROP_FIELD_OF_VIEW:
-      g_value_set_double (value, settings.orbit.fov_deg);
-      break;
-    case PROP_PAN_X:
-      g_value_set_double (value, settings.orbit.pan.x);
-      break;
-    case PROP_PAN_Y:
-      g_value_set_double (value, settings.orbit.pan.y);
-      break;
-    case PROP_PAN_Z:
-      g_value_set_double (value, settings.orbit.pan.z);
-      break;
-    case PROP_AUTO_ORBIT:
-      g_value_set_double (value, settings.auto_orbit);
-      break;
-    case PROP_BACKGROUND:
-      g_value_set_uint (value, settings.background);
-      break;
-    case PROP_DEPTH_STEP:
-      g_value_set_double (value, settings.strips.depth_step);
-      break;
-    case PROP_MAX_GAP:
-      g_value_set_int (value, settings.strips.max_gap);
-      break;
-    case PROP_POINT_SIZE:
-      g_value_set_double (value, settings.point_size);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv->stats));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == prop_stats)
+    g_value_take_boxed (value, make_stats (priv->stats));
+  else if (!get_strip_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
 gst_strip_render_finalize (GObject *object)
 {
-  delete GST_STRIP_RENDER (object)->priv;
+  GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
+  g_clear_error (&priv->gl_error);
+  delete priv;
   G_OBJECT_CLASS (gst_strip_render_parent_class)->finalize (object);
 }
 
@@ -678,67 +479,6 @@ gst_strip_render_init (GstStripRender *self)
 {
   self->priv = new GstStripRenderPrivate;
   gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), TRUE);
-}
-
-static void
-install_double (GObjectClass *object_class, guint id, const char *name, const char *nick,
-    const char *blurb, double minimum, double maximum, double fallback)
-{
-  g_object_class_install_property (object_class, id,
-      g_param_spec_double (name, nick, blurb, minimum, maximum, fallback,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING |
-                       GST_PARAM_CONTROLLABLE)));
-}
-
-static void
-install_camera_properties (GObjectClass *c)
-{
-  install_double (c, PROP_AZIMUTH, "azimuth", "Azimuth",
-      "Degrees round the scene from the first view, to the right (-360 to 360, default 0)", -360,
-      360, 0);
-  install_double (c, PROP_ELEVATION, "elevation", "Elevation",
-      "Degrees above the first view's height (-89 to 89, default 0)", -89, 89, 0);
-  install_double (c, PROP_DISTANCE, "distance", "Distance",
-      "Metres from what is looked at (0 to 1000, default 0: the first view's distance)", 0, 1000,
-      0);
-  install_double (c, PROP_FIELD_OF_VIEW, "field-of-view", "Field of view",
-      "Vertical angle in degrees (0 to 170, default 0: the first view's)", 0, 170, 0);
-  install_double (c, PROP_PAN_X, "pan-x", "Pan x",
-      "Metres by which what is looked at moves to the first view's right (default 0)", -1000, 1000,
-      0);
-  install_double (c, PROP_PAN_Y, "pan-y", "Pan y",
-      "Metres by which what is looked at moves up (default 0)", -1000, 1000, 0);
-  install_double (c, PROP_PAN_Z, "pan-z", "Pan z",
-      "Metres by which what is looked at moves towards the first view (default 0)", -1000, 1000, 0);
-  install_double (c, PROP_AUTO_ORBIT, "auto-orbit", "Auto orbit",
-      "Degrees a second by which the azimuth grows by itself from the first frame on (-3600 to "
-      "3600, "
-      "default 0)",
-      -3600, 3600, 0);
-}
-
-static void
-install_drawing_properties (GObjectClass *c)
-{
-  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (c, PROP_MODE,
-      g_param_spec_enum ("mode", "Mode", "What is drawn for the points (default: strips)",
-          GST_TYPE_STRIP_RENDER_MODE, int (StripMode::kStrips), live));
-  g_object_class_install_property (c, PROP_BACKGROUND,
-      g_param_spec_uint ("background", "Background",
-          "Colour behind the scene, ARGB (default 0xff20242a)", 0, G_MAXUINT32, kDefaultBackground,
-          live));
-  install_double (c, PROP_DEPTH_STEP, "depth-step", "Depth step",
-      "Neighbours that differ by more than this share of their depth are not joined (0 to 1, "
-      "default 0.02)",
-      0, 1, kDefaults.depth_step);
-  g_object_class_install_property (c, PROP_MAX_GAP,
-      g_param_spec_int ("max-gap", "Maximum gap",
-          "Invalid pixels of a row that a strip bridges (0 to 1000, default 3)", 0, 1000,
-          kDefaults.max_gap, live));
-  install_double (c, PROP_POINT_SIZE, "point-size", "Point size",
-      "Of mode points, in footprints of a pixel (0.1 to 100, default 1)", 0.1, 100, 1);
 }
 
 static void
@@ -752,9 +492,8 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   object_class->set_property = gst_strip_render_set_property;
   object_class->get_property = gst_strip_render_get_property;
   object_class->finalize = gst_strip_render_finalize;
-  install_camera_properties (object_class);
-  install_drawing_properties (object_class);
-  g_object_class_install_property (object_class, PROP_STATS,
+  prop_stats = install_strip_settings (object_class) + 1;
+  g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
           "frames since start; and of the last one: points, vertices, triangles, strips, isolated, "
           "uploaded-bytes",

@@ -27,6 +27,7 @@ precision highp int;
 precision highp usampler2D;
 uniform usampler2D u_depth;
 uniform sampler2D u_colour;
+uniform ivec2 u_size; /* of the ROI; beyond it the textures hold older frames */
 uniform mat4 u_clip_from_world;
 uniform mat4 u_world_from_view;
 uniform vec4 u_intrinsics; /* fx, fy, cx, cy of the ROI */
@@ -38,8 +39,8 @@ out vec3 v_colour;
 
 float depth_at (ivec2 p)
 {
-  ivec2 inside = clamp (p, ivec2 (0), textureSize (u_depth, 0) - 1);
-  return float (texelFetch (u_depth, inside, 0).r);
+  bool inside = all (greaterThanEqual (p, ivec2 (0))) && all (lessThan (p, u_size));
+  return inside ? float (texelFetch (u_depth, p, 0).r) : 0.0;
 }
 float slope (ivec2 p, ivec2 way, float depth)
 {
@@ -205,6 +206,8 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
       gfloat (view.intrinsics.fy), gfloat (view.intrinsics.cx - layer.image.roi.x),
       gfloat (view.intrinsics.cy - layer.image.roi.y));
   gst_gl_shader_set_uniform_1f (shader_, "u_unit", gfloat (view.depth_unit_m));
+  gst_gl_shader_set_uniform_2i (
+      shader_, "u_size", layer.image.depth.width, layer.image.depth.height);
   gl->ActiveTexture (GL_TEXTURE1);
   gl->BindTexture (GL_TEXTURE_2D, objects.colour);
   gl->ActiveTexture (GL_TEXTURE0);
@@ -224,7 +227,8 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
   gl->ClearColor (c[0], c[1], c[2], c[3]);
   gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   gl->Enable (GL_DEPTH_TEST);
-  if (gst_gl_context_get_gl_api (context_) != GST_GL_API_GLES2)
+  const bool switched_point_size = gst_gl_context_get_gl_api (context_) != GST_GL_API_GLES2;
+  if (switched_point_size) /* OpenGL ES always takes it from the shader */
     gl->Enable (GL_PROGRAM_POINT_SIZE);
   gst_gl_shader_use (shader_);
   gst_gl_shader_set_uniform_matrix_4fv (
@@ -245,6 +249,8 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gl->Disable (GL_DEPTH_TEST);
+  if (switched_point_size)
+    gl->Disable (GL_PROGRAM_POINT_SIZE);
   gst_gl_context_clear_shader (context_);
   return uploaded;
 }

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <rangecast/strips/strips.hpp>
+
+#include "orbitcontrol.hpp"
+
+/** What an application wants of striprender. Any thread, under the element's lock. */
+struct StripRenderSettings {
+  static constexpr guint kDefaultBackground = 0xff20242a;
+
+  OrbitControl camera;
+  guint background = kDefaultBackground; ///< ARGB
+  double point_size = 1;                 ///< footprints of a pixel
+  rangecast::StripSettings strips;
+};
+
+/** Installs the properties of these settings, numbers 1 to the result. All may change in any state
+ *  and are controllable. */
+guint install_strip_settings (GObjectClass *object_class);
+
+/** @return false if no property of these settings has that number */
+bool set_strip_setting (StripRenderSettings &settings, guint id, const GValue *value);
+bool get_strip_setting (const StripRenderSettings &settings, guint id, GValue *value);
+
+GType gst_strip_render_mode_get_type (void);
+#define GST_TYPE_STRIP_RENDER_MODE (gst_strip_render_mode_get_type ())
