@@ -225,7 +225,7 @@ gst_range_view_map (
   if (meta->width == 0 || meta->height == 0)
     return TRUE;
   if (meta->width > rangecast::kMaxImageSide || meta->height > rangecast::kMaxImageSide ||
-      meta->depth_offset % 2 || meta->depth_stride % 2)
+      meta->depth_offset % 2 || meta->depth_stride % 2 || meta->colour_stride % 4)
     return FALSE;
 
   const gsize size = gst_buffer_get_size (buffer);

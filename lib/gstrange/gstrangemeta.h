@@ -20,7 +20,7 @@ G_BEGIN_DECLS
  *   the view's depth units, 0 = invalid); even
  * @depth_stride: bytes from one row of depth to the next; even
  * @colour_offset: bytes from the start of the buffer to the first pixel (R, G, B, unused)
- * @colour_stride: bytes from one row of colour to the next
+ * @colour_stride: bytes from one row of colour to the next; a multiple of 4
  * @capture_time: when the view was taken, ns on the clock that the camera hosts share
  *
  * One view of a frame set. Both planes of a view lie in one #GstMemory. Only the ROI is stored.

@@ -121,6 +121,8 @@ GST_START_TEST (test_metas_that_point_outside_are_refused)
   fail_unless (refused ());
   meta->depth_offset = G_MAXSIZE - 1;
   fail_unless (refused ());
+  meta->colour_stride += 2; /* not whole pixels */
+  fail_unless (refused ());
   meta->colour_stride = 4;
   fail_unless (refused ());
   meta->height = 100000;
