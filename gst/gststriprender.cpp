@@ -58,7 +58,8 @@ struct GstStripRenderPrivate {
   GstVideoInfo out;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GstGLFramebuffer *framebuffer = nullptr;
-  GError *gl_error = nullptr; /* why OpenGL cannot be used */
+  GError *gl_error = nullptr;   /* why OpenGL cannot be used */
+  bool gl_error_posted = false; /* negotiation is tried again, the error is not */
   StripPainter painter;
   std::array<std::vector<StripVertex>, rangecast::kMaxViews> vertices; /* by number in the buffer */
 };
@@ -183,12 +184,13 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
       !choose_pool (self, query) ||
       !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
     return FALSE;
-  if (const GError *error = self->priv->gl_error) {
-    GST_ELEMENT_ERROR (
-        self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
-    return FALSE;
+  GstStripRenderPrivate *priv = self->priv;
+  if (priv->gl_error && !priv->gl_error_posted) {
+    priv->gl_error_posted = true;
+    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
+        ("OpenGL cannot be used: %s", priv->gl_error->message), (nullptr));
   }
-  return TRUE;
+  return priv->gl_error == nullptr;
 }
 
 /* ---- OpenGL's life ---- */
@@ -428,6 +430,7 @@ gst_strip_render_start (GstBaseTransform *base)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (base)->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
+  priv->gl_error_posted = false;
   {
     std::lock_guard guard (priv->lock);
     priv->stats = {};
