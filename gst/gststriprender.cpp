@@ -406,17 +406,26 @@ gst_strip_render_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta,
 /* ---- mouse and keys ---- */
 
 static bool
-handle_navigation (GstStripRenderPrivate *priv, GstEvent *event)
+handle_navigation (GstStripRender *self, GstEvent *event)
 {
-  std::lock_guard guard (priv->lock);
-  return priv->settings.camera.handle (event);
+  GstStripRenderPrivate *priv = self->priv;
+  StripRenderSettings before, after;
+  bool handled;
+  {
+    std::lock_guard guard (priv->lock);
+    before = priv->settings;
+    handled = priv->settings.camera.handle (event);
+    after = priv->settings;
+  }
+  notify_strip_settings (G_OBJECT (self), before, after);
+  return handled;
 }
 
 static gboolean
 gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_NAVIGATION &&
-      handle_navigation (GST_STRIP_RENDER (base)->priv, event)) {
+      handle_navigation (GST_STRIP_RENDER (base), event)) {
     gst_event_unref (event);
     return TRUE;
   }

@@ -92,6 +92,20 @@ install_strip_settings (GObjectClass *object_class)
   return PROP_MAX_GAP;
 }
 
+static double
+number (const Settings &settings, const NumberRow &row)
+{
+  return row.field (const_cast<Settings &> (settings));
+}
+
+void
+notify_strip_settings (GObject *object, const Settings &before, const Settings &after)
+{
+  for (const NumberRow &row : kNumbers)
+    if (number (before, row) != number (after, row))
+      g_object_notify (object, row.name);
+}
+
 bool
 set_strip_setting (Settings &settings, guint id, const GValue *value)
 {
@@ -112,8 +126,7 @@ bool
 get_strip_setting (const Settings &settings, guint id, GValue *value)
 {
   if (id >= PROP_NUMBERS && id < PROP_NUMBERS + std::size (kNumbers))
-    g_value_set_double (
-        value, kNumbers[id - PROP_NUMBERS].field (const_cast<Settings &> (settings)));
+    g_value_set_double (value, number (settings, kNumbers[id - PROP_NUMBERS]));
   else if (id == PROP_MODE)
     g_value_set_enum (value, int (settings.strips.mode));
   else if (id == PROP_BACKGROUND)

@@ -25,5 +25,9 @@ guint install_strip_settings (GObjectClass *object_class);
 bool set_strip_setting (StripRenderSettings &settings, guint id, const GValue *value);
 bool get_strip_setting (const StripRenderSettings &settings, guint id, GValue *value);
 
+/** Tells listeners which numbers differ. Call it without a lock. */
+void notify_strip_settings (
+    GObject *object, const StripRenderSettings &before, const StripRenderSettings &after);
+
 GType gst_strip_render_mode_get_type (void);
 #define GST_TYPE_STRIP_RENDER_MODE (gst_strip_render_mode_get_type ())

@@ -271,17 +271,21 @@ GST_START_TEST (test_moving_with_the_mouse_follows_the_hand)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_arrow_keys_go_round)
+GST_START_TEST (test_arrow_keys_go_round_and_tell)
 {
   GstElement *element = gst_element_factory_make ("striprender", nullptr);
   GstPad *src = gst_element_get_static_pad (element, "src");
   gst_pad_set_active (src, TRUE);
   double azimuth = 0;
+  int told = 0;
+  g_signal_connect_swapped (
+      element, "notify::azimuth", G_CALLBACK (+[] (int *count) { ++*count; }), &told);
   for (int i = 0; i < 80; i++)
     gst_pad_send_event (
         src, gst_navigation_event_new_key_press ("Right", GST_NAVIGATION_MODIFIER_NONE));
   g_object_get (element, "azimuth", &azimuth, nullptr);
   fail_unless (azimuth == 40, "azimuth %f", azimuth);
+  fail_unless_equals_int (told, 80);
   for (int i = 0; i < 160; i++)
     gst_pad_send_event (
         src, gst_navigation_event_new_key_press ("Left", GST_NAVIGATION_MODIFIER_NONE));
@@ -555,7 +559,7 @@ striprender_suite ()
   tcase_add_test (tc, test_empty_frame_set_is_the_background);
   tcase_add_test (tc, test_mouse_turns_and_zooms_and_r_goes_back);
   tcase_add_test (tc, test_moving_with_the_mouse_follows_the_hand);
-  tcase_add_test (tc, test_arrow_keys_go_round);
+  tcase_add_test (tc, test_arrow_keys_go_round_and_tell);
   tcase_add_test (tc, test_azimuth_can_be_controlled);
   tcase_add_test (tc, test_output_size_changes_in_mid_stream);
   tcase_add_test (tc, test_gap_and_eos_and_flush_pass_and_it_goes_on);
