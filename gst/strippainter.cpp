@@ -42,6 +42,9 @@ float depth_at (ivec2 p)
   bool inside = all (greaterThanEqual (p, ivec2 (0))) && all (lessThan (p, u_size));
   return inside ? float (texelFetch (u_depth, p, 0).r) : 0.0;
 }
+/* Edges of a surface go on no steeper than 45 degrees: where it is seen at a grazing angle, depth
+ * rises too fast there to be trusted, and spikes would stand out from it. */
+const float kSteepest = 1.0;
 float slope (ivec2 p, ivec2 way, float depth)
 {
   float before = depth_at (p - way), after = depth_at (p + way), limit = u_step * depth;
@@ -49,11 +52,13 @@ float slope (ivec2 p, ivec2 way, float depth)
   bool has_after = after > 0.0 && abs (after - depth) <= limit;
   if (has_before && has_after)
     return (after - before) * 0.5;
-  return has_after ? after - depth : has_before ? depth - before : 0.0;
+  float edge = has_after ? after - depth : has_before ? depth - before : 0.0;
+  float most = kSteepest * depth / u_intrinsics.x;
+  return clamp (edge, -most, most);
 }
 float place (uint n)
 {
-  return n == 0u ? 0.0 : n == 1u ? -0.5 : n == 2u ? 0.5 : n == 3u ? -0.75 : 0.75;
+  return n == 0u ? 0.0 : n == 1u ? -0.5 : n == 2u ? 0.5 : n == 3u ? -0.75 : n == 4u ? 0.75 : 1.0;
 }
 void main ()
 {

@@ -73,9 +73,9 @@ TEST (Strips, band_has_its_pixels_in_order_and_reaches_beyond_its_ends)
   StripSettings settings;
   settings.merge = false;
   EXPECT_EQ (vertices_of (Drawing ({"55", "5."}), settings),
-      (std::vector<Vertex>{{0, 0, kFarBefore, kFarBefore}, {0, 1, kFarBefore, kCentre},
-          {0, 0, kCentre, kFarBefore}, {0, 1, kCentre, kCentre}, {1, 0, kCentre, kFarBefore},
-          {1, 0, kCentre, kFarAfter}, {1, 0, kFarAfter, kFarBefore}, {1, 0, kFarAfter, kFarAfter},
+      (std::vector<Vertex>{{0, 0, kFarBefore, kBefore}, {0, 1, kFarBefore, kCentre},
+          {0, 0, kCentre, kBefore}, {0, 1, kCentre, kCentre}, {1, 0, kCentre, kBefore},
+          {1, 0, kCentre, kFarAfter}, {1, 0, kFarAfter, kBefore}, {1, 0, kFarAfter, kFarAfter},
           /* joined by degenerate triangles: the isolated pixel below */
           {1, 0, kFarAfter, kFarAfter}, {0, 1, kBefore, kBefore}, {0, 1, kBefore, kBefore},
           {0, 1, kBefore, kAfter}, {0, 1, kAfter, kBefore}, {0, 1, kAfter, kAfter}}));
@@ -119,6 +119,19 @@ TEST (Strips, band_starts_where_the_one_above_ends)
       p.vertical == kCentre ? met++ : open++;
   EXPECT_GT (met, 0);
   EXPECT_EQ (open, 0);
+}
+
+TEST (Strips, farther_surface_goes_on_behind_a_nearer_one_below)
+{
+  StripSettings settings;
+  settings.merge = false;
+  int behind = 0;
+  for (const Vertex &p : vertices_of (Drawing ({"777", "555", "777"}), settings)) {
+    behind += p.y == 0 && p.vertical == kFullAfter;
+    EXPECT_TRUE (p.y != 1 || p.vertical == kCentre || p.vertical == kFarAfter);
+    EXPECT_TRUE (p.y != 2 || p.vertical == kBefore || p.vertical == kFarAfter);
+  }
+  EXPECT_EQ (behind, 6); /* the joining piece repeats the last one */
 }
 
 namespace {
@@ -182,7 +195,7 @@ covers (const Vertex (&t)[3], double x, double y)
 void
 expect_no_cracks (const std::vector<std::string> &rows, const std::vector<Vertex> &v)
 {
-  constexpr double kCorners[][2] = {{-0.45, -0.4}, {0.4, -0.45}, {-0.4, 0.45}, {0.45, 0.4}};
+  constexpr double kCorners[][2] = {{-0.35, -0.35}, {0.35, -0.35}, {-0.35, 0.35}, {0.35, 0.35}};
   std::vector<bool> covered (600 * 4);
   for (std::size_t i = 2; i < v.size (); i++) {
     const Vertex t[3] = {v[i - 2], v[i - 1], v[i]};

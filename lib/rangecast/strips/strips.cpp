@@ -55,6 +55,16 @@ private:
     return below_ && below_[x] != kInvalidDepth && near (depth_[x], below_[x]);
   }
 
+  /* Where the lower vertex of a pixel is: kCentre of the one below, or below its own centre. A
+   * farther surface goes on behind a nearer one; the other way round shards would stand up from
+   * surfaces seen at a grazing angle, whose rows are far apart in depth. */
+  [[nodiscard]] StripPlace own_lower (int x) const
+  {
+    if (!below_ || below_[x] == kInvalidDepth)
+      return kFarAfter;
+    return near (depth_[x], below_[x]) ? kCentre : below_[x] < depth_[x] ? kFullAfter : kFarAfter;
+  }
+
   /* The next pixel of the band after x, or -1. */
   [[nodiscard]] int next_in_band (int x) const
   {
@@ -71,11 +81,11 @@ private:
     if (depth_[a] != depth_[b] || (*met_)[a] != (*met_)[b] ||
         !same_colour (image_.colour.at (a, row_), image_.colour.at (b, row_)))
       return false;
-    const bool joined = joins_below (a);
-    if (joined != joins_below (b))
+    const StripPlace own = own_lower (a);
+    if (own != own_lower (b))
       return false;
-    return !joined || (below_[a] == below_[b] && same_colour (image_.colour.at (a, row_ + 1),
-                                                     image_.colour.at (b, row_ + 1)));
+    return own != kCentre || (below_[a] == below_[b] && same_colour (image_.colour.at (a, row_ + 1),
+                                                            image_.colour.at (b, row_ + 1)));
   }
 
   /* Whether the step from pixel a to b can use what lies below them: both of its triangles then
@@ -97,18 +107,19 @@ private:
     to_.push_back (v);
   }
 
-  /* A band begins where the one above ends, or as far beyond its pixels as its ends do. */
+  /* A band begins where the one above ends, or at the upper edge of its pixels. */
   [[nodiscard]] StripVertex upper (int x, StripPlace horizontal) const
   {
-    return strip_vertex (x, row_, horizontal, (*met_)[x] ? kCentre : kFarBefore);
+    return strip_vertex (x, row_, horizontal, (*met_)[x] ? kCentre : kBefore);
   }
 
   /* The two vertices of a pixel, or of an end of the band beside it. */
   void pair (int x, bool joined, StripPlace horizontal = kCentre)
   {
     to_.push_back (upper (x, horizontal));
+    const StripPlace own = own_lower (x);
     to_.push_back (joined ? strip_vertex (x, row_ + 1, horizontal, kCentre)
-                          : strip_vertex (x, row_, horizontal, kFarAfter));
+                          : strip_vertex (x, row_, horizontal, own == kCentre ? kFarAfter : own));
   }
 
   void rectangle (int x)
@@ -136,7 +147,7 @@ private:
     bool fits = true; /* the step before x */
     for (int previous = -1;; previous = x, x = next, next = next_in_band (x)) {
       const bool joined = joins_below (x), next_fits = next < 0 || step_fits_below (x, next);
-      (*meets_)[x] = joined && fits && next_fits;
+      (*meets_)[x] = joined ? fits && next_fits : own_lower (x) == kFullAfter;
       const bool inside_piece = settings_.merge && x > first && next == x + 1 &&
                                 previous == x - 1 && same_pair (previous, x) && same_pair (x, next);
       if (!inside_piece)

@@ -34,9 +34,10 @@ enum StripPlace : std::uint32_t {
   kAfter = 2,     ///< half a pixel right or down
   kFarBefore = 3, ///< three quarters: an end of a band, so that it meets what another camera saw
   kFarAfter = 4,
+  kFullAfter = 5, ///< a whole pixel: behind a nearer surface that begins there
 };
 /** Offsets in pixels, by StripPlace. */
-inline constexpr float kStripOffsets[] = {0.f, -0.5f, 0.5f, -0.75f, 0.75f};
+inline constexpr float kStripOffsets[] = {0.f, -0.5f, 0.5f, -0.75f, 0.75f, 1.f};
 /** No image that is drawn is larger, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -58,12 +59,14 @@ struct StripResult {
  *
  *  kStrips: successive valid pixels of a row form a band, one triangle strip with two vertices a
  *  pixel: its own place, and that of the pixel below if that is valid and near in depth, so that
- *  bands join and no cracks open when the view turns; else a little below on its own surface. Both
- *  ends of a band reach a little beyond their pixels. A pixel whose pair of vertices equals both
- * neighbours' in depth and colour is left out: the piece becomes longer. A gap of invalid pixels is
- * bridged if its ends are near in depth; a depth step ends the band; a pixel with nothing beside it
- * becomes a rectangle of its own size. Bands are joined by degenerate triangles to one triangle
- * strip. kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
+ *  bands join and no cracks open when the view turns; else a little below on its own surface. A
+ *  band that no other one comes down to begins at the upper edge of its pixels. Both ends of a band
+ *  reach a little beyond their pixels. No triangle's three pixels are further apart in depth than
+ *  depth_step allows. A pixel whose pair of vertices equals both neighbours' in depth and colour is
+ *  left out: the piece becomes longer. A gap of invalid pixels is bridged if its ends are near in
+ *  depth; a depth step ends the band; a pixel with nothing beside it becomes a rectangle of its own
+ *  size. Bands are joined by degenerate triangles to one triangle strip. kRectangles: four vertices
+ *  a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn
  *  @param[out] to    replaced; keeps its memory
  *  Reentrant. */
