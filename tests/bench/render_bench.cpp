@@ -6,7 +6,8 @@
  *   render_bench [--rounds N] [--model FILE] [--pictures DIR]
  *
  * Four views, cut to the figure (or to that model), seen from 25 degrees beside the first camera in
- * 640x480. --pictures writes what was drawn as PNG. Holes: background pixels with something drawn
+ * 640x480; coded-strips are those of frame sets that went through the neighbour code with its
+ * defaults. --pictures writes what was drawn as PNG. Holes: background pixels with something drawn
  * within 5 pixels left and right and above and below them, of all that is drawn or hole. */
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
@@ -19,6 +20,7 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <rangecast/neighbourcode/access_unit.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <string>
 #include <vector>
@@ -64,6 +66,25 @@ make_frame_set (const SceneSettings &settings, FrameSet &set)
   if (!status.ok ())
     std::fprintf (stderr, "%s\n", status.message ().c_str ());
   return status.ok ();
+}
+
+/* What comes out of the neighbour code has runs of equal pixels. */
+bool
+code_and_decode (FrameSet &set)
+{
+  AccessUnitEncoder encoder;
+  AccessUnitDecoder decoder;
+  EncoderResult encoded;
+  DecoderResult decoded;
+  if (!encoder.configure (set.rig, {}).ok () || !decoder.set_rig (set.rig).ok () ||
+      !encoder.encode (set.images, 1, 1, encoded).ok ())
+    return false;
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t i = 0; i < encoder.parts (); i++)
+    bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+  decoder.plan (bytes, decoded);
+  decoder.decode (set.images, 1, decoded);
+  return true;
 }
 
 StripPainter::Picture
@@ -438,17 +459,20 @@ run_in_gl_thread (GstGLContext *, gpointer data)
     settings.width = width;
     settings.height = width * 3 / 4;
     settings.model = bench.model;
-    FrameSet set;
-    if (!make_frame_set (settings, set)) {
+    FrameSet set, coded;
+    if (!make_frame_set (settings, set) || !make_frame_set (settings, coded) ||
+        !code_and_decode (coded)) {
       bench.ok = false;
       break;
     }
     const std::string size = "4 x " + std::to_string (width) + "x" + std::to_string (width * 3 / 4);
     StripWay strips (bench.painter, set, StripMode::kStrips);
+    StripWay coded_strips (bench.painter, coded, StripMode::kStrips);
     StripWay rectangles (bench.painter, set, StripMode::kRectangles);
     StripWay points (bench.painter, set, StripMode::kPoints);
     PeerWay peer (bench.cloud, set);
     measure (bench, size, "strips", strips);
+    measure (bench, size, "coded-strips", coded_strips);
     measure (bench, size, "rectangles", rectangles);
     measure (bench, size, "points", points);
     measure (bench, size, "point-cloud", peer);
