@@ -12,6 +12,7 @@ if [ ${#elements[@]} = 0 ]; then
   done
 fi
 export GST_PLUGIN_PATH=$PWD/$build/gst GST_REGISTRY=$PWD/$build/test-registry.bin RANGECAST_SOURCE=$PWD
+export GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device # without them striprender's tests would skip
 export CK_FORK=no CK_DEFAULT_TIMEOUT=0 G_SLICE=always-malloc G_DEBUG=gc-friendly GST_REGISTRY_FORK=no
 gst-inspect-1.0 >/dev/null 2>&1 # fills the registry outside valgrind
 failed=0

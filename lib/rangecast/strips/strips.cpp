@@ -132,46 +132,51 @@ private:
     result_.triangles += 2;
   }
 
+  /* A pixel of a band, the ones before and after it (negative: none), and whether the steps to them
+   * can use what lies below. */
+  struct BandPixel {
+    int before, x, after;
+    bool fits_before, fits_after;
+  };
+
+  void add_to_band (const BandPixel &p)
+  {
+    const bool joined = joins_below (p.x);
+    (*meets_)[p.x] = joined ? p.fits_before && p.fits_after : own_lower (p.x) == kFullAfter;
+    const bool inside_piece = settings_.merge && p.before == p.x - 1 && p.after == p.x + 1 &&
+                              same_pair (p.before, p.x) && same_pair (p.x, p.after);
+    if (!inside_piece) {
+      pair (p.x, joined && p.fits_before);
+      result_.triangles += 2;
+    }
+    if (joined && p.fits_before != p.fits_after) {
+      begin_piece (upper (p.x, kCentre));
+      pair (p.x, p.fits_after);
+    }
+  }
+
   /* @return the column after the band */
   int band (int first)
   {
-    int x = first, next = next_in_band (first);
+    BandPixel p{-2, first, next_in_band (first), true, true};
     result_.points++;
-    if (next < 0) {
+    if (p.after < 0) {
       rectangle (first);
       result_.isolated++;
       return first + 1;
     }
     begin_piece (upper (first, kFarBefore));
     pair (first, joins_below (first), kFarBefore);
-    bool fits = true; /* the step before x */
-    for (int previous = -1;; previous = x, x = next, next = next_in_band (x)) {
-      const bool joined = joins_below (x), next_fits = next < 0 || step_fits_below (x, next);
-      (*meets_)[x] = joined ? fits && next_fits : own_lower (x) == kFullAfter;
-      const bool inside_piece = settings_.merge && x > first && next == x + 1 &&
-                                previous == x - 1 && same_pair (previous, x) && same_pair (x, next);
-      if (!inside_piece)
-        add_step (x, joined && fits);
-      if (joined && fits != next_fits) {
-        begin_piece (upper (x, kCentre));
-        pair (x, next_fits);
-      }
-      if (next < 0)
-        break;
+    for (; p.after >= 0; p = {p.x, p.after, next_in_band (p.after), p.fits_after, true}) {
+      p.fits_after = step_fits_below (p.x, p.after);
+      add_to_band (p);
       result_.points++;
-      fits = next_fits;
     }
-    pair (x, joins_below (x), kFarAfter);
+    add_to_band (p);
+    pair (p.x, joins_below (p.x), kFarAfter);
     result_.triangles += 2;
     result_.strips++;
-    return x + 1;
-  }
-
-  /* The next pair of a band, and the two triangles between it and the last. */
-  void add_step (int x, bool joined)
-  {
-    pair (x, joined);
-    result_.triangles += 2;
+    return p.x + 1;
   }
 
   void bands_of_row ()
