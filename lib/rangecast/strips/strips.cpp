@@ -2,7 +2,6 @@
 #include "strips.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <cstring>
 
@@ -34,7 +33,7 @@ public:
       row_ = y;
       if (settings_.mode == StripMode::kStrips) {
         std::swap (met_, meets_);
-        std::fill_n (meets_->begin (), width_, false);
+        std::fill_n (meets_, width_, false);
         bands_of_row ();
       } else
         pixels_of_row ();
@@ -42,8 +41,6 @@ public:
   }
 
 private:
-  using Columns = std::array<bool, kMaxStripSide>;
-
   [[nodiscard]] bool near (int a, int b) const
   {
     return static_cast<std::int64_t> (std::abs (a - b)) * 65536 <=
@@ -78,7 +75,7 @@ private:
   /* Whether the vertices of two pixels of this row are alike but for their column. */
   [[nodiscard]] bool same_pair (int a, int b) const
   {
-    if (depth_[a] != depth_[b] || (*met_)[a] != (*met_)[b] ||
+    if (depth_[a] != depth_[b] || met_[a] != met_[b] ||
         !same_colour (image_.colour.at (a, row_), image_.colour.at (b, row_)))
       return false;
     const StripPlace own = own_lower (a);
@@ -110,7 +107,7 @@ private:
   /* A band begins where the one above ends, or at the upper edge of its pixels. */
   [[nodiscard]] StripVertex upper (int x, StripPlace horizontal) const
   {
-    return strip_vertex (x, row_, horizontal, (*met_)[x] ? kCentre : kBefore);
+    return strip_vertex (x, row_, horizontal, met_[x] ? kCentre : kBefore);
   }
 
   /* The two vertices of a pixel, or of an end of the band beside it. */
@@ -132,8 +129,8 @@ private:
     result_.triangles += 2;
   }
 
-  /* A pixel of a band, the ones before and after it (negative: none), and whether the steps to them
-   * can use what lies below. */
+  /* A pixel of a band, the ones before it (itself: none) and after it (negative: none), and whether
+   * the steps to them can use what lies below. */
   struct BandPixel {
     int before, x, after;
     bool fits_before, fits_after;
@@ -142,7 +139,7 @@ private:
   void add_to_band (const BandPixel &p)
   {
     const bool joined = joins_below (p.x);
-    (*meets_)[p.x] = joined ? p.fits_before && p.fits_after : own_lower (p.x) == kFullAfter;
+    meets_[p.x] = joined ? p.fits_before && p.fits_after : own_lower (p.x) == kFullAfter;
     const bool inside_piece = settings_.merge && p.before == p.x - 1 && p.after == p.x + 1 &&
                               same_pair (p.before, p.x) && same_pair (p.x, p.after);
     if (!inside_piece) {
@@ -158,7 +155,7 @@ private:
   /* @return the column after the band */
   int band (int first)
   {
-    BandPixel p{-2, first, next_in_band (first), true, true};
+    BandPixel p{first, first, next_in_band (first), true, true};
     result_.points++;
     if (p.after < 0) {
       rectangle (first);
@@ -206,9 +203,9 @@ private:
   const int step_; /* of 65536 */
   const std::uint16_t *depth_ = nullptr, *below_ = nullptr;
   int row_ = 0;
-  Columns columns_[2] = {};
-  Columns *met_ = &columns_[0]; /* columns where the row above reaches down to this one's pixels */
-  Columns *meets_ = &columns_[1]; /* and where this row does to the next one's */
+  bool columns_[2][kMaxStripSide] = {};
+  bool *met_ = columns_[0];   /* columns where the row above reaches down to this one's pixels */
+  bool *meets_ = columns_[1]; /* and where this row does to the next one's */
 };
 
 } // namespace
