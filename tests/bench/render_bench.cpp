@@ -420,31 +420,51 @@ read_back (Bench &bench)
   return rgba;
 }
 
+struct Row {
+  const char *name;
+  Way &way;
+  std::vector<double> build = {}, draw = {}, total = {}; /* ms */
+};
+
 void
-measure (Bench &bench, const std::string &size, const char *name, Way &way)
+time_once (Bench &bench, Row &row)
 {
-  std::vector<double> build, draw, total;
-  guint64 bytes = 0;
-  for (int i = -3; i < bench.rounds; i++) { /* the first ones allocate */
-    const auto begin = Clock::now ();
-    way.build ();
-    const double built = ms_since (begin);
-    bytes = draw_once (bench, way);
-    if (i < 0)
-      continue;
-    build.push_back (built);
-    total.push_back (ms_since (begin));
-    draw.push_back (total.back () - built);
-  }
+  const auto begin = Clock::now ();
+  row.way.build ();
+  row.build.push_back (ms_since (begin));
+  draw_once (bench, row.way);
+  row.total.push_back (ms_since (begin));
+  row.draw.push_back (row.total.back () - row.build.back ());
+}
+
+void
+report (Bench &bench, const std::string &size, Row &row)
+{
+  const guint64 bytes = draw_once (bench, row.way);
   const cv::Mat rgba = read_back (bench);
   std::printf ("%-14s %-12s %6.2f ms = CPU %5.2f + draw %6.2f  %s, %llu bytes, %.2f %% holes\n",
-      size.c_str (), name, median (total), median (build), median (draw), way.counts ().c_str (),
-      static_cast<unsigned long long> (bytes), holes_percent (rgba));
+      size.c_str (), row.name, median (row.total), median (row.build), median (row.draw),
+      row.way.counts ().c_str (), static_cast<unsigned long long> (bytes), holes_percent (rgba));
   if (bench.pictures.empty ())
     return;
   cv::Mat bgra;
   cv::cvtColor (rgba, bgra, cv::COLOR_RGBA2BGRA);
-  cv::imwrite (bench.pictures + "/" + size.substr (4) + "-" + name + ".png", bgra);
+  cv::imwrite (bench.pictures + "/" + size.substr (4) + "-" + row.name + ".png", bgra);
+}
+
+/* In turns, so that whatever else the machine does hits all of them alike. */
+void
+measure (Bench &bench, const std::string &size, std::span<Row> rows)
+{
+  for (Row &row : rows) { /* the first time allocates */
+    row.way.build ();
+    draw_once (bench, row.way);
+  }
+  for (int i = 0; i < bench.rounds; i++)
+    for (Row &row : rows)
+      time_once (bench, row);
+  for (Row &row : rows)
+    report (bench, size, row);
 }
 
 void
@@ -471,11 +491,9 @@ run_in_gl_thread (GstGLContext *, gpointer data)
     StripWay rectangles (bench.painter, set, StripMode::kRectangles);
     StripWay points (bench.painter, set, StripMode::kPoints);
     PeerWay peer (bench.cloud, set);
-    measure (bench, size, "strips", strips);
-    measure (bench, size, "coded-strips", coded_strips);
-    measure (bench, size, "rectangles", rectangles);
-    measure (bench, size, "points", points);
-    measure (bench, size, "point-cloud", peer);
+    Row rows[] = {{"strips", strips}, {"coded-strips", coded_strips}, {"rectangles", rectangles},
+        {"points", points}, {"point-cloud", peer}};
+    measure (bench, size, rows);
   }
   stop (bench);
 }

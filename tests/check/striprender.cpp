@@ -23,7 +23,7 @@ render_harness (const Rig &rig, const char *properties = "")
     return nullptr;
   gst_element_set_state (probe, GST_STATE_PAUSED);
   const bool usable =
-      gst_element_get_state (probe, nullptr, nullptr, 20 * GST_SECOND) == GST_STATE_CHANGE_SUCCESS;
+      gst_element_get_state (probe, nullptr, nullptr, 60 * GST_SECOND) == GST_STATE_CHANGE_SUCCESS;
   gst_element_set_state (probe, GST_STATE_NULL);
   gst_object_unref (probe);
   if (!usable)
