@@ -17,8 +17,8 @@ import struct
 import sys
 from array import array
 from dataclasses import dataclass, field
-from math import floor
-from typing import BinaryIO, Iterator, NamedTuple
+from math import floor, hypot
+from typing import BinaryIO, Iterable, Iterator, NamedTuple
 
 VERSION = 1
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
@@ -29,7 +29,10 @@ SLICE_FIELDS = struct.Struct("<BBBBIQ4H2H2H")
 RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
+KEY = 1
 FULL_PIXEL, INVALID = 4, 5
+NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
+Pixel = tuple[int, int, int, int]  # depth in depth units, R, G, B
 
 
 class Damaged(Exception):
@@ -65,9 +68,16 @@ class Slice(NamedTuple):
     columns: int
     body: bytes
 
-    def agreement(self) -> tuple[int, ...]:
-        """What the slices of one view have in common within an access unit."""
-        return (self.x, self.y, self.width, self.height, self.depth_bits, self.colour_bits, self.frame)
+    def lies_in(self, view: View | None) -> bool:
+        """Its view is in the rig, and its ROI in the view's image."""
+        return view is not None and self.x + self.width <= view.width and self.y + self.height <= view.height
+
+    def agrees(self, other: Slice) -> bool:
+        """What slices of one view have in common within an access unit is the same."""
+        return self[2:5] == other[2:5] and self[6:10] == other[6:10]
+
+    def pixel_bits(self) -> int:
+        return self.depth_bits + 3 * self.colour_bits
 
 
 class Picture:
@@ -78,7 +88,7 @@ class Picture:
         self.depth = array("H", bytes(2 * view.width * view.height))
         self.colour = bytearray(3 * view.width * view.height)
 
-    def put(self, part: Slice, pixels: list[tuple[int, int, int, int] | None]) -> None:
+    def put(self, part: Slice, pixels: list[Pixel | None]) -> None:
         """Takes the pixels of a slice; None is an invalid one."""
         for i, pixel in enumerate(pixels):
             row, column = divmod(i, part.columns)
@@ -92,11 +102,11 @@ class Reader:
     """Reads access units; keeps the rig from one to the next."""
 
     data: bytes
-    views: list[View] = field(default_factory=list)
+    views: dict[int, View] = field(default_factory=dict)
     parts: dict[int, View] = field(default_factory=dict)
     rig_key: tuple[int, int, int] | None = None
     counts: dict[str, int] = field(
-        default_factory=lambda: dict.fromkeys(("access units", "slices", "damaged slices", "other units refused or skipped"), 0)
+        default_factory=lambda: dict.fromkeys(("access units", "slices", "damaged slices", "damaged rig views"), 0)
     )
 
     def access_units(self) -> Iterator[dict[int, Picture]]:
@@ -111,7 +121,7 @@ class Reader:
             if 0 <= following < end:
                 end = following
             pictures = self.read_access_unit(self.data[begin:end])
-            if self.views:
+            if pictures is not None:
                 self.counts["access units"] += 1
                 yield pictures
             position = self.find_access_unit(end)
@@ -123,61 +133,71 @@ class Reader:
             if head + ACCESS_UNIT_SIZE <= len(self.data):
                 kind, flags, size = UNIT_HEADER.unpack_from(self.data, head)
                 length = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
-                if kind == VERSION << 4 | ACCESS_UNIT and flags <= 1 and size == ACCESS_UNIT_SIZE and length <= MAX_ACCESS_UNIT:
+                if kind == VERSION << 4 | ACCESS_UNIT and flags <= KEY and size == ACCESS_UNIT_SIZE and length <= MAX_ACCESS_UNIT:
                     return position
             position += 1
         return -1
 
-    def read_access_unit(self, data: bytes) -> dict[int, Picture]:
-        """Decodes the units of one access unit."""
+    def read_access_unit(self, data: bytes) -> dict[int, Picture] | None:
+        """Decodes the units of one access unit; None if it holds nothing but rig views or the rig is unknown."""
         slices: list[Slice] = []
-        position = 0
-        while position + UNIT_HEADER.size <= len(data):
-            kind, flags, size = UNIT_HEADER.unpack_from(data, position)
-            if size < UNIT_HEADER.size or position + size > len(data):
-                break
-            payload = data[position + UNIT_HEADER.size : position + size]
-            position += size
+        other_units = False
+        for kind, flags, payload in units(data):
+            other_units |= kind != RIG_VIEW
             try:
-                if kind == VERSION << 4 | SLICE:
+                if kind == SLICE:
                     self.counts["slices"] += 1
                     slices.append(parse_slice(flags, payload))
-                elif kind == VERSION << 4 | RIG_VIEW:
+                elif kind == RIG_VIEW:
                     self.take_rig_view(flags, payload)
-                else:
-                    raise Damaged("another version or an unknown type")
             except Damaged:
-                self.counts["damaged slices" if kind == VERSION << 4 | SLICE else "other units refused or skipped"] += 1
+                self.counts["damaged slices" if kind == SLICE else "damaged rig views"] += 1
+        if not other_units or not self.views:
+            return None
 
-        views = {view.id: view for view in self.views}
-        pictures: dict[int, Picture] = {}
+        sound: list[Slice] = []
         first: dict[int, Slice] = {}
         for part in slices:
+            if part.lies_in(self.views.get(part.view)) and part.agrees(first.setdefault(part.view, part)):
+                sound.append(part)
+            else:
+                self.counts["damaged slices"] += 1
+        pictures = {view_id: Picture(self.views[view_id]) for view_id in first}
+        for part in sorted(sound, key=lambda part: (part.first_column, part.first_row)):
+            pixels: list[Pixel | None] = [None] * (part.rows * part.columns)
             try:
-                if part.view not in views:
-                    raise Damaged("of a view that the rig lacks")
-                pixels = decode_slice(part, views[part.view])
-                if part.agreement() != first.setdefault(part.view, part).agreement():
-                    raise Damaged("differs from the first of its view")
-                pictures.setdefault(part.view, Picture(views[part.view])).put(part, pixels)
+                pixels = decode_slice(part, self.views[part.view])
             except Damaged:
                 self.counts["damaged slices"] += 1
+            pictures[part.view].put(part, pixels)
         return pictures
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
         """Collects the views of the rig and makes it the present one when all are there."""
-        if flags or len(payload) < RIG_VIEW_FIELDS.size:
+        if flags & ~KEY or len(payload) < RIG_VIEW_FIELDS.size:
             raise Damaged("rig view")
         number, total, numerator, denominator = RIG_VIEW_FIELDS.unpack_from(payload)
-        if not 1 <= total <= 64 or number >= total or denominator == 0:
+        if not 1 <= total <= 64 or number >= total or numerator >> 31 or not 1 <= denominator < 1 << 31:
             raise Damaged("rig view")
         view = parse_rig_blob(payload[RIG_VIEW_FIELDS.size :])
         if self.rig_key != (total, numerator, denominator):
             self.rig_key = (total, numerator, denominator)
             self.parts = {}
         self.parts[number] = view
-        if len(self.parts) == total:
-            self.views = [self.parts[i] for i in range(total)]
+        by_id = {view.id: view for view in self.parts.values()}
+        if len(by_id) == total:
+            self.views = by_id
+
+
+def units(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Type, flags and content of each unit, up to the first one that cannot be passed over."""
+    position = 0
+    while position + UNIT_HEADER.size <= len(data):
+        kind, flags, size = UNIT_HEADER.unpack_from(data, position)
+        if kind >> 4 != VERSION or size < UNIT_HEADER.size or position + size > len(data):
+            break
+        yield kind & 15, flags, data[position + UNIT_HEADER.size : position + size]
+        position += size
 
 
 def parse_rig_blob(blob: bytes) -> View:
@@ -185,27 +205,46 @@ def parse_rig_blob(blob: bytes) -> View:
     try:
         magic, version, views, view_id, flags, name_size = struct.unpack_from("<4s5B", blob)
         position = 9 + name_size
-        width, height = struct.unpack_from("<2H", blob, position)
-        position += 4 + 4 * 8
-        coefficients = blob[position]
-        position += 1 + 96
-        unit, near, far = struct.unpack_from("<3d", blob, position)
-    except (struct.error, IndexError):
+        width, height, *lens, coefficients = struct.unpack_from("<2H4dB", blob, position)
+        *pose, unit, near, far = struct.unpack_from("<15d", blob, position + 37)
+    except struct.error:
         raise Damaged("rig view is short") from None
-    if magic != b"RCRG" or version != 1 or views != 1 or flags or coefficients or position + 24 != len(blob):
+    if magic != b"RCRG" or version != 1 or views != 1 or flags or coefficients or position + 37 + 15 * 8 != len(blob):
         raise Damaged("not a rig of one range view")
+    if view_id > 63 or not 1 <= width <= 16384 or not 1 <= height <= 16384 or not 1e-7 <= unit <= 1:
+        raise Damaged("view-id, image size or depth unit")
+    if not 0 < near < far or not far / unit < 65536:
+        raise Damaged("near and far")
+    if not is_lens(lens) or not is_pose(pose):
+        raise Damaged("lens or pose")
     return View(view_id, width, height, *(min(max(floor(metres / unit + 0.5), 1), 65535) for metres in (near, far)))
+
+
+def is_lens(lens: list[float]) -> bool:
+    """Focal lengths and principal point lie within the limits of docs/rig.md."""
+    return all(0 < f <= 1e6 for f in lens[:2]) and all(abs(c) <= 1e6 for c in lens[2:])
+
+
+def is_pose(pose: list[float]) -> bool:
+    """The rotation is one, and the translation is below 1e6 m."""
+    x, y, z = pose[0:3], pose[3:6], pose[6:9]
+    products = [sum(a * b for a, b in zip(u, v)) for u in (x, y, z) for v in (x, y, z)]
+    cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+    return (
+        all(abs(product - (i % 4 == 0)) <= 1e-5 for i, product in enumerate(products))
+        and sum(a * b for a, b in zip(cross, z)) > 0
+        and hypot(*pose[9:]) < 1e6
+    )
 
 
 def parse_slice(flags: int, payload: bytes) -> Slice:
     """Reads and checks what can be checked without the rig."""
-    if flags != 1 or len(payload) < SLICE_FIELDS.size:
-        raise Damaged("header")
+    if flags & ~KEY or len(payload) < SLICE_FIELDS.size:
+        raise Damaged("flags or size")
     part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :])
     if part.view > 63 or part.profile != 0 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
-        raise Damaged("header")
-    where = part[6:14]
-    if any(where):
+        raise Damaged("view, profile or bits")
+    if any(part[6:14]):
         if not part.rows or not part.columns:
             raise Damaged("no pixels")
         if part.first_row + part.rows > part.height or part.first_column + part.columns > part.width:
@@ -213,67 +252,59 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     return part
 
 
-def decode_slice(part: Slice, view: View) -> list[tuple[int, int, int, int] | None]:
-    """Depth in depth units, R, G and B of each pixel of a slice, row by row; None: invalid."""
-    if part.x + part.width > view.width or part.y + part.height > view.height:
-        raise Damaged("ROI beyond the image")
-    count = part.rows * part.columns
+def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
+    """The pixels of a slice, row by row; None: invalid."""
+    count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
     if len(part.body) < symbols_size:
         raise Damaged("short of symbols")
     symbol_bits = int.from_bytes(part.body[:symbols_size], "little")
-    symbols = [int(digit) for digit in f"{symbol_bits:0{count}o}"[::-1]] if count else []
-    if len(symbols) > count:
+    if symbol_bits >> 3 * count:
         raise Damaged("bits set behind the symbols")
-
-    pixel_bits = part.depth_bits + 3 * part.colour_bits
+    symbols = [int(digit) for digit in f"{symbol_bits:0{count}o}"[::-1]] if count else []
     full_bytes = part.body[symbols_size:]
-    if len(full_bytes) != (symbols.count(FULL_PIXEL) * pixel_bits + 7) // 8:
-        raise Damaged("too many or too few bytes of full pixels")
+    if len(full_bytes) != (symbols.count(FULL_PIXEL) * part.pixel_bits() + 7) // 8:
+        raise Damaged("too many or too few full pixels")
     full = full_pixels(full_bytes, part, view)
-
-    columns = part.columns
-    codes: list[tuple[int, int, int, int] | None] = []
+    pixels: list[Pixel | None] = []
     for i, symbol in enumerate(symbols):
-        row, column = divmod(i, columns)
-        if symbol == FULL_PIXEL:
-            codes.append(next(full))
-        elif symbol == INVALID:
-            codes.append(None)
+        if symbol == INVALID:
+            pixels.append(None)
+        elif symbol == FULL_PIXEL:
+            pixels.append(next(full))
+        elif symbol > INVALID:
+            raise Damaged("reserved symbol")
         else:
-            if symbol > INVALID:
-                raise Damaged("reserved symbol")
-            dx, dy = ((-1, 0), (-1, -1), (0, -1), (1, -1))[symbol]
-            if not (0 <= column + dx < columns and row + dy >= 0) or (pixel := codes[i + dy * columns + dx]) is None:
+            row, column = divmod(i, columns)
+            dx, dy = NEIGHBOURS[symbol]
+            if not 0 <= column + dx < columns or row + dy < 0 or not (pixel := pixels[i + dy * columns + dx]):
                 raise Damaged("names a pixel that does not exist or is invalid")
-            codes.append(pixel)
-    if next(full, None) is not None:
-        raise Damaged("full pixels are left over")
-    return codes
+            pixels.append(pixel)
+    return pixels
 
 
-def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[tuple[int, int, int, int]]:
-    """The values of a slice's full pixels, in their order."""
+def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
+    """Depth in depth units, R, G and B of a slice's full pixels, in their order."""
     extent = view.far - view.near
     last = min(extent, (1 << part.depth_bits) - 1)
+    if last < 1:
+        raise Damaged("near and far are less than one depth unit apart")
     maximum = (1 << part.colour_bits) - 1
     values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
-    pixel_bits = part.depth_bits + 3 * part.colour_bits
-    position = 0
-    while position + pixel_bits <= 8 * len(data):
+    count = 8 * len(data) // part.pixel_bits()
+    if int.from_bytes(data, "little") >> count * part.pixel_bits():
+        raise Damaged("bits set behind the full pixels")
+    for position in range(0, count * part.pixel_bits(), part.pixel_bits()):
         start, shift = divmod(position, 8)
         bits = int.from_bytes(data[start : start + 6], "little") >> shift
-        position += pixel_bits
-        depth = bits & (1 << part.depth_bits) - 1
-        red, green, blue = (bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
-        if depth > last:
+        code = bits & (1 << part.depth_bits) - 1
+        if code > last:
             raise Damaged("depth code beyond the greatest")
-        yield (view.near + (depth * extent + last // 2) // last, values[red], values[green], values[blue])
-    if int.from_bytes(data, "little") >> position:
-        raise Damaged("bits set behind the full pixels")
+        red, green, blue = (bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
+        yield (view.near + (code * extent + last // 2) // last, values[red], values[green], values[blue])
 
 
-def write(pictures: dict[int, Picture], views: list[View], prefix: str, files: dict[str, BinaryIO]) -> None:
+def write(pictures: dict[int, Picture], views: Iterable[View], prefix: str, files: dict[str, BinaryIO]) -> None:
     """Appends one picture of each view to its files; all invalid where a view has none."""
     for view in views:
         picture = pictures.get(view.id) or Picture(view)
@@ -295,7 +326,7 @@ def main() -> int:
         reader = Reader(stream.read())
     files: dict[str, BinaryIO] = {}
     for pictures in reader.access_units():
-        write(pictures, reader.views, sys.argv[2], files)
+        write(pictures, reader.views.values(), sys.argv[2], files)
     for file in files.values():
         file.close()
     print(", ".join(f"{count} {what}" for what, count in reader.counts.items()))
