@@ -109,6 +109,14 @@ test_rig_that_changes_within_a_file_is_taken_up () {
   [ "$(stat -c %s python-depth-0.raw)" = $((2 * 2 * (2 * 64 * 48 + 96 * 72))) ] || fail "$(ls -l)"
 }
 
+test_recorded_streams_decode_as_ever () {
+  local stream
+  for stream in default exact coarse damaged; do
+    python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
+  done
+  sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"
+}
+
 # What the document says of damage: both decoders find the same. The rig, at the beginning, stays
 # whole, or there would be nothing to see.
 test_damaged_files_decode_the_same () {
