@@ -5,7 +5,7 @@
 Shares no line with the plugin, so that where both give the same pictures the documents say what the plugin does.
 
 usage: decode.py FILE OUT_PREFIX
-Writes for each view N of the rig, one picture of its full size for each access unit, one behind the other:
+Writes for each view N of the rig, one picture of its full size for each frame set, one behind the other:
   OUT_PREFIX-depth-N.raw   16 bits little-endian, depth units, 0 where invalid
   OUT_PREFIX-colour-N.raw  8 bits each of R, G and B, 0 where invalid
 and prints what it read. Pixels that did not arrive are invalid; so is all of a view that has no slice.
@@ -25,7 +25,7 @@ SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
 UNIT_HEADER = struct.Struct("<BBH")
 ACCESS_UNIT_FIELDS = struct.Struct("<IQQ")
-SLICE_FIELDS = struct.Struct("<BBBBIQ4H2H2H")
+SLICE_FIELDS = struct.Struct("<BBBBIQ8H")
 RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
@@ -110,7 +110,7 @@ class Reader:
     )
 
     def access_units(self) -> Iterator[dict[int, Picture]]:
-        """The pictures of each access unit, by view-id, once the rig is known."""
+        """The pictures of each access unit that is a frame set, by view-id."""
         position = self.find_access_unit(0)
         while position >= 0:
             head = position + len(START_CODE)
@@ -133,7 +133,8 @@ class Reader:
             if head + ACCESS_UNIT_SIZE <= len(self.data):
                 kind, flags, size = UNIT_HEADER.unpack_from(self.data, head)
                 length = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
-                if kind == VERSION << 4 | ACCESS_UNIT and flags <= KEY and size == ACCESS_UNIT_SIZE and length <= MAX_ACCESS_UNIT:
+                sound = kind == VERSION << 4 | ACCESS_UNIT and flags <= KEY and size == ACCESS_UNIT_SIZE
+                if sound and length <= MAX_ACCESS_UNIT:
                     return position
             position += 1
         return -1
