@@ -109,6 +109,31 @@ test_rig_that_changes_within_a_file_is_taken_up () {
   [ "$(stat -c %s python-depth-0.raw)" = $((2 * 2 * (2 * 64 * 48 + 96 * 72))) ] || fail "$(ls -l)"
 }
 
+# Every copy of the rig but the first may be damaged: flags, number, total, frame rate and the numbers of the blob. The
+# image's width and the view-id stay, for the sake of rows and pads.
+test_damaged_rigs_decode_the_same () {
+  local seed
+  record one.rcnc 2 64x48 "num-buffers=1 range-person-only=true"
+  record other.rcnc 2 48x36 "num-buffers=1 range-person-only=true arc=60"
+  cat one.rcnc other.rcnc one.rcnc other.rcnc >rigs.rcnc
+  for seed in {1..8}; do
+    python3 - "$seed" <<'END'
+import random, sys
+random.seed(int(sys.argv[1]))
+data = bytearray(open("rigs.rcnc", "rb").read())
+rig_views = [i for i in range(len(data) - 18) if data[i] == 0x12 and data[i + 14 : i + 18] == b"RCRG"]
+for begin in rig_views[2:]:
+    width = begin + 23 + data[begin + 22]
+    end = begin + int.from_bytes(data[begin + 2 : begin + 4], "little")
+    places = [begin + i for i in (1, 4, 5, 6, 9, 10, 13, 18, 19, 21)] + [width + 2, width + 3]
+    at = random.choice((random.choice(places), random.randrange(width + 4, end), random.randrange(end - 24, end)))
+    data[at] ^= random.choice((0, 0, 1, 2, 4, 8, 16, 32, 64, 128))
+open("bad.rcnc", "wb").write(data)
+END
+    expect_decoders_agree bad.rcnc 2 "rigs damaged with seed $seed"
+  done
+}
+
 test_recorded_streams_decode_as_ever () {
   local stream
   for stream in default exact coarse damaged; do
