@@ -11,8 +11,8 @@ write_pictures () {
   local prefix=$1 views=$2 view pads=()
   shift 2
   for ((view = 0; view < views; view++)); do
-    pads+=(s.depth_$view ! queue ! filesink "location=$prefix-depth-$view.raw"
-      s.colour_$view ! queue ! videoconvert ! video/x-raw,format=RGB ! filesink "location=$prefix-colour-$view.raw")
+    pads+=("s.depth_$view" ! queue ! filesink "location=$prefix-depth-$view.raw"
+      "s.colour_$view" ! queue ! videoconvert ! "video/x-raw,format=RGB" ! filesink "location=$prefix-colour-$view.raw")
   done
   timeout 60 gst-launch-1.0 -q "$@" ! rangesplit name=s "${pads[@]}"
 }
