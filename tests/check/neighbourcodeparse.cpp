@@ -440,9 +440,9 @@ GST_START_TEST (test_flush_forgets_what_was_half_there)
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_BYTES);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
-  push_bytes (h, recording.bytes, 5000);
+  push_bytes (h, {recording.bytes.data (), recording.offsets[1]}, 500);
   const auto parsed = pull_all (h);
-  fail_unless_equals_int (parsed.size (), 10);
+  fail_unless_equals_int (parsed.size (), 1);
   fail_unless (same_bytes (parsed[0], recording.access_units[0]));
   unref_all (parsed);
   gst_harness_teardown (h);
