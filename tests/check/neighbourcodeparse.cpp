@@ -756,12 +756,12 @@ GST_START_TEST (test_file_plays_again_after_all_state_changes)
   const TemporaryFile file (recording.bytes);
   Player player (file);
   for (int i = 0; i < 2; i++) {
-    player.seen.clear ();
     fail_unless (player.finish ());
     fail_unless_equals_int (player.seen.size (), 20);
     fail_unless_equals_uint64 (player.seen.back (), 19 * kFrame);
     gst_element_set_state (player.pipeline, GST_STATE_READY);
     gst_element_set_state (player.pipeline, GST_STATE_NULL);
+    player.seen.clear ();
   }
 }
 GST_END_TEST;
