@@ -32,9 +32,9 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <optional>
 #include <rangecast/neighbourcode/byte_stream.hpp>
 #include <span>
-#include <string>
 #include <vector>
 
 using rangecast::AccessUnitHeader;
@@ -146,16 +146,19 @@ GST_ELEMENT_REGISTER_DEFINE_CUSTOM (neighbourcodeparse, register_with_typefinder
 
 /* ---- caps ---- */
 
-/* Access units unless downstream takes only the byte stream. */
+/* Access units unless downstream takes only the byte stream. Its peer is asked, not the pad: the
+ * base class makes the pad answer with the caps that it already has. */
 static bool
 downstream_wants_stream (GstBaseParse *base)
 {
-  GstCaps *allowed = gst_pad_get_allowed_caps (GST_BASE_PARSE_SRC_PAD (base));
-  GstCaps *access_units =
-      gst_caps_from_string (GST_NEIGHBOUR_CODE_MEDIA_TYPE ", alignment = (string) access-unit");
+  GstPad *pad = GST_BASE_PARSE_SRC_PAD (base);
+  GstCaps *ours = gst_pad_get_pad_template_caps (pad);
+  GstCaps *allowed = gst_pad_peer_query_caps (pad, ours);
+  GstCaps *access_units = gst_caps_from_string (ACCESS_UNIT_CAPS);
   const bool wants =
-      allowed && !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
-  gst_clear_caps (&allowed);
+      !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
+  gst_caps_unref (ours);
+  gst_caps_unref (allowed);
   gst_caps_unref (access_units);
   return wants;
 }
@@ -211,14 +214,14 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 
 /* ---- errors ---- */
 
-static std::string
+static const char *
 what_is_missing (Seen seen)
 {
   switch (seen) {
     case Seen::kNothing:
-      return "No access unit found: expected a neighbour code byte stream, version 1 (start code "
-             "00 "
-             "52 43 55, then an access-unit unit)";
+      return "No access unit found: expected a neighbour code byte stream of version 1, which "
+             "begins "
+             "with the start code 00 52 43 55";
     case Seen::kAccessUnit:
       return "No complete rig found: expected the rig views of a neighbour code byte stream in "
              "front of its slices";
@@ -231,35 +234,43 @@ static void
 post_what_is_missing (GstBaseParse *base)
 {
   const Seen seen = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.seen;
-  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", what_is_missing (seen).c_str ()), (nullptr));
+  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", what_is_missing (seen)), (nullptr));
 }
 
-/* The base class says "No valid frames found" where we know what is missing, and in pull mode adds
- * "Internal data stream error" to any error of ours. One error that tells is enough. */
-static gboolean
-gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
+/* Where the base class says "No valid frames found" we know what is missing. */
+static GstMessage *
+say_what_is_missing (GstElement *element, GstMessage *message)
 {
-  auto parent_class = GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class);
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream;
-  if (GST_MESSAGE_TYPE (message) != GST_MESSAGE_ERROR)
-    return parent_class->post_message (element, message);
-  if (stream.failed) {
-    gst_message_unref (message);
-    return TRUE;
-  }
-  stream.failed = true;
   GError *error = nullptr;
   gchar *debug = nullptr;
   gst_message_parse_error (message, &error, &debug);
   if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
+    const Seen seen = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream.seen;
     g_free (error->message);
-    error->message = g_strdup (what_is_missing (stream.seen).c_str ());
+    error->message = g_strdup (what_is_missing (seen));
     gst_message_unref (message);
     message = gst_message_new_error (GST_OBJECT (element), error, debug);
   }
   g_clear_error (&error);
   g_free (debug);
-  return parent_class->post_message (element, message);
+  return message;
+}
+
+/* In pull mode the base class adds "Internal data stream error" to any error: one that tells is
+ * enough. */
+static gboolean
+gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
+    if (stream.failed) {
+      gst_message_unref (message);
+      return TRUE;
+    }
+    stream.failed = true;
+    message = say_what_is_missing (element, message);
+  }
+  return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
 }
 
 /* ---- from access units ---- */
@@ -333,23 +344,33 @@ make_stream_buffer (Stream &stream, GstBuffer *access_unit, AccessUnitHeader hea
 }
 
 static GstFlowReturn
+refuse_long_access_unit (GstBaseParse *base, gsize size)
+{
+  GST_ELEMENT_ERROR (base, STREAM, FORMAT,
+      ("An access unit of %" G_GSIZE_FORMAT " bytes: expected at most 32 MiB with its rig", size),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+static GstFlowReturn
+refuse_unreadable_buffer (GstBaseParse *base)
+{
+  GST_ELEMENT_ERROR (base, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+  return GST_FLOW_ERROR;
+}
+
+static GstFlowReturn
 handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   const gsize size = gst_buffer_get_size (frame->buffer);
   if (gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)) && !set_source_caps (base))
     return refused (base);
-  if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize) {
-    GST_ELEMENT_ERROR (base, STREAM, FORMAT,
-        ("An access unit of %" G_GSIZE_FORMAT " bytes: expected at most 32 MiB with its rig", size),
-        (nullptr));
-    return GST_FLOW_ERROR;
-  }
+  if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
+    return refuse_long_access_unit (base, size);
   GstMapInfo map;
-  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ)) {
-    GST_ELEMENT_ERROR (base, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
-    return GST_FLOW_ERROR;
-  }
+  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+    return refuse_unreadable_buffer (base);
   const AccessUnitHeader header = summarise ({map.data, map.size});
   gst_buffer_unmap (frame->buffer, &map);
   frame->buffer = gst_buffer_make_writable (frame->buffer);
@@ -572,10 +593,8 @@ static GstFlowReturn
 handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
 {
   GstMapInfo map;
-  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ)) {
-    GST_ELEMENT_ERROR (base, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
-    return GST_FLOW_ERROR;
-  }
+  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+    return refuse_unreadable_buffer (base);
   const Bytes bytes (map.data, map.size);
   const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
   if (part.length) {
@@ -641,38 +660,52 @@ keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlac
   priv->seek.rig_units = std::move (units);
 }
 
-/* Looks the place up in the file and tells the base class, whose own index only holds what was
- * played. Returns: (transfer full): the seek that the base class shall do. */
+static GstClockTime
+first_pts_of (GstNeighbourCodeParsePrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->seek.first_pts;
+}
+
+/* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
+ * played. Returns: the time there; none if it could not be found. */
+static GstClockTime
+find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
+{
+  const GstClockTime first_pts = first_pts_of (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  if (!GST_CLOCK_TIME_IS_VALID (first_pts))
+    return GST_CLOCK_TIME_NONE;
+  const guint64 pts = first_pts + time;
+  const StreamFile::Target target = file_of (base).locate (pts);
+  const auto place = choose (target, pts, flags);
+  if (!place)
+    return GST_CLOCK_TIME_NONE;
+  keep_rig (base, place->offset, target.rig);
+  const GstClockTime found = place->header.pts_ns - std::min (first_pts, place->header.pts_ns);
+  gst_base_parse_add_index_entry (base, place->offset, found, TRUE, TRUE);
+  return found;
+}
+
+/* Returns: (transfer full): the seek that the base class shall do. */
 static GstEvent *
 aim (GstBaseParse *base, GstEvent *event)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   gdouble rate;
   GstFormat format;
   GstSeekFlags flags;
   GstSeekType start_type, stop_type;
   gint64 start, stop;
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  GstClockTime first_pts;
-  {
-    std::lock_guard guard (priv->lock);
-    first_pts = priv->seek.first_pts;
-  }
-  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0 ||
-      !GST_CLOCK_TIME_IS_VALID (first_pts))
+  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
     return event;
-  const guint64 pts = first_pts + guint64 (start);
-  const StreamFile::Target target = file_of (base).locate (pts);
-  const auto place = choose (target, pts, flags);
-  if (!place)
+  const GstClockTime found = find_place (base, GstClockTime (start), flags);
+  if (!GST_CLOCK_TIME_IS_VALID (found))
     return event;
-  const GstClockTime time = place->header.pts_ns - std::min (first_pts, place->header.pts_ns);
-  keep_rig (base, place->offset, target.rig);
-  gst_base_parse_add_index_entry (base, place->offset, time, TRUE, TRUE);
   if (flags & GST_SEEK_FLAG_KEY_UNIT)
-    start = gint64 (time);
-  GstEvent *aimed = gst_event_new_seek (rate, format, GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE),
-      start_type, start, stop_type, stop);
+    start = gint64 (found);
+  /* The base class uses the place only where it shall be accurate. */
+  flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
+  GstEvent *aimed = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
   gst_event_set_seqnum (aimed, gst_event_get_seqnum (event));
   gst_event_unref (event);
   return aimed;

@@ -854,6 +854,57 @@ GST_START_TEST (test_cut_file_that_plays_is_no_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_downstream_may_change_its_mind)
+{
+  const Recording recording;
+  GstHarness *h = new_parser ();
+  const std::span<const guint8> bytes (recording.bytes);
+  push_bytes (h, bytes.first (recording.offsets[5]), 5000);
+  unref_all (pull_all (h));
+  gst_harness_set_sink_caps_str (h, kStreamCaps);
+  push_bytes (h, bytes.subspan (recording.offsets[5]), 5000);
+  const auto parsed = pull_all (h);
+  fail_unless_equals_int (parsed.size (), 5);
+  for (GstBuffer *buffer : parsed)
+    fail_unless (gst_buffer_memcmp (buffer, 0, kStartCode.data (), kStartCode.size ()) == 0);
+  unref_all (parsed);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_units_pass_as_they_are)
+{
+  const Recording recording;
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
+                                   gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+  for (GstBuffer *coded : recording.access_units) {
+    GstBuffer *passed = gst_harness_push_and_pull (h, gst_buffer_ref (coded));
+    fail_unless (same_bytes (passed, coded));
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (passed), GST_BUFFER_PTS (coded));
+    fail_unless_equals_uint64 (
+        gst_range_buffer_get_capture_time (passed), gst_range_buffer_get_capture_time (coded));
+    gst_buffer_unref (passed);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
+{
+  const Recording recording (1, 8);
+  auto future = recording.bytes;
+  future[4] = 0x23;
+  for (const std::span<const guint8> bytes :
+      {std::span (recording.bytes).first (27), std::span<const guint8> (future)}) {
+    GstCaps *caps = gst_type_find_helper_for_data (nullptr, bytes.data (), bytes.size (), nullptr);
+    fail_if (caps && gst_structure_has_name (
+                         gst_caps_get_structure (caps, 0), "application/x-neighbour-code"));
+    gst_clear_caps (&caps);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_typefinder_knows_the_stream)
 {
   const Recording recording;
@@ -910,6 +961,9 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_future_version_is_one_error);
   tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
   tcase_add_test (tc, test_cut_file_that_plays_is_no_error);
+  tcase_add_test (tc, test_downstream_may_change_its_mind);
+  tcase_add_test (tc, test_access_units_pass_as_they_are);
+  tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);
   return suite;
 }
