@@ -36,6 +36,7 @@ enum {
   PROP_COLUMNS,
   PROP_LAYER_GAP,
   PROP_SMOOTHING,
+  PROP_HIDDEN_GAP,
   PROP_N_THREADS,
   PROP_STATS,
 };
@@ -43,7 +44,7 @@ enum {
 enum GstCylinderFilterMode { GST_CYLINDER_FILTER_OFF, GST_CYLINDER_FILTER_WINNER };
 
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01;
+                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006;
 static constexpr int kDefaultColumns = 360;
 
 struct CylinderCounts {
@@ -271,6 +272,9 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_SMOOTHING:
       settings.units.smoothing_m = g_value_get_double (value);
       break;
+    case PROP_HIDDEN_GAP:
+      settings.hidden_gap_m = g_value_get_double (value);
+      break;
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
       break;
@@ -328,6 +332,9 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
     case PROP_SMOOTHING:
       g_value_set_double (value, settings.units.smoothing_m);
       break;
+    case PROP_HIDDEN_GAP:
+      g_value_set_double (value, settings.hidden_gap_m);
+      break;
     case PROP_N_THREADS:
       g_value_set_int (value, settings.threads);
       break;
@@ -354,6 +361,7 @@ gst_cylinder_filter_init (GstCylinderFilter *self)
   self->priv = new GstCylinderFilterPrivate;
   self->priv->settings.units = {
       kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
+  self->priv->settings.hidden_gap_m = kDefaultHiddenGap;
   self->priv->settings.threads = 0;
   gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
 }
@@ -409,6 +417,11 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
           "How far neighbours count in a unit's decision, metres, 0 to 1; 0 decides each unit "
           "alone (default: 0.01)",
           0, 1, kDefaultSmoothing, controllable));
+  g_object_class_install_property (object_class, PROP_HIDDEN_GAP,
+      g_param_spec_double ("hidden-gap", "Hidden gap",
+          "A point this far behind what the winning view sees is hidden from it and stays, metres, "
+          "0 to 100; 0 clears all points of losers (default: 0.006)",
+          0, 100, kDefaultHiddenGap, controllable));
 }
 
 static void

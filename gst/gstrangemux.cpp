@@ -203,8 +203,9 @@ public:
     for (const auto &entry : pads) {
       GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
       if (buffer)
-        list.push_back ({entry.get (), buffer, gstrange::capture_time_of (entry->pad, buffer, live),
-            gstrange::running_time_of (entry->pad, buffer)});
+        (gstrange::is_gap (buffer) ? gaps : list)
+            .push_back ({entry.get (), buffer, gstrange::capture_time_of (entry->pad, buffer, live),
+                gstrange::running_time_of (entry->pad, buffer)});
       else if (!gst_aggregator_pad_is_eos (entry->pad))
         missing++;
       else
@@ -213,12 +214,13 @@ public:
   }
   ~WaitingBuffers ()
   {
-    for (const Waiting &waiting : list)
-      gst_buffer_unref (waiting.buffer);
+    for (const auto *waiting : {&list, &gaps})
+      for (const Waiting &w : *waiting)
+        gst_buffer_unref (w.buffer);
   }
   WaitingBuffers (const WaitingBuffers &) = delete;
 
-  std::vector<Waiting> list;
+  std::vector<Waiting> list, gaps;
   int missing = 0, ended = 0;
 };
 
@@ -267,6 +269,25 @@ drop_useless (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime tol
     (astray ? w.entry->out_of_step : w.entry->late)++;
     any = true;
   }
+  return any;
+}
+
+/* A gap says that its pad has nothing for a while: nobody waits for that pad until another one's
+ * frame is behind the gap. @return whether one went */
+static bool
+drop_past_gaps (const WaitingBuffers &waiting, GstClockTime tolerance, bool timeout)
+{
+  if (waiting.list.empty () && waiting.missing > 0 && !timeout)
+    return false;
+  GstClockTime first = GST_CLOCK_TIME_NONE;
+  for (const Waiting &w : waiting.list)
+    first = std::min (first, w.running);
+  bool any = false;
+  for (const Waiting &gap : waiting.gaps)
+    if (first > gstrange::gap_end (gap.running, gap.buffer, tolerance)) {
+      gst_aggregator_pad_drop_buffer (gap.entry->pad);
+      any = true;
+    }
   return any;
 }
 
@@ -336,7 +357,7 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   const MuxPads pads = current_pads (self);
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const WaitingBuffers waiting (pads, live);
-  if (waiting.list.empty ())
+  if (waiting.list.empty () && waiting.gaps.empty ())
     return waiting.missing == 0 && waiting.ended > 0 ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
   if (priv->caps_dirty) {
     const GstFlowReturn flow = negotiate (self, pads);
@@ -344,9 +365,9 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
       return flow;
   }
   const GstClockTime tolerance = tolerance_of (priv);
-  if (drop_useless (self, waiting, tolerance))
+  if (drop_past_gaps (waiting, tolerance, timeout) || drop_useless (self, waiting, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
-  if (waiting.missing > 0 && !timeout)
+  if (waiting.list.empty () || (waiting.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   GstClockTime first = GST_CLOCK_TIME_NONE;
   for (const Waiting &w : waiting.list)
@@ -364,7 +385,8 @@ gst_range_mux_get_next_time (GstAggregator *aggregator)
     GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
     if (!buffer)
       continue;
-    oldest = std::min (oldest, gstrange::running_time_of (entry->pad, buffer));
+    if (!gstrange::is_gap (buffer))
+      oldest = std::min (oldest, gstrange::running_time_of (entry->pad, buffer));
     gst_buffer_unref (buffer);
   }
   return oldest;

@@ -146,10 +146,10 @@ begin_learning (ViewState &state, const View &view, int frames)
   state.background.reset (view.width, view.height);
   state.learning_target = frames;
   state.learnt = false;
-  state.announced = {};
 }
 
-/* Each view of the caps gets a state; backgrounds of views that keep their size stay. */
+/* Each view of the caps gets a state; backgrounds of views that keep their size stay. What upstream
+ * was told holds until new caps only. */
 static void
 prepare_views (GstRoiExtractPrivate *priv, int background_frames)
 {
@@ -164,7 +164,15 @@ prepare_views (GstRoiExtractPrivate *priv, int background_frames)
       state = std::make_unique<ViewState> ();
     if (state->background.width () != view->width || state->background.height () != view->height)
       begin_learning (*state, *view, background_frames);
+    state->announced = {};
   }
+}
+
+static bool
+all_learnt (GstRoiExtractPrivate *priv)
+{
+  return std::ranges::all_of (
+      priv->info.rig.views, [priv] (const View &view) { return priv->views[view.id]->learnt; });
 }
 
 static Status
@@ -195,15 +203,11 @@ load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
 static void
 save_when_all_learnt (GstRoiExtract *self, const std::string &path)
 {
-  if (path.empty ())
+  if (path.empty () || !all_learnt (self->priv))
     return;
   std::vector<std::pair<int, const BackgroundModel *>> models;
-  for (const View &view : self->priv->info.rig.views) {
-    const ViewState &state = *self->priv->views[view.id];
-    if (!state.learnt)
-      return;
-    models.emplace_back (view.id, &state.background);
-  }
+  for (const View &view : self->priv->info.rig.views)
+    models.emplace_back (view.id, &self->priv->views[view.id]->background);
   gst_range_post_warning (GST_ELEMENT (self), rangecast::save_backgrounds (path, models));
 }
 
@@ -216,7 +220,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   Status status = gstrange::parse_caps (caps, priv->info);
   if (status.ok ()) {
     prepare_views (priv, settings.background_frames);
-    if (!settings.background_file.empty ())
+    if (!settings.background_file.empty () && !all_learnt (priv))
       status = load_background_file (priv, settings.background_file);
   }
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
@@ -247,6 +251,16 @@ process_view (
   state.box = rangecast::bounding_box (image, settings.margin);
 }
 
+static void
+push_roi_event (GstRoiExtract *self, int view_id, const Roi &roi)
+{
+  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
+      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
+      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
+  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+}
+
 /* Tells upstream (stereodepth) which part of the picture is still wanted. */
 static void
 announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
@@ -273,11 +287,7 @@ announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
     roi.width = std::min (full->width, box.x + box.width + kAnnouncedMargin) - roi.x;
     roi.height = std::min (full->height, box.y + box.height + kAnnouncedMargin) - roi.y;
   }
-  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
-      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
-      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
-  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
-      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+  push_roi_event (self, view_id, roi);
 }
 
 /* A view that has seen enough of the empty scene is ready. */
@@ -294,8 +304,13 @@ finish_learning (ViewState &state)
 static void
 relearn_all (GstRoiExtract *self, int frames)
 {
-  for (const View &view : self->priv->info.rig.views)
-    begin_learning (*self->priv->views[view.id], view, frames);
+  for (const View &view : self->priv->info.rig.views) {
+    ViewState &state = *self->priv->views[view.id];
+    begin_learning (state, view, frames);
+    if (!state.announced.empty ())
+      push_roi_event (self, view.id, {}); /* the whole background is to be seen */
+    state.announced = {};
+  }
 }
 
 static Status

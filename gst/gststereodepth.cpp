@@ -22,6 +22,8 @@
  */
 #include "gststereodepth.h"
 
+#include "picturereader.hpp"
+
 #include <gst/video/video.h>
 
 #include <gstrange/gstrange.h>
@@ -80,62 +82,6 @@ struct StereoProperties {
   double near = 0, far = 0, depth_unit = 0;
   rangecast::StereoSettings core;
   int refresh_interval = kDefaultRefreshInterval;
-};
-
-/* One camera's pictures as RGBx: mapped as they are, or converted into memory of ours. */
-class PictureReader {
-public:
-  ~PictureReader () { reset (); }
-  void reset ()
-  {
-    if (converter_)
-      gst_video_converter_free (converter_);
-    converter_ = nullptr;
-    gst_clear_buffer (&converted_);
-  }
-  bool set (const GstVideoInfo &info)
-  {
-    reset ();
-    info_ = info;
-    if (GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_RGBx ||
-        GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_RGBA)
-      return true;
-    gst_video_info_set_format (
-        &rgbx_, GST_VIDEO_FORMAT_RGBx, guint (info.width), guint (info.height));
-    rgbx_.fps_n = info.fps_n;
-    rgbx_.fps_d = info.fps_d;
-    rgbx_.interlace_mode = info.interlace_mode;
-    converter_ = gst_video_converter_new (&info_, &rgbx_, nullptr);
-    converted_ = gst_buffer_new_allocate (nullptr, rgbx_.size, nullptr);
-    return converter_ != nullptr;
-  }
-  /* Valid until close(). */
-  bool open (GstBuffer *buffer)
-  {
-    if (!converter_)
-      return gst_video_frame_map (&frame_, &info_, buffer, GST_MAP_READ);
-    GstVideoFrame from;
-    if (!gst_video_frame_map (&from, &info_, buffer, GST_MAP_READ))
-      return false;
-    const bool mapped = gst_video_frame_map (&frame_, &rgbx_, converted_, GST_MAP_READWRITE);
-    if (mapped)
-      gst_video_converter_frame (converter_, &from, &frame_);
-    gst_video_frame_unmap (&from);
-    return mapped;
-  }
-  void close () { gst_video_frame_unmap (&frame_); }
-  [[nodiscard]] ImageView<const Rgbx> view () const
-  {
-    return {static_cast<const Rgbx *> (GST_VIDEO_FRAME_PLANE_DATA (&frame_, 0)),
-        GST_VIDEO_FRAME_WIDTH (&frame_), GST_VIDEO_FRAME_HEIGHT (&frame_),
-        GST_VIDEO_FRAME_PLANE_STRIDE (&frame_, 0)};
-  }
-
-private:
-  GstVideoInfo info_ = {}, rgbx_ = {};
-  GstVideoConverter *converter_ = nullptr;
-  GstBuffer *converted_ = nullptr;
-  GstVideoFrame frame_ = {};
 };
 
 struct GstStereoDepthPrivate {
@@ -369,46 +315,63 @@ gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
 
 /* ---- data ---- */
 
-/* What to match of this picture. */
+/* What to match of the pair that was taken. */
 static Roi
 next_roi (GstStereoDepthPrivate *priv)
 {
   const View &view = priv->core.range_view ();
   const Roi full = {0, 0, view.width, view.height};
-  std::lock_guard guard (priv->lock);
-  const int interval = priv->properties.refresh_interval;
-  Roi roi = priv->wanted;
+  Roi roi;
+  int interval;
+  {
+    std::lock_guard guard (priv->lock);
+    interval = priv->properties.refresh_interval;
+    roi = priv->wanted;
+  }
   roi.width = std::min (roi.width, full.width - roi.x);
   roi.height = std::min (roi.height, full.height - roi.y);
-  if (interval == 0 || roi.empty () || ++priv->since_refresh >= interval) {
+  if (interval == 0 || roi.empty () || ++priv->since_refresh >= interval ||
+      priv->core.changed_outside (roi)) {
     priv->since_refresh = 0;
     return full;
   }
+  std::lock_guard guard (priv->lock);
   priv->restricted_frames++;
   return roi;
 }
 
 static Status
-match_pair (GstStereoDepthPrivate *priv, const gstrange::PairMatcher::Pair &pair, GstBuffer *output)
+match_pictures (GstStereoDepthPrivate *priv, GstBuffer *output, GstClockTime capture)
 {
+  const GstClockTime begin = gst_util_get_timestamp ();
+  if (Status s = priv->core.take (priv->readers[0].view (), priv->readers[1].view ()); !s.ok ())
+    return s;
+  const Roi roi = next_roi (priv);
+  gst_range_buffer_add_view (output, guint (priv->core.range_view ().id), guint (roi.x),
+      guint (roi.y), guint (roi.width), guint (roi.height), capture);
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
+  const Status status = priv->core.match (frame.views ()[0]);
+  std::lock_guard guard (priv->lock);
+  priv->frames++;
+  priv->match_time += gst_util_get_timestamp () - begin;
+  return status;
+}
+
+static Status
+match_pair (GstStereoDepthPrivate *priv, const gstrange::PairMatcher::Pair &pair, GstBuffer *output,
+    GstClockTime capture)
+{
   if (!priv->readers[0].open (pair.first))
     return {StatusCode::kBadData, "pad left: a buffer is smaller than its caps say"};
   if (!priv->readers[1].open (pair.second)) {
     priv->readers[0].close ();
     return {StatusCode::kBadData, "pad right: a buffer is smaller than its caps say"};
   }
-  const GstClockTime begin = gst_util_get_timestamp ();
-  const Status status =
-      priv->core.process (priv->readers[0].view (), priv->readers[1].view (), frame.views ()[0]);
-  const GstClockTime took = gst_util_get_timestamp () - begin;
+  const Status status = match_pictures (priv, output, capture);
   priv->readers[0].close ();
   priv->readers[1].close ();
-  std::lock_guard guard (priv->lock);
-  priv->frames++;
-  priv->match_time += took;
   return status;
 }
 
@@ -423,10 +386,7 @@ push_pair (GstStereoDepth *self, const gstrange::PairMatcher::Pair &pair)
     return flow;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const GstClockTime capture = gstrange::capture_time_of (priv->pads[0], pair.first, live);
-  const Roi roi = next_roi (priv);
-  gst_range_buffer_add_view (output, guint (priv->core.range_view ().id), guint (roi.x),
-      guint (roi.y), guint (roi.width), guint (roi.height), capture);
-  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, pair, output));
+  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, pair, output, capture));
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;
@@ -730,7 +690,7 @@ install_matching_properties (GObjectClass *c)
       "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 5 for the others)", 0, 51,
       m.block_size);
   install_int (c, PROP_UNIQUENESS_RATIO, "uniqueness-ratio", "Uniqueness ratio",
-      "Per cent by which the best match must beat the second (0 to 100, default 8)", 0, 100,
+      "Per cent by which the best match must beat the second (0 to 100, default 15)", 0, 100,
       m.uniqueness_ratio);
   install_int (c, PROP_SPECKLE_WINDOW_SIZE, "speckle-window-size", "Speckle window size",
       "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 60)", 0,

@@ -1,9 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "gstrangepairing.hpp"
 
+#include <algorithm>
+
 #include "gstrangemeta.h"
 
 namespace gstrange {
+
+bool
+is_gap (GstBuffer *buffer)
+{
+  return GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size (buffer) == 0;
+}
 
 GstClockTime
 running_time_of (GstAggregatorPad *pad, GstBuffer *buffer)
@@ -15,11 +23,13 @@ running_time_of (GstAggregatorPad *pad, GstBuffer *buffer)
   return time;
 }
 
-/* GstAggregator makes an empty buffer of a GAP event. */
-static bool
-is_gap (GstBuffer *buffer)
+GstClockTime
+gap_end (GstClockTime running_time, GstBuffer *gap, GstClockTime tolerance)
 {
-  return GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size (buffer) == 0;
+  if (!GST_BUFFER_DURATION_IS_VALID (gap))
+    return running_time + tolerance;
+  const GstClockTime duration = GST_BUFFER_DURATION (gap);
+  return running_time + duration - std::min (tolerance, duration);
 }
 
 /* Which of the two fronts to drop (0, 1), or -1 where they are a pair. A gap stands for all that

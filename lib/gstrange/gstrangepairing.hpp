@@ -39,6 +39,14 @@ private:
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
 
+/** Whether this is the empty buffer that GstAggregator makes of a GAP event. */
+GST_RANGE_API bool is_gap (GstBuffer *buffer);
+
+/** The last running time of a frame that a gap stands for, ns: the gap's end less the tolerance;
+ *  one frame is in a gap without duration. */
+GST_RANGE_API GstClockTime gap_end (
+    GstClockTime running_time, GstBuffer *gap, GstClockTime tolerance);
+
 /** Running time of a buffer on this pad, or GST_CLOCK_TIME_NONE. */
 GST_RANGE_API GstClockTime running_time_of (GstAggregatorPad *pad, GstBuffer *buffer);
 

@@ -290,28 +290,22 @@ measure (const std::string &name, FrameSet set, int rounds)
     }
     std::printf ("\n");
   };
-  for (int threads : {1, 0}) {
+  const auto run = [&] (const char *what, const CylinderSettings &settings) {
     CylinderFilter filter;
     CylinderResult result;
-    CylinderSettings settings;
-    settings.threads = threads;
     if (!filter.set_rig (set.rig).ok ())
       return;
-    const double ms = median_ms (
-        set, rounds, [&] { (void)filter.process (set.images (), settings, result).ok (); });
-    line (threads == 1 ? "cylinder, 1 thread" : "cylinder, all cores", ms);
-  }
-  {
-    CylinderFilter filter;
-    CylinderResult result;
-    CylinderSettings settings;
-    settings.units.smoothing_m = 0;
-    if (!filter.set_rig (set.rig).ok ())
-      return;
-    const double ms = median_ms (
-        set, rounds, [&] { (void)filter.process (set.images (), settings, result).ok (); });
-    line ("cylinder, smoothing 0", ms);
-  }
+    line (what, median_ms (set, rounds,
+                    [&] { (void)filter.process (set.images (), settings, result).ok (); }));
+  };
+  CylinderSettings settings;
+  run ("cylinder, 1 thread", settings);
+  settings.threads = 0;
+  run ("cylinder, all cores", settings);
+  settings.hidden_gap_m = 0;
+  run ("all losers go", settings);
+  settings.units.smoothing_m = 0;
+  run ("and smoothing 0", settings);
   const int few = std::max (3, rounds / 10);
   line ("plain rule", median_ms (set, few, [&] { plain_rule (set); }));
   line ("voxel grid 4 mm", median_ms (set, few, [&] { voxel_grid (set); }));

@@ -197,6 +197,20 @@ GST_START_TEST (test_stream_that_ends_is_left_out)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_gap_lets_the_others_go_on_until_it_is_over)
+{
+  Mux m (2);
+  gst_harness_push_event (m.in[1], gst_event_new_gap (0, 2 * kFrame));
+  m.push (0, 0, 0);
+  fail_unless_equals_int (m.pull (), 0b01);
+  m.push (0, kFrame, kFrame);
+  fail_unless_equals_int (m.pull (), 0b01);
+  m.push (0, 2 * kFrame, 2 * kFrame);
+  m.push (1, 2 * kFrame, 2 * kFrame);
+  fail_unless_equals_int (m.pull (), 0b11);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_clock_an_hour_off_is_left_out)
 {
   Mux mux (3);
@@ -281,6 +295,7 @@ rangemux_suite ()
   Suite *suite = suite_create ("rangemux");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_gap_lets_the_others_go_on_until_it_is_over);
   tcase_add_test (tc, test_views_are_matched_by_capture_time_not_by_arrival_or_pts);
   tcase_add_test (tc, test_skew_beyond_half_a_period_is_another_frame_set);
   tcase_add_test (tc, test_caps_are_the_union_and_memory_is_shared);

@@ -3,6 +3,8 @@
 
 #include <glib/gstdio.h>
 
+#include <vector>
+
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -45,6 +47,25 @@ push (GstHarness *h, GstBuffer *buffer)
   const Roi roi = roi_of (output, 0);
   gst_buffer_unref (output);
   return roi;
+}
+
+/* The ROIs of view 0 that upstream was told. */
+static std::vector<Roi>
+rois_told (GstHarness *h)
+{
+  std::vector<Roi> told;
+  while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
+    const GstStructure *s = gst_event_get_structure (event);
+    if (s && gst_structure_has_name (s, "GstRangeRoi")) {
+      guint view, x, y, width, height;
+      fail_unless (gst_structure_get (s, "view-id", G_TYPE_UINT, &view, "x", G_TYPE_UINT, &x, "y",
+          G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr));
+      fail_unless_equals_int (view, 0);
+      told.push_back ({int (x), int (y), int (width), int (height)});
+    }
+    gst_event_unref (event);
+  }
+  return told;
 }
 
 GST_START_TEST (test_learns_then_crops_to_the_person_without_copying)
@@ -120,6 +141,65 @@ GST_START_TEST (test_capture_background_learns_anew)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_learning_anew_asks_for_the_whole_picture)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  push (h, scene (rig, 1, true));
+  fail_unless_equals_int (rois_told (h).size (), 1);
+  GstElement *element = gst_harness_find_element (h, "roiextract");
+  g_signal_emit_by_name (element, "capture-background");
+  gst_object_unref (element);
+  push (h, scene (rig, 2, true));
+  const std::vector<Roi> told = rois_told (h);
+  fail_unless_equals_int (told.size (), 1);
+  fail_unless (told[0].empty ());
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_caps_leave_a_captured_background_alone)
+{
+  const Rig rig = ring_rig (1);
+  gchar *path = g_strdup_printf ("%s/roi-caps-%d.yml", g_get_tmp_dir (), int (getpid ()));
+  gchar *save = g_strdup_printf ("roiextract background-frames=1 save-background=%s", path);
+  gchar *load = g_strdup_printf ("roiextract background-frames=1 background-file=%s", path);
+  GstHarness *h = roi_harness (rig, save);
+  push (h, scene (rig, 0, false));
+  gst_harness_teardown (h);
+  h = roi_harness (rig, load);
+  GstElement *element = gst_harness_find_element (h, "roiextract");
+  g_signal_emit_by_name (element, "capture-background");
+  gst_object_unref (element);
+  push (h, scene (rig, 0, true)); /* the box belongs to the background from now on */
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 60, 1)));
+  fail_unless (push (h, scene (rig, 1, true)).empty ());
+  gst_harness_teardown (h);
+  g_unlink (path);
+  g_free (path);
+  g_free (save);
+  g_free (load);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_gap_and_eos_keep_the_background)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  push (h, scene (rig, 0, false));
+  gst_harness_push_event (h, gst_event_new_gap (1, 1));
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_start ()));
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_harness_push_event (h, gst_event_new_segment (&segment));
+  fail_unless (push (h, scene (rig, 2, true)) == (Roi{100, 90, 60, 80}));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_background_is_saved_and_loaded)
 {
   const Rig rig = ring_rig (1);
@@ -162,19 +242,9 @@ GST_START_TEST (test_tells_upstream_the_roi_once_for_a_person_who_stays)
   push (h, scene (rig, 0, false));
   for (int i = 1; i < 4; i++)
     push (h, scene (rig, i, true));
-  int told = 0;
-  while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
-    const GstStructure *s = gst_event_get_structure (event);
-    if (s && gst_structure_has_name (s, "GstRangeRoi")) {
-      guint view, x, y, width, height;
-      fail_unless (gst_structure_get (s, "view-id", G_TYPE_UINT, &view, "x", G_TYPE_UINT, &x, "y",
-          G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr));
-      fail_unless (view == 0 && x == 84 && y == 74 && width == 92 && height == 112);
-      told++;
-    }
-    gst_event_unref (event);
-  }
-  fail_unless_equals_int (told, 1);
+  const std::vector<Roi> told = rois_told (h);
+  fail_unless_equals_int (told.size (), 1);
+  fail_unless (told[0] == (Roi{84, 74, 92, 112}));
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -267,6 +337,9 @@ roiextract_suite ()
   tcase_add_test (tc, test_frames_before_the_camera_has_settled_teach_nothing);
   tcase_add_test (tc, test_margin_grows_the_roi);
   tcase_add_test (tc, test_capture_background_learns_anew);
+  tcase_add_test (tc, test_learning_anew_asks_for_the_whole_picture);
+  tcase_add_test (tc, test_new_caps_leave_a_captured_background_alone);
+  tcase_add_test (tc, test_flush_gap_and_eos_keep_the_background);
   tcase_add_test (tc, test_background_is_saved_and_loaded);
   tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
   tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);

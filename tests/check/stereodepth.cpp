@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rangecast-check.hpp"
 
+#include <glib/gstdio.h>
+#include <gst/video/video.h>
+
 #include <vector>
 
 using namespace rangecast;
@@ -112,6 +115,24 @@ GST_START_TEST (test_capture_time_is_the_left_cameras)
 }
 GST_END_TEST;
 
+static std::string
+error_of (const std::string &properties, const char *right_caps)
+{
+  Stereo s (properties, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1", right_caps);
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  return next_message_text (s.bus, GST_MESSAGE_ERROR);
+}
+
+static void
+want (Stereo &s, guint x, guint y, guint width, guint height)
+{
+  GstStructure *roi = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT, 0, "x", G_TYPE_UINT,
+      x, "y", G_TYPE_UINT, y, "width", G_TYPE_UINT, width, "height", G_TYPE_UINT, height, nullptr);
+  fail_unless (gst_harness_push_upstream_event (
+      s.left, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, roi)));
+}
+
 GST_START_TEST (test_only_the_wanted_part_is_matched_until_the_refresh)
 {
   Stereo s (std::string (kProperties) + " refresh-interval=3");
@@ -125,24 +146,172 @@ GST_START_TEST (test_only_the_wanted_part_is_matched_until_the_refresh)
     fail_unless_equals_int (meta->x, full ? 0 : 50);
     gst_buffer_unref (output);
     if (i == 0)
-      fail_unless (gst_harness_push_upstream_event (
-          s.left, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
-                      gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT, 0, "x", G_TYPE_UINT,
-                          50, "y", G_TYPE_UINT, 20, "width", G_TYPE_UINT, 60, "height", G_TYPE_UINT,
-                          70, nullptr))));
+      want (s, 50, 20, 60, 70);
   }
   fail_unless_equals_uint64 (s.stat ("restricted-frames"), 3);
 }
 GST_END_TEST;
 
-static std::string
-error_of (const std::string &properties, const char *right_caps)
+GST_START_TEST (test_a_change_outside_the_wanted_part_is_matched_at_once)
 {
-  Stereo s (properties, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1", right_caps);
+  Stereo s (std::string (kProperties) + " refresh-interval=1000");
+  for (int i = 0; i < 4; i++) {
+    GstBuffer *left = Stereo::dots (false, i * kFrame);
+    if (i >= 2) /* somebody comes in at the left */
+      gst_buffer_memset (left, 0, 255, 160 * 4 * 60);
+    gst_harness_push (s.left, left);
+    s.push (s.right, i * kFrame);
+    GstBuffer *output = gst_harness_pull (s.left);
+    const bool full = i == 0 || i == 2; /* and stays: in picture 3 nothing is new */
+    fail_unless_equals_int (gst_buffer_get_range_meta (output, 0)->width, full ? 160 : 60);
+    gst_buffer_unref (output);
+    if (i == 0)
+      want (s, 50, 70, 60, 40);
+  }
+}
+GST_END_TEST;
+
+/* Pushes a pair of that format with rows that are longer than they need be; gives what is seen
+ * 0.8 m away, in per cent of the right half, where the right camera sees all. */
+static int
+seen_right (Stereo &s, GstVideoFormat format, int padding)
+{
+  for (GstHarness *h : {s.left, s.right}) {
+    GstBuffer *rgbx = Stereo::dots (h == s.right, 0);
+    GstMapInfo from;
+    gst_buffer_map (rgbx, &from, GST_MAP_READ);
+    GstVideoInfo info;
+    gst_video_info_set_format (&info, format, 160, 120);
+    const int n = GST_VIDEO_INFO_COMP_PSTRIDE (&info, 0), stride = 160 * n + padding;
+    gsize offset[GST_VIDEO_MAX_PLANES] = {gsize (padding), gsize (padding) + 120 * stride,
+        gsize (padding) + 120 * stride + 60 * stride};
+    gint strides[GST_VIDEO_MAX_PLANES] = {stride, stride, stride};
+    GstBuffer *buffer = gst_buffer_new_allocate (nullptr, padding + 240 * stride, nullptr);
+    gst_buffer_memset (buffer, 0, 128, gst_buffer_get_size (buffer));
+    for (int y = 0; y < 120; y++)
+      for (int x = 0; x < 160; x++)
+        for (int c = 0; c < n; c++)
+          gst_buffer_fill (
+              buffer, offset[0] + y * stride + x * n + c, from.data + 4 * (160 * y + x), 1);
+    gst_buffer_add_video_meta_full (buffer, GST_VIDEO_FRAME_FLAG_NONE, format, 160, 120,
+        GST_VIDEO_INFO_N_PLANES (&info), offset, strides);
+    gst_buffer_unmap (rgbx, &from);
+    gst_buffer_unref (rgbx);
+    GST_BUFFER_PTS (buffer) = 0;
+    gst_harness_push (h, buffer);
+  }
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless (output != nullptr);
+  int seen = 0;
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    for (int y = 0; y < 120; y++)
+      for (int x = 80; x < 160; x++)
+        seen += std::abs (frame.views ()[0].depth.at (x, y) - 8000) < 100;
+  }
+  gst_buffer_unref (output);
+  return 100 * seen / (80 * 120);
+}
+
+GST_START_TEST (test_every_format_and_padded_rows_give_the_same_depth)
+{
+  for (GstVideoFormat format :
+      {GST_VIDEO_FORMAT_RGBx, GST_VIDEO_FORMAT_BGR, GST_VIDEO_FORMAT_GRAY8, GST_VIDEO_FORMAT_I420})
+    for (int padding : {0, 48}) {
+      const std::string caps =
+          std::string ("video/x-raw,width=160,height=120,framerate=25/1,format=") +
+          gst_video_format_to_string (format);
+      Stereo s (kProperties, caps.c_str (), caps.c_str ());
+      const int seen = seen_right (s, format, padding);
+      fail_unless (seen >= 90, "%s, %d bytes padding: %d %%", gst_video_format_to_string (format),
+          padding, seen);
+    }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_forgets_the_picture_that_waited)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  for (GstHarness *h : {s.left, s.right}) {
+    gst_harness_push_event (h, gst_event_new_flush_start ());
+    gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+  }
+  s.push (s.left, 5 * kFrame);
+  s.push (s.right, 5 * kFrame);
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 5 * kFrame);
+  gst_buffer_unref (output);
+  fail_unless_equals_uint64 (s.stat ("frames"), 1);
+  fail_unless_equals_uint64 (s.stat ("dropped-left"), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_size_in_the_stream_gives_new_caps)
+{
+  Stereo s;
   s.push (s.left, 0);
   s.push (s.right, 0);
-  return next_message_text (s.bus, GST_MESSAGE_ERROR);
+  gst_buffer_unref (gst_harness_pull (s.left));
+  for (GstHarness *h : {s.left, s.right})
+    gst_harness_set_src_caps_str (h, "video/x-raw,format=RGBx,width=80,height=120,framerate=25/1");
+  for (GstHarness *h : {s.left, s.right}) {
+    GstBuffer *half = Stereo::dots (h == s.right, kFrame);
+    gst_buffer_set_size (half, 80 * 120 * 4);
+    gst_harness_push (h, half);
+  }
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_int (gst_buffer_get_range_meta (output, 0)->width, 80);
+  gst_buffer_unref (output);
+  GstCaps *caps = gst_pad_get_current_caps (s.left->sinkpad);
+  gint width = 0;
+  gst_structure_get_int (gst_caps_get_structure (caps, 0), "width", &width);
+  fail_unless_equals_int (width, 80);
+  gst_caps_unref (caps);
 }
+GST_END_TEST;
+
+GST_START_TEST (test_gap_on_one_pad_costs_the_others_picture_and_nothing_else)
+{
+  Stereo s;
+  gst_harness_push_event (s.right, gst_event_new_gap (0, kFrame));
+  s.push (s.left, 0);
+  s.push (s.left, kFrame);
+  s.push (s.right, kFrame);
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), kFrame);
+  gst_buffer_unref (output);
+  fail_unless_equals_uint64 (s.stat ("dropped-left"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_latency_is_that_of_the_slower_camera_and_its_own)
+{
+  Stereo s (std::string (kProperties) + " latency=7000000");
+  gst_harness_set_live (s.left, TRUE);
+  gst_harness_set_live (s.right, TRUE);
+  gst_harness_set_upstream_latency (s.left, 10 * GST_MSECOND);
+  gst_harness_set_upstream_latency (s.right, 30 * GST_MSECOND);
+  fail_unless_equals_uint64 (gst_harness_query_latency (s.left), 37 * GST_MSECOND);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_without_the_view_or_of_another_size_is_one_error)
+{
+  const char *same = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
+  gchar *path = g_strdup_printf ("%s/stereodepth-rig-%d.yaml", g_get_tmp_dir (), int (getpid ()));
+  Rig rig = ring_rig (2);
+  fail_unless (save_rig (path, rig).ok ());
+  const std::string file = std::string ("rig=") + path;
+  fail_unless (error_of (file + " view-id=7", same).find ("7") != std::string::npos);
+  fail_unless (error_of (file, same).find ("320x240") != std::string::npos);
+  g_unlink (path);
+  g_free (path);
+}
+GST_END_TEST;
 
 GST_START_TEST (test_bad_settings_are_one_error_that_names_them)
 {
@@ -206,6 +375,13 @@ stereodepth_suite ()
   tcase_add_test (tc, test_pairs_by_pts_not_by_arrival);
   tcase_add_test (tc, test_capture_time_is_the_left_cameras);
   tcase_add_test (tc, test_only_the_wanted_part_is_matched_until_the_refresh);
+  tcase_add_test (tc, test_a_change_outside_the_wanted_part_is_matched_at_once);
+  tcase_add_test (tc, test_every_format_and_padded_rows_give_the_same_depth);
+  tcase_add_test (tc, test_flush_forgets_the_picture_that_waited);
+  tcase_add_test (tc, test_new_size_in_the_stream_gives_new_caps);
+  tcase_add_test (tc, test_gap_on_one_pad_costs_the_others_picture_and_nothing_else);
+  tcase_add_test (tc, test_latency_is_that_of_the_slower_camera_and_its_own);
+  tcase_add_test (tc, test_rig_without_the_view_or_of_another_size_is_one_error);
   tcase_add_test (tc, test_bad_settings_are_one_error_that_names_them);
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_changes_states_twice);

@@ -146,10 +146,22 @@ TEST (Background, small_island_goes_and_small_hole_closes)
   Frame frame (99);
   frame.put (5, 5, 6, 6, 12000, {200, 60, 60, 0});
   frame.put (20, 10, 30, 30, 12000, {200, 60, 60, 0});
-  frame.put (30, 20, 4, 4, 20000, {120, 125, 110, 0});
+  frame.put (30, 20, 4, 4, 12000, {120, 125, 110, 0}); /* the wall's colour */
   segment (frame);
   EXPECT_EQ (frame.valid (5, 5, 6, 6), 0);
   EXPECT_EQ (frame.valid (30, 20, 4, 4), 16);
+}
+
+TEST (Background, small_island_in_space_goes_although_it_touches_the_person_in_the_picture)
+{
+  Frame frame (99);
+  frame.put (20, 10, 20, 20, 12000, {190, 90, 80, 0});
+  frame.put (40, 10, 5, 5, 12600, {190, 90, 80, 0}); /* 60 mm behind the person's edge */
+  frame.put (40, 20, 5, 5, 12200, {190, 90, 80, 0}); /* 20 mm: still the person */
+  segment (frame);
+  EXPECT_EQ (frame.valid (40, 10, 5, 5), 0);
+  EXPECT_EQ (frame.valid (40, 20, 5, 5), 25);
+  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
 }
 
 TEST (Background, closing_a_hole_makes_no_depth)

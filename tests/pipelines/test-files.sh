@@ -93,3 +93,21 @@ test_bunny_scans_go_through_everything () {
   expect_file bunny.png 5000
   [ "$(ply_vertices bunny.ply)" -gt 50000 ] || fail "few points: $(ply_vertices bunny.ply)"
 }
+
+# A camera under a ceiling: people cross below it, over moving shadows of trees. By eye, frames 120,
+# 160 and 600 of 30 a second are empty, and people cross between 216 and 290 and at 510.
+test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
+  need_data luxonis_people_stereo/left.mp4
+  local input=$data/luxonis_people_stereo empty n
+  "$pipelines/rig-from-luxonis.py" "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
+  "$pipelines/stereo-to-cutout.sh" "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 \
+    --fps 5 --settle 17 --learn 8 --stereo "block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05" \
+    --roi "cue=depth depth-threshold=0.3 min-area=1000 max-hole=400"
+  empty=$(stat -c %s out/00001.png) # learning: all black
+  for n in 00020 00027 00100; do
+    [ "$(stat -c %s out/$n.png)" = "$empty" ] || fail "frame $n is not empty"
+  done
+  for n in 00038 00040 00042 00044 00068 00083; do
+    expect_file out/$n.png $((4 * empty))
+  done
+}

@@ -24,6 +24,8 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: columns, expected 8 to 3600");
   if (!(u.layer_gap_m >= 0 && u.layer_gap_m <= 100) || !(u.smoothing_m >= 0 && u.smoothing_m <= 1))
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
+  if (!(settings.hidden_gap_m >= 0 && settings.hidden_gap_m <= 100))
+    return bad ("cylinder: hidden gap, expected 0 to 100 metres");
   const double length = norm (settings.fixed_axis.direction);
   if (settings.axis == AxisMode::kFixed &&
       !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
@@ -42,6 +44,8 @@ CylinderFilter::set_rig (const Rig &rig)
       return {StatusCode::kBadValue,
           "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
     rig_rays_[view.id] = PixelRays (view);
+    rig_lookups_[view.id] = PixelLookup (view);
+    rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
     rig_views_ |= std::uint64_t{1} << view.id;
   }
   reset ();
@@ -175,7 +179,11 @@ CylinderFilter::work (
   units_.smooth (settings.threads);
   result.units = units_.occupied;
   result.units_shared = units_.shared;
-  result.points_out -= clear_losers (images);
+  mark_losers ();
+  if (settings.hidden_gap_m > 0)
+    keep_uncovered (images, settings);
+  clear_losers (images);
+  result.points_out -= losers_.size ();
   return {};
 }
 
@@ -208,10 +216,11 @@ CylinderFilter::winners (const UnitLayer &layer) const
   return -least >= greatest ? out : in;
 }
 
-std::uint64_t
-CylinderFilter::clear_losers (std::span<const RangeImage> images)
+void
+CylinderFilter::mark_losers ()
 {
-  std::uint64_t cleared = 0;
+  losers_.clear ();
+  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
   for (const UnitLayer &layer : units_.layers) {
     if (!(layer.covering & (layer.covering - 1)))
       continue;
@@ -220,16 +229,95 @@ CylinderFilter::clear_losers (std::span<const RangeImage> images)
     for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++) {
       if (stay >> entry->view & 1)
         continue;
-      const ImageView<std::uint16_t> depth = images[entry->view].depth;
-      for (std::uint32_t i = 0; i < entry->point_count; i++) {
-        const std::uint32_t place = cloud_.pixel[units_.points[entry->first_point + i].index];
-        depth.at (static_cast<int> (place & 0xffff), static_cast<int> (place >> 16)) =
-            kInvalidDepth;
-      }
-      cleared += entry->point_count;
+      const std::uint64_t rivals = layer.covering & ~(std::uint64_t{1} << entry->view);
+      for (std::uint32_t i = 0; i < entry->point_count; i++)
+        losers_.push_back ({rivals, cloud_.pixel[units_.points[entry->first_point + i].index],
+            static_cast<std::uint8_t> (entry->view)});
     }
   }
-  return cleared;
+}
+
+/* What a view has in the pixel and its neighbours where it sees a point at depth z. */
+bool
+CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
+{
+  const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
+  const int left = static_cast<int> (std::floor (x)), top = static_cast<int> (std::floor (y));
+  const int column = static_cast<int> (std::floor (x + 0.5f)),
+            row = static_cast<int> (std::floor (y + 0.5f));
+  bool covered = false;
+  for (int py = top; py <= top + 1; py++)
+    for (int px = left; px <= left + 1; px++) {
+      if (px < 0 || py < 0 || px >= image.depth.width || py >= image.depth.height)
+        continue;
+      const std::uint16_t there = image.depth.at (px, py);
+      if (there == kInvalidDepth || z - there > behind_[i] || there - z > before_[i])
+        continue;
+      if (lost_[cloud_.parts ()[i].begin + static_cast<std::size_t> (py) * image.depth.width + px])
+        return false; /* the winner's region ends here: overlap by a pixel */
+      covered |= px == column && py == row;
+    }
+  return covered;
+}
+
+/* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
+ * what a view sees is hidden from it: another place. A point well before it would have hidden that:
+ * one of both is wrong, and it is the loser's, up to errors that no stereo makes on the same
+ * surface. */
+bool
+CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
+{
+  const RangeImage &image = images[loser.image];
+  const int column = static_cast<int> (loser.pixel & 0xffff),
+            row = static_cast<int> (loser.pixel >> 16);
+  float point[3];
+  rays_[loser.image].point (static_cast<float> (image.roi.x + column),
+      static_cast<float> (image.roi.y + row), image.depth.at (column, row), point);
+  for (std::uint64_t rest = loser.rivals; rest; rest &= rest - 1) {
+    const auto i = static_cast<std::size_t> (std::countr_zero (rest));
+    float u, v, z;
+    rig_lookups_[images[i].view_id].find (point, u, v, z);
+    constexpr float kFar = 1e6f; /* pixels; keeps what follows within integers */
+    if (z > 0 && std::abs (u) < kFar && std::abs (v) < kFar && covers (i, images[i], u, v, z))
+      return true;
+  }
+  return false;
+}
+
+/* One after the other, so that of two losers at one place only the first stays. */
+void
+CylinderFilter::keep_uncovered (
+    std::span<const RangeImage> images, const CylinderSettings &settings)
+{
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const double units_per_metre = rig_units_per_metre_[images[i].view_id];
+    behind_[i] = static_cast<float> (settings.hidden_gap_m * units_per_metre);
+    before_[i] = static_cast<float> (settings.units.layer_gap_m / 2 * units_per_metre);
+  }
+  lost_.assign (cloud_.x.size (), 0);
+  for (const Loser &loser : losers_)
+    lost_[place (images, loser)] = 1;
+  std::erase_if (losers_, [&] (const Loser &loser) {
+    if (is_covered (images, loser))
+      return false;
+    lost_[place (images, loser)] = 0;
+    return true;
+  });
+}
+
+std::size_t
+CylinderFilter::place (std::span<const RangeImage> images, const Loser &loser) const
+{
+  const auto width = static_cast<std::size_t> (images[loser.image].depth.width);
+  return cloud_.parts ()[loser.image].begin + (loser.pixel >> 16) * width + (loser.pixel & 0xffff);
+}
+
+void
+CylinderFilter::clear_losers (std::span<const RangeImage> images) const
+{
+  for (const Loser &loser : losers_)
+    images[loser.image].depth.at (static_cast<int> (loser.pixel & 0xffff),
+        static_cast<int> (loser.pixel >> 16)) = kInvalidDepth;
 }
 
 } // namespace rangecast

@@ -19,7 +19,10 @@ struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
   UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
-  int threads = 1;    ///< views, and slices, at a time; 0 = number of cores
+  /** A point further behind what the winner sees, along the winner's optical axis, is hidden from
+   *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
+  double hidden_gap_m = 0.006;
+  int threads = 1; ///< views, and slices, at a time; 0 = number of cores
 };
 
 /** What one frame came to. */
@@ -48,6 +51,12 @@ struct CylinderResult {
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
  *  - Views that look squarely at opposite sides of a thin thing see different surfaces: both stay.
+ *  - Points of losers stay where no winner is (hidden_gap_m > 0): a unit can be larger than what
+ *    its winner sees of it, above all where the surface lies across the axis (shoulders, crown), or
+ *    the winner has a hole there. A loser's point goes only if another view that competes has a
+ *    point left in the pixel where it sees the loser's, at most hidden_gap_m before it and half the
+ *    layer gap behind it, and in the pixels beside no such point that goes. Where two regions meet
+ *    they overlap by a pixel.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
@@ -65,17 +74,32 @@ public:
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
 private:
+  /* A point in a unit that another view won. */
+  struct Loser {
+    std::uint64_t rivals; /* bit i: image i competes for the unit, too */
+    std::uint32_t pixel;  /* as in WorldPoints */
+    std::uint8_t image;
+  };
+
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
   void choose_axis (const CylinderSettings &settings, std::size_t images);
   void unroll (int columns, int threads);
-  std::uint64_t clear_losers (std::span<const RangeImage> images);
   [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
+  void mark_losers ();
+  void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
+  [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
+  [[nodiscard]] bool covers (
+      std::size_t i, const RangeImage &image, float u, float v, float z) const;
+  [[nodiscard]] std::size_t place (std::span<const RangeImage> images, const Loser &loser) const;
+  void clear_losers (std::span<const RangeImage> images) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
-  std::uint64_t rig_views_ = 0;               /* bit i: view-id i is in the rig */
+  std::array<PixelLookup, kMaxViews> rig_lookups_;
+  std::array<float, kMaxViews> rig_units_per_metre_{};
+  std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
   AxisTracker tracker_;
 
   /* Of the present frame; kept for their memory. By number of the image. */
@@ -88,6 +112,11 @@ private:
   std::vector<float> radius_;
   std::vector<std::int32_t> column_;
   Units units_;
+
+  std::vector<Loser> losers_;
+  std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
+  /* How far a point may lie behind, or before, what the image has there; in its depth units. */
+  std::array<float, kMaxViews> behind_{}, before_{};
 };
 
 } // namespace rangecast

@@ -23,6 +23,21 @@ PixelRays::PixelRays (const View &view)
   store (optical_axis, r * Vec3{0, 0, 1});
 }
 
+PixelLookup::PixelLookup (const View &view)
+{
+  const Intrinsics &k = view.intrinsics;
+  const Mat3 r = transposed (view.world_from_view.rotation);
+  const Vec3 t = r * view.world_from_view.translation;
+  const double per_metre = 1 / view.depth_unit_m;
+  for (int i = 0; i < 4; i++) {
+    /* column i of view_from_world */
+    const double x = i < 3 ? r[i] : -t.x, y = i < 3 ? r[3 + i] : -t.y, z = i < 3 ? r[6 + i] : -t.z;
+    rows[0][i] = static_cast<float> ((k.fx * x + k.cx * z) * per_metre);
+    rows[1][i] = static_cast<float> ((k.fy * y + k.cy * z) * per_metre);
+    rows[2][i] = static_cast<float> (z * per_metre);
+  }
+}
+
 Status
 WorldPoints::reset (std::span<const RangeImage> images)
 {

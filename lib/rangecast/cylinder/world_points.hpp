@@ -20,6 +20,33 @@ struct PixelRays {
 
   float origin[3] = {}, corner[3] = {}, right[3] = {}, down[3] = {};
   float optical_axis[3] = {}; ///< unit vector
+
+  /** The world point of a pixel of the full image at a depth (depth units), metres. */
+  void point (float u, float v, float depth, float out[3]) const
+  {
+    for (int k = 0; k < 3; k++)
+      out[k] = origin[k] + depth * (corner[k] + u * right[k] + v * down[k]);
+  }
+};
+
+/** Where a range view sees points of the world: the inverse of PixelRays. */
+struct PixelLookup {
+  PixelLookup () = default;
+  explicit PixelLookup (const View &view);
+
+  /** @param[out] u, v   pixel of the full image, not rounded
+   *  @param[out] depth  depth units; u and v mean nothing if it is not positive */
+  void find (const float point[3], float &u, float &v, float &depth) const
+  {
+    const auto row = [&] (int k) {
+      return rows[k][0] * point[0] + rows[k][1] * point[1] + rows[k][2] * point[2] + rows[k][3];
+    };
+    depth = row (2);
+    u = row (0) / depth;
+    v = row (1) / depth;
+  }
+
+  float rows[3][4] = {}; ///< intrinsics * view_from_world / depth unit
 };
 
 /** The valid pixels of some range images as points in the world, one array a coordinate. Keeps its

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace rangecast {
@@ -11,6 +12,9 @@ namespace {
 constexpr std::uint8_t kForeground = 255;
 /* The background's depth is known where it was valid in at least this share of its frames. */
 constexpr float kKnownShare = 0.5f;
+
+/* Neighbours further apart in depth do not belong to one island, metres. */
+constexpr double kIslandStepM = 0.03;
 
 /* Thresholds in the units of the pixels. */
 struct Limits {
@@ -118,6 +122,45 @@ Segmenter::remove_small (cv::Mat &mask, int min_area)
   }
 }
 
+/* Islands in space: patches beside the person in the picture, but well before or behind it. What
+ * stereo makes of a silhouette is often such a patch. */
+void
+Segmenter::remove_small_in_space (const RangeImage &image, double depth_unit_m, int min_area)
+{
+  if (min_area <= 1)
+    return;
+  /* cv::filterSpeckles takes signed numbers only; half of a depth is one. */
+  constexpr int kHalf = 2;
+  halves_.create (image.roi.height, image.roi.width, CV_16S);
+  for (int y = 0; y < image.roi.height; y++) {
+    const std::uint16_t *depth = image.depth.row (y);
+    auto half = halves_.ptr<std::int16_t> (y);
+    for (int x = 0; x < image.roi.width; x++)
+      half[x] = static_cast<std::int16_t> ((depth[x] + (depth[x] == 1)) / kHalf);
+  }
+  cv::filterSpeckles (
+      halves_, kInvalidDepth, min_area - 1, kIslandStepM / depth_unit_m / kHalf, speckles_);
+  for (int y = 0; y < image.roi.height; y++) {
+    std::uint16_t *depth = image.depth.row (y);
+    const auto half = halves_.ptr<std::int16_t> (y);
+    for (int x = 0; x < image.roi.width; x++)
+      if (half[x] == kInvalidDepth)
+        depth[x] = kInvalidDepth;
+  }
+}
+
+static void
+clear_where (const cv::Mat &mask, const RangeImage &image)
+{
+  for (int y = 0; y < image.roi.height; y++) {
+    const auto clear = mask.ptr<std::uint8_t> (y);
+    std::uint16_t *depth = image.depth.row (y);
+    for (int x = 0; x < image.roi.width; x++)
+      if (clear[x])
+        depth[x] = kInvalidDepth;
+  }
+}
+
 Status
 Segmenter::clear_background (const RangeImage &image, const BackgroundModel &background,
     double depth_unit_m, const SegmentationSettings &settings)
@@ -135,15 +178,10 @@ Segmenter::clear_background (const RangeImage &image, const BackgroundModel &bac
     remove_small (mask_, settings.min_area);
     cv::bitwise_not (mask_, inverse_);
     remove_small (inverse_, settings.max_hole);
+    clear_where (inverse_, image);
+    remove_small_in_space (image, depth_unit_m, settings.min_area);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
-  }
-  for (int y = 0; y < roi.height; y++) {
-    const auto background_row = inverse_.ptr<std::uint8_t> (y);
-    std::uint16_t *depth = image.depth.row (y);
-    for (int x = 0; x < roi.width; x++)
-      if (background_row[x])
-        depth[x] = kInvalidDepth;
   }
   return {};
 }

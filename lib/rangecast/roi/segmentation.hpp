@@ -32,7 +32,9 @@ public:
    *  subtraction and shadow detection", ICCV 1999), so that a pixel which is only darker (shadow)
    *  or only brighter (light) stays background. Where only depth speaks for a pixel, the region
    * must be at least 9 pixels wide, lest fringes beside silhouettes stay. Then small islands go and
-   * small holes close. Closing a hole makes no depth; it decides which valid pixels stay.
+   * small holes close. Closing a hole makes no depth; it decides which valid pixels stay. Last,
+   *  islands in space go: patches of fewer than min_area pixels whose neighbours are invalid or
+   * more than 30 mm nearer or farther.
    *  @param image         depth is written, colour read
    *  @param depth_unit_m  metres per depth unit
    *  @return kBadSize if the ROI does not lie in the background's image */
@@ -44,10 +46,11 @@ private:
       const SegmentationSettings &settings);
   void join_cues (Cue cue);
   void remove_small (cv::Mat &mask, int min_area);
+  void remove_small_in_space (const RangeImage &image, double depth_unit_m, int min_area);
 
   cv::Mat nearer_only_, opened_,
       kernel_; /* what is nearer than the background, but not of another colour */
-  cv::Mat mask_, inverse_, labels_, stats_, centroids_;
+  cv::Mat mask_, inverse_, labels_, stats_, centroids_, halves_, speckles_;
 };
 
 } // namespace rangecast

@@ -12,7 +12,7 @@ enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way };
 struct MatchSettings {
   MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
   int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 5 for the others
-  int uniqueness_ratio = 8;          ///< per cent by which the best match must beat the second
+  int uniqueness_ratio = 15;         ///< per cent by which the best match must beat the second
   int speckle_window_size = 60;      ///< pixels; smaller patches of like disparity go; 0 = off
   int speckle_range = 2;             ///< pixels of disparity within a patch
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check

@@ -48,26 +48,29 @@ StereoDepth::set (const View &view, const StereoSettings &settings)
             " pixels, more than the picture is wide"};
   view_ = view;
   settings_ = settings;
+  changes_.forget ();
+  pictures_[0].release ();
   return to_depth_.set (
       range.intrinsics.fx, rectifier_.baseline_m (), range.depth_unit_m, range.near_m, range.far_m);
 }
 
-/* Rectifies one picture and cuts the window that the ROI's matches lie in. Columns that would lie
- * left of the picture repeat its edge: without them OpenCV matches nothing near the left edge. */
 void
-StereoDepth::prepare (int camera, ImageView<const Rgbx> picture, const RangeImage &image)
+StereoDepth::rectify (int camera, ImageView<const Rgbx> picture)
+{
+  pictures_[camera] = as_mat (picture);
+  if (rectifier_.is_identity ())
+    return;
+  rectifier_.rectify (camera, pictures_[camera], rectified_[camera]);
+  pictures_[camera] = rectified_[camera];
+}
+
+/* Cuts the window that the ROI's matches lie in. Columns that would lie left of the picture repeat
+ * its edge: without them OpenCV matches nothing near the left edge. */
+void
+StereoDepth::cut_window (int camera, const RangeImage &image)
 {
   const Roi &roi = image.roi;
-  cv::Mat colour = as_mat (picture);
-  if (!rectifier_.is_identity ()) {
-    rectifier_.rectify (camera, colour, rectified_);
-    colour = rectified_;
-  }
-  if (camera == 0) {
-    const cv::Mat to (roi.height, roi.width, CV_8UC4, image.colour.data,
-        static_cast<std::size_t> (image.colour.stride));
-    colour (cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
-  }
+  const cv::Mat &colour = pictures_[camera];
   const int left = std::max (0, roi.x - matcher_.reach () - kMargin);
   const int right = std::min (view_.width, roi.x + roi.width + kMargin);
   const int top = std::max (0, roi.y - kMargin);
@@ -94,7 +97,8 @@ StereoDepth::take_disparities (const RangeImage &image)
     auto to = disparity_.ptr<std::uint16_t> (y);
     for (int x = 0; x < roi.width; x++) {
       const int d = from[x] + offset;
-      const bool seen = 16 * (roi.x + x) >= from[x]; /* not in the repeated edge of the right picture */
+      const bool seen =
+          16 * (roi.x + x) >= from[x]; /* not in the repeated edge of the right picture */
       to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
@@ -107,22 +111,39 @@ StereoDepth::disparity () const
 }
 
 Status
-StereoDepth::process (
-    ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image)
+StereoDepth::take (ImageView<const Rgbx> left, ImageView<const Rgbx> right)
 {
-  const auto has_size = [&] (ImageView<const Rgbx> p) {
-    return p.width == view_.width && p.height == view_.height;
-  };
-  const Roi &roi = image.roi;
-  if (!has_size (left) || !has_size (right) || roi.empty () || roi.x < 0 || roi.y < 0 ||
-      roi.x + roi.width > view_.width || roi.y + roi.height > view_.height)
-    return {StatusCode::kBadSize, "stereo: a picture or ROI does not have the view's size"};
+  for (const auto &picture : {left, right})
+    if (picture.width != view_.width || picture.height != view_.height)
+      return {StatusCode::kBadSize, "stereo: a picture does not have the view's size"};
   try {
-    prepare (0, left, image);
-    prepare (1, right, image);
+    rectify (0, left);
+    rectify (1, right);
+    changes_.look (pictures_[0]);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};
   }
+  return {};
+}
+
+Status
+StereoDepth::match (const RangeImage &image)
+{
+  const Roi &roi = image.roi;
+  if (pictures_[0].empty () || roi.empty () || roi.x < 0 || roi.y < 0 ||
+      roi.x + roi.width > view_.width || roi.y + roi.height > view_.height)
+    return {StatusCode::kBadSize, "stereo: the ROI does not lie in the view"};
+  const cv::Mat to (roi.height, roi.width, CV_8UC4, image.colour.data,
+      static_cast<std::size_t> (image.colour.stride));
+  try {
+    pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
+    cut_window (0, image);
+    cut_window (1, image);
+  } catch (const cv::Exception &) {
+    return {StatusCode::kNoSpace, "stereo: OpenCV failed to cut the pictures"};
+  }
+  if (roi.width == view_.width && roi.height == view_.height)
+    changes_.remember ();
   if (Status s = matcher_.match (window_[0], window_[1], raw_disparity_); !s.ok ())
     return s;
   take_disparities (image);

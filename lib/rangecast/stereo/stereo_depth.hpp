@@ -5,6 +5,7 @@
 
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
+#include "change_detector.hpp"
 #include "depth.hpp"
 #include "matching.hpp"
 #include "rectification.hpp"
@@ -28,18 +29,40 @@ public:
   /** The view of the range images. */
   [[nodiscard]] const View &range_view () const { return rectifier_.range_view (); }
 
-  /** @param left, right  of the view's size
-   *  @param image  its ROI (not empty, inside the view) says what to compute; depth and colour are
-   *  written in full
+  /** @name One pair
+   *  Either process(), or take() and match(), between which the caller may choose the ROI. @{ */
+
+  /** Takes and rectifies both pictures. Their memory must stay until match() is done.
+   *  @param left, right  of the view's size
    *  @return kBadSize if a picture has another size */
-  Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image);
+  Status take (ImageView<const Rgbx> left, ImageView<const Rgbx> right);
+
+  /** Whether anything outside of the ROI has changed in the left picture since the last one that
+   *  was matched as a whole (ChangeDetector). */
+  [[nodiscard]] bool changed_outside (const Roi &roi) const
+  {
+    return changes_.changed_outside (roi);
+  }
+
+  /** @param image  its ROI (not empty, inside the view) says what to compute; depth and colour are
+   *  written in full
+   *  @return kBadSize if the ROI is not in the view */
+  Status match (const RangeImage &image);
+
+  Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image)
+  {
+    const Status status = take (left, right);
+    return status.ok () ? match (image) : status;
+  }
+  /** @} */
 
   /** The disparities of the last picture, 1/16 pixel with equal principal points, 0 = no match; of
    *  its ROI. */
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
 private:
-  void prepare (int camera, ImageView<const Rgbx> picture, const RangeImage &image);
+  void rectify (int camera, ImageView<const Rgbx> picture);
+  void cut_window (int camera, const RangeImage &image);
   void take_disparities (const RangeImage &image);
 
   View view_;
@@ -47,7 +70,9 @@ private:
   Rectifier rectifier_;
   Matcher matcher_;
   DisparityToDepth to_depth_;
-  cv::Mat rectified_, grey_, window_[2], raw_disparity_, disparity_, depth_;
+  ChangeDetector changes_;
+  cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
+  cv::Mat rectified_[2], grey_, window_[2], raw_disparity_, disparity_, depth_;
 };
 
 } // namespace rangecast

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/video/video.h>
+
+#include <rangecast/geometry/range_image.hpp>
+
+/* One camera's pictures as RGBx: mapped as they are, or converted into memory of ours. */
+class PictureReader {
+public:
+  ~PictureReader () { reset (); }
+  void reset ()
+  {
+    if (converter_)
+      gst_video_converter_free (converter_);
+    converter_ = nullptr;
+    gst_clear_buffer (&converted_);
+  }
+  bool set (const GstVideoInfo &info)
+  {
+    reset ();
+    info_ = info;
+    if (GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_RGBx ||
+        GST_VIDEO_INFO_FORMAT (&info) == GST_VIDEO_FORMAT_RGBA)
+      return true;
+    gst_video_info_set_format (
+        &rgbx_, GST_VIDEO_FORMAT_RGBx, guint (info.width), guint (info.height));
+    rgbx_.fps_n = info.fps_n;
+    rgbx_.fps_d = info.fps_d;
+    rgbx_.interlace_mode = info.interlace_mode;
+    converter_ = gst_video_converter_new (&info_, &rgbx_, nullptr);
+    converted_ = gst_buffer_new_allocate (nullptr, rgbx_.size, nullptr);
+    return converter_ != nullptr;
+  }
+  /* Valid until close(). */
+  bool open (GstBuffer *buffer)
+  {
+    if (!converter_)
+      return gst_video_frame_map (&frame_, &info_, buffer, GST_MAP_READ);
+    GstVideoFrame from;
+    if (!gst_video_frame_map (&from, &info_, buffer, GST_MAP_READ))
+      return false;
+    const bool mapped = gst_video_frame_map (&frame_, &rgbx_, converted_, GST_MAP_READWRITE);
+    if (mapped)
+      gst_video_converter_frame (converter_, &from, &frame_);
+    gst_video_frame_unmap (&from);
+    return mapped;
+  }
+  void close () { gst_video_frame_unmap (&frame_); }
+  [[nodiscard]] rangecast::ImageView<const rangecast::Rgbx> view () const
+  {
+    return {static_cast<const rangecast::Rgbx *> (GST_VIDEO_FRAME_PLANE_DATA (&frame_, 0)),
+        GST_VIDEO_FRAME_WIDTH (&frame_), GST_VIDEO_FRAME_HEIGHT (&frame_),
+        GST_VIDEO_FRAME_PLANE_STRIDE (&frame_, 0)};
+  }
+
+private:
+  GstVideoInfo info_ = {}, rgbx_ = {};
+  GstVideoConverter *converter_ = nullptr;
+  GstBuffer *converted_ = nullptr;
+  GstVideoFrame frame_ = {};
+};

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "../geometry/range_image.hpp"
+
+namespace rangecast {
+
+/** Tells whether anything moves in the part of the pictures that is not looked at closely. Compares
+ *  means of blocks of 8 x 8 pixels, whose noise is an eighth of a pixel's. Keeps its memory. */
+class ChangeDetector {
+public:
+  /** Takes the blocks of one camera's picture. @param picture  CV_8UC4, R G B x */
+  void look (const cv::Mat &picture);
+  /** What was looked at last is what later pictures are compared with. */
+  void remember ();
+  void forget () { remembered_.release (); }
+
+  /** Whether two or more blocks that lie wholly outside of the ROI (pixels) differ from what was
+   *  remembered by more than 10 grey levels in one colour. True if nothing is remembered. */
+  [[nodiscard]] bool changed_outside (const Roi &roi) const;
+
+private:
+  cv::Mat blocks_, remembered_; /* CV_8UC4 */
+};
+
+} // namespace rangecast

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "test-support.hpp"
+
+#include <random>
+#include <rangecast/stereo/change_detector.hpp>
+
+using namespace rangecast;
+
+namespace {
+
+/* A grey picture of 163 x 120 pixels (not a multiple of blocks) with sensor noise. */
+cv::Mat
+picture (unsigned seed, double noise = 6)
+{
+  cv::Mat picture (120, 163, CV_8UC4);
+  std::mt19937 random (seed);
+  std::normal_distribution<double> grey (120, noise);
+  for (int y = 0; y < picture.rows; y++)
+    for (int x = 0; x < picture.cols; x++)
+      for (int c = 0; c < 4; c++)
+        picture.at<cv::Vec4b> (y, x)[c] = cv::saturate_cast<uchar> (grey (random));
+  return picture;
+}
+
+/* Of one picture and then another with a brighter rectangle. */
+bool
+changed (cv::Rect brighter, const Roi &roi, int levels = 30)
+{
+  ChangeDetector detector;
+  detector.look (picture (1));
+  detector.remember ();
+  cv::Mat next = picture (2);
+  next (brighter) += cv::Scalar (0, levels, 0, 0);
+  detector.look (next);
+  return detector.changed_outside (roi);
+}
+
+constexpr Roi kRoi = {40, 30, 80, 60};
+
+} // namespace
+
+TEST (ChangeDetector, noise_is_no_change)
+{
+  EXPECT_FALSE (changed ({0, 0, 1, 1}, kRoi));
+}
+
+TEST (ChangeDetector, somebody_beside_the_roi_is_one)
+{
+  EXPECT_TRUE (changed ({125, 20, 30, 80}, kRoi));
+}
+
+TEST (ChangeDetector, what_moves_inside_is_not)
+{
+  EXPECT_FALSE (changed ({45, 35, 70, 50}, kRoi));
+}
+
+TEST (ChangeDetector, one_block_is_not_enough_and_little_light_neither)
+{
+  EXPECT_FALSE (changed ({8, 8, 8, 8}, kRoi));
+  EXPECT_FALSE (changed ({0, 0, 163, 120}, kRoi, 6));
+}
+
+TEST (ChangeDetector, without_memory_or_after_a_new_size_everything_has_changed)
+{
+  ChangeDetector detector;
+  detector.look (picture (1));
+  EXPECT_TRUE (detector.changed_outside (kRoi));
+  detector.remember ();
+  detector.look (picture (2));
+  EXPECT_FALSE (detector.changed_outside (kRoi));
+  detector.look (picture (3) (cv::Rect (0, 0, 100, 100)));
+  EXPECT_TRUE (detector.changed_outside (kRoi));
+  detector.look (picture (2));
+  detector.forget ();
+  EXPECT_TRUE (detector.changed_outside (kRoi));
+}
