@@ -236,6 +236,7 @@ GST_START_TEST (test_released_pad_leaves_the_others_running)
   fail_unless (stat (source, "frames") >= before + 3);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (pipeline);
+  gst_object_unref (source);
 }
 GST_END_TEST;
 
