@@ -110,12 +110,14 @@ AvatarPad::take_pool (GstBufferPool *pool)
 bool
 AvatarPad::negotiate (GstCaps *caps)
 {
-  negotiated_ = peer_ended_ = false;
-  if (gst_caps_is_empty (caps))
-    return false;
   GstCaps *old = gst_pad_get_current_caps (pad_);
   const bool same = old && gst_caps_is_equal (old, caps);
   gst_clear_caps (&old);
+  if (same && negotiated_)
+    return true; /* another pad asked for it */
+  negotiated_ = peer_ended_ = false;
+  if (gst_caps_is_empty (caps))
+    return false;
   if (!same && !gst_pad_push_event (pad_, gst_event_new_caps (caps)))
     return false;
   if (kind_ != AvatarPadKind::kRange && !gst_video_info_from_caps (&video_, caps))

@@ -65,6 +65,36 @@ AvatarStream::remove_pad (GstPad *pad)
 }
 
 bool
+AvatarStream::any_linked () const
+{
+  return std::ranges::any_of (
+      pads_, [] (const auto &entry) { return gst_pad_is_linked (entry->pad ()); });
+}
+
+/* A pad that is requested while the element runs is linked only a moment later: that is no error.
+ */
+bool
+AvatarStream::rests () const
+{
+  const bool over = eos_wanted_ || ended_;
+  return !running_ || holds_ > 0 || pads_.empty () || (!over && !any_linked ());
+}
+
+bool
+AvatarStream::all_unlinked ()
+{
+  std::lock_guard guard (lock_);
+  return !any_linked ();
+}
+
+void
+AvatarStream::pad_linked ()
+{
+  std::lock_guard guard (lock_);
+  run_task ();
+}
+
+bool
 AvatarStream::knows (const AvatarPad &pad) const
 {
   return std::ranges::any_of (pads_, [&] (const auto &entry) { return entry.get () == &pad; });
@@ -215,7 +245,7 @@ AvatarStream::one_frame (const AvatarPads &pads)
     return GST_FLOW_EOS;
   flow = push_pictures (pads, moment);
   if (flow != GST_FLOW_OK)
-    return flow;
+    return flow == GST_FLOW_NOT_LINKED && all_unlinked () ? GST_FLOW_OK : flow;
   segment_.position = moment.pts + moment.duration;
   sent_++;
   std::lock_guard guard (lock_);
@@ -282,7 +312,7 @@ AvatarStream::loop (gpointer stream)
   bool over;
   {
     std::lock_guard guard (self->lock_);
-    if (!self->running_ || self->holds_ > 0 || self->pads_.empty ()) {
+    if (self->rests ()) {
       self->pause_task (); /* whoever changes that starts it again */
       return;
     }
@@ -298,7 +328,7 @@ AvatarStream::loop (gpointer stream)
 void
 AvatarStream::run_task ()
 {
-  if (!running_ || holds_ > 0 || pads_.empty ())
+  if (rests ())
     return;
   if (!task_) {
     task_ = gst_task_new (loop, this, nullptr);
@@ -316,6 +346,7 @@ AvatarStream::end ()
   eos_wanted_ = running_;
   if (running_)
     clock_.interrupt ();
+  run_task ();
   return running_;
 }
 

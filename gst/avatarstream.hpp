@@ -12,7 +12,7 @@
 
 /** The thread that feeds all pads of avatartestsrc: it agrees with their peers on one size and
  *  frame rate, waits for the next picture's time, draws and pushes. It runs from READY to PAUSED
- *  and back, as long as there are pads; flushes and seeks make it stand still for a moment.
+ *  and back, as long as a pad is linked; flushes and seeks make it stand still for a moment.
  *
  *  Locks, in this order: task_lock_, lock_, those inside of AvatarClock and AvatarPad. The thread
  *  holds task_lock_ all through a frame, as it would a pad's stream lock. No other is held while
@@ -44,6 +44,7 @@ public:
   /** Call while the pad is still active: what the thread gets from a pad that it does not know any
    *  more, as FLUSHING, it forgets. */
   void remove_pad (GstPad *pad);
+  void pad_linked ();
   /** Answers to events; false: not in this state. */
   bool end ();
   bool flush_start (GstEvent *event);
@@ -57,7 +58,10 @@ public:
 
 private:
   AvatarPads pads ();
+  bool all_unlinked ();
   bool knows (const AvatarPad &pad) const; /* with lock_ */
+  bool any_linked () const;                /* with lock_ */
+  bool rests () const;                     /* with lock_ */
 
   GstCaps *caps_for (const AvatarPad &pad, const AvatarFormat &format) const;
   GstFlowReturn negotiate (const AvatarPads &pads);

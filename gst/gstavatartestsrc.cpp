@@ -99,8 +99,11 @@ gst_avatar_test_src_event (GstPad *, GstObject *parent, GstEvent *event)
     case GST_EVENT_SEEK:
       handled = GST_AVATAR_TEST_SRC (parent)->priv->stream.seek (event);
       break;
-    case GST_EVENT_RECONFIGURE: /* has marked the pad already */
-    case GST_EVENT_QOS:         /* these two ask for nothing that we could do */
+    case GST_EVENT_RECONFIGURE: /* has marked the pad already; a new link says it, too */
+      GST_AVATAR_TEST_SRC (parent)->priv->stream.pad_linked ();
+      handled = true;
+      break;
+    case GST_EVENT_QOS: /* these two ask for nothing that we could do */
     case GST_EVENT_LATENCY:
       handled = true;
       break;

@@ -48,6 +48,14 @@ stat (GstElement *source, const char *name)
   return value;
 }
 
+static bool
+wait_for_frames (GstElement *source, guint64 count)
+{
+  for (int i = 0; i < 1000 && stat (source, "frames") < count; i++)
+    g_usleep (10000);
+  return stat (source, "frames") >= count;
+}
+
 static void
 expect_buffer (GstHarness *h, GstClockTime pts, bool discont)
 {
@@ -230,10 +238,7 @@ GST_START_TEST (test_released_pad_leaves_the_others_running)
     gst_element_set_state (other, GST_STATE_NULL);
     gst_bin_remove (GST_BIN (pipeline), other);
   }
-  const guint64 before = stat (source, "frames");
-  for (int i = 0; i < 1000 && stat (source, "frames") < before + 3; i++)
-    g_usleep (10000);
-  fail_unless (stat (source, "frames") >= before + 3);
+  fail_unless (wait_for_frames (source, stat (source, "frames") + 3));
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (pipeline);
   gst_object_unref (source);
@@ -277,6 +282,47 @@ GST_START_TEST (test_pad_requested_after_eos_ends_too)
 }
 GST_END_TEST;
 
+static GstFlowReturn
+drop (GstPad *, GstObject *, GstBuffer *buffer)
+{
+  gst_buffer_unref (buffer);
+  return GST_FLOW_OK;
+}
+
+static GstPad *
+make_sink_pad ()
+{
+  GstPad *sink = GST_PAD (gst_object_ref_sink (gst_pad_new ("sink", GST_PAD_SINK)));
+  gst_pad_set_chain_function (sink, drop);
+  gst_pad_set_active (sink, TRUE);
+  return sink;
+}
+
+GST_START_TEST (test_pad_may_be_linked_and_unlinked_at_leisure)
+{
+  GstElement *source = make_source (FALSE);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (source, bus);
+  gst_element_set_state (source, GST_STATE_PLAYING);
+  GstPad *pad = gst_element_request_pad_simple (source, "left"), *sink = make_sink_pad ();
+  g_usleep (30000);
+  for (int i = 0; i < 5; i++) {
+    const guint64 before = stat (source, "frames");
+    fail_unless_equals_int (gst_pad_link (pad, sink), GST_PAD_LINK_OK);
+    fail_unless (wait_for_frames (source, before + 2), "link %d", i);
+    gst_pad_unlink (pad, sink);
+    g_usleep (5000);
+  }
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_release_request_pad (source, pad);
+  gst_object_unref (pad);
+  gst_element_set_state (source, GST_STATE_NULL);
+  gst_element_set_bus (source, nullptr);
+  for (gpointer object : {gpointer (bus), gpointer (source), gpointer (sink)})
+    gst_object_unref (object);
+}
+GST_END_TEST;
+
 static gpointer
 change_states (gpointer element)
 {
@@ -288,19 +334,10 @@ change_states (gpointer element)
   return nullptr;
 }
 
-static GstFlowReturn
-drop (GstPad *, GstObject *, GstBuffer *buffer)
-{
-  gst_buffer_unref (buffer);
-  return GST_FLOW_OK;
-}
-
 GST_START_TEST (test_pads_may_come_and_go_while_states_change)
 {
   GstElement *source = make_source (FALSE);
-  GstPad *sink = GST_PAD (gst_object_ref_sink (gst_pad_new ("sink", GST_PAD_SINK)));
-  gst_pad_set_chain_function (sink, drop);
-  gst_pad_set_active (sink, TRUE);
+  GstPad *sink = make_sink_pad ();
   GThread *thread = g_thread_new ("states", change_states, source);
   for (int i = 0; i < 60; i++) {
     GstPad *left = gst_element_request_pad_simple (source, "left");
@@ -486,6 +523,7 @@ avatarstream_suite ()
   tcase_add_test (tc, test_released_pad_leaves_the_others_running);
   tcase_add_test (tc, test_stream_rests_without_pads_and_goes_on_with_a_new_one);
   tcase_add_test (tc, test_pad_requested_after_eos_ends_too);
+  tcase_add_test (tc, test_pad_may_be_linked_and_unlinked_at_leisure);
   tcase_add_test (tc, test_pads_may_come_and_go_while_states_change);
   tcase_add_test (tc, test_flush_events_go_through_and_restart_running_time);
   tcase_add_test (tc, test_flush_seek_gives_the_frames_of_its_segment_once);
