@@ -140,6 +140,13 @@ AvatarClock::set_playing (bool playing)
 }
 
 void
+AvatarClock::note_rest ()
+{
+  std::lock_guard guard (lock_);
+  paused_since_tick_ = true;
+}
+
+void
 AvatarClock::interrupt ()
 {
   std::lock_guard guard (lock_);

@@ -35,6 +35,8 @@ public:
 
   /** A live picture is taken only while the element plays. */
   void set_playing (bool playing);
+  /** The thread rests: ticks from now to the next picture are none that it missed. */
+  void note_rest ();
   /** Ends wait() now, and at once until resume(). */
   void interrupt ();
   void resume ();

@@ -314,6 +314,7 @@ AvatarStream::loop (gpointer stream)
     std::lock_guard guard (self->lock_);
     if (self->rests ()) {
       self->pause_task (); /* whoever changes that starts it again */
+      self->clock_.note_rest ();
       return;
     }
     pads = self->pads_;

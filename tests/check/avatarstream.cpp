@@ -146,6 +146,27 @@ GST_START_TEST (test_ticks_while_paused_are_no_skipped_ones)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_ticks_without_a_linked_pad_are_no_skipped_ones)
+{
+  GstHarness *h = make_harness (TRUE);
+  GstPad *pad = gst_pad_get_peer (h->sinkpad);
+  gst_harness_play (h);
+  fail_unless (gst_harness_crank_single_clock_wait (h));
+  expect_buffer (h, 0, true);
+  fail_unless (gst_harness_wait_for_clock_id_waits (h, 1, 10));
+  gst_pad_unlink (pad, h->sinkpad);
+  fail_unless (gst_harness_crank_single_clock_wait (h)); /* finds nobody, and rests */
+  g_usleep (50000);
+  gst_harness_set_time (h, 550 * GST_MSECOND);
+  fail_unless_equals_int (gst_pad_link (pad, h->sinkpad), GST_PAD_LINK_OK);
+  fail_unless (gst_harness_crank_single_clock_wait (h));
+  expect_buffer (h, 6 * kFrame, true);
+  fail_unless_equals_uint64 (stat (h->element, "skipped"), 0);
+  gst_object_unref (pad);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_eos_event_ends_a_live_stream_that_waits)
 {
   GstHarness *h = make_harness (TRUE);
@@ -516,6 +537,7 @@ avatarstream_suite ()
   tcase_add_test (tc, test_live_frames_come_when_the_clock_says_so);
   tcase_add_test (tc, test_late_live_frames_are_skipped_with_discont);
   tcase_add_test (tc, test_ticks_while_paused_are_no_skipped_ones);
+  tcase_add_test (tc, test_ticks_without_a_linked_pad_are_no_skipped_ones);
   tcase_add_test (tc, test_eos_event_ends_a_live_stream_that_waits);
   tcase_add_test (tc, test_every_pad_ends_after_num_buffers);
   tcase_add_test (tc, test_first_pad_requested_while_playing_is_fed);
