@@ -179,9 +179,11 @@ CylinderFilter::work (
   units_.smooth (settings.threads);
   result.units = units_.occupied;
   result.units_shared = units_.shared;
-  result.points_out -= clear_losers (images);
+  mark_losers ();
   if (settings.hidden_gap_m > 0)
-    result.points_out += restore_uncovered (images, settings);
+    keep_uncovered (images, settings);
+  clear_losers (images);
+  result.points_out -= losers_.size ();
   return {};
 }
 
@@ -215,19 +217,7 @@ CylinderFilter::winners (const UnitLayer &layer) const
 }
 
 void
-CylinderFilter::clear_entry (const RangeImage &image, const UnitEntry &entry, std::uint64_t rivals)
-{
-  for (std::uint32_t i = 0; i < entry.point_count; i++) {
-    const std::uint32_t pixel = cloud_.pixel[units_.points[entry.first_point + i].index];
-    std::uint16_t &depth =
-        image.depth.at (static_cast<int> (pixel & 0xffff), static_cast<int> (pixel >> 16));
-    losers_.push_back ({rivals, pixel, depth, static_cast<std::uint8_t> (entry.view)});
-    depth = kInvalidDepth;
-  }
-}
-
-std::uint64_t
-CylinderFilter::clear_losers (std::span<const RangeImage> images)
+CylinderFilter::mark_losers ()
 {
   losers_.clear ();
   losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
@@ -236,41 +226,67 @@ CylinderFilter::clear_losers (std::span<const RangeImage> images)
       continue;
     const std::uint64_t stay = winners (layer);
     const UnitEntry *entry = &units_.entries[layer.first_entry];
-    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++)
-      if (!(stay >> entry->view & 1))
-        clear_entry (
-            images[entry->view], *entry, layer.covering & ~(std::uint64_t{1} << entry->view));
+    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++) {
+      if (stay >> entry->view & 1)
+        continue;
+      const std::uint64_t rivals = layer.covering & ~(std::uint64_t{1} << entry->view);
+      for (std::uint32_t i = 0; i < entry->point_count; i++)
+        losers_.push_back ({rivals, cloud_.pixel[units_.points[entry->first_point + i].index],
+            static_cast<std::uint8_t> (entry->view)});
+    }
   }
-  return losers_.size ();
 }
 
-/* Whether one of these views has a point left where it sees this one. A point well behind what a
- * view sees is hidden from it: another place. A point well before it would have hidden that: one of
- * both is wrong, and it is the loser's, up to errors that no stereo makes on the same surface. */
+/* What a view has in the pixel and its neighbours where it sees a point at depth z. */
 bool
-CylinderFilter::is_covered (
-    std::span<const RangeImage> images, const float point[3], std::uint64_t rivals) const
+CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
 {
-  for (; rivals; rivals &= rivals - 1) {
-    const int i = std::countr_zero (rivals);
-    const RangeImage &image = images[i];
+  const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
+  const int left = static_cast<int> (std::floor (x)), top = static_cast<int> (std::floor (y));
+  const int column = static_cast<int> (std::floor (x + 0.5f)),
+            row = static_cast<int> (std::floor (y + 0.5f));
+  bool covered = false;
+  for (int py = top; py <= top + 1; py++)
+    for (int px = left; px <= left + 1; px++) {
+      if (px < 0 || py < 0 || px >= image.depth.width || py >= image.depth.height)
+        continue;
+      const std::uint16_t there = image.depth.at (px, py);
+      if (there == kInvalidDepth || z - there > behind_[i] || there - z > before_[i])
+        continue;
+      if (lost_[cloud_.parts ()[i].begin + static_cast<std::size_t> (py) * image.depth.width + px])
+        return false; /* the winner's region ends here: overlap by a pixel */
+      covered |= px == column && py == row;
+    }
+  return covered;
+}
+
+/* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
+ * what a view sees is hidden from it: another place. A point well before it would have hidden that:
+ * one of both is wrong, and it is the loser's, up to errors that no stereo makes on the same
+ * surface. */
+bool
+CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
+{
+  const RangeImage &image = images[loser.image];
+  const int column = static_cast<int> (loser.pixel & 0xffff),
+            row = static_cast<int> (loser.pixel >> 16);
+  float point[3];
+  rays_[loser.image].point (static_cast<float> (image.roi.x + column),
+      static_cast<float> (image.roi.y + row), image.depth.at (column, row), point);
+  for (std::uint64_t rest = loser.rivals; rest; rest &= rest - 1) {
+    const auto i = static_cast<std::size_t> (std::countr_zero (rest));
     float u, v, z;
-    rig_lookups_[image.view_id].find (point, u, v, z);
-    const float x = u - static_cast<float> (image.roi.x) + 0.5f;
-    const float y = v - static_cast<float> (image.roi.y) + 0.5f;
-    if (!(z > 0 && x >= 0 && y >= 0 && x < static_cast<float> (image.depth.width) &&
-            y < static_cast<float> (image.depth.height)))
-      continue;
-    const std::uint16_t there = image.depth.at (static_cast<int> (x), static_cast<int> (y));
-    if (there != kInvalidDepth && z - there <= behind_[i] && there - z <= before_[i])
+    rig_lookups_[images[i].view_id].find (point, u, v, z);
+    constexpr float kFar = 1e6f; /* pixels; keeps what follows within integers */
+    if (z > 0 && std::abs (u) < kFar && std::abs (v) < kFar && covers (i, images[i], u, v, z))
       return true;
   }
   return false;
 }
 
-/* One after the other, so that of two losers at one place only the first comes back. */
-std::uint64_t
-CylinderFilter::restore_uncovered (
+/* One after the other, so that of two losers at one place only the first stays. */
+void
+CylinderFilter::keep_uncovered (
     std::span<const RangeImage> images, const CylinderSettings &settings)
 {
   for (std::size_t i = 0; i < images.size (); i++) {
@@ -278,19 +294,30 @@ CylinderFilter::restore_uncovered (
     behind_[i] = static_cast<float> (settings.hidden_gap_m * units_per_metre);
     before_[i] = static_cast<float> (settings.units.layer_gap_m / 2 * units_per_metre);
   }
-  std::uint64_t restored = 0;
-  for (const Loser &loser : losers_) {
-    const RangeImage &image = images[loser.image];
-    const int u = static_cast<int> (loser.pixel & 0xffff), v = static_cast<int> (loser.pixel >> 16);
-    float point[3];
-    rays_[loser.image].point (static_cast<float> (image.roi.x + u),
-        static_cast<float> (image.roi.y + v), loser.depth, point);
-    if (is_covered (images, point, loser.rivals))
-      continue;
-    image.depth.at (u, v) = loser.depth;
-    restored++;
-  }
-  return restored;
+  lost_.assign (cloud_.x.size (), 0);
+  for (const Loser &loser : losers_)
+    lost_[place (images, loser)] = 1;
+  std::erase_if (losers_, [&] (const Loser &loser) {
+    if (is_covered (images, loser))
+      return false;
+    lost_[place (images, loser)] = 0;
+    return true;
+  });
+}
+
+std::size_t
+CylinderFilter::place (std::span<const RangeImage> images, const Loser &loser) const
+{
+  const auto width = static_cast<std::size_t> (images[loser.image].depth.width);
+  return cloud_.parts ()[loser.image].begin + (loser.pixel >> 16) * width + (loser.pixel & 0xffff);
+}
+
+void
+CylinderFilter::clear_losers (std::span<const RangeImage> images) const
+{
+  for (const Loser &loser : losers_)
+    images[loser.image].depth.at (static_cast<int> (loser.pixel & 0xffff),
+        static_cast<int> (loser.pixel >> 16)) = kInvalidDepth;
 }
 
 } // namespace rangecast

@@ -54,8 +54,9 @@ struct CylinderResult {
  *  - Points of losers stay where no winner is (hidden_gap_m > 0): a unit can be larger than what
  *    its winner sees of it, above all where the surface lies across the axis (shoulders, crown), or
  *    the winner has a hole there. A loser's point goes only if another view that competes has a
- *    point left in the pixel where it sees the loser's: at most hidden_gap_m before it and half the
- *    layer gap behind it.
+ *    point left in the pixel where it sees the loser's, at most hidden_gap_m before it and half the
+ *    layer gap behind it, and in the pixels beside no such point that goes. Where two regions meet
+ *    they overlap by a pixel.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
@@ -73,19 +74,27 @@ public:
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
 private:
+  /* A point in a unit that another view won. */
+  struct Loser {
+    std::uint64_t rivals; /* bit i: image i competes for the unit, too */
+    std::uint32_t pixel;  /* as in WorldPoints */
+    std::uint8_t image;
+  };
+
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
   void choose_axis (const CylinderSettings &settings, std::size_t images);
   void unroll (int columns, int threads);
-  std::uint64_t clear_losers (std::span<const RangeImage> images);
-  void clear_entry (const RangeImage &image, const UnitEntry &entry, std::uint64_t rivals);
-  std::uint64_t restore_uncovered (
-      std::span<const RangeImage> images, const CylinderSettings &settings);
-  [[nodiscard]] bool is_covered (
-      std::span<const RangeImage> images, const float point[3], std::uint64_t rivals) const;
   [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
+  void mark_losers ();
+  void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
+  [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
+  [[nodiscard]] bool covers (
+      std::size_t i, const RangeImage &image, float u, float v, float z) const;
+  [[nodiscard]] std::size_t place (std::span<const RangeImage> images, const Loser &loser) const;
+  void clear_losers (std::span<const RangeImage> images) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
@@ -104,14 +113,8 @@ private:
   std::vector<std::int32_t> column_;
   Units units_;
 
-  /* A point that was cleared because the views in rivals compete for its unit, too. */
-  struct Loser {
-    std::uint64_t rivals;
-    std::uint32_t pixel; /* as in WorldPoints */
-    std::uint16_t depth;
-    std::uint8_t image;
-  };
   std::vector<Loser> losers_;
+  std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
   /* How far a point may lie behind, or before, what the image has there; in its depth units. */
   std::array<float, kMaxViews> behind_{}, before_{};
 };

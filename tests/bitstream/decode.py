@@ -1,0 +1,357 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Decodes a byte stream of the neighbour code, written from docs/bitstream.md and docs/rig.md alone.
+
+Shares no line with the plugin, so that where both give the same pictures the documents say what the plugin does.
+
+usage: decode.py FILE OUT_PREFIX
+Writes for each view N of the rig, one picture of its full size for each frame set, one behind the other:
+  OUT_PREFIX-depth-N.raw   16 bits little-endian, depth units, 0 where invalid
+  OUT_PREFIX-colour-N.raw  8 bits each of R, G and B, 0 where invalid
+and prints what it read. Pixels that did not arrive are invalid; so is all of a view that has no slice.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from array import array
+from dataclasses import dataclass, field
+from math import floor, hypot
+from typing import BinaryIO, Iterable, Iterator, NamedTuple
+
+VERSION = 1
+SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
+START_CODE = b"\x00RCU"
+UNIT_HEADER = struct.Struct("<BBH")
+ACCESS_UNIT_FIELDS = struct.Struct("<IQQ")
+SLICE_FIELDS = struct.Struct("<BBBBIQ8H")
+RIG_VIEW_FIELDS = struct.Struct("<BBII")
+ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
+MAX_ACCESS_UNIT = 32 << 20
+KEY = 1
+FULL_PIXEL, INVALID = 4, 5
+NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
+Pixel = tuple[int, int, int, int]  # depth in depth units, R, G, B
+
+
+class Damaged(Exception):
+    """A unit that a reader must not use. Costs that unit and nothing else."""
+
+
+class View(NamedTuple):
+    """What decoding needs of a view of the rig; near and far in depth units."""
+
+    id: int
+    width: int
+    height: int
+    near: int
+    far: int
+
+
+class Slice(NamedTuple):
+    """Fields of a slice, in their order, and the bytes behind them."""
+
+    view: int
+    profile: int
+    depth_bits: int
+    colour_bits: int
+    frame: int
+    capture_time: int
+    x: int
+    y: int
+    width: int
+    height: int
+    first_row: int
+    rows: int
+    first_column: int
+    columns: int
+    body: bytes
+
+    def lies_in(self, view: View | None) -> bool:
+        """Its view is in the rig, and its ROI in the view's image."""
+        return view is not None and self.x + self.width <= view.width and self.y + self.height <= view.height
+
+    def agrees(self, other: Slice) -> bool:
+        """What slices of one view have in common within an access unit is the same."""
+        return self[2:5] == other[2:5] and self[6:10] == other[6:10]
+
+    def pixel_bits(self) -> int:
+        return self.depth_bits + 3 * self.colour_bits
+
+
+class Picture:
+    """A view of an access unit in its full size, invalid until slices arrive."""
+
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self.depth = array("H", bytes(2 * view.width * view.height))
+        self.colour = bytearray(3 * view.width * view.height)
+
+    def put(self, part: Slice, pixels: list[Pixel | None]) -> None:
+        """Takes the pixels of a slice; None is an invalid one."""
+        for i, pixel in enumerate(pixels):
+            row, column = divmod(i, part.columns)
+            at = (part.y + part.first_row + row) * self.view.width + part.x + part.first_column + column
+            self.depth[at] = pixel[0] if pixel else 0
+            self.colour[3 * at : 3 * at + 3] = bytes(pixel[1:]) if pixel else bytes(3)
+
+
+@dataclass
+class Reader:
+    """Reads access units; keeps the rig from one to the next."""
+
+    data: bytes
+    views: dict[int, View] = field(default_factory=dict)
+    parts: dict[int, View] = field(default_factory=dict)
+    rig_key: tuple[int, int, int] | None = None
+    counts: dict[str, int] = field(
+        default_factory=lambda: dict.fromkeys(("access units", "slices", "damaged slices", "damaged rig views"), 0)
+    )
+
+    def access_units(self) -> Iterator[dict[int, Picture]]:
+        """The pictures of each access unit that is a frame set, by view-id."""
+        position = self.find_access_unit(0)
+        while position >= 0:
+            head = position + len(START_CODE)
+            size = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
+            begin = head + ACCESS_UNIT_SIZE
+            end = self.end_of(begin, size)
+            pictures = self.read_access_unit(self.data[begin:end])
+            if pictures is not None:
+                self.counts["access units"] += 1
+                yield pictures
+            position = self.find_access_unit(end)
+
+    def end_of(self, begin: int, size: int) -> int:
+        """Where the access unit ends whose units begin here and are said to be so many bytes."""
+        told = min(begin + size, len(self.data))
+        end = begin
+        for kind, flags, payload in units(self.data[begin:told]):
+            end += UNIT_HEADER.size + len(payload)
+        fills = end == begin + size
+        if told < begin + size and self.breaks_off(end, begin + size):
+            end = told
+        inner = self.find_access_unit(begin)
+        if not begin <= inner < end:
+            return end
+        behind = end == len(self.data) or self.find_access_unit(end) == end
+        return end if fills and behind else inner
+
+    def breaks_off(self, position: int, limit: int) -> bool:
+        """Whether the file ends in a unit that could have been sound."""
+        if position + UNIT_HEADER.size > len(self.data):
+            return position + UNIT_HEADER.size <= limit
+        kind, _, size = UNIT_HEADER.unpack_from(self.data, position)
+        return kind >> 4 == VERSION and UNIT_HEADER.size <= size <= limit - position
+
+    def find_access_unit(self, position: int) -> int:
+        """Where the next start code with a sound access-unit unit is; -1: nowhere."""
+        while (position := self.data.find(START_CODE, position)) >= 0:
+            head = position + len(START_CODE)
+            if head + ACCESS_UNIT_SIZE <= len(self.data):
+                kind, flags, size = UNIT_HEADER.unpack_from(self.data, head)
+                length = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
+                sound = kind == VERSION << 4 | ACCESS_UNIT and flags <= KEY and size == ACCESS_UNIT_SIZE
+                if sound and length <= MAX_ACCESS_UNIT:
+                    return position
+            position += 1
+        return -1
+
+    def read_access_unit(self, data: bytes) -> dict[int, Picture] | None:
+        """Decodes the units of one access unit; None if it holds nothing but rig views or the rig is unknown."""
+        slices: list[Slice] = []
+        other_units = False
+        for kind, flags, payload in units(data):
+            other_units |= kind != RIG_VIEW
+            try:
+                if kind == SLICE:
+                    self.counts["slices"] += 1
+                    slices.append(parse_slice(flags, payload))
+                elif kind == RIG_VIEW:
+                    self.take_rig_view(flags, payload)
+            except Damaged:
+                self.counts["damaged slices" if kind == SLICE else "damaged rig views"] += 1
+        if not other_units or not self.views:
+            return None
+
+        sound: list[Slice] = []
+        first: dict[int, Slice] = {}
+        for part in slices:
+            if part.lies_in(self.views.get(part.view)) and part.agrees(first.setdefault(part.view, part)):
+                sound.append(part)
+            else:
+                self.counts["damaged slices"] += 1
+        pictures = {view_id: Picture(self.views[view_id]) for view_id in first}
+        for part in sorted(sound, key=lambda part: (part.first_column, part.first_row)):
+            pixels: list[Pixel | None] = [None] * (part.rows * part.columns)
+            try:
+                pixels = decode_slice(part, self.views[part.view])
+            except Damaged:
+                self.counts["damaged slices"] += 1
+            pictures[part.view].put(part, pixels)
+        return pictures
+
+    def take_rig_view(self, flags: int, payload: bytes) -> None:
+        """Collects the views of the rig and makes it the present one when all are there."""
+        if flags & ~KEY or len(payload) < RIG_VIEW_FIELDS.size:
+            raise Damaged("rig view")
+        number, total, numerator, denominator = RIG_VIEW_FIELDS.unpack_from(payload)
+        if not 1 <= total <= 64 or number >= total or numerator >> 31 or not 1 <= denominator < 1 << 31:
+            raise Damaged("rig view")
+        view = parse_rig_blob(payload[RIG_VIEW_FIELDS.size :])
+        if self.rig_key != (total, numerator, denominator):
+            self.rig_key = (total, numerator, denominator)
+            self.parts = {}
+        self.parts[number] = view
+        by_id = {view.id: view for view in self.parts.values()}
+        if len(by_id) == total:
+            self.views = by_id
+
+
+def units(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Type, flags and content of each unit, up to the first one that cannot be passed over."""
+    position = 0
+    while position + UNIT_HEADER.size <= len(data):
+        kind, flags, size = UNIT_HEADER.unpack_from(data, position)
+        if kind >> 4 != VERSION or size < UNIT_HEADER.size or position + size > len(data):
+            break
+        yield kind & 15, flags, data[position + UNIT_HEADER.size : position + size]
+        position += size
+
+
+def parse_rig_blob(blob: bytes) -> View:
+    """The one range view that a blob holds."""
+    try:
+        magic, version, views, view_id, flags, name_size = struct.unpack_from("<4s5B", blob)
+        position = 9 + name_size
+        width, height, *lens, coefficients = struct.unpack_from("<2H4dB", blob, position)
+        *pose, unit, near, far = struct.unpack_from("<15d", blob, position + 37)
+    except struct.error:
+        raise Damaged("rig view is short") from None
+    if magic != b"RCRG" or version != 1 or views != 1 or flags or coefficients or position + 37 + 15 * 8 != len(blob):
+        raise Damaged("not a rig of one range view")
+    if view_id > 63 or not 1 <= width <= 16384 or not 1 <= height <= 16384 or not 1e-7 <= unit <= 1:
+        raise Damaged("view-id, image size or depth unit")
+    if not 0 < near < far or not far / unit < 65536:
+        raise Damaged("near and far")
+    if not is_lens(lens) or not is_pose(pose):
+        raise Damaged("lens or pose")
+    return View(view_id, width, height, *(min(max(floor(metres / unit + 0.5), 1), 65535) for metres in (near, far)))
+
+
+def is_lens(lens: list[float]) -> bool:
+    """Focal lengths and principal point lie within the limits of docs/rig.md."""
+    return all(0 < f <= 1e6 for f in lens[:2]) and all(abs(c) <= 1e6 for c in lens[2:])
+
+
+def is_pose(pose: list[float]) -> bool:
+    """The rotation is one, and the translation is below 1e6 m."""
+    x, y, z = pose[0:3], pose[3:6], pose[6:9]
+    products = [sum(a * b for a, b in zip(u, v)) for u in (x, y, z) for v in (x, y, z)]
+    cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+    return (
+        all(abs(product - (i % 4 == 0)) <= 1e-5 for i, product in enumerate(products))
+        and sum(a * b for a, b in zip(cross, z)) > 0
+        and hypot(*pose[9:]) < 1e6
+    )
+
+
+def parse_slice(flags: int, payload: bytes) -> Slice:
+    """Reads and checks what can be checked without the rig."""
+    if flags & ~KEY or len(payload) < SLICE_FIELDS.size:
+        raise Damaged("flags or size")
+    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :])
+    if part.view > 63 or part.profile != 0 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
+        raise Damaged("view, profile or bits")
+    if any(part[6:14]):
+        if not part.rows or not part.columns:
+            raise Damaged("no pixels")
+        if part.first_row + part.rows > part.height or part.first_column + part.columns > part.width:
+            raise Damaged("beyond the ROI")
+    return part
+
+
+def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
+    """The pixels of a slice, row by row; None: invalid."""
+    count, columns = part.rows * part.columns, part.columns
+    symbols_size = (3 * count + 7) // 8
+    if len(part.body) < symbols_size:
+        raise Damaged("short of symbols")
+    symbol_bits = int.from_bytes(part.body[:symbols_size], "little")
+    if symbol_bits >> 3 * count:
+        raise Damaged("bits set behind the symbols")
+    symbols = [int(digit) for digit in f"{symbol_bits:0{count}o}"[::-1]] if count else []
+    full_bytes = part.body[symbols_size:]
+    if len(full_bytes) != (symbols.count(FULL_PIXEL) * part.pixel_bits() + 7) // 8:
+        raise Damaged("too many or too few full pixels")
+    full = full_pixels(full_bytes, part, view)
+    pixels: list[Pixel | None] = []
+    for i, symbol in enumerate(symbols):
+        if symbol == INVALID:
+            pixels.append(None)
+        elif symbol == FULL_PIXEL:
+            pixels.append(next(full))
+        elif symbol > INVALID:
+            raise Damaged("reserved symbol")
+        else:
+            row, column = divmod(i, columns)
+            dx, dy = NEIGHBOURS[symbol]
+            if not 0 <= column + dx < columns or row + dy < 0 or not (pixel := pixels[i + dy * columns + dx]):
+                raise Damaged("names a pixel that does not exist or is invalid")
+            pixels.append(pixel)
+    return pixels
+
+
+def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
+    """Depth in depth units, R, G and B of a slice's full pixels, in their order."""
+    extent = view.far - view.near
+    last = min(extent, (1 << part.depth_bits) - 1)
+    if last < 1:
+        raise Damaged("near and far are less than one depth unit apart")
+    maximum = (1 << part.colour_bits) - 1
+    values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
+    count = 8 * len(data) // part.pixel_bits()
+    if int.from_bytes(data, "little") >> count * part.pixel_bits():
+        raise Damaged("bits set behind the full pixels")
+    for position in range(0, count * part.pixel_bits(), part.pixel_bits()):
+        start, shift = divmod(position, 8)
+        bits = int.from_bytes(data[start : start + 6], "little") >> shift
+        code = bits & (1 << part.depth_bits) - 1
+        if code > last:
+            raise Damaged("depth code beyond the greatest")
+        red, green, blue = (bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
+        yield (view.near + (code * extent + last // 2) // last, values[red], values[green], values[blue])
+
+
+def write(pictures: dict[int, Picture], views: Iterable[View], prefix: str, files: dict[str, BinaryIO]) -> None:
+    """Appends one picture of each view to its files; all invalid where a view has none."""
+    for view in views:
+        picture = pictures.get(view.id) or Picture(view)
+        depth = array("H", picture.depth)
+        if sys.byteorder == "big":
+            depth.byteswap()
+        for kind, content in (("depth", depth.tobytes()), ("colour", bytes(picture.colour))):
+            name = f"{prefix}-{kind}-{view.id}.raw"
+            if name not in files:
+                files[name] = open(name, "wb")
+            files[name].write(content)
+
+
+def main() -> int:
+    if len(sys.argv) != 3:
+        print("usage: decode.py FILE OUT_PREFIX", file=sys.stderr)
+        return 2
+    with open(sys.argv[1], "rb") as stream:
+        reader = Reader(stream.read())
+    files: dict[str, BinaryIO] = {}
+    for pictures in reader.access_units():
+        write(pictures, reader.views.values(), sys.argv[2], files)
+    for file in files.values():
+        file.close()
+    print(", ".join(f"{count} {what}" for what, count in reader.counts.items()))
+    return 0 if reader.counts["access units"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
