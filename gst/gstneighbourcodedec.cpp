@@ -25,9 +25,7 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
-using rangecast::ConstRangeImage;
 using rangecast::DecoderResult;
-using rangecast::RangeImage;
 using rangecast::Status;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
@@ -158,18 +156,6 @@ make_frame_set (GstNeighbourCodeDecPrivate *priv)
   return buffer;
 }
 
-/* Pixels that no slice holds: invalid, or the last frame set's. */
-static void
-fill_missing (const RangeImage &image, const gstrange::RangeFrameMap *older)
-{
-  ConstRangeImage from; /* an empty one: everything becomes invalid */
-  if (older)
-    for (const RangeImage &view : older->views ())
-      if (view.view_id == image.view_id)
-        from = view;
-  rangecast::fill_from (from, image);
-}
-
 static Status
 decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, int n_threads,
     DecoderResult &result)
@@ -177,20 +163,12 @@ decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, 
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  bool missing = false;
-  for (std::size_t i = 0; i < frame.views ().size (); i++)
-    missing |= priv->decoder.missing_pixels (i) > 0;
-  if (missing && conceal && priv->last) {
+  if (conceal && priv->last) {
     gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
-    for (std::size_t i = 0; i < frame.views ().size (); i++)
-      if (priv->decoder.missing_pixels (i) > 0)
-        fill_missing (frame.views ()[i], &older);
+    priv->decoder.decode (frame.views (), n_threads, result, older.views ());
   } else {
-    for (std::size_t i = 0; i < frame.views ().size (); i++)
-      if (priv->decoder.missing_pixels (i) > 0)
-        fill_missing (frame.views ()[i], nullptr);
+    priv->decoder.decode (frame.views (), n_threads, result);
   }
-  priv->decoder.decode (frame.views (), n_threads, result);
   return {};
 }
 
