@@ -155,7 +155,7 @@ drop_pool (GstNeighbourCodeEncPrivate *priv)
 static GstBuffer *
 acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
 {
-  if (size > priv->pool_size) {
+  if (!priv->pool || size > priv->pool_size) {
     drop_pool (priv);
     priv->pool = gst_buffer_pool_new ();
     priv->pool_size = size + size / 2;
