@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <rangecast/neighbourcode/access_unit.hpp>
+#include <rangecast/neighbourcode/symbols.hpp>
 
 using namespace rangecast;
 
@@ -18,6 +19,19 @@ one_view ()
   view.height = kHeight;
   view.intrinsics = {60, 60, 39.5, 29.5};
   return {{view}};
+}
+
+/* Bytes of a slice with as many full pixels as its symbols ask for. */
+static std::size_t
+size_of_slice (const SliceHeader &header, std::span<const std::uint8_t> body)
+{
+  const auto pixels = std::size_t (header.rows) * std::size_t (header.columns);
+  BitReader symbols (body.data (), std::min (body.size (), symbol_bytes (pixels)));
+  std::size_t full = 0;
+  for (std::size_t i = 0; i < pixels; i++)
+    full += symbols.get (kSymbolBits) == kFull;
+  const auto bits = std::size_t (header.depth_bits + 3 * header.colour_bits);
+  return std::min (kSliceHeaderSize + symbol_bytes (pixels) + (full * bits + 7) / 8, kMaxUnitSize);
 }
 
 /* Makes a header that is sound of the first bytes, so that the others are read as symbols. */
@@ -38,9 +52,12 @@ make_slice (std::span<const std::uint8_t> data)
   header.first_column = at_most (8, header.roi.width - header.columns);
   header.first_row = at_most (9, header.roi.height - header.rows);
   const auto body = data.subspan (10);
-  std::vector<std::uint8_t> unit (kSliceHeaderSize + body.size ());
+  const bool right_size = data[0] & 0x80;
+  std::vector<std::uint8_t> unit (kSliceHeaderSize);
+  unit.insert (unit.end (), body.begin (), body.end ());
+  if (right_size)
+    unit.resize (size_of_slice (header, body));
   write_slice_header (header, unit.size (), unit.data ());
-  std::copy (body.begin (), body.end (), unit.begin () + kSliceHeaderSize);
   return unit;
 }
 
