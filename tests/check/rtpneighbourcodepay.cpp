@@ -212,8 +212,8 @@ GST_START_TEST (test_new_rig_is_sent_at_once)
     gst_harness_push (h, access_unit (*rig, 1));
     fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), int (rig->views.size ()));
     GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
-    fail_unless_equals_string (gst_structure_get_string (gst_caps_get_structure (caps, 0), "width"),
-        std::to_string (rig->views[0].width).c_str ());
+    const gchar *width = gst_structure_get_string (gst_caps_get_structure (caps, 0), "width");
+    fail_unless (std::to_string (rig->views[0].width) == width);
     gst_caps_unref (caps);
   }
   gst_harness_teardown (h);
