@@ -4,36 +4,47 @@
  * @title: neighbourcodeparse
  *
  * Turns files of coded frame sets into access units, and access units into the byte stream that
- * files hold: whichever downstream asks for. Goes on after damage at the next start code. Comes
- * with a typefinder.
+ * files hold: whichever downstream asks for. Goes on after damage at the next start code. Files
+ * can be sought by time. Comes with a typefinder.
  *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=60 ! neighbourcodeenc ! neighbourcodeparse !
- * application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc gst-launch-1.0
- * filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink
- * location=cloud-%05d.ply
+ * application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
  * ]|
+ * Writes a file.
+ * |[
+ * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
+ * ]|
+ * Plays it.
  *
  * Since: 0.1
  */
+/* Locking: `lock` guards what a seek, in the application's thread, shares with the streaming
+ * thread. It is never held while pulling, pushing, querying or posting. */
 #include "gstneighbourcodeparse.h"
 
 #include <gst/base/base.h>
 
 #include <algorithm>
-#include <cstring>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
-#include <rangecast/neighbourcode/unit.hpp>
+#include <mutex>
+#include <optional>
+#include <rangecast/neighbourcode/byte_stream.hpp>
 #include <span>
 #include <vector>
 
 using rangecast::AccessUnitHeader;
+using rangecast::AccessUnitPlace;
 using rangecast::kAccessUnitHeaderSize;
 using rangecast::kStartCode;
+using rangecast::kStreamPrefixSize;
 using rangecast::SliceHeader;
+using rangecast::StreamFile;
+using rangecast::StreamPart;
 using rangecast::UnitHeader;
 using rangecast::UnitReader;
 using rangecast::UnitType;
@@ -43,26 +54,50 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_parse_debug);
 
 using Bytes = std::span<const guint8>;
 
-static constexpr gsize kPrefix = kStartCode.size () + kAccessUnitHeaderSize;
-/* More data is asked for in such steps while the end of an access unit is not in sight. */
-static constexpr guint kMore = 65536;
 /* The rig is written again after so much time. */
 static constexpr GstClockTime kRigInterval = GST_SECOND;
+/* A stream that begins with more rubbish is taken for something else. */
+static constexpr gsize kMaxLeadingRubbish = 2 << 20;
+/* The rig views of an access unit are in its first bytes: 64 units of at most 500 bytes. */
+static constexpr gsize kMaxRigBytes = 32000;
 
-struct GstNeighbourCodeParsePrivate { /* streaming thread only */
-  bool reads_stream = true;           /* sink: byte stream; else access units */
-  bool writes_stream = false;         /* src: byte stream; else access units */
+/* What a stream has shown so far: what to complain of at its end. */
+enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
+
+/* Some bytes of the input. */
+struct Range {
+  gsize offset, size;
+};
+
+struct Stream {               /* streaming thread only */
+  bool reads_stream = true;   /* sink: byte stream; else access units */
+  bool writes_stream = false; /* src: byte stream; else access units */
   bool src_caps_set = false;
+  bool failed = false; /* an error was posted */
+  bool had_gaps = false;
+  bool discont = false; /* bytes were dropped since the last buffer */
+  Seen seen = Seen::kNothing;
+  gsize leading_rubbish = 0;
   rangecast::RigCollector collector;
   unsigned used_generation = 0;
-  GstClockTime first_pts = GST_CLOCK_TIME_NONE;
-  guint64 frames = 0;
-  GstClockTime duration = GST_CLOCK_TIME_NONE;
-  std::vector<guint8> slices;
+  gstrange::RangeInfo info; /* of the source caps */
+  std::vector<Range> output;
 
-  gstrange::RangeInfo info; /* of access units to be written */
-  std::vector<guint8> rig_units;
+  std::vector<guint8> rig_units; /* of access units to be written */
   GstClockTime last_rig = GST_CLOCK_TIME_NONE;
+};
+
+struct SeekState { /* guarded by the lock */
+  GstClockTime first_pts = GST_CLOCK_TIME_NONE;
+  /* The rig of the access unit at that offset, which may not have one of its own. */
+  guint64 rig_offset = G_MAXUINT64;
+  std::vector<guint8> rig_units;
+};
+
+struct GstNeighbourCodeParsePrivate {
+  std::mutex lock;
+  SeekState seek;
+  Stream stream;
 };
 
 struct _GstNeighbourCodeParse {
@@ -82,44 +117,14 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 
 G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PARSE)
 
-/* ---- what lies at the beginning of bytes ---- */
-
-static bool
-begins_access_unit (Bytes bytes, AccessUnitHeader &header)
-{
-  return bytes.size () >= kPrefix &&
-         std::memcmp (bytes.data (), kStartCode.data (), kStartCode.size ()) == 0 &&
-         rangecast::read_access_unit_header (
-             bytes.subspan (kStartCode.size (), kAccessUnitHeaderSize), header)
-             .ok ();
-}
-
-/* Where the next access unit begins, from `from` on; bytes.size () if none is in sight. Places too
- * near the end to tell count as candidates if `or_candidate`. */
-static gsize
-find_access_unit (Bytes bytes, gsize from, bool or_candidate)
-{
-  auto at = bytes.begin () + std::ptrdiff_t (std::min (from, bytes.size ()));
-  while (true) {
-    at = std::search (at, bytes.end (), kStartCode.begin (), kStartCode.end ());
-    if (at == bytes.end ())
-      break;
-    const auto position = gsize (at - bytes.begin ());
-    AccessUnitHeader header;
-    const Bytes rest = bytes.subspan (position);
-    if (begins_access_unit (rest, header) || (or_candidate && rest.size () < kPrefix))
-      return position;
-    ++at;
-  }
-  return bytes.size ();
-}
+/* ---- typefinder ---- */
 
 static void
 find_type (GstTypeFind *find, gpointer)
 {
-  const guint8 *data = gst_type_find_peek (find, 0, kPrefix);
+  const guint8 *data = gst_type_find_peek (find, 0, kStreamPrefixSize);
   AccessUnitHeader header;
-  if (!data || !begins_access_unit ({data, kPrefix}, header))
+  if (!data || !rangecast::begins_access_unit ({data, kStreamPrefixSize}, header))
     return;
   GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
   gst_type_find_suggest (find, GST_TYPE_FIND_MAXIMUM, caps);
@@ -141,236 +146,633 @@ GST_ELEMENT_REGISTER_DEFINE_CUSTOM (neighbourcodeparse, register_with_typefinder
 
 /* ---- caps ---- */
 
-/* Access units unless downstream takes only the byte stream. */
+/* Access units unless downstream takes only the byte stream. Its peer is asked, not the pad: the
+ * base class makes the pad answer with the caps that it already has. */
 static bool
 downstream_wants_stream (GstBaseParse *base)
 {
-  GstCaps *allowed = gst_pad_get_allowed_caps (GST_BASE_PARSE_SRC_PAD (base));
-  GstCaps *access_units =
-      gst_caps_from_string (GST_NEIGHBOUR_CODE_MEDIA_TYPE ", alignment = (string) access-unit");
+  GstPad *pad = GST_BASE_PARSE_SRC_PAD (base);
+  GstCaps *ours = gst_pad_get_pad_template_caps (pad);
+  GstCaps *allowed = gst_pad_peer_query_caps (pad, ours);
+  GstCaps *access_units = gst_caps_from_string (ACCESS_UNIT_CAPS);
   const bool wants =
-      allowed && !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
-  gst_clear_caps (&allowed);
+      !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
+  gst_caps_unref (ours);
+  gst_caps_unref (allowed);
   gst_caps_unref (access_units);
   return wants;
 }
 
+/* Buffers that do not fill an access unit were left behind: begin small again. */
 static void
-set_source_caps (GstBaseParse *base, const gstrange::RangeInfo &info)
+ask_for_the_least (GstBaseParse *base)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  priv->writes_stream = downstream_wants_stream (base);
+  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kStreamPrefixSize) : 1);
+}
+
+static bool
+set_source_caps (GstBaseParse *base)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* done with this */
+  stream.writes_stream = downstream_wants_stream (base);
   GstCaps *caps = gstrange::make_neighbour_code_caps (
-      info, priv->writes_stream ? "byte-stream" : "access-unit");
-  gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
+      stream.info, stream.writes_stream ? "byte-stream" : "access-unit");
+  stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
-  priv->duration = info.frame_duration ();
-  if (info.fps_n > 0)
-    gst_base_parse_set_frame_rate (base, guint (info.fps_n), guint (info.fps_d), 0, 0);
-  priv->src_caps_set = true;
+  gst_base_parse_set_frame_rate (base, guint (stream.info.fps_n), guint (stream.info.fps_d), 0, 0);
+  return stream.src_caps_set;
+}
+
+/* What to return where downstream did not take the caps. */
+static GstFlowReturn
+refused (GstBaseParse *base)
+{
+  return GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)) ? GST_FLOW_FLUSHING
+                                                             : GST_FLOW_NOT_NEGOTIATED;
 }
 
 static gboolean
 gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   const gchar *alignment = gst_structure_get_string (gst_caps_get_structure (caps, 0), "alignment");
-  priv->reads_stream = g_strcmp0 (alignment, "access-unit") != 0;
-  gst_base_parse_set_min_frame_size (base, priv->reads_stream ? guint (kPrefix) : 1);
-  if (priv->reads_stream)
+  stream.reads_stream = g_strcmp0 (alignment, "access-unit") != 0;
+  ask_for_the_least (base);
+  if (stream.reads_stream)
     return TRUE;
-  const rangecast::Status status = gstrange::parse_caps (caps, priv->info);
+  const rangecast::Status status = gstrange::parse_caps (caps, stream.info);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->rig_units.clear ();
+  stream.rig_units.clear ();
   rangecast::write_rig_units (
-      {priv->info.rig, priv->info.fps_n, priv->info.fps_d}, priv->rig_units);
-  priv->last_rig = GST_CLOCK_TIME_NONE;
-  set_source_caps (base, priv->info);
-  return TRUE;
+      {stream.info.rig, stream.info.fps_n, stream.info.fps_d}, stream.rig_units);
+  stream.last_rig = GST_CLOCK_TIME_NONE;
+  return set_source_caps (base);
+}
+
+/* ---- errors ---- */
+
+static const char *
+what_is_missing (Seen seen)
+{
+  switch (seen) {
+    case Seen::kNothing:
+      return "No access unit found: expected a neighbour code byte stream of version 1, which "
+             "begins "
+             "with the start code 00 52 43 55";
+    case Seen::kAccessUnit:
+      return "No complete rig found: expected the rig views of a neighbour code byte stream in "
+             "front of its slices";
+    default:
+      return "The neighbour code byte stream ends before its first whole slice";
+  }
+}
+
+static void
+post_what_is_missing (GstBaseParse *base)
+{
+  const Seen seen = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.seen;
+  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", what_is_missing (seen)), (nullptr));
+}
+
+/* Where the base class says "No valid frames found" we know what is missing. */
+static GstMessage *
+say_what_is_missing (GstElement *element, GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_error (message, &error, &debug);
+  if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
+    const Seen seen = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream.seen;
+    g_free (error->message);
+    error->message = g_strdup (what_is_missing (seen));
+    gst_message_unref (message);
+    message = gst_message_new_error (GST_OBJECT (element), error, debug);
+  }
+  g_clear_error (&error);
+  g_free (debug);
+  return message;
+}
+
+/* In pull mode the base class adds "Internal data stream error" to any error: one that tells is
+ * enough. */
+static gboolean
+gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
+    if (stream.failed) {
+      gst_message_unref (message);
+      return TRUE;
+    }
+    stream.failed = true;
+    message = say_what_is_missing (element, message);
+  }
+  return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
 }
 
 /* ---- from access units ---- */
 
-static GstClockTime
-capture_time_of (Bytes access_unit)
+/* What the header of an access unit says of its slices. */
+static AccessUnitHeader
+summarise (Bytes access_unit)
 {
+  AccessUnitHeader summary;
   UnitReader units (access_unit);
   UnitHeader header;
   SliceHeader slice;
-  while (const auto unit = units.next (header))
-    if (rangecast::read_slice_header (*unit, slice).ok ())
-      return slice.capture_time_ns;
-  return 0;
+  bool first = true;
+  while (const auto unit = units.next (header)) {
+    if (!rangecast::read_slice_header (*unit, slice).ok ())
+      continue;
+    if (first)
+      summary.capture_time_ns = slice.capture_time_ns;
+    summary.key = summary.key && slice.key;
+    first = false;
+  }
+  return summary;
+}
+
+static void
+set_key (GstBuffer *buffer, bool key)
+{
+  if (key)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  else
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
 }
 
 static bool
-rig_is_due (GstNeighbourCodeParsePrivate *priv, GstClockTime pts)
+rig_is_due (Stream &stream, GstClockTime pts)
 {
-  const bool due = !GST_CLOCK_TIME_IS_VALID (priv->last_rig) || !GST_CLOCK_TIME_IS_VALID (pts) ||
-                   pts < priv->last_rig || pts - priv->last_rig >= kRigInterval;
+  const GstClockTime last = stream.last_rig;
+  const bool due = !GST_CLOCK_TIME_IS_VALID (last) || !GST_CLOCK_TIME_IS_VALID (pts) ||
+                   pts < last || pts - last >= kRigInterval;
   if (due)
-    priv->last_rig = pts;
+    stream.last_rig = pts;
   return due;
 }
 
-/* Start code, header, the rig where it is due, and the access unit itself. */
-static GstBuffer *
-make_stream_buffer (GstNeighbourCodeParsePrivate *priv, Bytes access_unit, GstClockTime pts)
+/* Start code, header, the rig where it is due. */
+static GstMemory *
+make_stream_prefix (AccessUnitHeader &header, Bytes rig, gsize access_unit_size)
 {
-  const Bytes rig = rig_is_due (priv, pts) ? Bytes (priv->rig_units) : Bytes ();
-  AccessUnitHeader header;
-  header.size = guint32 (rig.size () + access_unit.size ());
-  header.pts_ns = pts;
-  header.capture_time_ns = capture_time_of (access_unit);
-  guint8 prefix[kPrefix];
-  std::copy (kStartCode.begin (), kStartCode.end (), prefix);
-  rangecast::write_access_unit_header (header, prefix + kStartCode.size ());
-  GstBuffer *buffer = gst_buffer_new_allocate (nullptr, kPrefix + header.size, nullptr);
-  gsize offset = 0;
-  for (const Bytes part : {Bytes (prefix), rig, access_unit})
-    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
+  header.size = guint32 (rig.size () + access_unit_size);
+  const gsize size = kStreamPrefixSize + rig.size ();
+  auto bytes = static_cast<guint8 *> (g_malloc (size));
+  std::copy (kStartCode.begin (), kStartCode.end (), bytes);
+  rangecast::write_access_unit_header (header, bytes + kStartCode.size ());
+  std::copy (rig.begin (), rig.end (), bytes + kStreamPrefixSize);
+  return gst_memory_new_wrapped (GstMemoryFlags (0), bytes, size, 0, size, bytes, g_free);
+}
+
+/* The access unit in the byte stream; its own bytes are shared, not copied. */
+static GstBuffer *
+make_stream_buffer (Stream &stream, GstBuffer *access_unit, AccessUnitHeader header)
+{
+  header.pts_ns = GST_BUFFER_PTS (access_unit);
+  const Bytes rig = rig_is_due (stream, header.pts_ns) ? Bytes (stream.rig_units) : Bytes ();
+  GstBuffer *buffer = gst_buffer_copy_region (access_unit,
+      GstBufferCopyFlags (
+          GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_MEMORY),
+      0, gst_buffer_get_size (access_unit));
+  gst_buffer_prepend_memory (
+      buffer, make_stream_prefix (header, rig, gst_buffer_get_size (access_unit)));
   return buffer;
+}
+
+static GstFlowReturn
+refuse_long_access_unit (GstBaseParse *base, gsize size)
+{
+  GST_ELEMENT_ERROR (base, STREAM, FORMAT,
+      ("An access unit of %" G_GSIZE_FORMAT " bytes: expected at most 32 MiB with its rig", size),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+static GstFlowReturn
+refuse_unreadable_buffer (GstBaseParse *base)
+{
+  GST_ELEMENT_ERROR (base, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+  return GST_FLOW_ERROR;
 }
 
 static GstFlowReturn
 handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  GstMapInfo map;
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   const gsize size = gst_buffer_get_size (frame->buffer);
-  if (priv->writes_stream && gst_buffer_map (frame->buffer, &map, GST_MAP_READ)) {
-    frame->out_buffer =
-        make_stream_buffer (priv, {map.data, map.size}, GST_BUFFER_PTS (frame->buffer));
-    gst_buffer_unmap (frame->buffer, &map);
-    gst_buffer_copy_into (frame->out_buffer, frame->buffer,
-        GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0, -1);
-  }
+  if (gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)) && !set_source_caps (base))
+    return refused (base);
+  if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
+    return refuse_long_access_unit (base, size);
+  GstMapInfo map;
+  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+    return refuse_unreadable_buffer (base);
+  const AccessUnitHeader header = summarise ({map.data, map.size});
+  gst_buffer_unmap (frame->buffer, &map);
+  frame->buffer = gst_buffer_make_writable (frame->buffer);
+  set_key (frame->buffer, header.key);
+  if (stream.writes_stream)
+    frame->out_buffer = make_stream_buffer (stream, frame->buffer, header);
   return gst_base_parse_finish_frame (base, frame, gint (size));
+}
+
+/* ---- files ---- */
+
+static bool
+reads_file (GstBaseParse *base)
+{
+  return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
+}
+
+static void
+read_file (GstPad *pad, guint64 offset, gsize size, std::vector<guint8> &to)
+{
+  to.clear ();
+  GstBuffer *buffer = nullptr;
+  if (gst_pad_pull_range (pad, offset, guint (size), &buffer) != GST_FLOW_OK)
+    return;
+  to.resize (std::min (gst_buffer_get_size (buffer), size));
+  gst_buffer_extract (buffer, 0, to.data (), to.size ());
+  gst_buffer_unref (buffer);
+}
+
+static StreamFile
+file_of (GstBaseParse *base)
+{
+  GstPad *pad = GST_BASE_PARSE_SINK_PAD (base);
+  gint64 size = 0;
+  if (!gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size))
+    size = 0;
+  return {[pad] (guint64 offset, gsize bytes, std::vector<guint8> &to) {
+            read_file (pad, offset, bytes, to);
+          },
+      guint64 (std::max<gint64> (size, 0))};
+}
+
+/* From the first time of a file to the end of its last access unit. */
+static void
+find_duration (GstBaseParse *base, GstClockTime first_pts)
+{
+  const auto last = file_of (base).last ();
+  if (!last || last->header.pts_ns == rangecast::kNoTime || last->header.pts_ns < first_pts)
+    return; /* the base class goes on estimating */
+  GstClockTime duration = last->header.pts_ns - first_pts;
+  const auto &info = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.info;
+  if (GST_CLOCK_TIME_IS_VALID (info.frame_duration ()))
+    duration += info.frame_duration ();
+  if (duration <= G_MAXINT64)
+    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
 }
 
 /* ---- from the byte stream ---- */
 
-/* Length of the access unit at the beginning of `bytes`; 0: more bytes are needed to tell. */
-static gsize
-access_unit_length (Bytes bytes, const AccessUnitHeader &header, bool draining)
+static GstFlowReturn
+drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
-  const gsize told = kPrefix + header.size;
-  const gsize next = find_access_unit (bytes, kPrefix, false);
-  if (next < bytes.size ())
-    return std::min (next, told); /* earlier than told: its size is damaged */
-  if (draining)
-    return std::min (bytes.size (), told);
-  return bytes.size () >= told + kPrefix ? told : 0; /* rubbish follows */
+  GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.discont = true;
+  frame->flags |= GST_BASE_PARSE_FRAME_FLAG_DROP;
+  return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
-/* Gathers rig and slices of one access unit. */
+/* Not by skipping: the base class gives up after 2 MiB, and one access unit can be longer. */
+static GstFlowReturn
+drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GST_WARNING_OBJECT (base, "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are no access unit",
+      size, guint64 (frame->offset));
+  if (stream.seen == Seen::kNothing) {
+    stream.leading_rubbish += size;
+    if (stream.leading_rubbish > kMaxLeadingRubbish) {
+      post_what_is_missing (base);
+      return GST_FLOW_ERROR;
+    }
+  }
+  return drop (base, frame, size);
+}
+
+static void
+add_rig_view (GstBaseParse *base, Bytes unit)
+{
+  if (!GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.collector.add (unit).ok ())
+    GST_DEBUG_OBJECT (base, "a damaged rig view");
+}
+
+/* After a seek: the rig that the file had last there. */
+static void
+use_rig_of_seek (GstBaseParse *base, guint64 offset)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  std::vector<guint8> units;
+  {
+    std::lock_guard guard (priv->lock);
+    if (priv->seek.rig_offset != offset)
+      return;
+    units = std::move (priv->seek.rig_units);
+    priv->seek.rig_offset = G_MAXUINT64;
+  }
+  UnitReader reader (units);
+  UnitHeader header;
+  while (const auto unit = reader.next (header))
+    if (header.type == guint8 (UnitType::kRigView))
+      add_rig_view (base, *unit);
+}
+
+/* Takes the rig of an access unit, and notes where its other units are. */
 static void
 take_units (GstBaseParse *base, Bytes units)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  priv->slices.clear ();
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  stream.output.clear ();
   UnitReader reader (units);
   UnitHeader header;
+  gsize offset = kStreamPrefixSize;
   while (const auto unit = reader.next (header)) {
-    if (header.type != guint8 (UnitType::kRigView))
-      priv->slices.insert (priv->slices.end (), unit->begin (), unit->end ());
-    else if (!priv->collector.add (*unit).ok ())
-      GST_DEBUG_OBJECT (base, "a damaged rig view");
+    if (header.type == guint8 (UnitType::kRigView))
+      add_rig_view (base, *unit);
+    else if (!stream.output.empty () &&
+             stream.output.back ().offset + stream.output.back ().size == offset)
+      stream.output.back ().size += unit->size ();
+    else
+      stream.output.push_back ({offset, unit->size ()});
+    offset += unit->size ();
   }
-  if (priv->collector.generation () == priv->used_generation)
-    return;
-  priv->used_generation = priv->collector.generation ();
-  const rangecast::StreamInfo &stream = priv->collector.info ();
-  set_source_caps (base, gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d));
+}
+
+/* New caps where the rig is another, or downstream wants others. */
+static bool
+update_caps (GstBaseParse *base)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const bool wanted = gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base));
+  if (stream.collector.generation () == 0)
+    return true;
+  if (stream.collector.generation () == stream.used_generation && stream.src_caps_set && !wanted)
+    return true;
+  stream.used_generation = stream.collector.generation ();
+  const rangecast::StreamInfo &info = stream.collector.info ();
+  stream.info = gstrange::make_info (info.rig, info.fps_n, info.fps_d);
+  return set_source_caps (base);
 }
 
 /* Times of a file begin at 0. */
 static GstClockTime
-time_of (GstNeighbourCodeParsePrivate *priv, const AccessUnitHeader &header)
+time_of (GstBaseParse *base, const AccessUnitHeader &header)
 {
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   if (!GST_CLOCK_TIME_IS_VALID (header.pts_ns))
-    return GST_CLOCK_TIME_IS_VALID (priv->duration) ? priv->frames * priv->duration
-                                                    : GST_CLOCK_TIME_NONE;
-  if (!GST_CLOCK_TIME_IS_VALID (priv->first_pts))
-    priv->first_pts = header.pts_ns;
-  return header.pts_ns >= priv->first_pts ? header.pts_ns - priv->first_pts : 0;
+    return GST_CLOCK_TIME_NONE;
+  bool first = false;
+  GstClockTime first_pts;
+  {
+    std::lock_guard guard (priv->lock);
+    first = !GST_CLOCK_TIME_IS_VALID (priv->seek.first_pts);
+    if (first)
+      priv->seek.first_pts = header.pts_ns;
+    first_pts = priv->seek.first_pts;
+  }
+  if (first && reads_file (base))
+    find_duration (base, first_pts);
+  return header.pts_ns >= first_pts ? header.pts_ns - first_pts : 0;
+}
+
+/* The units that go on, sharing the input's memory. */
+static GstBuffer *
+make_output (Stream &stream, GstBuffer *input, gsize length)
+{
+  if (stream.writes_stream)
+    stream.output.assign (1, {0, length});
+  GstBuffer *output = gst_buffer_new ();
+  gst_buffer_copy_into (output, input, GST_BUFFER_COPY_FLAGS, 0, gsize (-1));
+  for (const Range &range : stream.output)
+    gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
+  GST_BUFFER_PTS (output) = GST_BUFFER_PTS (input);
+  GST_BUFFER_DTS (output) = GST_BUFFER_DTS (input);
+  return output;
 }
 
 static GstFlowReturn
 finish_access_unit (
     GstBaseParse *base, GstBaseParseFrame *frame, const AccessUnitHeader &header, gsize length)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  const GstClockTime pts = time_of (priv, header);
-  priv->frames++;
-  if (!priv->writes_stream)
-    frame->out_buffer = gst_buffer_new_memdup (priv->slices.data (), priv->slices.size ());
-  frame->buffer = gst_buffer_make_writable (frame->buffer);
-  for (GstBuffer *buffer : {frame->buffer, frame->out_buffer}) {
-    if (!buffer)
-      continue;
-    GST_BUFFER_PTS (buffer) = pts;
-    GST_BUFFER_DURATION (buffer) = priv->duration;
-    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
-    gst_range_buffer_set_capture_time (buffer, header.capture_time_ns);
-  }
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstBuffer *output = make_output (stream, frame->buffer, length);
+  const GstClockTime pts = time_of (base, header);
+  /* Where there is none, the base class goes on from the one before, or from where it sought. */
+  if (GST_CLOCK_TIME_IS_VALID (pts))
+    GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = pts;
+  GST_BUFFER_DURATION (output) = stream.info.frame_duration ();
+  set_key (output, header.key);
+  if (stream.discont)
+    GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
+  gst_range_buffer_set_capture_time (output, header.capture_time_ns);
+  stream.discont = false;
+  stream.seen = Seen::kSlices;
+  frame->out_buffer = output;
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
 
 static GstFlowReturn
-handle_stream (GstBaseParse *base, GstBaseParseFrame *frame, gint *skip)
+handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  const bool draining = GST_BASE_PARSE_DRAINING (base);
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  ask_for_the_least (base);
+  if (!update_caps (base))
+    return refused (base);
+  stream.seen = std::max (stream.seen, stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
+  if (!stream.src_caps_set || stream.output.empty ()) /* of no use without its rig, or empty */
+    return drop (base, frame, part.length);
+  return finish_access_unit (base, frame, part.header, part.length);
+}
+
+static GstFlowReturn
+handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
+{
   GstMapInfo map;
   if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
-    return GST_FLOW_ERROR;
+    return refuse_unreadable_buffer (base);
   const Bytes bytes (map.data, map.size);
-  AccessUnitHeader header;
-  gsize length = 0;
-  *skip = 0;
-  if (!begins_access_unit (bytes, header)) {
-    *skip = gint (find_access_unit (bytes, 1, !draining));
-    if (gsize (*skip) == bytes.size () && !draining) /* half a start code may be at its end */
-      *skip -= gint (std::min (bytes.size () - 1, kStartCode.size () - 1));
-  } else {
-    length = access_unit_length (bytes, header, draining);
-    if (length)
-      take_units (base, bytes.subspan (kPrefix, length - kPrefix));
+  const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
+  if (part.length) {
+    use_rig_of_seek (base, guint64 (frame->offset));
+    take_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
-  const gsize size = bytes.size ();
   gst_buffer_unmap (frame->buffer, &map);
-  if (*skip > 0 || !length) {
-    /* Nothing yet: come again with more, or behind what is no access unit. */
-    gst_base_parse_set_min_frame_size (base, guint (*skip ? kPrefix : size + kMore));
-    return GST_FLOW_OK;
-  }
-  gst_base_parse_set_min_frame_size (base, guint (kPrefix));
-  if (!priv->src_caps_set || priv->slices.empty ()) { /* of no use without its rig, or empty */
-    *skip = gint (length);
-    return GST_FLOW_OK;
-  }
-  return finish_access_unit (base, frame, header, length);
+  if (part.rubbish)
+    return drop_rubbish (base, frame, part.rubbish);
+  if (part.length)
+    return handle_access_unit_of_stream (base, frame, part);
+  gst_base_parse_set_min_frame_size (base, guint (part.wanted));
+  return GST_FLOW_OK;
 }
 
 static GstFlowReturn
 gst_neighbour_code_parse_handle_frame (GstBaseParse *base, GstBaseParseFrame *frame, gint *skip)
 {
-  if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->reads_stream)
-    return handle_stream (base, frame, skip);
+  *skip = 0;
+  if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.reads_stream)
+    return handle_stream (base, frame);
   return handle_access_unit (base, frame);
+}
+
+/* What lies before a segment may be needed to decode what lies in it: the seek began at the last
+ * key access unit. Sinks clip it. */
+static GstFlowReturn
+gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *frame)
+{
+  const GstClockTime pts = GST_BUFFER_PTS (frame->buffer);
+  if (!GST_CLOCK_TIME_IS_VALID (pts) || pts >= base->segment.start)
+    frame->flags |= GST_BASE_PARSE_FRAME_FLAG_CLIP;
+  return GST_FLOW_OK;
+}
+
+/* ---- seeking ---- */
+
+/* The one that the seek's flags ask for. */
+static std::optional<AccessUnitPlace>
+choose (const StreamFile::Target &target, guint64 pts, GstSeekFlags flags)
+{
+  const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
+  const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
+  const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
+  if (!target.before || !target.after || !snap || !after)
+    return target.before ? target.before : target.after;
+  if (nearest && pts - target.before->header.pts_ns <= target.after->header.pts_ns - pts)
+    return target.before;
+  return target.after;
+}
+
+/* The rig is not with each access unit: keep it until the streaming thread is there. */
+static void
+keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlace> &rig)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  std::vector<guint8> units;
+  if (rig)
+    read_file (GST_BASE_PARSE_SINK_PAD (base), rig->offset + kStreamPrefixSize,
+        std::min<gsize> (rig->header.size, kMaxRigBytes), units);
+  std::lock_guard guard (priv->lock);
+  priv->seek.rig_offset = offset;
+  priv->seek.rig_units = std::move (units);
+}
+
+static GstClockTime
+first_pts_of (GstNeighbourCodeParsePrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->seek.first_pts;
+}
+
+/* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
+ * played. Returns: the time there; none if it could not be found. */
+static GstClockTime
+find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
+{
+  const GstClockTime first_pts = first_pts_of (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  if (!GST_CLOCK_TIME_IS_VALID (first_pts))
+    return GST_CLOCK_TIME_NONE;
+  const guint64 pts = first_pts + time;
+  const StreamFile::Target target = file_of (base).locate (pts);
+  const auto place = choose (target, pts, flags);
+  if (!place)
+    return GST_CLOCK_TIME_NONE;
+  keep_rig (base, place->offset, target.rig);
+  const GstClockTime found = place->header.pts_ns - std::min (first_pts, place->header.pts_ns);
+  gst_base_parse_add_index_entry (base, place->offset, found, TRUE, TRUE);
+  return found;
+}
+
+/* Returns: (transfer full): the seek that the base class shall do. */
+static GstEvent *
+aim (GstBaseParse *base, GstEvent *event)
+{
+  gdouble rate;
+  GstFormat format;
+  GstSeekFlags flags;
+  GstSeekType start_type, stop_type;
+  gint64 start, stop;
+  gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
+  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
+    return event;
+  const GstClockTime found = find_place (base, GstClockTime (start), flags);
+  if (!GST_CLOCK_TIME_IS_VALID (found))
+    return event;
+  if (flags & GST_SEEK_FLAG_KEY_UNIT)
+    start = gint64 (found);
+  /* The base class uses the place only where it shall be accurate. */
+  flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
+  GstEvent *aimed = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
+  gst_event_set_seqnum (aimed, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return aimed;
+}
+
+static gboolean
+gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && reads_file (base)) {
+    gdouble rate;
+    gst_event_parse_seek (event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
+    if (rate < 0) { /* nothing here reads backwards */
+      gst_event_unref (event);
+      return FALSE;
+    }
+    event = aim (base, event);
+  }
+  return GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->src_event (base, event);
+}
+
+static void
+finish_stream (GstBaseParse *base)
+{
+  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  if (base->segment.rate > 0)
+    gst_base_parse_drain (base);
+  if (stream.reads_stream && stream.seen != Seen::kSlices && !stream.had_gaps)
+    post_what_is_missing (base);
+}
+
+static gboolean
+gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
+{
+  const GstEventType type = GST_EVENT_TYPE (event);
+  if (type == GST_EVENT_EOS)
+    finish_stream (base);
+  else if (type == GST_EVENT_GAP)
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.had_gaps = true;
+  const gboolean done =
+      GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->sink_event (base, event);
+  if (type == GST_EVENT_FLUSH_STOP || type == GST_EVENT_SEGMENT)
+    ask_for_the_least (base);
+  return done;
 }
 
 /* ---- life ---- */
 
+static void
+forget_stream (GstNeighbourCodeParsePrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  priv->stream = {};
+  priv->seek = {};
+}
+
 static gboolean
 gst_neighbour_code_parse_start (GstBaseParse *base)
 {
-  auto self = GST_NEIGHBOUR_CODE_PARSE (base);
-  *self->priv = {};
-  gst_base_parse_set_syncable (base, TRUE);
-  gst_base_parse_set_min_frame_size (base, guint (kPrefix));
+  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  ask_for_the_least (base);
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_parse_stop (GstBaseParse *base)
+{
+  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   return TRUE;
 }
 
@@ -396,14 +798,19 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   auto parse_class = GST_BASE_PARSE_CLASS (klass);
 
   G_OBJECT_CLASS (klass)->finalize = gst_neighbour_code_parse_finalize;
+  element_class->post_message = gst_neighbour_code_parse_post_message;
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
       "Codec/Parser/Video", "Parses and writes files of coded range frame sets", "gst-rangecast");
 
   parse_class->start = gst_neighbour_code_parse_start;
+  parse_class->stop = gst_neighbour_code_parse_stop;
   parse_class->set_sink_caps = gst_neighbour_code_parse_set_sink_caps;
+  parse_class->sink_event = gst_neighbour_code_parse_sink_event;
+  parse_class->src_event = gst_neighbour_code_parse_src_event;
   parse_class->handle_frame = gst_neighbour_code_parse_handle_frame;
+  parse_class->pre_push_frame = gst_neighbour_code_parse_pre_push_frame;
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_parse_debug, "neighbourcodeparse", 0, "Neighbour code parser");

@@ -483,23 +483,12 @@ gst_range_combine_finalize (GObject *object)
   G_OBJECT_CLASS (gst_range_combine_parent_class)->finalize (object);
 }
 
-static GstAggregatorPad *
-add_sink_pad (GstRangeCombine *self, const char *name)
-{
-  GstPadTemplate *pad_template =
-      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), name);
-  auto pad = static_cast<GstPad *> (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
-      "direction", GST_PAD_SINK, "template", pad_template, nullptr));
-  gst_element_add_pad (GST_ELEMENT (self), pad);
-  return GST_AGGREGATOR_PAD (pad);
-}
-
 static void
 gst_range_combine_init (GstRangeCombine *self)
 {
   self->priv = new GstRangeCombinePrivate;
-  self->priv->colour_pad = add_sink_pad (self, "colour");
-  self->priv->depth_pad = add_sink_pad (self, "depth");
+  self->priv->colour_pad = gstrange::add_sink_pad (GST_ELEMENT (self), "colour");
+  self->priv->depth_pad = gstrange::add_sink_pad (GST_ELEMENT (self), "depth");
   self->priv->matcher = new gstrange::PairMatcher (self->priv->colour_pad, self->priv->depth_pad);
 }
 

@@ -608,23 +608,12 @@ gst_stereo_depth_finalize (GObject *object)
   G_OBJECT_CLASS (gst_stereo_depth_parent_class)->finalize (object);
 }
 
-static GstAggregatorPad *
-add_sink_pad (GstStereoDepth *self, const char *name)
-{
-  GstPadTemplate *pad_template =
-      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (self), name);
-  auto pad = static_cast<GstPad *> (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
-      "direction", GST_PAD_SINK, "template", pad_template, nullptr));
-  gst_element_add_pad (GST_ELEMENT (self), pad);
-  return GST_AGGREGATOR_PAD (pad);
-}
-
 static void
 gst_stereo_depth_init (GstStereoDepth *self)
 {
   self->priv = new GstStereoDepthPrivate;
-  self->priv->pads[0] = add_sink_pad (self, "left");
-  self->priv->pads[1] = add_sink_pad (self, "right");
+  self->priv->pads[0] = gstrange::add_sink_pad (GST_ELEMENT (self), "left");
+  self->priv->pads[1] = gstrange::add_sink_pad (GST_ELEMENT (self), "right");
   self->priv->matcher =
       std::make_unique<gstrange::PairMatcher> (self->priv->pads[0], self->priv->pads[1]);
 }

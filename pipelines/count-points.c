@@ -78,14 +78,18 @@ main (int argc, char **argv)
   g_object_set (file, "location", argv[1], NULL);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
 
-  GstSample *sample;
-  while ((sample = gst_app_sink_pull_sample (GST_APP_SINK (sink)))) {
-    print_frame_set (sample);
-    gst_sample_unref (sample);
-  }
-
+  /* An error (no such file, say) ends no stream: the bus must be heard, too. */
   GstBus *bus = gst_element_get_bus (pipeline);
-  GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
+  GstMessage *message = NULL;
+  while (!message && !gst_app_sink_is_eos (GST_APP_SINK (sink))) {
+    GstSample *sample = gst_app_sink_try_pull_sample (GST_APP_SINK (sink), 100 * GST_MSECOND);
+    if (sample) {
+      print_frame_set (sample);
+      gst_sample_unref (sample);
+    } else {
+      message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
+    }
+  }
   if (message) {
     gst_message_parse_error (message, &error, NULL);
     g_printerr ("count-points: %s\n", error->message);

@@ -106,11 +106,9 @@ done
 run_options=
 start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port"
 
-# The view turns once round while the frames last.
-orbit=$(awk -v f="$fps" -v n="$frames" 'BEGIN { printf "%.3f", 360 * f / n }')
-RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --timeout $((60 + 4 * frames / fps)) \
+RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
   --snapshot $out/avatar.png --report $out/log/viewer.json" \
-  pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" --orbit "$orbit" $window &
+  pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" $window &
 viewer=$!
 pids+=($viewer)
 

@@ -4,8 +4,8 @@
  * application can read: buffers, their metas, and the elements' `stats` properties.
  *
  * Elements it looks for, by name (all may be missing): "rendered" (frames and latency),
- * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "snapshot" (a sink whose last
- * sample becomes a PNG); every rtpjitterbuffer, whatever its name. */
+ * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "view" (a striprender), "snapshot"
+ * (a sink whose last sample becomes a PNG); every rtpjitterbuffer, whatever its name. */
 #include <glib-unix.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
@@ -21,6 +21,8 @@
 struct Options {
   gint64 base_time = -1;
   gint frames = 0;
+  gint views = 1;
+  gboolean turn = FALSE;
   gint timeout_s = 0;
   gboolean progress = FALSE;
   gchar *report = nullptr;
@@ -32,6 +34,7 @@ struct Runner {
   Options options;
   GstElement *pipeline = nullptr;
   GMainLoop *loop = nullptr;
+  GstElement *turned = nullptr; /* a striprender */
   bool failed = false;
   bool ending = false;
 
@@ -39,6 +42,7 @@ struct Runner {
   std::vector<double> latencies_ms;
   GstClockTime first_frame = GST_CLOCK_TIME_NONE, last_frame = GST_CLOCK_TIME_NONE;
   bool seen_points = false;
+  gint64 first_points_us = 0; /* monotonic; 0: none yet */
 };
 
 struct StreamStats {
@@ -135,16 +139,22 @@ percentile (std::vector<double> values, double p)
 
 /* ---- probes, on streaming threads ---- */
 
-/* Until somebody is in the picture (the hosts are still learning their backgrounds) nothing is
- * drawn, recorded or counted. */
+/* Until all views see somebody (the hosts are still learning their backgrounds) nothing is drawn,
+ * recorded or counted. A view that has nobody in it is not waited for for ever. */
 static GstPadProbeReturn
 drop_until_points (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
   GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
+  constexpr gint64 kPatienceUs = 2 * G_USEC_PER_SEC;
   gpointer state = nullptr;
+  gint seen = 0;
   while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (buffer, &state))
-    runner->seen_points |= meta->width > 0 && meta->height > 0;
+    seen += meta->width > 0 && meta->height > 0;
+  if (seen > 0 && runner->first_points_us == 0)
+    runner->first_points_us = g_get_monotonic_time ();
+  const bool tired = seen > 0 && g_get_monotonic_time () - runner->first_points_us > kPatienceUs;
+  runner->seen_points |= seen >= std::max (1, runner->options.views) || tired;
   return runner->seen_points ? GST_PAD_PROBE_REMOVE : GST_PAD_PROBE_DROP;
 }
 
@@ -179,6 +189,9 @@ count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
       GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
   if (runner->options.frames > 0 && frames + 1 == runner->options.frames)
     g_idle_add (send_eos, runner);
+  if (runner->turned) /* the next picture; the last one is the first view's again */
+    g_object_set (runner->turned, "azimuth",
+        360.0 * std::min (frames + 2, runner->options.frames) / runner->options.frames, nullptr);
   return GST_PAD_PROBE_OK;
 }
 
@@ -352,6 +365,8 @@ play (Runner &runner)
     gst_element_set_start_time (runner.pipeline, GST_CLOCK_TIME_NONE);
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
   }
+  if (runner.options.turn && runner.options.frames > 0)
+    runner.turned = gst_bin_get_by_name (GST_BIN (runner.pipeline), "view");
   add_probe (runner, "decoder", drop_until_points);
   add_probe (runner, "rendered", count_rendered);
 
@@ -365,6 +380,7 @@ play (Runner &runner)
     runner.failed = !write_snapshot (runner);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
   gst_bus_remove_watch (bus);
+  gst_clear_object (&runner.turned);
   gst_object_unref (bus);
   g_main_loop_unref (runner.loop);
 }
@@ -377,6 +393,10 @@ parse_arguments (int *argc, char ***argv, Options &options)
           "Base time of the pipeline: that running time 0 is at this clock time", "NS"},
       {"frames", 0, 0, G_OPTION_ARG_INT, &options.frames,
           "Stop after N frames at the element named rendered (default 0: run to the end)", "N"},
+      {"views", 0, 0, G_OPTION_ARG_INT, &options.views,
+          "Begin when N views have points, or 2 s after the first one has (default 1)", "N"},
+      {"turn", 0, 0, G_OPTION_ARG_NONE, &options.turn,
+          "Turn the striprender named view once round in the N frames", nullptr},
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
           "Fail if it has not ended by then (default 0: never)", "SECONDS"},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &options.progress, "Print a line every 2 s", nullptr},

@@ -47,6 +47,6 @@ fi
 launch udpsrc "port=$listen" reuse=false buffer-size=4194304 "caps=$rtp_caps" \
   ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
-  ! cylinderfilter name=cylinder ! striprender "auto-orbit=$orbit" \
+  ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
   ! identity name=rendered ! tee name=picture "${sinks[@]}"

@@ -16,7 +16,8 @@ export CK_FORK=no CK_DEFAULT_TIMEOUT=0 G_SLICE=always-malloc G_DEBUG=gc-friendly
 gst-inspect-1.0 >/dev/null 2>&1 # fills the registry outside valgrind
 failed=0
 for element in "${elements[@]}"; do
-  if valgrind --quiet --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite \
+  # fair-sched: else a source that pushes without end can keep all other threads from running
+  if valgrind --quiet --fair-sched=try --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite \
     --show-leak-kinds=definite --num-callers=30 --suppressions=tests/valgrind.supp \
     "$build/tests/check/check_$element" >"$build/valgrind-$element.log" 2>&1; then
     echo "ok $element"

@@ -7,6 +7,17 @@
 
 namespace gstrange {
 
+GstAggregatorPad *
+add_sink_pad (GstElement *aggregator, const char *name)
+{
+  GstPadTemplate *pad_template =
+      gst_element_class_get_pad_template (GST_ELEMENT_GET_CLASS (aggregator), name);
+  auto pad = static_cast<GstPad *> (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", name,
+      "direction", GST_PAD_SINK, "template", pad_template, nullptr));
+  gst_element_add_pad (aggregator, pad);
+  return GST_AGGREGATOR_PAD (pad);
+}
+
 bool
 is_gap (GstBuffer *buffer)
 {

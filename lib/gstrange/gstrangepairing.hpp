@@ -39,6 +39,10 @@ private:
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
 
+/** Adds the always pad of that template and name to an aggregator; for instance_init.
+ *  @return transfer none: the element owns it */
+GST_RANGE_API GstAggregatorPad *add_sink_pad (GstElement *aggregator, const char *name);
+
 /** Whether this is the empty buffer that GstAggregator makes of a GAP event. */
 GST_RANGE_API bool is_gap (GstBuffer *buffer);
 

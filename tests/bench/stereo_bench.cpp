@@ -115,6 +115,7 @@ run_opencv (const cv::Ptr<cv::StereoMatcher> &matcher, const cv::Mat &left, cons
 {
   cv::Mat disparity;
   matcher->setMinDisparity (least);
+  /* The same limits as ours; StereoBM's own uniqueness is 15 by default, too. */
   matcher->setDisp12MaxDiff (1);
   matcher->setSpeckleWindowSize (60);
   matcher->setSpeckleRange (2);
@@ -175,7 +176,8 @@ main (int argc, char **argv)
   run_ours (
       view, left_rgb, right_rgb, truth, MatchAlgorithm::kBm, "stereodepth bm", rounds, offset);
   for (int mode : {cv::StereoSGBM::MODE_SGBM_3WAY, cv::StereoSGBM::MODE_SGBM})
-    run_opencv (cv::StereoSGBM::create (least, count, 5, 200, 800, 1, 31, 8, 60, 2, mode),
+    run_opencv (cv::StereoSGBM::create (least, count, 5, 200, 800, 1, 31,
+                    MatchSettings ().uniqueness_ratio, 60, 2, mode),
         left_grey, right_grey, truth,
         mode == cv::StereoSGBM::MODE_SGBM ? "OpenCV SGBM" : "OpenCV SGBM 3-way", rounds, least);
   run_opencv (

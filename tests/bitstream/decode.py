@@ -124,15 +124,34 @@ class Reader:
             head = position + len(START_CODE)
             size = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
             begin = head + ACCESS_UNIT_SIZE
-            end = min(begin + size, len(self.data))
-            following = self.find_access_unit(begin)
-            if 0 <= following < end:
-                end = following
+            end = self.end_of(begin, size)
             pictures = self.read_access_unit(self.data[begin:end])
             if pictures is not None:
                 self.counts["access units"] += 1
                 yield pictures
             position = self.find_access_unit(end)
+
+    def end_of(self, begin: int, size: int) -> int:
+        """Where the access unit ends whose units begin here and are said to be so many bytes."""
+        told = min(begin + size, len(self.data))
+        end = begin
+        for kind, flags, payload in units(self.data[begin:told]):
+            end += UNIT_HEADER.size + len(payload)
+        fills = end == begin + size
+        if told < begin + size and self.breaks_off(end, begin + size):
+            end = told
+        inner = self.find_access_unit(begin)
+        if not begin <= inner < end:
+            return end
+        behind = end == len(self.data) or self.find_access_unit(end) == end
+        return end if fills and behind else inner
+
+    def breaks_off(self, position: int, limit: int) -> bool:
+        """Whether the file ends in a unit that could have been sound."""
+        if position + UNIT_HEADER.size > len(self.data):
+            return position + UNIT_HEADER.size <= limit
+        kind, _, size = UNIT_HEADER.unpack_from(self.data, position)
+        return kind >> 4 == VERSION and UNIT_HEADER.size <= size <= limit - position
 
     def find_access_unit(self, position: int) -> int:
         """Where the next start code with a sound access-unit unit is; -1: nowhere."""

@@ -1,7 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <rangecast/scene/scene.hpp> // before check's macro fail(), which <memory> does not survive
+
 #include "rangecast-check.hpp"
 
 #include <glib/gstdio.h>
+#include <gst/video/gstvideopool.h>
+#include <gst/video/video.h>
+
+#include <cstring>
+#include <gstrange/gstrangebufferpool.h>
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -191,6 +198,317 @@ GST_START_TEST (test_caps_change_mid_stream_changes_the_size)
 }
 GST_END_TEST;
 
+/* ---- the same picture everywhere ---- */
+
+/* The n-th picture (from 0) of a source with that frame rate and seed. */
+static GstBuffer *
+nth_picture (int n, int frames_per_second, guint seed)
+{
+  gchar *caps = g_strdup_printf (
+      "video/x-raw,format=RGBx,width=64,height=48,framerate=%d/1", frames_per_second);
+  GstHarness *h = source_harness ("left", caps);
+  g_free (caps);
+  g_object_set (h->element, "num-buffers", n + 1, "seed", seed, nullptr);
+  gst_harness_play (h);
+  GstBuffer *buffer = gst_harness_pull (h);
+  for (int i = 0; i < n; i++) {
+    gst_buffer_unref (buffer);
+    buffer = gst_harness_pull (h);
+  }
+  gst_harness_teardown (h);
+  return buffer;
+}
+
+static std::string
+bytes_of (GstBuffer *buffer)
+{
+  std::string bytes (gst_buffer_get_size (buffer), 0);
+  gst_buffer_extract (buffer, 0, bytes.data (), bytes.size ());
+  return bytes;
+}
+
+static std::string
+take_bytes (GstBuffer *buffer)
+{
+  std::string bytes = bytes_of (buffer);
+  gst_buffer_unref (buffer);
+  return bytes;
+}
+
+GST_START_TEST (test_same_seed_and_capture_time_give_the_same_picture)
+{
+  const std::string picture = take_bytes (nth_picture (4, 10, 7));
+  fail_unless (take_bytes (nth_picture (2, 5, 7)) == picture, "0.4 s, whatever came before");
+  fail_if (take_bytes (nth_picture (2, 5, 8)) == picture, "another seed");
+  fail_if (take_bytes (nth_picture (1, 5, 7)) == picture, "another time");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_camera_pad_gives_its_own_cameras_picture)
+{
+  SceneSettings settings;
+  settings.width = 64;
+  settings.height = 48;
+  std::unique_ptr<Scene> scene;
+  fail_unless (Scene::create (settings, scene).ok ());
+  const char *pads[] = {"left", "right", "third"};
+  for (int i = 0; i < 3; i++) {
+    GstHarness *h = source_harness (pads[i], "video/x-raw,format=RGBx,width=64,height=48");
+    g_object_set (h->element, "num-buffers", 1, nullptr);
+    gst_harness_play (h);
+    std::string expected (64 * 48 * 4, 0);
+    const ImageView<Rgbx> view{reinterpret_cast<Rgbx *> (expected.data ()), 64, 48, 64 * 4};
+    fail_unless (scene->render (0, static_cast<SceneCamera> (i), 0, false, view, {}, {}).ok ());
+    fail_unless (take_bytes (gst_harness_pull (h)) == expected, "%s", pads[i]);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* ---- downstream's memory ---- */
+
+static GstPadProbeReturn
+offer_pool (GstPad *, GstPadProbeInfo *info, gpointer pool)
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) != GST_QUERY_ALLOCATION)
+    return GST_PAD_PROBE_OK;
+  gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
+  gst_query_add_allocation_pool (query, GST_BUFFER_POOL (pool), 0, 0, 0);
+  return GST_PAD_PROBE_HANDLED;
+}
+
+static GstHarness *
+harness_with_pool (const char *pad, const char *caps, GstBufferPool *pool)
+{
+  GstHarness *h = source_harness (pad, caps);
+  g_object_set (h->element, "num-buffers", 1, nullptr);
+  gst_pad_add_probe (h->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM, offer_pool, pool, nullptr);
+  gst_harness_play (h);
+  return h;
+}
+
+/* A pool of pictures with room beside and above them. */
+static GstBufferPool *
+make_padded_pool (const char *caps_text)
+{
+  GstBufferPool *pool = gst_video_buffer_pool_new ();
+  GstCaps *caps = gst_caps_from_string (caps_text);
+  GstVideoInfo video;
+  fail_unless (gst_video_info_from_caps (&video, caps));
+  GstVideoAlignment padding;
+  gst_video_alignment_reset (&padding);
+  padding.padding_left = 16;
+  padding.padding_right = 32;
+  padding.padding_top = 2;
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  gst_buffer_pool_config_set_params (config, caps, GST_VIDEO_INFO_SIZE (&video), 0, 0);
+  gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_ALIGNMENT);
+  gst_buffer_pool_config_set_video_alignment (config, &padding);
+  fail_unless (gst_buffer_pool_set_config (pool, config));
+  gst_caps_unref (caps);
+  return pool;
+}
+
+GST_START_TEST (test_padded_strides_of_downstreams_pool_are_kept_to)
+{
+  for (const char *format : {"RGBx", "RGB", "GRAY8"}) {
+    const std::string caps =
+        "video/x-raw,framerate=(fraction)30/1,width=50,height=40,format=" + std::string (format);
+    GstBufferPool *pool = make_padded_pool (caps.c_str ());
+    GstHarness *padded = harness_with_pool ("left", caps.c_str (), pool);
+    GstHarness *plain = source_harness ("left", caps.c_str ());
+    gst_harness_play (plain);
+    GstBuffer *a = gst_harness_pull (padded), *b = gst_harness_pull (plain);
+    fail_unless (a->pool == pool);
+    GstVideoInfo video;
+    GstCaps *fixed = gst_caps_from_string (caps.c_str ());
+    gst_video_info_from_caps (&video, fixed);
+    GstVideoFrame x, y;
+    fail_unless (gst_video_frame_map (&x, &video, a, GST_MAP_READ));
+    fail_unless (gst_video_frame_map (&y, &video, b, GST_MAP_READ));
+    fail_unless (GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0) > GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0));
+    const auto bytes = static_cast<std::size_t> (50 * GST_VIDEO_FRAME_COMP_PSTRIDE (&x, 0));
+    for (int row = 0; row < 40; row++)
+      fail_unless (std::memcmp (static_cast<guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&x, 0)) +
+                                    row * GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0),
+                       static_cast<guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&y, 0)) +
+                           row * GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0),
+                       bytes) == 0,
+          "%s row %d", format, row);
+    gst_video_frame_unmap (&x);
+    gst_video_frame_unmap (&y);
+    gst_caps_unref (fixed);
+    gst_buffer_unref (a);
+    gst_buffer_unref (b);
+    gst_harness_teardown (padded);
+    gst_harness_teardown (plain);
+    gst_object_unref (pool);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_range_pool_of_downstream_is_used_and_others_are_not)
+{
+  const char *caps = "video/x-range,width=64,height=48";
+  GstBufferPool *range = gst_range_buffer_pool_new (), *video = gst_video_buffer_pool_new ();
+  for (GstBufferPool *pool : {range, video}) {
+    GstHarness *h = harness_with_pool ("src", caps, pool);
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless_equals_int (buffer->pool == pool, pool == range);
+    fail_unless_equals_int (gst_buffer_n_range_metas (buffer), 4);
+    gst_buffer_unref (buffer);
+    gst_harness_teardown (h);
+    gst_object_unref (pool);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstreams_alignment_is_kept_to)
+{
+  for (const char *pad : {"src", "left"}) {
+    GstHarness *h = gst_harness_new_with_padnames ("avatartestsrc", nullptr, pad);
+    GstAllocationParams params;
+    gst_allocation_params_init (&params);
+    params.align = 4095;
+    gst_harness_set_propose_allocator (h, nullptr, &params);
+    g_object_set (h->element, "num-buffers", 1, nullptr);
+    gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx; video/x-range");
+    gst_harness_play (h);
+    GstBuffer *buffer = gst_harness_pull (h);
+    GstMemory *memory = gst_buffer_peek_memory (buffer, 0);
+    GstMapInfo map;
+    fail_unless (gst_memory_map (memory, &map, GST_MAP_READ));
+    fail_unless_equals_int (GPOINTER_TO_SIZE (map.data) % 4096, 0);
+    gst_memory_unmap (memory, &map);
+    gst_buffer_unref (buffer);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* A pool that takes no settings at all. */
+typedef struct {
+  GstVideoBufferPool parent;
+} StubbornPool;
+typedef struct {
+  GstVideoBufferPoolClass parent;
+} StubbornPoolClass;
+static GType stubborn_pool_get_type ();
+G_DEFINE_TYPE (StubbornPool, stubborn_pool, GST_TYPE_VIDEO_BUFFER_POOL)
+
+static gboolean
+refuse_config (GstBufferPool *, GstStructure *)
+{
+  return FALSE;
+}
+
+static void
+stubborn_pool_init (StubbornPool *)
+{
+}
+
+static void
+stubborn_pool_class_init (StubbornPoolClass *klass)
+{
+  GST_BUFFER_POOL_CLASS (klass)->set_config = refuse_config;
+}
+
+GST_START_TEST (test_downstreams_pool_that_refuses_is_replaced)
+{
+  auto pool = GST_BUFFER_POOL (g_object_new (stubborn_pool_get_type (), nullptr));
+  gst_object_ref_sink (pool);
+  GstHarness *h = harness_with_pool ("left", "video/x-raw,format=RGBx", pool);
+  GstBuffer *buffer = gst_harness_pull (h);
+  fail_unless (buffer && buffer->pool && buffer->pool != pool);
+  gst_buffer_unref (buffer);
+  gst_harness_teardown (h);
+  gst_object_unref (pool);
+}
+GST_END_TEST;
+
+/* ---- other ways to go wrong ---- */
+
+GST_START_TEST (test_file_that_is_no_model_is_one_error_that_names_it)
+{
+  gchar *path = g_build_filename (g_get_tmp_dir (), "rangecast-no-model.glb", nullptr);
+  fail_unless (g_file_set_contents (path, "no model", -1, nullptr));
+  gchar *line = g_strdup_printf ("avatartestsrc location=%s name=s ! fakesink async=false "
+                                 "s.left ! fakesink async=false",
+      path);
+  GstElement *pipeline = gst_parse_launch (line, nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find (path) != std::string::npos);
+  gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr, "a second error");
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+  g_remove (path);
+  g_free (line);
+  g_free (path);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capsfilters_change_changes_all_pads_at_one_frame)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc name=s num-buffers=400 s.left ! capsfilter name=f "
+                        "caps=video/x-raw,format=RGBx,width=64,height=48 ! queue "
+                        "max-size-buffers=2 ! appsink name=a max-buffers=1 sync=false "
+                        "s.right ! video/x-raw,format=RGBx ! queue ! appsink name=b sync=false",
+          nullptr);
+  fail_unless (pipeline != nullptr);
+  GstElement *filter = gst_bin_get_by_name (GST_BIN (pipeline), "f");
+  GstElement *sinks[] = {
+      gst_bin_get_by_name (GST_BIN (pipeline), "a"), gst_bin_get_by_name (GST_BIN (pipeline), "b")};
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstClockTime changed[2] = {GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE};
+  for (int i = 0; i < 400 && (i < 3 || changed[0] == GST_CLOCK_TIME_NONE); i++) {
+    if (i == 2) {
+      GstCaps *caps = gst_caps_from_string ("video/x-raw,format=RGBx,width=32,height=24");
+      g_object_set (filter, "caps", caps, nullptr);
+      gst_caps_unref (caps);
+    }
+    for (int k = 0; k < 2; k++) {
+      GstSample *sample = nullptr;
+      g_signal_emit_by_name (sinks[k], "pull-sample", &sample);
+      fail_unless (sample != nullptr, "ended without the new size");
+      GstBuffer *buffer = gst_sample_get_buffer (sample);
+      if (gst_buffer_get_size (buffer) == 32 * 24 * 4)
+        changed[k] = MIN (changed[k], GST_BUFFER_PTS (buffer));
+      gst_sample_unref (sample);
+    }
+  }
+  fail_unless (changed[0] != GST_CLOCK_TIME_NONE);
+  fail_unless_equals_uint64 (changed[0], changed[1]);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  for (GstElement *element : {filter, sinks[0], sinks[1], pipeline})
+    gst_object_unref (element);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_second_run_begins_as_the_first)
+{
+  GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
+  std::string first;
+  for (int run = 0; run < 2; run++) {
+    gst_harness_play (h);
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), 0);
+    if (run == 1)
+      fail_unless (bytes_of (buffer) == first);
+    first = take_bytes (buffer);
+    gst_element_set_state (h->element, GST_STATE_NULL);
+    while (GstBuffer *rest = gst_harness_try_pull (h))
+      gst_buffer_unref (rest);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 avatartestsrc_suite ()
 {
@@ -207,6 +525,15 @@ avatartestsrc_suite ()
   tcase_add_test (tc, test_live_frames_lie_on_multiples_of_the_frame_period);
   tcase_add_test (tc, test_rig_is_exported_with_the_size_of_the_caps);
   tcase_add_test (tc, test_caps_change_mid_stream_changes_the_size);
+  tcase_add_test (tc, test_same_seed_and_capture_time_give_the_same_picture);
+  tcase_add_test (tc, test_each_camera_pad_gives_its_own_cameras_picture);
+  tcase_add_test (tc, test_padded_strides_of_downstreams_pool_are_kept_to);
+  tcase_add_test (tc, test_range_pool_of_downstream_is_used_and_others_are_not);
+  tcase_add_test (tc, test_downstreams_alignment_is_kept_to);
+  tcase_add_test (tc, test_downstreams_pool_that_refuses_is_replaced);
+  tcase_add_test (tc, test_file_that_is_no_model_is_one_error_that_names_it);
+  tcase_add_test (tc, test_capsfilters_change_changes_all_pads_at_one_frame);
+  tcase_add_test (tc, test_second_run_begins_as_the_first);
   return suite;
 }
 

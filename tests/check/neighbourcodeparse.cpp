@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rangecast-check.hpp"
 
+#include <glib/gstdio.h>
 #include <gst/base/base.h>
 
+#include <algorithm>
+#include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
 using namespace rangecast;
@@ -12,13 +15,15 @@ static constexpr GstClockTime kFrame = GST_SECOND / 25;
 static constexpr const char *kStreamCaps =
     "application/x-neighbour-code,version=1,alignment=byte-stream";
 
-/* Ten coded frame sets as access units and as the byte stream that the parser makes of them. */
+/* Coded frame sets as access units and as the byte stream that the parser makes of them. */
 struct Recording {
-  Rig rig = ring_rig (2, 64, 48);
+  Rig rig;
   std::vector<GstBuffer *> access_units;
   std::vector<guint8> bytes;
+  std::vector<gsize> offsets; /* of the access units in the bytes */
 
-  Recording ()
+  explicit Recording (int frames = 10, int width = 64, GstClockTime start = GST_SECOND)
+      : rig (ring_rig (2, width, width * 3 / 4))
   {
     GstHarness *encoder = gst_harness_new ("neighbourcodeenc");
     GstHarness *writer = gst_harness_new ("neighbourcodeparse");
@@ -26,12 +31,13 @@ struct Recording {
     gst_harness_set_src_caps (encoder, gstrange::make_range_caps (info));
     gst_harness_set_sink_caps_str (writer, kStreamCaps);
     gst_harness_set_src_caps (writer, gstrange::make_neighbour_code_caps (info, "access-unit"));
-    for (int i = 0; i < 10; i++) {
+    for (int i = 0; i < frames; i++) {
       GstBuffer *coded =
-          gst_harness_push_and_pull (encoder, make_frame_set (rig, GST_SECOND + i * kFrame));
+          gst_harness_push_and_pull (encoder, make_frame_set (rig, start + i * kFrame));
       access_units.push_back (gst_buffer_ref (coded));
       GstBuffer *written = gst_harness_push_and_pull (writer, coded);
       const std::size_t begin = bytes.size ();
+      offsets.push_back (begin);
       bytes.resize (begin + gst_buffer_get_size (written));
       gst_buffer_extract (written, 0, bytes.data () + begin, bytes.size () - begin);
       gst_buffer_unref (written);
@@ -39,6 +45,7 @@ struct Recording {
     gst_harness_teardown (encoder);
     gst_harness_teardown (writer);
   }
+  Recording (const Recording &) = delete;
   ~Recording ()
   {
     for (GstBuffer *buffer : access_units)
@@ -46,22 +53,43 @@ struct Recording {
   }
 };
 
-/* What the parser gives for a file of these bytes, read in pieces. */
-static std::vector<GstBuffer *>
-parse (const std::vector<guint8> &bytes, gsize piece)
+/* A parser that is fed as filesrc feeds it. */
+static GstHarness *
+new_parser ()
 {
   GstHarness *h = gst_harness_new ("neighbourcodeparse");
   gst_harness_set_src_caps_str (h, kStreamCaps);
-  GstSegment segment; /* as filesrc has it */
+  GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_BYTES);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
+  return h;
+}
+
+static void
+push_bytes (GstHarness *h, std::span<const guint8> bytes, gsize piece)
+{
   for (gsize at = 0; at < bytes.size (); at += piece)
     gst_harness_push (
         h, gst_buffer_new_memdup (bytes.data () + at, std::min (piece, bytes.size () - at)));
-  gst_harness_push_event (h, gst_event_new_eos ());
+}
+
+static std::vector<GstBuffer *>
+pull_all (GstHarness *h)
+{
   std::vector<GstBuffer *> parsed;
   while (GstBuffer *buffer = gst_harness_try_pull (h))
     parsed.push_back (buffer);
+  return parsed;
+}
+
+/* What the parser gives for a file of these bytes, read in pieces. */
+static std::vector<GstBuffer *>
+parse (std::span<const guint8> bytes, gsize piece)
+{
+  GstHarness *h = new_parser ();
+  push_bytes (h, bytes, piece);
+  gst_harness_push_event (h, gst_event_new_eos ());
+  const auto parsed = pull_all (h);
   gst_harness_teardown (h);
   return parsed;
 }
@@ -116,13 +144,33 @@ GST_START_TEST (test_rubbish_before_and_between_costs_nothing_else)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_every_cut_keeps_the_whole_access_units_before_it)
+GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_it)
+{
+  const Recording recording (3, 8);
+  const auto &ends = recording.offsets;
+  for (gsize size = 0; size < recording.bytes.size (); size++) {
+    /* exact: reading on would be seen */
+    const std::vector<guint8> cut (recording.bytes.begin (), recording.bytes.begin () + size);
+    const auto parsed = parse (cut, G_MAXINT);
+    const auto whole = gsize (size >= ends[1]) + gsize (size >= ends[2]);
+    fail_unless (parsed.size () >= whole && parsed.size () <= whole + 1);
+    for (gsize i = 0; i < whole; i++)
+      fail_unless (same_bytes (parsed[i], recording.access_units[i]));
+    unref_all (parsed);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_trailing_bytes_cost_nothing)
 {
   const Recording recording;
-  for (gsize size = 50; size < recording.bytes.size (); size += 997) {
-    const std::vector<guint8> cut (recording.bytes.begin (), recording.bytes.begin () + size);
-    const auto parsed = parse (cut, 100000);
-    fail_unless (parsed.size () + 1 >= size * 10 / recording.bytes.size ());
+  for (gsize extra : {1, 3, 4, 27, 28, 1000}) {
+    auto bytes = recording.bytes;
+    for (gsize i = 0; i < extra; i++) /* the beginning of one more access unit, for the first */
+      bytes.push_back (i < 4 ? kStartCode[i] : 0x77);
+    const auto parsed = parse (bytes, 5000);
+    fail_unless_equals_int (parsed.size (), 10);
+    fail_unless (same_bytes (parsed[9], recording.access_units[9]));
     unref_all (parsed);
   }
 }
@@ -137,6 +185,723 @@ GST_START_TEST (test_size_field_that_lies_costs_no_later_access_unit)
   fail_unless_equals_int (parsed.size (), 10);
   fail_unless (same_bytes (parsed[1], recording.access_units[1]));
   unref_all (parsed);
+}
+GST_END_TEST;
+
+/* Whether all later access units came as they were, whatever became of the first `damaged`. */
+static bool
+ends_with (const std::vector<GstBuffer *> &parsed, const Recording &recording, gsize damaged)
+{
+  const gsize sound = recording.access_units.size () - damaged;
+  if (parsed.size () < sound || parsed.size () > recording.access_units.size ())
+    return false;
+  for (gsize i = 0; i < sound; i++)
+    if (!same_bytes (parsed[parsed.size () - sound + i], recording.access_units[damaged + i]))
+      return false;
+  return true;
+}
+
+GST_START_TEST (test_every_flipped_bit_costs_its_own_access_unit_only)
+{
+  const Recording recording (4, 8);
+  for (gsize bit = 8 * recording.offsets[1]; bit < 8 * recording.offsets[2]; bit++) {
+    auto bytes = recording.bytes;
+    bytes[bit / 8] ^= guint8 (1 << bit % 8);
+    const auto parsed = parse (bytes, G_MAXINT);
+    fail_unless (ends_with (parsed, recording, 2), "bit %" G_GSIZE_FORMAT, bit);
+    fail_unless (same_bytes (parsed[0], recording.access_units[0]));
+    unref_all (parsed);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_lost_bytes_cost_their_own_access_unit_only)
+{
+  const Recording recording (4, 16);
+  for (gsize lost : {1, 5, 28, 200})
+    for (gsize at = recording.offsets[2] - lost; at > recording.offsets[1]; at -= lost) {
+      auto bytes = recording.bytes;
+      bytes.erase (bytes.begin () + at, bytes.begin () + at + lost);
+      const auto parsed = parse (bytes, G_MAXINT);
+      fail_unless (ends_with (parsed, recording, 2), "%d lost at %d", int (lost), int (at));
+      unref_all (parsed);
+      if (at < lost)
+        break;
+    }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damage_is_told_by_discont)
+{
+  const Recording recording;
+  auto bytes = recording.bytes;
+  bytes[recording.offsets[4]] ^= 1;
+  const auto parsed = parse (bytes, 5000);
+  fail_unless_equals_int (parsed.size (), 9);
+  for (gsize i = 0; i < 9; i++)
+    fail_unless_equals_int (GST_BUFFER_IS_DISCONT (parsed[i]), i == 0 || i == 4);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_lost_header_of_a_long_access_unit_is_no_error)
+{
+  const Recording recording;
+  std::vector<guint8> bytes (recording.bytes);
+  bytes.insert (bytes.end (), 5 << 20, 0x55); /* the base class would give up after 2 MiB */
+  bytes.insert (bytes.end (), recording.bytes.begin (), recording.bytes.end ());
+  const auto parsed = parse (bytes, 100000);
+  fail_unless_equals_int (parsed.size (), 20);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+/* An access unit of units of an unknown type, ahead of its own slices. */
+static std::vector<guint8>
+pad_first_access_unit (const Recording &recording, std::vector<guint8> padding)
+{
+  AccessUnitHeader header;
+  const auto &bytes = recording.bytes;
+  fail_unless (read_access_unit_header ({&bytes[4], 24}, header).ok ());
+  header.size += guint32 (padding.size ());
+  std::vector<guint8> padded (bytes.begin (), bytes.begin () + 28);
+  write_access_unit_header (header, &padded[4]);
+  padded.insert (padded.end (), padding.begin (), padding.end ());
+  padded.insert (padded.end (), bytes.begin () + 28, bytes.end ());
+  return padded;
+}
+
+static std::vector<guint8>
+unknown_unit (const std::vector<guint8> &content)
+{
+  const gsize size = content.size () + 4;
+  std::vector<guint8> unit = {0x19, 0, guint8 (size & 255), guint8 (size >> 8)};
+  unit.insert (unit.end (), content.begin (), content.end ());
+  return unit;
+}
+
+GST_START_TEST (test_start_code_inside_a_unit_does_not_end_the_access_unit)
+{
+  const Recording recording;
+  std::vector<guint8> inner (recording.bytes.begin (), recording.bytes.begin () + 200);
+  const auto bytes = pad_first_access_unit (recording, unknown_unit (inner));
+  for (gsize piece : {100, 5000, G_MAXINT}) {
+    const auto parsed = parse (bytes, piece);
+    fail_unless_equals_int (parsed.size (), 10);
+    const gsize size = gst_buffer_get_size (recording.access_units[0]);
+    fail_unless_equals_int (gst_buffer_get_size (parsed[0]), size + 204);
+    fail_unless (same_bytes (parsed[9], recording.access_units[9]));
+    unref_all (parsed);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_longest_access_unit_in_small_pieces_takes_linear_time)
+{
+  const Recording recording;
+  std::vector<guint8> padding;
+  const auto unit = unknown_unit (std::vector<guint8> (8000, 0));
+  while (padding.size () + unit.size () < (31 << 20))
+    padding.insert (padding.end (), unit.begin (), unit.end ());
+  const auto bytes = pad_first_access_unit (recording, padding);
+  const gint64 begin = g_get_monotonic_time ();
+  const auto parsed = parse (bytes, 4096);
+  fail_unless_equals_int (parsed.size (), 10);
+  unref_all (parsed);
+  /* Looking at it all again with each piece would copy 120 GB. */
+  fail_unless (g_get_monotonic_time () - begin < 15 * G_USEC_PER_SEC);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_size_that_lies_delays_nothing)
+{
+  const Recording recording;
+  auto bytes = recording.bytes;
+  bytes[4 + 4 + 3] = 0x01; /* 16 MiB */
+  GstHarness *h = new_parser ();
+  push_bytes (h, {bytes.data (), recording.offsets[1]}, 500);
+  for (int i = 0; i < 20; i++) /* 64 KiB are asked for at first, and all is shorter than that */
+    push_bytes (
+        h, {bytes.data () + recording.offsets[1], bytes.size () - recording.offsets[1]}, 500);
+  fail_unless (gst_harness_buffers_received (h) >= 100);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_unit_goes_on_as_soon_as_it_is_whole)
+{
+  const Recording recording;
+  GstHarness *h = new_parser ();
+  for (gsize i = 0; i < 9; i++) {
+    const gsize begin = recording.offsets[i], end = recording.offsets[i + 1];
+    push_bytes (h, {recording.bytes.data () + begin, end - begin}, 1000);
+    fail_unless_equals_int (gst_harness_buffers_received (h), i + 1);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_units_share_the_memory_of_the_input)
+{
+  const Recording recording;
+  GstHarness *h = new_parser ();
+  GstBuffer *input = gst_buffer_new_memdup (recording.bytes.data (), recording.bytes.size ());
+  GstMemory *memory = gst_buffer_get_memory (input, 0);
+  gst_harness_push (h, input);
+  const auto parsed = pull_all (h);
+  fail_unless_equals_int (parsed.size (), 10);
+  for (GstBuffer *buffer : parsed) {
+    fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
+    fail_unless (gst_buffer_peek_memory (buffer, 0)->parent == memory);
+  }
+  unref_all (parsed);
+  gst_memory_unref (memory);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Only every fifth access unit says that it decodes without the ones before. */
+static std::vector<guint8>
+with_delta_units (const Recording &recording)
+{
+  auto bytes = recording.bytes;
+  for (gsize i = 0; i < recording.offsets.size (); i++)
+    if (i % 5)
+      bytes[recording.offsets[i] + 4 + 1] = 0;
+  return bytes;
+}
+
+GST_START_TEST (test_delta_unit_is_set_where_the_header_says_no_key)
+{
+  const Recording recording;
+  const auto parsed = parse (with_delta_units (recording), 5000);
+  fail_unless_equals_int (parsed.size (), 10);
+  for (gsize i = 0; i < 10; i++)
+    fail_unless_equals_int (
+        GST_BUFFER_FLAG_IS_SET (parsed[i], GST_BUFFER_FLAG_DELTA_UNIT), i % 5 != 0);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_written_header_is_key_only_if_all_slices_are)
+{
+  const Recording recording;
+  for (guint8 key : {0, 1}) {
+    GstHarness *h = gst_harness_new ("neighbourcodeparse");
+    gst_harness_set_sink_caps_str (h, kStreamCaps);
+    gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
+                                     gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+    GstBuffer *coded = gst_buffer_copy_deep (recording.access_units[0]);
+    gst_buffer_memset (coded, 1, key, 1); /* the flags of its first slice */
+    GstBuffer *written = gst_harness_push_and_pull (h, coded);
+    guint8 flags = 7;
+    gst_buffer_extract (written, 4 + 1, &flags, 1);
+    fail_unless_equals_int (flags, key);
+    fail_unless_equals_int (GST_BUFFER_FLAG_IS_SET (written, GST_BUFFER_FLAG_DELTA_UNIT), !key);
+    gst_buffer_unref (written);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_that_changes_gives_new_caps)
+{
+  const Recording first (10, 64), second (10, 32);
+  auto bytes = first.bytes;
+  bytes.insert (bytes.end (), second.bytes.begin (), second.bytes.end ());
+  GstHarness *h = new_parser ();
+  push_bytes (h, bytes, 5000);
+  int widths[2] = {}, caps_events = 0;
+  while (GstEvent *event = gst_harness_try_pull_event (h)) {
+    GstCaps *caps = nullptr;
+    if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS && caps_events < 2) {
+      gst_event_parse_caps (event, &caps);
+      gst_structure_get_int (gst_caps_get_structure (caps, 0), "width", &widths[caps_events++]);
+    }
+    gst_event_unref (event);
+  }
+  fail_unless_equals_int (caps_events, 2);
+  fail_unless_equals_int (widths[0], 64);
+  fail_unless_equals_int (widths[1], 32);
+  fail_unless_equals_int (gst_harness_buffers_received (h), 20);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_forgets_what_was_half_there)
+{
+  const Recording recording;
+  GstHarness *h = new_parser ();
+  auto lying = recording.bytes;
+  lying[4 + 4 + 3] = 0x01;
+  push_bytes (h, {lying.data (), recording.offsets[1] - 10}, 500);
+  gst_harness_push_event (h, gst_event_new_flush_start ());
+  gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_BYTES);
+  gst_harness_push_event (h, gst_event_new_segment (&segment));
+  push_bytes (h, {recording.bytes.data (), recording.offsets[1]}, 500);
+  const auto parsed = pull_all (h);
+  fail_unless_equals_int (parsed.size (), 1);
+  fail_unless (same_bytes (parsed[0], recording.access_units[0]));
+  unref_all (parsed);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* A file that is gone with its scope. */
+struct TemporaryFile {
+  std::string path;
+
+  explicit TemporaryFile (std::span<const guint8> bytes)
+  {
+    gchar *name = nullptr;
+    const gint fd = g_file_open_tmp ("neighbourcodeparse-XXXXXX", &name, nullptr);
+    fail_unless (fd >= 0);
+    g_close (fd, nullptr);
+    path = name;
+    g_free (name);
+    fail_unless (g_file_set_contents (
+        path.c_str (), reinterpret_cast<const gchar *> (bytes.data ()), bytes.size (), nullptr));
+  }
+  TemporaryFile (const TemporaryFile &) = delete;
+  ~TemporaryFile () { g_unlink (path.c_str ()); }
+};
+
+/* filesrc ! between ! neighbourcodeparse ! fakesink, paused on its first buffer. */
+struct Player {
+  GstElement *pipeline, *sink;
+  std::vector<GstClockTime> seen; /* times of what reached the sink since the last seek */
+  std::vector<int> widths;        /* caps that reached it */
+
+  explicit Player (const TemporaryFile &file, const char *between = "")
+  {
+    const std::string line = "filesrc name=file ! " + std::string (between) +
+                             " neighbourcodeparse ! fakesink name=sink sync=false";
+    pipeline = gst_parse_launch (line.c_str (), nullptr);
+    GstElement *source = gst_bin_get_by_name (GST_BIN (pipeline), "file");
+    g_object_set (source, "location", file.path.c_str (), nullptr);
+    gst_object_unref (source);
+    sink = gst_bin_get_by_name (GST_BIN (pipeline), "sink");
+    GstPad *pad = gst_element_get_static_pad (sink, "sink");
+    gst_pad_add_probe (pad,
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM), &note,
+        this, nullptr);
+    gst_object_unref (pad);
+    gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  }
+  Player (const Player &) = delete;
+  ~Player ()
+  {
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (sink);
+    gst_object_unref (pipeline);
+  }
+
+  static GstPadProbeReturn note (GstPad *, GstPadProbeInfo *info, gpointer data)
+  {
+    auto self = static_cast<Player *> (data);
+    if (info->type & GST_PAD_PROBE_TYPE_BUFFER) {
+      self->seen.push_back (GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)));
+      return GST_PAD_PROBE_OK;
+    }
+    GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+    GstCaps *caps = nullptr;
+    int width = 0;
+    if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+      gst_event_parse_caps (event, &caps);
+      gst_structure_get_int (gst_caps_get_structure (caps, 0), "width", &width);
+      self->widths.push_back (width);
+    }
+    return GST_PAD_PROBE_OK;
+  }
+
+  bool wait ()
+  {
+    return gst_element_get_state (pipeline, nullptr, nullptr, 10 * GST_SECOND) ==
+           GST_STATE_CHANGE_SUCCESS;
+  }
+  bool seek (GstClockTime time, int flags)
+  {
+    if (!wait ())
+      return false;
+    seen.clear ();
+    return gst_element_seek_simple (pipeline, GST_FORMAT_TIME,
+               GstSeekFlags (GST_SEEK_FLAG_FLUSH | flags), gint64 (time)) &&
+           wait ();
+  }
+  /* The buffer that the sink is paused on. */
+  GstClockTime shown ()
+  {
+    GstSample *sample = nullptr;
+    g_object_get (sink, "last-sample", &sample, nullptr);
+    const GstClockTime pts =
+        sample ? GST_BUFFER_PTS (gst_sample_get_buffer (sample)) : GST_CLOCK_TIME_NONE;
+    if (sample)
+      gst_sample_unref (sample);
+    return pts;
+  }
+  gint64 position ()
+  {
+    gint64 value = -1;
+    gst_element_query_position (pipeline, GST_FORMAT_TIME, &value);
+    return value;
+  }
+  gint64 duration ()
+  {
+    gint64 value = -1;
+    gst_element_query_duration (pipeline, GST_FORMAT_TIME, &value);
+    return value;
+  }
+  /* Plays to the end; false if an error came. */
+  bool finish ()
+  {
+    gst_element_set_state (pipeline, GST_STATE_PLAYING);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    GstMessage *message = gst_bus_timed_pop_filtered (
+        bus, 30 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    const bool eos = message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS;
+    if (message)
+      gst_message_unref (message);
+    gst_object_unref (bus);
+    return eos;
+  }
+};
+
+GST_START_TEST (test_file_tells_its_duration_before_it_plays)
+{
+  const Recording recording (50, 16);
+  const TemporaryFile file (recording.bytes);
+  Player player (file);
+  fail_unless (player.wait ());
+  fail_unless_equals_int64 (player.duration (), 50 * kFrame);
+  fail_unless_equals_int64 (player.position (), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_key_unit_seek_lands_on_the_key_access_unit_at_or_before)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file);
+  for (GstClockTime frame : {17, 3, 10, 4, 19, 0}) {
+    fail_unless (player.seek (frame * kFrame + kFrame / 2, GST_SEEK_FLAG_KEY_UNIT));
+    const GstClockTime key = frame / 5 * 5 * kFrame;
+    fail_unless_equals_uint64 (player.seen[0], key);
+    fail_unless_equals_uint64 (player.shown (), key);
+    fail_unless_equals_int64 (player.position (), key);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_can_snap_to_the_key_access_unit_after_or_nearest)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file);
+  const int after = GST_SEEK_FLAG_KEY_UNIT | GST_SEEK_FLAG_SNAP_AFTER;
+  const int nearest = GST_SEEK_FLAG_KEY_UNIT | GST_SEEK_FLAG_SNAP_NEAREST;
+  fail_unless (player.seek (6 * kFrame, after));
+  fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+  fail_unless (player.seek (6 * kFrame, nearest));
+  fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
+  fail_unless (player.seek (9 * kFrame, nearest));
+  fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file);
+  for (GstClockTime frame : {18, 2, 9, 5}) {
+    const GstClockTime time = frame * kFrame + kFrame / 4;
+    fail_unless (player.seek (time, GST_SEEK_FLAG_ACCURATE));
+    fail_unless_equals_uint64 (player.seen[0], frame / 5 * 5 * kFrame);
+    fail_unless_equals_uint64 (player.shown (), frame * kFrame);
+    fail_unless_equals_int64 (player.position (), time);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_in_a_long_file_finds_its_place_by_bisection)
+{
+  const Recording recording (250, 64);
+  fail_unless (recording.bytes.size () > 1000000);
+  const TemporaryFile file (recording.bytes);
+  Player player (file);
+  for (GstClockTime frame : {249, 1, 125, 200, 51, 248}) {
+    fail_unless (player.seek (frame * kFrame + 1, GST_SEEK_FLAG_KEY_UNIT));
+    fail_unless_equals_uint64 (player.seen[0], frame * kFrame);
+  }
+  fail_unless (player.finish ());
+  fail_unless_equals_int (player.seen.size (), 2);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_beyond_the_end_ends)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (recording.bytes);
+  Player player (file);
+  fail_unless (player.wait ());
+  gst_element_seek_simple (player.pipeline, GST_FORMAT_TIME,
+      GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE), 100 * GST_SECOND);
+  fail_unless (player.finish ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_finds_its_place_in_spite_of_damage)
+{
+  const Recording recording (250, 64);
+  auto bytes = recording.bytes;
+  for (gsize i = 60; i < 70; i++)
+    bytes[recording.offsets[i]] ^= 0x10;
+  for (gsize i = 170; i < 180; i++)
+    bytes[recording.offsets[i] + 4 + 4 + 2] ^= 0x80; /* sizes that lie by 8 MiB */
+  const TemporaryFile file (bytes);
+  Player player (file);
+  for (GstClockTime frame : {200, 100, 175, 20}) {
+    fail_unless (player.seek (frame * kFrame + 1, GST_SEEK_FLAG_KEY_UNIT));
+    fail_unless_equals_uint64 (player.seen[0], frame * kFrame);
+  }
+  fail_unless (player.seek (65 * kFrame, GST_SEEK_FLAG_KEY_UNIT));
+  fail_unless_equals_uint64 (player.seen[0], 59 * kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_uses_the_rig_of_the_place)
+{
+  const Recording first (40, 64), second (40, 32, GST_SECOND + 40 * kFrame);
+  auto bytes = first.bytes;
+  bytes.insert (bytes.end (), second.bytes.begin (), second.bytes.end ());
+  const TemporaryFile file (bytes);
+  Player player (file);
+  fail_unless (player.seek (50 * kFrame, GST_SEEK_FLAG_KEY_UNIT)); /* which has no rig itself */
+  fail_unless_equals_uint64 (player.shown (), 50 * kFrame);
+  fail_unless_equals_int (player.widths.back (), 32);
+  fail_unless (player.seek (10 * kFrame, GST_SEEK_FLAG_KEY_UNIT));
+  fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+  fail_unless_equals_int (player.widths.back (), 64);
+}
+GST_END_TEST;
+
+/* Without presentation times in the headers. */
+static std::vector<guint8>
+without_times (const Recording &recording)
+{
+  auto bytes = recording.bytes;
+  for (gsize offset : recording.offsets)
+    std::fill_n (bytes.begin () + std::ptrdiff_t (offset) + 4 + 8, 8, guint8{0xff});
+  return bytes;
+}
+
+GST_START_TEST (test_times_that_are_missing_are_counted)
+{
+  const Recording recording;
+  const auto parsed = parse (without_times (recording), 5000);
+  fail_unless_equals_int (parsed.size (), 10);
+  for (gsize i = 0; i < 10; i++)
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (parsed[i]), i * kFrame);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_times_that_are_missing_are_right_after_a_seek)
+{
+  const Recording recording (50, 16);
+  const TemporaryFile file (without_times (recording));
+  Player player (file);
+  for (GstClockTime frame : {30, 7, 45}) {
+    fail_unless (player.seek (frame * kFrame + 1, GST_SEEK_FLAG_ACCURATE));
+    fail_unless_equals_uint64 (player.shown (), frame * kFrame);
+    fail_unless_equals_int64 (player.position (), frame * kFrame + 1);
+  }
+  fail_unless (player.finish ());
+  fail_unless_equals_uint64 (player.seen.back (), 49 * kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pushed_file_is_sought_by_time_too)
+{
+  const Recording recording (100, 64);
+  const TemporaryFile file (recording.bytes);
+  Player player (file, "queue !");
+  fail_unless (player.wait ());
+  for (GstClockTime frame : {40, 0}) {
+    fail_unless (player.seek (frame * kFrame, GST_SEEK_FLAG_ACCURATE));
+    fail_unless_equals_uint64 (player.shown (), frame * kFrame);
+  }
+  fail_unless (player.finish ());
+  fail_unless_equals_uint64 (player.seen.back (), 99 * kFrame);
+  fail_unless (ABS (player.duration () - gint64 (100 * kFrame)) < gint64 (10 * kFrame));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_reverse_playback_is_refused)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (recording.bytes);
+  Player player (file);
+  fail_unless (player.wait ());
+  fail_if (gst_element_seek (player.pipeline, -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+      GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, 10 * kFrame));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_file_plays_again_after_all_state_changes)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (recording.bytes);
+  Player player (file);
+  for (int i = 0; i < 2; i++) {
+    fail_unless (player.finish ());
+    fail_unless_equals_int (player.seen.size (), 20);
+    fail_unless_equals_uint64 (player.seen.back (), 19 * kFrame);
+    gst_element_set_state (player.pipeline, GST_STATE_READY);
+    gst_element_set_state (player.pipeline, GST_STATE_NULL);
+    player.seen.clear ();
+  }
+}
+GST_END_TEST;
+
+/* The errors that the parser posts for a file, in pull or in push mode. */
+static std::vector<std::string>
+errors_of (std::span<const guint8> bytes, const char *between)
+{
+  const TemporaryFile file (bytes);
+  Player player (file, between);
+  GstBus *bus = gst_element_get_bus (player.pipeline);
+  GstMessage *end = nullptr;
+  std::vector<std::string> texts;
+  player
+      .finish (); /* its first error, if any, is gone with it: so look at those of the next time */
+  gst_element_set_state (player.pipeline, GST_STATE_NULL);
+  gst_bus_set_flushing (bus, FALSE);
+  gst_element_set_state (player.pipeline, GST_STATE_PLAYING);
+  while ((end = gst_bus_timed_pop_filtered (bus, texts.empty () ? 5 * GST_SECOND : GST_SECOND / 5,
+              GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR)))) {
+    GError *error = nullptr;
+    if (GST_MESSAGE_TYPE (end) == GST_MESSAGE_ERROR &&
+        g_str_has_prefix (GST_MESSAGE_SRC_NAME (end), "neighbourcodeparse")) {
+      gst_message_parse_error (end, &error, nullptr);
+      fail_unless (error->domain == GST_STREAM_ERROR);
+      texts.emplace_back (error->message);
+      g_error_free (error);
+    }
+    const bool eos = GST_MESSAGE_TYPE (end) == GST_MESSAGE_EOS;
+    gst_message_unref (end);
+    if (eos)
+      break;
+  }
+  gst_object_unref (bus);
+  return texts;
+}
+
+static void
+expect_one_error (std::span<const guint8> bytes, const char *expected)
+{
+  for (const char *between : {"", "queue !"}) {
+    const auto texts = errors_of (bytes, between);
+    fail_unless_equals_int (texts.size (), 1);
+    fail_unless (texts[0].find (expected) != std::string::npos, "%s", texts[0].c_str ());
+  }
+}
+
+GST_START_TEST (test_empty_file_is_one_error)
+{
+  expect_one_error ({}, "start code 00 52 43 55");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_other_file_is_one_error)
+{
+  std::vector<guint8> noise (50000);
+  guint32 state = 1;
+  for (guint8 &byte : noise)
+    byte = guint8 ((state = state * 1664525 + 1013904223) >> 24);
+  expect_one_error (noise, "start code 00 52 43 55");
+  expect_one_error (std::vector<guint8> (3 << 20, 'x'), "start code 00 52 43 55");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_future_version_is_one_error)
+{
+  const Recording recording (2, 16);
+  auto bytes = recording.bytes;
+  for (gsize offset : recording.offsets)
+    bytes[offset + 4] = 0x23;
+  expect_one_error (bytes, "version 1");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_file_cut_before_its_first_slice_is_one_error)
+{
+  const Recording recording (1, 16);
+  expect_one_error ({recording.bytes.data (), 100}, "rig");
+  const auto rig = recording.bytes.size () - gst_buffer_get_size (recording.access_units[0]);
+  expect_one_error ({recording.bytes.data (), rig + 20}, "first whole slice");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_cut_file_that_plays_is_no_error)
+{
+  const Recording recording (3, 16);
+  const std::span<const guint8> bytes (recording.bytes);
+  for (const char *between : {"", "queue !"})
+    fail_unless (errors_of (bytes.first (bytes.size () - 50), between).empty ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstream_may_change_its_mind)
+{
+  const Recording recording;
+  GstHarness *h = new_parser ();
+  const std::span<const guint8> bytes (recording.bytes);
+  push_bytes (h, bytes.first (recording.offsets[5]), 5000);
+  unref_all (pull_all (h));
+  gst_harness_set_sink_caps_str (h, kStreamCaps);
+  push_bytes (h, bytes.subspan (recording.offsets[5]), 5000);
+  const auto parsed = pull_all (h);
+  fail_unless_equals_int (parsed.size (), 5);
+  for (GstBuffer *buffer : parsed)
+    fail_unless (gst_buffer_memcmp (buffer, 0, kStartCode.data (), kStartCode.size ()) == 0);
+  unref_all (parsed);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_units_pass_as_they_are)
+{
+  const Recording recording;
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
+                                   gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+  for (GstBuffer *coded : recording.access_units) {
+    GstBuffer *passed = gst_harness_push_and_pull (h, gst_buffer_ref (coded));
+    fail_unless (same_bytes (passed, coded));
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (passed), GST_BUFFER_PTS (coded));
+    fail_unless_equals_uint64 (
+        gst_range_buffer_get_capture_time (passed), gst_range_buffer_get_capture_time (coded));
+    gst_buffer_unref (passed);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
+{
+  const Recording recording (1, 8);
+  auto future = recording.bytes;
+  future[4] = 0x23;
+  for (const std::span<const guint8> bytes :
+      {std::span (recording.bytes).first (27), std::span<const guint8> (future)}) {
+    GstCaps *caps = gst_type_find_helper_for_data (nullptr, bytes.data (), bytes.size (), nullptr);
+    fail_if (caps && gst_structure_has_name (
+                         gst_caps_get_structure (caps, 0), "application/x-neighbour-code"));
+    gst_clear_caps (&caps);
+  }
 }
 GST_END_TEST;
 
@@ -162,8 +927,43 @@ neighbourcodeparse_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_what_is_written_reads_the_same_in_pieces_of_any_size);
   tcase_add_test (tc, test_rubbish_before_and_between_costs_nothing_else);
-  tcase_add_test (tc, test_every_cut_keeps_the_whole_access_units_before_it);
+  tcase_add_test (tc, test_every_truncated_prefix_keeps_the_whole_access_units_before_it);
+  tcase_add_test (tc, test_trailing_bytes_cost_nothing);
   tcase_add_test (tc, test_size_field_that_lies_costs_no_later_access_unit);
+  tcase_add_test (tc, test_every_flipped_bit_costs_its_own_access_unit_only);
+  tcase_add_test (tc, test_lost_bytes_cost_their_own_access_unit_only);
+  tcase_add_test (tc, test_damage_is_told_by_discont);
+  tcase_add_test (tc, test_lost_header_of_a_long_access_unit_is_no_error);
+  tcase_add_test (tc, test_start_code_inside_a_unit_does_not_end_the_access_unit);
+  tcase_add_test (tc, test_longest_access_unit_in_small_pieces_takes_linear_time);
+  tcase_add_test (tc, test_size_that_lies_delays_nothing);
+  tcase_add_test (tc, test_access_unit_goes_on_as_soon_as_it_is_whole);
+  tcase_add_test (tc, test_access_units_share_the_memory_of_the_input);
+  tcase_add_test (tc, test_delta_unit_is_set_where_the_header_says_no_key);
+  tcase_add_test (tc, test_written_header_is_key_only_if_all_slices_are);
+  tcase_add_test (tc, test_rig_that_changes_gives_new_caps);
+  tcase_add_test (tc, test_flush_forgets_what_was_half_there);
+  tcase_add_test (tc, test_file_tells_its_duration_before_it_plays);
+  tcase_add_test (tc, test_key_unit_seek_lands_on_the_key_access_unit_at_or_before);
+  tcase_add_test (tc, test_seek_can_snap_to_the_key_access_unit_after_or_nearest);
+  tcase_add_test (tc, test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time);
+  tcase_add_test (tc, test_seek_in_a_long_file_finds_its_place_by_bisection);
+  tcase_add_test (tc, test_seek_beyond_the_end_ends);
+  tcase_add_test (tc, test_seek_finds_its_place_in_spite_of_damage);
+  tcase_add_test (tc, test_seek_uses_the_rig_of_the_place);
+  tcase_add_test (tc, test_times_that_are_missing_are_counted);
+  tcase_add_test (tc, test_times_that_are_missing_are_right_after_a_seek);
+  tcase_add_test (tc, test_pushed_file_is_sought_by_time_too);
+  tcase_add_test (tc, test_reverse_playback_is_refused);
+  tcase_add_test (tc, test_file_plays_again_after_all_state_changes);
+  tcase_add_test (tc, test_empty_file_is_one_error);
+  tcase_add_test (tc, test_other_file_is_one_error);
+  tcase_add_test (tc, test_future_version_is_one_error);
+  tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
+  tcase_add_test (tc, test_cut_file_that_plays_is_no_error);
+  tcase_add_test (tc, test_downstream_may_change_its_mind);
+  tcase_add_test (tc, test_access_units_pass_as_they_are);
+  tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);
   return suite;
 }

@@ -9,6 +9,13 @@
 
 using namespace rangecast;
 using rangecast::testing::Image;
+namespace fs = std::filesystem;
+
+#ifdef RANGECAST_HAVE_ASSIMP
+#define RANGECAST_NEED_MODELS
+#else
+#define RANGECAST_NEED_MODELS GTEST_SKIP () << "built without assimp"
+#endif
 
 struct Picture {
   Image<Rgbx> colour{320, 240};
@@ -209,6 +216,125 @@ TEST (Scene, test_small_obj_is_fitted_and_drawn)
   ASSERT_TRUE (
       scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), depth.view (), {}).ok ());
   EXPECT_NEAR (depth.view ().at (160, 120), 8000, 40) << "a plane through the origin, 0.8 m away";
+}
+
+/* A folder with a square that faces view 0, as OBJ and as glTF, and a picture for it: red above,
+ * blue below. Each format's v runs its own way; the picture's top belongs to the square's. */
+class TexturedSquare {
+public:
+  TexturedSquare ()
+      : folder_ (fs::path (::testing::TempDir ()) / ("square-" + std::to_string (getpid ())))
+  {
+    fs::create_directories (folder_);
+    write_picture ("paint.ppm");
+  }
+  ~TexturedSquare () { fs::remove_all (folder_); }
+
+  [[nodiscard]] std::string path (const char *name) const { return (folder_ / name).string (); }
+
+  void write_picture (const char *name) const
+  {
+    std::ofstream (folder_ / name) << "P3 2 4 255 200 0 0 200 0 0 200 0 0 200 0 0 "
+                                      "0 0 200 0 0 200 0 0 200 0 0 200\n";
+  }
+
+  /** OBJ counts v from the picture's bottom. */
+  void write_obj (const char *picture) const
+  {
+    std::ofstream obj (folder_ / "square.obj");
+    if (*picture) {
+      std::ofstream (folder_ / "square.mtl") << "newmtl m\nKd 1 1 1\nmap_Kd " << picture << "\n";
+      obj << "mtllib square.mtl\nusemtl m\n";
+    }
+    obj << "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+           "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+  }
+
+  /** glTF counts v from the picture's top. */
+  void write_gltf (const std::string &picture) const
+  {
+    const float positions[] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+    const float places[] = {0, 1, 1, 1, 1, 0, 0, 0};
+    const std::uint16_t corners[] = {0, 1, 2, 0, 2, 3};
+    std::ofstream bin (folder_ / "square.bin", std::ios::binary);
+    bin.write (reinterpret_cast<const char *> (positions), sizeof positions);
+    bin.write (reinterpret_cast<const char *> (places), sizeof places);
+    bin.write (reinterpret_cast<const char *> (corners), sizeof corners);
+    const std::string material =
+        picture.empty () ? ""
+                         : R"("images":[{"uri":")" + picture +
+                               R"("}],"textures":[{"source":0}],"materials":[{)"
+                               R"("pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],)";
+    std::ofstream (folder_ / "square.gltf")
+        << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+        << material << R"("meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},)"
+        << R"("indices":2)" << (picture.empty () ? "" : R"(,"material":0)") << R"(}]}],)"
+        << R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3",)"
+           R"("min":[-1,-1,0],"max":[1,1,0]},)"
+           R"({"bufferView":1,"componentType":5126,"count":4,"type":"VEC2"},)"
+           R"({"bufferView":2,"componentType":5123,"count":6,"type":"SCALAR"}],)"
+           R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},)"
+           R"({"buffer":0,"byteOffset":48,"byteLength":32},)"
+           R"({"buffer":0,"byteOffset":80,"byteLength":12}],)"
+           R"("buffers":[{"uri":"square.bin","byteLength":92}]})";
+  }
+
+private:
+  fs::path folder_;
+};
+
+/* "red", "blue" or neither, in the upper and in the lower half of the square. */
+static std::string
+halves_of (const std::string &model, const std::string &texture = "", bool flip = false)
+{
+  SceneSettings settings;
+  settings.model = model;
+  settings.texture = texture;
+  settings.texture_flip = flip;
+  settings.motion = settings.noise_sigma = 0;
+  const auto scene = make_scene (settings);
+  Picture picture;
+  if (scene)
+    render (*scene, 0, SceneCamera::kLeft, 0, picture);
+  const auto name = [&] (int y) {
+    const Rgbx p = picture.colour.view ().at (160, y);
+    return p.r > 100 && p.b < 10 ? "red" : p.b > 100 && p.r < 10 ? "blue" : "neither";
+  };
+  return std::string (name (60)) + " over " + name (180);
+}
+
+TEST (Scene, test_texture_property_follows_the_v_of_either_format)
+{
+  RANGECAST_NEED_MODELS;
+  const TexturedSquare square;
+  square.write_obj ("");
+  square.write_gltf ("");
+  const std::string paint = square.path ("paint.ppm");
+  EXPECT_EQ (halves_of (square.path ("square.obj"), paint), "red over blue");
+  EXPECT_EQ (halves_of (square.path ("square.gltf"), paint), "red over blue");
+  EXPECT_EQ (halves_of (square.path ("square.gltf"), paint, true), "blue over red");
+}
+
+TEST (Scene, test_texture_that_the_material_names_stands_upright)
+{
+  RANGECAST_NEED_MODELS;
+  const TexturedSquare square;
+  square.write_obj ("paint.ppm");
+  square.write_gltf ("paint.ppm");
+  EXPECT_EQ (halves_of (square.path ("square.obj")), "red over blue");
+  EXPECT_EQ (halves_of (square.path ("square.gltf")), "red over blue");
+}
+
+TEST (Scene, test_colour_map_beside_a_gltf_file_counts_v_from_its_bottom)
+{
+  RANGECAST_NEED_MODELS;
+  const TexturedSquare square;
+  square.write_obj ("");
+  square.write_gltf ("");
+  fs::rename (square.path ("paint.ppm"), square.path ("Map-COL.png")); /* read by its content */
+  EXPECT_EQ (halves_of (square.path ("square.obj")), "red over blue");
+  EXPECT_EQ (halves_of (square.path ("square.gltf")), "blue over red");
+  EXPECT_EQ (halves_of (square.path ("square.gltf"), "", true), "red over blue");
 }
 
 TEST (Scene, test_scanned_head_faces_the_first_view)

@@ -38,13 +38,20 @@ need_gl () {
 }
 need_data () { [ -e "$data/$1" ] || skip "no test data $1"; }
 
+# Each run has 250 UDP ports of its own, below those that the kernel gives away.
+ports=$((20000 + $$ % 48 * 250))
+
 file=$1
 source "$file"
 passed=0 failed=0 skipped=0
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do
   folder=$(mktemp -d)
-  (set -e; cd "$folder"; "$name") # not in a condition: bash would ignore the -e
+  set -m # a process group of its own, so that nothing of a test that failed goes on
+  (set -e; cd "$folder"; "$name") & # not in a condition: bash would ignore the -e
+  wait $!
   status=$?
+  kill -KILL -- -$! 2>/dev/null
+  set +m
   case $status in
     0) passed=$((passed + 1)); echo "ok $name" ;;
     77) skipped=$((skipped + 1)); echo "skip $name" ;;

@@ -34,7 +34,7 @@ END
 
 test_demo_renders_the_built_in_figure () {
   need_gl
-  "$pipelines/demo.sh" --frames 20 --fps 8 --size 160x120 --out demo --port 22000
+  "$pipelines/demo.sh" --frames 20 --fps 8 --size 160x120 --out demo --port $((ports + 0))
   check_report demo 20 4 0.95
   check_picture demo/avatar.png
 }
@@ -43,7 +43,7 @@ test_demo_renders_a_scanned_head () {
   need_gl
   need_data lps_head/LeePerrySmith.glb
   "$pipelines/demo.sh" --input "avatar=$data/lps_head/LeePerrySmith.glb" --views 2 --frames 10 --fps 8 \
-    --size 160x120 --out demo --port 22010
+    --size 160x120 --out demo --port $((ports + 10))
   check_report demo 10 2 1
   check_picture demo/avatar.png
 }
@@ -57,7 +57,7 @@ test_demo_plays_recorded_pairs () {
       s.left ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-left-%05d.png" \
       s.right ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-right-%05d.png"
   done
-  "$pipelines/demo.sh" --input pairs --fps 8 --frames 15 --out demo --port 22020
+  "$pipelines/demo.sh" --input pairs --fps 8 --frames 15 --out demo --port $((ports + 20))
   check_report demo 15 2 0.9
   check_picture demo/avatar.png
 }
@@ -73,9 +73,9 @@ test_demo_says_what_is_wrong () {
 test_demo_says_when_a_port_is_in_use () {
   need_gl
   python3 -c 'import socket, time
-s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 22031)); time.sleep(40)' &
+s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", '$((ports + 31))')); time.sleep(40)' &
   local blocker=$!
   sleep 1
-  expect_error "22031" "$pipelines/demo.sh" --views 2 --frames 5 --size 160x120 --out demo --port 22030
+  expect_error "$((ports + 31))" "$pipelines/demo.sh" --views 2 --frames 5 --size 160x120 --out demo --port $((ports + 30))
   kill "$blocker"
 }

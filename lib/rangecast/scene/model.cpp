@@ -33,7 +33,8 @@ add_mesh (const aiMesh &from, Mesh &mesh)
     MeshVertex vertex{p.x, p.y, p.z, 0, 0, 0, 0, 0, 0};
     if (from.HasTextureCoords (0)) {
       vertex.u = from.mTextureCoords[0][i].x;
-      vertex.v = 1 - from.mTextureCoords[0][i].y; /* assimp counts from the picture's bottom */
+      /* assimp counts from the picture's bottom, whatever the file does: it turns glTF's v. */
+      vertex.v = 1 - from.mTextureCoords[0][i].y;
     }
     mesh.vertices.push_back (vertex);
   }
@@ -100,16 +101,25 @@ take_picture_file (const std::string &path, Mesh &mesh)
   return take_picture (cv::imread (path, cv::IMREAD_COLOR), path, mesh);
 }
 
-/* A picture that the model does not name. glTF counts v from the top of a picture that it names, as
- * we do by now; pictures that come beside it are as a rule drawn for v from the bottom. */
-Status
-take_foreign_picture (const std::string &path, const std::string &model, Mesh &mesh)
+void
+turn_texture (Mesh &mesh)
 {
+  for (MeshVertex &vertex : mesh.vertices)
+    vertex.v = 1 - vertex.v;
+}
+
+/* A colour map that lies beside a glTF file which does not name it was as a rule drawn for the
+ * scan's first format, where v counts from the bottom; exporters carry v over as it is. */
+Status
+take_picture_beside (const std::string &model, Mesh &mesh)
+{
+  const std::string picture = colour_map_beside (model);
+  if (picture.empty ())
+    return {};
   const std::string type = lower_case (fs::path (model).extension ().string ());
   if (type == ".glb" || type == ".gltf")
-    for (MeshVertex &vertex : mesh.vertices)
-      vertex.v = 1 - vertex.v;
-  return take_picture_file (path, mesh);
+    turn_texture (mesh);
+  return take_picture_file (picture, mesh);
 }
 
 /* A picture inside the model's own file: compressed, or plain BGRA. */
@@ -134,7 +144,7 @@ take_texture (
     const aiScene &scene, const std::string &model, const std::string &texture, Mesh &mesh)
 {
   if (!texture.empty ())
-    return take_foreign_picture (texture, model, mesh);
+    return take_picture_file (texture, mesh);
   for (unsigned i = 0; i < scene.mNumMaterials; i++)
     for (aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
       aiString name;
@@ -144,14 +154,13 @@ take_texture (
         return take_embedded (*embedded, model, mesh);
       return take_picture_file ((fs::path (model).parent_path () / name.C_Str ()).string (), mesh);
     }
-  const std::string beside = colour_map_beside (model);
-  return beside.empty () ? Status{} : take_foreign_picture (beside, model, mesh);
+  return take_picture_beside (model, mesh);
 }
 
 } // namespace
 
 Status
-load_model (const std::string &path, const std::string &texture, Mesh &mesh)
+load_model (const std::string &path, const std::string &texture, bool flip, Mesh &mesh)
 {
   std::error_code error;
   if (!fs::is_regular_file (path, error))
@@ -173,6 +182,8 @@ load_model (const std::string &path, const std::string &texture, Mesh &mesh)
       return {StatusCode::kBadData, path + ": a model without triangles"};
     if (Status s = take_texture (*scene, path, texture, loaded); !s.ok ())
       return s;
+    if (flip)
+      turn_texture (loaded);
   } catch (const std::exception &) { /* OpenCV's decoders and allocations */
     return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
   }
@@ -189,7 +200,7 @@ load_model (const std::string &path, const std::string &texture, Mesh &mesh)
 namespace rangecast {
 
 Status
-load_model (const std::string &path, const std::string &, Mesh &)
+load_model (const std::string &path, const std::string &, bool, Mesh &)
 {
   return {StatusCode::kUnsupported,
       path + ": this build reads no models (built without assimp); expected no location"};

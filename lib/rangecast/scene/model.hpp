@@ -12,7 +12,8 @@ namespace rangecast {
  *  @param path     glTF (.glb, .gltf), OBJ or whatever else assimp reads
  *  @param texture  JPEG or PNG; empty: the one that the material names, else a picture beside the
  *                  model whose name says that it is a colour map, else plain skin
+ *  @param flip     turn the texture upside down, for a picture drawn for v the other way round
  *  @return kNotFound or kBadData naming the file; kUnsupported in a build without assimp */
-Status load_model (const std::string &path, const std::string &texture, Mesh &mesh);
+Status load_model (const std::string &path, const std::string &texture, bool flip, Mesh &mesh);
 
 } // namespace rangecast

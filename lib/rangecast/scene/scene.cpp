@@ -285,7 +285,8 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
   impl.settings = settings;
   if (settings.model.empty ())
     impl.figure = make_figure (settings.seed);
-  else if (Status status = load_model (settings.model, settings.texture, impl.figure);
+  else if (Status status =
+               load_model (settings.model, settings.texture, settings.texture_flip, impl.figure);
            !status.ok ())
     return status;
   impl.noise.fill (settings.noise_sigma, settings.seed);

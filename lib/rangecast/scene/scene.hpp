@@ -25,6 +25,7 @@ struct SceneSettings {
   std::uint32_t seed = 1;  ///< of all patterns and of the noise
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
   std::string texture;     ///< picture for the model; empty: what the model names, or one beside it
+  bool texture_flip = false; ///< turn the model's texture upside down
 };
 
 enum class SceneCamera {

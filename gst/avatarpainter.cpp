@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "avatarpainter.hpp"
+
+#include <array>
+#include <gstrange/gstrange.h>
+#include <gstrange/gstrangebufferpool.h>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+
+using rangecast::PixelFormat;
+using rangecast::Rgbx;
+using rangecast::Roi;
+using rangecast::Scene;
+using rangecast::SceneCamera;
+using rangecast::Status;
+using rangecast::StatusCode;
+
+void
+AvatarPainter::start (const AvatarSettings &settings)
+{
+  settings_ = settings;
+  scene_.reset ();
+}
+
+Status
+AvatarPainter::set_size (int width, int height)
+{
+  rangecast::SceneSettings &s = settings_.scene;
+  if (settings_.view_id >= s.views)
+    return {StatusCode::kBadValue, "view-id " + std::to_string (settings_.view_id) +
+                                       ": expected less than views, " + std::to_string (s.views)};
+  if (scene_ && s.width == width && s.height == height)
+    return {};
+  s.width = width;
+  s.height = height;
+  scene_.reset (); /* a model and its rooms are large: not two at a time */
+  if (Status status = Scene::create (s, scene_); !status.ok ())
+    return status;
+  scratch_.resize (static_cast<std::size_t> (width) * static_cast<std::size_t> (height));
+  return settings_.rig_export.empty () ? Status ()
+                                       : rangecast::save_rig (settings_.rig_export, scene_->rig ());
+}
+
+GstCaps *
+AvatarPainter::make_range_caps (int fps_n, int fps_d) const
+{
+  rangecast::Rig rig = scene_->range_rig ();
+  if (settings_.view_id != AvatarSettings::kAllViews)
+    rig.views = {*rig.find (settings_.view_id)};
+  return gstrange::make_range_caps (gstrange::make_info (rig, fps_n, fps_d));
+}
+
+GstCaps *
+AvatarPainter::make_raw_caps (int fps_n, int fps_d) const
+{
+  return gst_caps_new_simple ("video/x-raw", "width", G_TYPE_INT, settings_.scene.width, "height",
+      G_TYPE_INT, settings_.scene.height, "framerate", GST_TYPE_FRACTION, fps_n, fps_d,
+      "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, "interlace-mode", G_TYPE_STRING, "progressive",
+      nullptr);
+}
+
+static PixelFormat
+pixel_format (const GstVideoInfo &info)
+{
+  switch (GST_VIDEO_INFO_FORMAT (&info)) {
+    case GST_VIDEO_FORMAT_BGRx:
+      return PixelFormat::kBgrx;
+    case GST_VIDEO_FORMAT_RGB:
+      return PixelFormat::kRgb;
+    case GST_VIDEO_FORMAT_BGR:
+      return PixelFormat::kBgr;
+    case GST_VIDEO_FORMAT_GRAY8:
+      return PixelFormat::kGray;
+    default:
+      return PixelFormat::kRgbx;
+  }
+}
+
+static double
+seconds (GstClockTime time)
+{
+  return static_cast<double> (time) / GST_SECOND;
+}
+
+Status
+AvatarPainter::draw_raw (
+    SceneCamera camera, const GstVideoInfo &video, const AvatarMoment &moment, GstBuffer *buffer)
+{
+  GstVideoFrame frame;
+  if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
+    return {StatusCode::kNoSpace, "cannot map an output buffer"};
+  auto pixels = static_cast<std::uint8_t *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0));
+  const int stride = GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0);
+  const int width = settings_.scene.width;
+  const PixelFormat format = pixel_format (video);
+  const bool direct = format == PixelFormat::kRgbx;
+  const rangecast::ImageView<Rgbx> picture{
+      direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
+      direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+  const Status status = scene_->render (MAX (settings_.view_id, 0), camera,
+      seconds (moment.capture_time), empty_at (moment), picture, {}, {});
+  if (status.ok () && !direct)
+    rangecast::convert_pixels (picture, format, pixels, stride);
+  gst_video_frame_unmap (&frame);
+  return status;
+}
+
+Status
+AvatarPainter::draw_range (const AvatarMoment &moment, GstBuffer *buffer)
+{
+  for (const auto &view : scene_->range_rig ().views)
+    if (settings_.view_id == AvatarSettings::kAllViews || settings_.view_id == view.id)
+      gst_range_buffer_add_view (buffer, guint (view.id), 0, 0, guint (view.width),
+          guint (view.height), moment.capture_time);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  std::array<Roi, rangecast::kMaxViews> boxes;
+  const std::size_t count = frame.views ().size ();
+  const Status status = scene_->render_range (frame.views (), seconds (moment.capture_time),
+      empty_at (moment), {boxes.data (), count}, settings_.n_threads);
+  for (std::size_t i = 0; status.ok () && settings_.person_only && i < count; i++)
+    frame.crop (i, boxes[i]);
+  return status;
+}

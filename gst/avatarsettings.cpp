@@ -1,0 +1,222 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "avatarsettings.hpp"
+
+enum {
+  PROP_0,
+  PROP_VIEWS,
+  PROP_VIEW_ID,
+  PROP_ARC,
+  PROP_DISTANCE,
+  PROP_BASELINE,
+  PROP_SEED,
+  PROP_NOISE,
+  PROP_MOTION,
+  PROP_EMPTY_FRAMES,
+  PROP_NUM_BUFFERS,
+  PROP_IS_LIVE,
+  PROP_LOCATION,
+  PROP_TEXTURE,
+  PROP_TEXTURE_FLIP,
+  PROP_RIG_EXPORT,
+  PROP_RANGE_PERSON_ONLY,
+  PROP_N_THREADS,
+};
+
+static std::string
+string_of (const GValue *value)
+{
+  const gchar *text = g_value_get_string (value);
+  return text ? text : "";
+}
+
+static void
+set_string (GValue *value, const std::string &text)
+{
+  g_value_set_string (value, text.empty () ? nullptr : text.c_str ());
+}
+
+bool
+AvatarSettings::set (guint id, const GValue *value)
+{
+  switch (id) {
+    case PROP_VIEWS:
+      scene.views = g_value_get_int (value);
+      return true;
+    case PROP_VIEW_ID:
+      view_id = g_value_get_int (value);
+      return true;
+    case PROP_ARC:
+      scene.arc_deg = g_value_get_double (value);
+      return true;
+    case PROP_DISTANCE:
+      scene.distance_m = g_value_get_double (value);
+      return true;
+    case PROP_BASELINE:
+      scene.baseline_m = g_value_get_double (value);
+      return true;
+    case PROP_SEED:
+      scene.seed = g_value_get_uint (value);
+      return true;
+    case PROP_NOISE:
+      scene.noise_sigma = g_value_get_double (value);
+      return true;
+    case PROP_MOTION:
+      scene.motion = g_value_get_double (value);
+      return true;
+    case PROP_EMPTY_FRAMES:
+      empty_frames = g_value_get_uint (value);
+      return true;
+    case PROP_NUM_BUFFERS:
+      num_buffers = g_value_get_int (value);
+      return true;
+    case PROP_IS_LIVE:
+      is_live = g_value_get_boolean (value);
+      return true;
+    case PROP_LOCATION:
+      scene.model = string_of (value);
+      return true;
+    case PROP_TEXTURE:
+      scene.texture = string_of (value);
+      return true;
+    case PROP_TEXTURE_FLIP:
+      scene.texture_flip = g_value_get_boolean (value);
+      return true;
+    case PROP_RIG_EXPORT:
+      rig_export = string_of (value);
+      return true;
+    case PROP_RANGE_PERSON_ONLY:
+      person_only = g_value_get_boolean (value);
+      return true;
+    case PROP_N_THREADS:
+      n_threads = g_value_get_int (value);
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool
+AvatarSettings::get (guint id, GValue *value) const
+{
+  switch (id) {
+    case PROP_VIEWS:
+      g_value_set_int (value, scene.views);
+      return true;
+    case PROP_VIEW_ID:
+      g_value_set_int (value, view_id);
+      return true;
+    case PROP_ARC:
+      g_value_set_double (value, scene.arc_deg);
+      return true;
+    case PROP_DISTANCE:
+      g_value_set_double (value, scene.distance_m);
+      return true;
+    case PROP_BASELINE:
+      g_value_set_double (value, scene.baseline_m);
+      return true;
+    case PROP_SEED:
+      g_value_set_uint (value, scene.seed);
+      return true;
+    case PROP_NOISE:
+      g_value_set_double (value, scene.noise_sigma);
+      return true;
+    case PROP_MOTION:
+      g_value_set_double (value, scene.motion);
+      return true;
+    case PROP_EMPTY_FRAMES:
+      g_value_set_uint (value, empty_frames);
+      return true;
+    case PROP_NUM_BUFFERS:
+      g_value_set_int (value, num_buffers);
+      return true;
+    case PROP_IS_LIVE:
+      g_value_set_boolean (value, is_live);
+      return true;
+    case PROP_LOCATION:
+      set_string (value, scene.model);
+      return true;
+    case PROP_TEXTURE:
+      set_string (value, scene.texture);
+      return true;
+    case PROP_TEXTURE_FLIP:
+      g_value_set_boolean (value, scene.texture_flip);
+      return true;
+    case PROP_RIG_EXPORT:
+      set_string (value, rig_export);
+      return true;
+    case PROP_RANGE_PERSON_ONLY:
+      g_value_set_boolean (value, person_only);
+      return true;
+    case PROP_N_THREADS:
+      g_value_set_int (value, n_threads);
+      return true;
+    default:
+      return false;
+  }
+}
+
+void
+AvatarSettings::install (GObjectClass *klass)
+{
+  const auto ready =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  const auto add_int = [&] (guint id, const char *name, const char *blurb, int low, int high,
+                           int value) {
+    g_object_class_install_property (
+        klass, id, g_param_spec_int (name, name, blurb, low, high, value, ready));
+  };
+  const auto add_uint = [&] (guint id, const char *name, const char *blurb, guint value) {
+    g_object_class_install_property (
+        klass, id, g_param_spec_uint (name, name, blurb, 0, G_MAXUINT, value, ready));
+  };
+  const auto add_double = [&] (guint id, const char *name, const char *blurb, double low,
+                              double high, double value) {
+    g_object_class_install_property (
+        klass, id, g_param_spec_double (name, name, blurb, low, high, value, ready));
+  };
+  const auto add_bool = [&] (guint id, const char *name, const char *blurb) {
+    g_object_class_install_property (
+        klass, id, g_param_spec_boolean (name, name, blurb, FALSE, ready));
+  };
+  const auto add_string = [&] (guint id, const char *name, const char *blurb) {
+    g_object_class_install_property (
+        klass, id, g_param_spec_string (name, name, blurb, nullptr, ready));
+  };
+  add_int (PROP_VIEWS, "views", "Stereo cameras in the rig (1 to 64, default: 4)", 1, 64, 4);
+  add_int (PROP_VIEW_ID, "view-id",
+      "Which view to give (0 to 63; -1, the default: all on src, view 0 on left, right and third)",
+      kAllViews, 63, kAllViews);
+  add_double (PROP_ARC, "arc",
+      "Arc on which the views stand, degrees (1 to 360; 360, the default: a ring, view 0 in front; "
+      "less: the figure's front in the middle)",
+      1, 360, 360);
+  add_double (PROP_DISTANCE, "distance",
+      "From the left cameras to the figure's axis, metres (0.5 to 1.2, default: 0.8)", 0.5, 1.2,
+      0.8);
+  add_double (PROP_BASELINE, "baseline",
+      "From left to right and to third camera, metres (0.01 to 0.3, default: 0.1)", 0.01, 0.3, 0.1);
+  add_uint (PROP_SEED, "seed", "Of all patterns and the noise (default: 1)", 1);
+  add_double (PROP_NOISE, "noise",
+      "Sensor noise, standard deviation in grey levels (0 to 20, default: 1)", 0, 20, 1);
+  add_double (
+      PROP_MOTION, "motion", "How much the figure moves (0 = still, to 2; default: 1)", 0, 2, 1);
+  add_uint (PROP_EMPTY_FRAMES, "empty-frames",
+      "So many frames at first show the room without the figure (default: 0)", 0);
+  add_int (
+      PROP_NUM_BUFFERS, "num-buffers", "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);
+  add_bool (PROP_IS_LIVE, "is-live",
+      "Take pictures at multiples of the frame period of the pipeline's clock (default: false)");
+  add_string (
+      PROP_LOCATION, "location", "Model of the figure, glTF or OBJ (default: the built-in one)");
+  add_string (PROP_TEXTURE, "texture",
+      "Picture for the model (default: what the model names, or a colour map beside it)");
+  add_bool (PROP_TEXTURE_FLIP, "texture-flip",
+      "Turn the model's texture upside down, for a picture made for the other direction of v "
+      "(default: false)");
+  add_string (PROP_RIG_EXPORT, "rig-export",
+      "Write the calibration of all cameras to this file, YAML or JSON (default: none)");
+  add_bool (PROP_RANGE_PERSON_ONLY, "range-person-only",
+      "Crop range images to the person's bounding box (default: false)");
+  add_int (PROP_N_THREADS, "n-threads",
+      "Threads that draw range images (0, the default: one a core)", 0, 64, 0);
+}

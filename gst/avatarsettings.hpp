@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <rangecast/scene/scene.hpp>
+#include <string>
+
+/** What the application wants of avatartestsrc; all of it may change in NULL and READY. */
+struct AvatarSettings {
+  static constexpr int kAllViews = -1;
+
+  rangecast::SceneSettings scene; ///< all but the size, which the caps decide
+  int view_id = kAllViews;
+  guint empty_frames = 0;
+  int num_buffers = -1; ///< frames; -1: no end
+  bool is_live = false;
+  std::string rig_export; ///< file; empty: none
+  bool person_only = false;
+  int n_threads = 0; ///< 0: one a core
+
+  /** The first property id that is free for the element's own ones. */
+  static constexpr guint kFirstFreeId = 100;
+  static void install (GObjectClass *klass);
+  /** @return false if the id is none of ours */
+  bool set (guint id, const GValue *value);
+  bool get (guint id, GValue *value) const;
+};
