@@ -9,6 +9,9 @@
 GST_DEBUG_CATEGORY_EXTERN (gst_avatar_test_src_debug);
 #define GST_CAT_DEFAULT gst_avatar_test_src_debug
 
+/* Negotiation was overtaken by a new wish of downstream. */
+static constexpr GstFlowReturn kAgain = GST_FLOW_CUSTOM_SUCCESS;
+
 AvatarStream::AvatarStream (GstElement *element) : element_ (element)
 {
   g_rec_mutex_init (&task_lock_);
@@ -137,6 +140,8 @@ AvatarStream::refused (const AvatarPad &pad)
   }
   if (GST_PAD_IS_FLUSHING (pad.pad ()))
     return GST_FLOW_FLUSHING;
+  if (GST_PAD_NEEDS_RECONFIGURE (pad.pad ()))
+    return kAgain; /* the peer wants something else since the format was chosen */
   GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
       ("pad %s: its peer takes none of our formats", GST_PAD_NAME (pad.pad ())), (nullptr));
   return GST_FLOW_ERROR;
@@ -234,6 +239,8 @@ AvatarStream::one_frame (const AvatarPads &pads)
   for (const auto &pad : pads)
     stale |= pad->needs_negotiation ();
   GstFlowReturn flow = stale ? negotiate (pads) : GST_FLOW_OK;
+  if (flow == kAgain)
+    return GST_FLOW_OK;
   if (flow != GST_FLOW_OK)
     return flow;
   AvatarMoment moment{};

@@ -6,6 +6,9 @@
  * Decodes range images from the neighbour code. Slices that are lost or damaged leave invalid
  * pixels (or, by #GstNeighbourCodeDec:conceal, the last ones), never an error.
  *
+ * Where buffers are slices (alignment=slice), a frame set ends with a buffer that has the MARKER
+ * flag, before one of another capture time, or where the stream ends.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
@@ -25,15 +28,16 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
-using rangecast::ConstRangeImage;
 using rangecast::DecoderResult;
-using rangecast::RangeImage;
 using rangecast::Status;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
 
 enum { PROP_0, PROP_CONCEAL, PROP_N_THREADS, PROP_STATS };
+
+/* Pixels from before a jump in time are not shown after it. */
+static constexpr GstClockTime kMaxConcealAge = GST_SECOND;
 
 enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
@@ -48,6 +52,10 @@ struct GstNeighbourCodeDecPrivate {
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
   GstBuffer *last = nullptr; /* what conceal=last takes pixels from */
+  bool by_slices = false;    /* alignment of the input */
+  std::vector<guint8> slices;
+  GstBuffer *first = nullptr; /* of slices: gives times and flags */
+  bool complete = false;      /* nothing more comes to slices */
 };
 
 struct _GstNeighbourCodeDec {
@@ -55,10 +63,8 @@ struct _GstNeighbourCodeDec {
   GstNeighbourCodeDecPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 
@@ -72,8 +78,9 @@ gst_neighbour_code_conceal_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {CONCEAL_INVALID, "Pixels of lost slices are invalid", "invalid"},
-        {CONCEAL_LAST, "Pixels of lost slices are those of the last frame set", "last"}, {}};
+        {CONCEAL_INVALID, "Pixels of lost or damaged slices are invalid", "invalid"},
+        {CONCEAL_LAST, "Pixels of lost or damaged slices are those of the last frame set", "last"},
+        {}};
     return g_enum_register_static ("GstNeighbourCodeConceal", values);
   }();
   return type;
@@ -85,32 +92,21 @@ static GstCaps *
 gst_neighbour_code_dec_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
 {
-  const bool to_src = direction == GST_PAD_SINK;
-  GstCaps *other = gst_caps_new_empty ();
-  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
-    GstStructure *s = gst_structure_copy (gst_caps_get_structure (caps, i));
-    if (to_src) {
-      gst_structure_set_name (s, GST_RANGE_MEDIA_TYPE);
-      gst_structure_remove_fields (s, "version", "alignment", nullptr);
-      gst_structure_set (s, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
-    } else {
-      gst_structure_set_name (s, GST_NEIGHBOUR_CODE_MEDIA_TYPE);
-      gst_structure_remove_field (s, "format");
-      gst_structure_set (
-          s, "version", G_TYPE_INT, 1, "alignment", G_TYPE_STRING, "access-unit", nullptr);
-    }
-    gst_caps_append_structure (other, s);
-  }
-  if (!filter)
-    return other;
-  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
-  gst_caps_unref (other);
-  return filtered;
+  return gstrange::recode_caps (caps, direction == GST_PAD_SRC, filter);
+}
+
+static void
+forget_slices (GstNeighbourCodeDecPrivate *priv)
+{
+  priv->slices.clear ();
+  gst_clear_buffer (&priv->first);
+  priv->complete = false;
 }
 
 static void
 forget_stream (GstNeighbourCodeDecPrivate *priv)
 {
+  forget_slices (priv);
   gst_clear_buffer (&priv->last);
 }
 
@@ -134,6 +130,10 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   forget_stream (priv);
+  const GstStructure *structure = gst_caps_get_structure (in, 0);
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  /* It would drop single slices. */
+  gst_base_transform_set_qos_enabled (base, !priv->by_slices);
   drop_pool (priv);
   priv->pool = gst_range_buffer_pool_new ();
   return gst_range_buffer_pool_configure (priv->pool, out, 2, 0) &&
@@ -158,18 +158,6 @@ make_frame_set (GstNeighbourCodeDecPrivate *priv)
   return buffer;
 }
 
-/* Pixels that no slice holds: invalid, or the last frame set's. */
-static void
-fill_missing (const RangeImage &image, const gstrange::RangeFrameMap *older)
-{
-  ConstRangeImage from; /* an empty one: everything becomes invalid */
-  if (older)
-    for (const RangeImage &view : older->views ())
-      if (view.view_id == image.view_id)
-        from = view;
-  rangecast::fill_from (from, image);
-}
-
 static Status
 decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, int n_threads,
     DecoderResult &result)
@@ -177,20 +165,12 @@ decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, 
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  bool missing = false;
-  for (std::size_t i = 0; i < frame.views ().size (); i++)
-    missing |= priv->decoder.missing_pixels (i) > 0;
-  if (missing && conceal && priv->last) {
+  if (conceal && priv->last) {
     gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
-    for (std::size_t i = 0; i < frame.views ().size (); i++)
-      if (priv->decoder.missing_pixels (i) > 0)
-        fill_missing (frame.views ()[i], &older);
+    priv->decoder.decode (frame.views (), n_threads, result, older.views ());
   } else {
-    for (std::size_t i = 0; i < frame.views ().size (); i++)
-      if (priv->decoder.missing_pixels (i) > 0)
-        fill_missing (frame.views ()[i], nullptr);
+    priv->decoder.decode (frame.views (), n_threads, result);
   }
-  priv->decoder.decode (frame.views (), n_threads, result);
   return {};
 }
 
@@ -209,7 +189,7 @@ count_frame (GstNeighbourCodeDecPrivate *priv, const DecoderResult &result, gsiz
 }
 
 static GstFlowReturn
-decode_buffer (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
+decode_bytes (GstNeighbourCodeDec *self, std::span<const guint8> bytes, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   bool conceal;
@@ -219,21 +199,13 @@ decode_buffer (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
     conceal = priv->conceal == CONCEAL_LAST;
     n_threads = priv->n_threads;
   }
-  GstMapInfo map;
-  if (!gst_buffer_map (input, &map, GST_MAP_READ)) {
-    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
-    return GST_FLOW_ERROR;
-  }
   DecoderResult result;
-  priv->decoder.plan ({map.data, map.size}, result);
+  priv->decoder.plan (bytes, result);
   GstBuffer *buffer = make_frame_set (priv);
-  Status status;
-  if (buffer)
-    status = decode_into (priv, buffer, conceal, n_threads, result);
-  count_frame (priv, result, map.size);
-  gst_buffer_unmap (input, &map);
   if (!buffer)
     return GST_FLOW_FLUSHING;
+  const Status status = decode_into (priv, buffer, conceal, n_threads, result);
+  count_frame (priv, result, bytes.size ());
   if (result.bad_slices)
     GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
   if (!status.ok ()) {
@@ -256,35 +228,116 @@ keep_for_concealment (GstNeighbourCodeDecPrivate *priv, GstBuffer *output)
   gst_buffer_replace (&priv->last, conceal ? output : nullptr);
 }
 
-static GstFlowReturn
-gst_neighbour_code_dec_prepare_output_buffer (
-    GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
+/* DISCONT comes with every lost packet, when the last pixels are needed most; they are too old only
+ * where the time jumps. */
+static void
+forget_what_is_too_old (GstNeighbourCodeDecPrivate *priv, GstBuffer *input)
 {
-  auto self = GST_NEIGHBOUR_CODE_DEC (base);
-  if (!self->priv->pool) {
-    GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, (nullptr), ("no caps before the first buffer"));
-    return GST_FLOW_NOT_NEGOTIATED;
-  }
-  if (GST_BUFFER_IS_DISCONT (input))
-    forget_stream (self->priv);
-  const GstFlowReturn flow = decode_buffer (self, input, output);
+  if (!priv->last || !GST_BUFFER_IS_DISCONT (input))
+    return;
+  const GstClockTime now = GST_BUFFER_PTS (input), then = GST_BUFFER_PTS (priv->last);
+  if (!GST_CLOCK_TIME_IS_VALID (now) || !GST_CLOCK_TIME_IS_VALID (then) || now < then ||
+      now - then > kMaxConcealAge)
+    gst_clear_buffer (&priv->last);
+}
+
+/* `input` gives times and flags; bytes are its own, or also those of slices that came later. */
+static GstFlowReturn
+decode_frame_set (
+    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  forget_what_is_too_old (priv, input);
+  const GstFlowReturn flow = decode_bytes (self, bytes, output);
   if (flow != GST_FLOW_OK)
     return flow;
-  GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, *output);
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, *output);
   GstClockTime capture = gst_range_buffer_get_capture_time (input);
-  if (!GST_CLOCK_TIME_IS_VALID (capture) && !self->priv->decoder.views ().empty ())
-    capture = self->priv->decoder.views ()[0].capture_time_ns;
+  if (!GST_CLOCK_TIME_IS_VALID (capture) && !priv->decoder.views ().empty ())
+    capture = priv->decoder.views ()[0].capture_time_ns;
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (*output, capture);
-  GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT);
-  keep_for_concealment (self->priv, *output);
+  GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
+  keep_for_concealment (priv, *output);
   return GST_FLOW_OK;
 }
 
 static GstFlowReturn
+decode_slices (GstNeighbourCodeDec *self, GstBuffer **output)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  const GstFlowReturn flow = decode_frame_set (self, priv->first, priv->slices, output);
+  forget_slices (priv);
+  return flow;
+}
+
+static bool
+same_frame_set (GstBuffer *a, GstBuffer *b)
+{
+  const GstClockTime time_a = gst_range_buffer_get_capture_time (a);
+  const GstClockTime time_b = gst_range_buffer_get_capture_time (b);
+  if (GST_CLOCK_TIME_IS_VALID (time_a) && GST_CLOCK_TIME_IS_VALID (time_b))
+    return time_a == time_b;
+  return GST_BUFFER_PTS (a) == GST_BUFFER_PTS (b);
+}
+
+/* What would make an access unit too long is lost. */
+static void
+append_slice (GstNeighbourCodeDecPrivate *priv, GstBuffer *input, std::span<const guint8> bytes)
+{
+  if (!priv->first)
+    priv->first = gst_buffer_ref (input);
+  if (priv->slices.size () + bytes.size () <= rangecast::kMaxAccessUnitSize)
+    priv->slices.insert (priv->slices.end (), bytes.begin (), bytes.end ());
+  priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
+}
+
+static GstFlowReturn
+take_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  GstMapInfo map;
+  if (!gst_buffer_map (input, &map, GST_MAP_READ)) {
+    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+    return GST_FLOW_ERROR;
+  }
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (priv->by_slices) {
+    if (priv->first && !same_frame_set (priv->first, input))
+      flow = decode_slices (self, output);
+    append_slice (priv, input, {map.data, map.size});
+  } else {
+    flow = decode_frame_set (self, input, {map.data, map.size}, output);
+  }
+  gst_buffer_unmap (input, &map);
+  return flow;
+}
+
+/* Called until it has no more to give: one slice may end two frame sets, the one before and its
+ * own. */
+static GstFlowReturn
+gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_DEC (base);
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  if (!priv->pool) {
+    GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, (nullptr), ("no caps before the first buffer"));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
+  if (GstBuffer *input = g_steal_pointer (&base->queued_buf)) {
+    const GstFlowReturn flow = take_input (self, input, output);
+    gst_buffer_unref (input);
+    if (flow != GST_FLOW_OK || *output)
+      return flow;
+  }
+  return priv->complete ? decode_slices (self, output) : GST_FLOW_OK;
+}
+
+/* Never called, but without it GstBaseTransform would be passthrough. */
+static GstFlowReturn
 gst_neighbour_code_dec_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
 {
-  return GST_FLOW_OK; /* prepare_output_buffer has decoded it */
+  return GST_FLOW_ERROR;
 }
 
 static gboolean
@@ -293,11 +346,33 @@ gst_neighbour_code_dec_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta 
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
+/* Pushes the frame set whose end did not come. */
+static void
+drain (GstNeighbourCodeDec *self)
+{
+  GstBuffer *output = nullptr;
+  if (self->priv->first && self->priv->pool && decode_slices (self, &output) == GST_FLOW_OK)
+    gst_pad_push (GST_BASE_TRANSFORM_SRC_PAD (self), output);
+}
+
 static gboolean
 gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    forget_stream (GST_NEIGHBOUR_CODE_DEC (base)->priv);
+  auto self = GST_NEIGHBOUR_CODE_DEC (base);
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_FLUSH_STOP:
+      forget_stream (self->priv);
+      break;
+    case GST_EVENT_EOS:
+    case GST_EVENT_CAPS:
+    case GST_EVENT_SEGMENT:
+    case GST_EVENT_GAP:
+    case GST_EVENT_STREAM_START:
+      drain (self);
+      break;
+    default:
+      break;
+  }
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event);
 }
 
@@ -403,7 +478,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
 
   g_object_class_install_property (object_class, PROP_CONCEAL,
       g_param_spec_enum ("conceal", "Conceal",
-          "What becomes of pixels whose slices are lost (default: invalid)",
+          "What becomes of pixels whose slices are lost or damaged (default: invalid)",
           GST_TYPE_NEIGHBOUR_CODE_CONCEAL, CONCEAL_INVALID, playing));
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
@@ -426,7 +501,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   transform_class->transform_caps = gst_neighbour_code_dec_transform_caps;
   transform_class->set_caps = gst_neighbour_code_dec_set_caps;
   transform_class->sink_event = gst_neighbour_code_dec_sink_event;
-  transform_class->prepare_output_buffer = gst_neighbour_code_dec_prepare_output_buffer;
+  transform_class->generate_output = gst_neighbour_code_dec_generate_output;
   transform_class->transform = gst_neighbour_code_dec_transform;
   transform_class->transform_meta = gst_neighbour_code_dec_transform_meta;
 

@@ -6,6 +6,9 @@
  * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
  * decode without one another. The format is specified in docs/bitstream.md.
  *
+ * A buffer is a frame set, or a slice of one where downstream asks for alignment=slice: then the
+ * last of a frame set has the MARKER flag.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
@@ -62,6 +65,11 @@ struct GstNeighbourCodeEncPrivate {
   std::uint32_t frame_number = 0;
   GstBufferPool *pool = nullptr;
   gsize pool_size = 0;
+  bool by_slices = false;     /* alignment of the output */
+  GstBuffer *input = nullptr; /* what encoder holds is of this one, and not yet all pushed */
+  std::size_t part = 0;
+  rangecast::UnitReader units{{}}; /* of the part before */
+  std::span<const guint8> slice;   /* the next one; before the first: empty */
 };
 
 struct _GstNeighbourCodeEnc {
@@ -71,10 +79,8 @@ struct _GstNeighbourCodeEnc {
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
 
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
@@ -94,40 +100,28 @@ gst_neighbour_code_profile_get_type (void)
 
 /* ---- caps ---- */
 
-/* Both sides share size, rate, views and rig; media type and what goes with it differ. */
 static GstCaps *
 gst_neighbour_code_enc_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
 {
-  const bool to_src = direction == GST_PAD_SINK;
-  GstCaps *other = gst_caps_new_empty ();
-  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
-    GstStructure *s = gst_structure_copy (gst_caps_get_structure (caps, i));
-    if (to_src) {
-      gst_structure_set_name (s, GST_NEIGHBOUR_CODE_MEDIA_TYPE);
-      gst_structure_remove_field (s, "format");
-      gst_structure_set (
-          s, "version", G_TYPE_INT, 1, "alignment", G_TYPE_STRING, "access-unit", nullptr);
-    } else {
-      gst_structure_set_name (s, GST_RANGE_MEDIA_TYPE);
-      gst_structure_remove_fields (s, "version", "alignment", nullptr);
-      gst_structure_set (s, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
-    }
-    gst_caps_append_structure (other, s);
-  }
-  if (!filter)
-    return other;
-  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
-  gst_caps_unref (other);
-  return filtered;
+  return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
+}
+
+static void
+forget_input (GstNeighbourCodeEncPrivate *priv)
+{
+  gst_clear_buffer (&priv->input);
 }
 
 static gboolean
-gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  const GstStructure *structure = gst_caps_get_structure (out, 0);
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  forget_input (priv);
   return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
 }
 
@@ -157,11 +151,11 @@ drop_pool (GstNeighbourCodeEncPrivate *priv)
   priv->pool_size = 0;
 }
 
-/* A recycled buffer of that size. The pool grows to the largest access unit seen. */
+/* A recycled buffer of that size. The pool grows to the largest seen. */
 static GstBuffer *
 acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
 {
-  if (size > priv->pool_size) {
+  if (!priv->pool || size > priv->pool_size) {
     drop_pool (priv);
     priv->pool = gst_buffer_pool_new ();
     priv->pool_size = size + size / 2;
@@ -198,16 +192,14 @@ count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsiz
   priv->totals.raw_bits += result.raw_bits;
 }
 
-/* The size is known only when it is coded, so that happens where the output buffer is made. */
 static GstFlowReturn
-gst_neighbour_code_enc_prepare_output_buffer (
-    GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
+encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
-  auto self = GST_NEIGHBOUR_CODE_ENC (base);
   GstNeighbourCodeEncPrivate *priv = self->priv;
   if (GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (input)))
-    gst_object_sync_values (GST_OBJECT (self),
-        gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
+    gst_object_sync_values (
+        GST_OBJECT (self), gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment,
+                               GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
   EncoderSettings settings;
   int n_threads;
   {
@@ -221,33 +213,111 @@ gst_neighbour_code_enc_prepare_output_buffer (
     status = encode_frame (priv, input, n_threads, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
-
-  const gsize size = priv->encoder.size ();
-  GstBuffer *buffer = acquire (priv, size);
-  if (!buffer) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory for an access unit of %" G_GSIZE_FORMAT " bytes", size));
-    return GST_FLOW_ERROR;
-  }
-  gsize offset = 0;
-  for (std::size_t i = 0; i < priv->encoder.parts (); i++) {
-    const auto part = priv->encoder.part (i);
-    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
-  }
-  count_frame (priv, result, size);
-  GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, buffer);
-  const GstClockTime capture = gst_range_buffer_get_capture_time (input);
-  if (GST_CLOCK_TIME_IS_VALID (capture))
-    gst_range_buffer_set_capture_time (buffer, capture);
-  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
-  *output = buffer;
+  count_frame (priv, result, priv->encoder.size ());
   return GST_FLOW_OK;
 }
 
+/* A buffer with times and flags of the input. */
+static GstBuffer *
+make_output (GstNeighbourCodeEnc *self, gsize size)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = acquire (priv, size);
+  if (!buffer) {
+    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
+        ("no memory for %" G_GSIZE_FORMAT " coded bytes", size));
+    return nullptr;
+  }
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
+      GST_BASE_TRANSFORM (self), priv->input, buffer);
+  const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (buffer, capture);
+  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  return buffer;
+}
+
+static GstBuffer *
+take_access_unit (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = make_output (self, priv->encoder.size ());
+  gsize offset = 0;
+  for (std::size_t i = 0; buffer && i < priv->encoder.parts (); i++) {
+    const auto part = priv->encoder.part (i);
+    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
+  }
+  forget_input (priv);
+  return buffer;
+}
+
+/* The encoder's next slice; nothing after the last one. */
+static std::span<const guint8>
+next_slice (GstNeighbourCodeEncPrivate *priv)
+{
+  rangecast::UnitHeader header;
+  while (true) {
+    if (const auto unit = priv->units.next (header))
+      return *unit;
+    if (priv->part == priv->encoder.parts ())
+      return {};
+    priv->units = rangecast::UnitReader (priv->encoder.part (priv->part++));
+  }
+}
+
+static GstBuffer *
+take_slice (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const bool is_first = priv->slice.empty ();
+  if (is_first)
+    priv->slice = next_slice (priv);
+  GstBuffer *buffer = make_output (self, priv->slice.size ());
+  if (!buffer)
+    return nullptr;
+  gst_buffer_fill (buffer, 0, priv->slice.data (), priv->slice.size ());
+  if (!is_first)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT | GST_BUFFER_FLAG_RESYNC);
+  priv->slice = next_slice (priv);
+  if (priv->slice.empty ()) {
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_MARKER);
+    forget_input (priv);
+  } else {
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_MARKER);
+  }
+  return buffer;
+}
+
+/* Called until it has no more to give; a new input comes where the rest of the last one failed to
+ * be pushed, too. */
+static GstFlowReturn
+gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_ENC (base);
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  if (base->queued_buf) {
+    forget_input (priv);
+    priv->input = g_steal_pointer (&base->queued_buf);
+    const GstFlowReturn flow = encode_buffer (self, priv->input);
+    if (flow != GST_FLOW_OK) {
+      forget_input (priv);
+      return flow;
+    }
+    priv->part = 0;
+    priv->units = rangecast::UnitReader ({});
+    priv->slice = {};
+  }
+  if (!priv->input)
+    return GST_FLOW_OK;
+  *output = priv->by_slices ? take_slice (self) : take_access_unit (self);
+  return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/* Never called, but without it GstBaseTransform would be passthrough. */
 static GstFlowReturn
 gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
 {
-  return GST_FLOW_OK; /* prepare_output_buffer has coded it */
+  return GST_FLOW_ERROR;
 }
 
 static gboolean
@@ -274,6 +344,7 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->is_configured = false;
+  forget_input (priv);
   drop_pool (priv);
   return TRUE;
 }
@@ -439,7 +510,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   transform_class->stop = gst_neighbour_code_enc_stop;
   transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
   transform_class->set_caps = gst_neighbour_code_enc_set_caps;
-  transform_class->prepare_output_buffer = gst_neighbour_code_enc_prepare_output_buffer;
+  transform_class->generate_output = gst_neighbour_code_enc_generate_output;
   transform_class->transform = gst_neighbour_code_enc_transform;
   transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
 

@@ -204,21 +204,29 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   priv->counters.bad_units += bad;
 }
 
+/* The packet with the marker was lost: what came of the frame set goes out. */
+static void
+push_unmarked (GstRtpNeighbourCodeDepay *self)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  if (priv->access_unit.empty ())
+    return;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->counters.unmarked++;
+  }
+  if (GstBuffer *buffer = take_access_unit (self))
+    gst_rtp_base_depayload_push (GST_RTP_BASE_DEPAYLOAD (self), buffer);
+}
+
 static GstBuffer *
 gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *rtp)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
-  if (!priv->access_unit.empty () && timestamp != priv->timestamp) {
-    /* The packet with the marker was lost: what came of the last frame set goes out now. */
-    {
-      std::lock_guard guard (priv->lock);
-      priv->counters.unmarked++;
-    }
-    if (GstBuffer *earlier = take_access_unit (self))
-      gst_rtp_base_depayload_push (base, earlier);
-  }
+  if (timestamp != priv->timestamp)
+    push_unmarked (self);
   if (priv->access_unit.empty ()) {
     priv->timestamp = timestamp;
     priv->pts = GST_BUFFER_PTS (rtp->buffer);
@@ -237,6 +245,8 @@ gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
   return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
       ->handle_event (base, event);
 }

@@ -4,6 +4,7 @@
  * @title: rtpneighbourcodepay
  *
  * Puts coded frame sets into RTP packets. Each packet holds whole units, so that it decodes alone.
+ * With alignment=slice a packet leaves as soon as its slice comes.
  * The format is specified in docs/rtp-payload.md.
  *
  * ## Example launch line
@@ -42,6 +43,9 @@ struct GstRtpNeighbourCodePayPrivate {
   /* streaming thread only */
   std::vector<guint8> rig_units;
   GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
+  bool by_slices = false;                         /* alignment of the input */
+  bool within_frame_set = false;                  /* slices of this one came before */
+  GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
 };
 
 struct _GstRtpNeighbourCodePay {
@@ -91,6 +95,9 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   priv->rig_units.clear ();
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, priv->rig_units);
   priv->last_config = GST_CLOCK_TIME_NONE;
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  priv->within_frame_set = false;
   return set_output_caps (base, info);
 }
 
@@ -139,6 +146,17 @@ struct Packer {
   }
 };
 
+/* Notes where frame sets begin and end. The end of one without MARKER is known only afterwards; its
+ * packets have no marker, and receivers go by the next timestamp. */
+static bool
+begins_frame_set (GstRtpNeighbourCodePayPrivate *priv, GstBuffer *buffer, bool is_last)
+{
+  const bool begins = !priv->within_frame_set || GST_BUFFER_PTS (buffer) != priv->pts;
+  priv->within_frame_set = !is_last;
+  priv->pts = GST_BUFFER_PTS (buffer);
+  return begins;
+}
+
 static bool
 config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
 {
@@ -176,8 +194,10 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
       GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
   const GstClockTime running =
       gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  const bool is_last =
+      !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
   gsize too_long = 0;
-  if (config_is_due (self, running)) {
+  if (begins_frame_set (self->priv, buffer, is_last) && config_is_due (self, running)) {
     GstBuffer *rig =
         gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
     too_long = packer.pack (rig);
@@ -199,7 +219,8 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
     gst_buffer_list_unref (packer.packets);
     return GST_FLOW_OK;
   }
-  set_marker (packer.packets);
+  if (is_last)
+    set_marker (packer.packets);
   return gst_rtp_base_payload_push_list (base, packer.packets);
 }
 

@@ -109,6 +109,37 @@ make_neighbour_code_caps (const RangeInfo &info, const char *alignment)
       info);
 }
 
+GstCaps *
+recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
+{
+  static GstStaticCaps media[] = {
+      GST_STATIC_CAPS (GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx"),
+      GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+          ", version = (int) 1, alignment = (string) { access-unit, slice }")};
+  GstCaps *form = gst_static_caps_get (&media[coded]);
+  GstCaps *other = gst_caps_new_empty ();
+  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
+    GstStructure *common = gst_structure_copy (gst_caps_get_structure (caps, i));
+    gst_structure_remove_fields (common, "format", "version", "alignment", nullptr);
+    GstStructure *merged = gst_structure_copy (gst_caps_get_structure (form, 0));
+    gst_structure_foreach (
+        common,
+        [] (GQuark field, const GValue *value, gpointer to) -> gboolean {
+          gst_structure_id_set_value (static_cast<GstStructure *> (to), field, value);
+          return TRUE;
+        },
+        merged);
+    gst_structure_free (common);
+    gst_caps_append_structure (other, merged);
+  }
+  gst_caps_unref (form);
+  if (!filter)
+    return other;
+  GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (other);
+  return filtered;
+}
+
 } // namespace gstrange
 
 /**

@@ -34,4 +34,9 @@ GST_RANGE_API GstCaps *make_range_caps (const RangeInfo &info);
  */
 GST_RANGE_API GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
 
+/** What an encoder or decoder has on its other side for `caps`: the same sizes, frame rates, views
+ * and rig, as video/x-range or, if `coded`, as application/x-neighbour-code with any alignment that
+ *  holds frame sets. For GstBaseTransform's transform_caps. Returns: (transfer full) */
+GST_RANGE_API GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
+
 } // namespace gstrange

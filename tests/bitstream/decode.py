@@ -76,6 +76,14 @@ class Slice(NamedTuple):
         """What slices of one view have in common within an access unit is the same."""
         return self[2:5] == other[2:5] and self[6:10] == other[6:10]
 
+    def place(self) -> tuple[int, int, int, int]:
+        """Where it lies; slices of a view are taken in this order."""
+        return self.first_column, self.first_row, self.columns, self.rows
+
+    def too_short(self) -> bool:
+        """It does not hold its symbols."""
+        return 8 * len(self.body) < 3 * self.rows * self.columns
+
     def pixel_bits(self) -> int:
         return self.depth_bits + 3 * self.colour_bits
 
@@ -176,21 +184,34 @@ class Reader:
             return None
 
         sound: list[Slice] = []
-        first: dict[int, Slice] = {}
         for part in slices:
-            if part.lies_in(self.views.get(part.view)) and part.agrees(first.setdefault(part.view, part)):
+            if part.lies_in(self.views.get(part.view)):
                 sound.append(part)
             else:
                 self.counts["damaged slices"] += 1
-        pictures = {view_id: Picture(self.views[view_id]) for view_id in first}
-        for part in sorted(sound, key=lambda part: (part.first_column, part.first_row)):
+        pictures = {}
+        for view_id in {part.view for part in sound}:
+            pictures[view_id] = Picture(self.views[view_id])
+            self.draw([part for part in sound if part.view == view_id], pictures[view_id])
+        return pictures
+
+    def draw(self, parts: list[Slice], picture: Picture) -> None:
+        """Draws the slices of one view, without those that are at odds with most of them."""
+        frequent = max(parts, key=lambda part: sum(map(part.agrees, parts)))
+        agreeing = [part for part in parts if part.agrees(frequent)]
+        self.counts["damaged slices"] += len(parts) - len(agreeing)
+        drawn = set()
+        for part in sorted(agreeing, key=Slice.place):
+            if part.place() in drawn:
+                continue
             pixels: list[Pixel | None] = [None] * (part.rows * part.columns)
             try:
-                pixels = decode_slice(part, self.views[part.view])
+                pixels = decode_slice(part, picture.view)
+                drawn.add(part.place())
             except Damaged:
                 self.counts["damaged slices"] += 1
-            pictures[part.view].put(part, pixels)
-        return pictures
+            if part.place() in drawn or not part.too_short():
+                picture.put(part, pixels)
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
         """Collects the views of the rig and makes it the present one when all are there."""
@@ -276,7 +297,7 @@ def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
     """The pixels of a slice, row by row; None: invalid."""
     count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
-    if len(part.body) < symbols_size:
+    if part.too_short():
         raise Damaged("short of symbols")
     symbol_bits = int.from_bytes(part.body[:symbols_size], "little")
     if symbol_bits >> 3 * count:

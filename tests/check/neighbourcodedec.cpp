@@ -1,8 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "rangecast-check.hpp"
-
-#include <rangecast/neighbourcode/unit.hpp>
-#include <vector>
+#include "coded-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -228,6 +225,261 @@ GST_START_TEST (test_works_again_after_null)
 }
 GST_END_TEST;
 
+/* What a view of the output has in one row; the whole frame set is as make_frame_set() made it. */
+static std::vector<guint16>
+depths_of_row (GstBuffer *buffer, int row)
+{
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
+  const RangeImage &image = frame.views ()[0];
+  return {image.depth.row (row), image.depth.row (row) + image.roi.width};
+}
+
+GST_START_TEST (test_conceal_last_shows_the_last_good_pixels_of_damaged_slices)
+{
+  const Rig rig = ring_rig (1);
+  const auto good = encoded_units (rig, make_frame_set (rig));
+  auto bad = good;
+  bad[3].push_back (0); /* a byte left over */
+  bad[3][2]++;
+  const int row = header_of (good[3]).first_row;
+  for (const bool conceal : {false, true}) {
+    GstHarness *h =
+        decoder_harness (rig, conceal ? "neighbourcodedec conceal=last" : "neighbourcodedec");
+    GstBuffer *whole = gst_harness_push_and_pull (h, buffer_of (good));
+    for (GstClockTime time = 1; time < 4; time++) {
+      GstBuffer *damaged = gst_harness_push_and_pull (h, buffer_of (bad, time));
+      if (conceal)
+        fail_unless_equals_int (points (damaged), points (whole));
+      fail_unless_equals_int (depths_of_row (damaged, row) == depths_of_row (whole, row), conceal);
+      gst_buffer_unref (damaged);
+    }
+    fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "bad-slices"), 3);
+    fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "missing-pixels"), 0);
+    gst_buffer_unref (whole);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does)
+{
+  const Rig rig = ring_rig (1);
+  auto units = encoded_units (rig, make_frame_set (rig));
+  GstHarness *h = decoder_harness (rig, "neighbourcodedec conceal=last");
+  GstBuffer *whole = gst_harness_push_and_pull (h, buffer_of (units));
+  units.erase (units.begin () + 3);
+  for (const GstClockTime time : {GST_SECOND / 30, 10 * GST_SECOND}) {
+    GstBuffer *with_gap = buffer_of (units, time);
+    GST_BUFFER_FLAG_SET (with_gap, GST_BUFFER_FLAG_DISCONT);
+    GstBuffer *output = gst_harness_push_and_pull (h, with_gap);
+    fail_unless_equals_int (points (output) == points (whole), time < GST_SECOND);
+    gst_buffer_unref (output);
+  }
+  gst_buffer_unref (whole);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stray_slice_that_comes_first_costs_only_itself)
+{
+  const Rig rig = ring_rig (1);
+  const auto good = encoded_units (rig, make_frame_set (rig));
+  const auto other_roi = encoded_units (rig, make_frame_set (rig, 0, {10, 10, 99, 50}));
+  auto other_frame = good[2], other_rows = good[0];
+  other_frame[8] = 99;
+  other_rows[28] = 20;
+  for (const auto &stray : {other_roi[1], other_frame, other_rows}) {
+    GstHarness *h = decoder_harness (rig);
+    GstBuffer *whole = gst_harness_push_and_pull (h, buffer_of (good));
+    auto units = good;
+    units.insert (units.begin (), stray);
+    GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (units));
+    for (const int row : {0, 100, 239})
+      fail_unless (depths_of_row (output, row) == depths_of_row (whole, row));
+    fail_unless (stat (h, "neighbourcodedec", "slices") >= 2 * good.size ());
+    fail_unless (stat (h, "neighbourcodedec", "bad-slices") <= 1);
+    gst_buffer_unref (whole);
+    gst_buffer_unref (output);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_repeated_slices_count_their_points_once)
+{
+  const Rig rig = ring_rig (1);
+  auto units = encoded_units (rig, make_frame_set (rig));
+  const auto n = units.size ();
+  units.insert (units.end (), units.begin (), units.begin () + std::ptrdiff_t (n));
+  GstHarness *h = decoder_harness (rig);
+  GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (units));
+  fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "points"), points (output));
+  fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "slices"), n);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* ---- alignment=slice ---- */
+
+static GstHarness *
+slice_decoder (const Rig &rig, const char *properties = "")
+{
+  GstHarness *h = harness_of (std::string ("neighbourcodedec ") + properties);
+  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
+  return h;
+}
+
+static void
+push_slices (GstHarness *h, const std::vector<std::vector<guint8>> &units, GstClockTime time,
+    bool with_marker)
+{
+  for (std::size_t i = 0; i < units.size (); i++) {
+    GstBuffer *slice = buffer_of ({units[i]}, time);
+    if (with_marker && i + 1 == units.size ())
+      GST_BUFFER_FLAG_SET (slice, GST_BUFFER_FLAG_MARKER);
+    fail_unless_equals_int (gst_harness_push (h, slice), GST_FLOW_OK);
+  }
+}
+
+static void
+expect_frame_set (GstHarness *h, GstBuffer *expected, GstClockTime time)
+{
+  GstBuffer *output = gst_harness_try_pull (h);
+  fail_unless (output != nullptr);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), time);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), time);
+  fail_if (GST_BUFFER_FLAG_IS_SET (output, GST_BUFFER_FLAG_MARKER));
+  fail_unless_equals_int (points (output), points (expected));
+  for (const int row : {0, 100, 239})
+    fail_unless (depths_of_row (output, row) == depths_of_row (expected, row));
+  gst_buffer_unref (output);
+}
+
+GST_START_TEST (test_frame_set_of_slices_ends_with_its_marker)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *input = make_frame_set (rig);
+  const auto units = encoded_units (rig, gst_buffer_ref (input));
+  GstHarness *h = slice_decoder (rig);
+  for (GstClockTime time = 0; time < 3; time++) {
+    push_slices (h, units, time, true);
+    expect_frame_set (h, input, time);
+  }
+  gst_buffer_unref (input);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_frame_set_of_slices_without_marker_ends_at_the_next_capture_time)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *input = make_frame_set (rig);
+  const auto units = encoded_units (rig, gst_buffer_ref (input));
+  GstHarness *h = slice_decoder (rig);
+  push_slices (h, units, 0, false);
+  fail_unless_equals_int (gst_harness_buffers_received (h), 0);
+  push_slices (h, {units[0]}, 1, true); /* ends two */
+  expect_frame_set (h, input, 0);
+  GstBuffer *second = gst_harness_try_pull (h);
+  fail_unless_equals_int (gst_buffer_n_range_metas (second), 1);
+  gst_buffer_unref (second);
+  gst_buffer_unref (input);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_last_slices_come_out_before_eos_gap_and_new_caps)
+{
+  const Rig rig = ring_rig (1);
+  GstBuffer *input = make_frame_set (rig);
+  const auto units = encoded_units (rig, gst_buffer_ref (input));
+  GstHarness *h = slice_decoder (rig);
+  push_slices (h, units, 0, false);
+  fail_unless (gst_harness_push_event (h, gst_event_new_gap (1, 1)));
+  expect_frame_set (h, input, 0);
+  push_slices (h, units, 2, false);
+  gst_harness_set_src_caps (h, coded_caps (ring_rig (2), "slice"));
+  expect_frame_set (h, input, 2);
+  gst_harness_set_src_caps (h, coded_caps (rig));
+  GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (units, 3));
+  fail_unless_equals_int (points (output), points (input));
+  gst_buffer_unref (output);
+  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
+  push_slices (h, units, 4, false);
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  expect_frame_set (h, input, 4);
+  gst_buffer_unref (input);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_and_null_drop_slices_that_wait)
+{
+  const Rig rig = ring_rig (1);
+  const auto units = encoded_units (rig, make_frame_set (rig));
+  GstHarness *h = slice_decoder (rig);
+  push_slices (h, units, 0, false);
+  flush (h);
+  push_slices (h, units, 1, false);
+  for (const GstState state : {GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
+    fail_unless (gst_element_set_state (h->element, state) == GST_STATE_CHANGE_SUCCESS);
+  gst_harness_play (h);
+  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
+  push_slices (h, units, 2, true);
+  fail_unless_equals_int (gst_harness_buffers_received (h), 1);
+  fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "frames"), 1);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slices_and_access_units_decode_to_the_same)
+{
+  const Rig rig = ring_rig (3);
+  std::vector<GstBuffer *> outputs[2];
+  for (const bool slices : {false, true}) {
+    GstHarness *h = harness (rig,
+        slices
+            ? "neighbourcodeenc ! application/x-neighbour-code,alignment=slice ! neighbourcodedec"
+            : "neighbourcodeenc ! neighbourcodedec");
+    for (GstClockTime time = 0; time < 3; time++)
+      gst_harness_push (h, make_frame_set (rig, time));
+    outputs[slices] = pull_all (h);
+    gst_harness_teardown (h);
+  }
+  fail_unless_equals_int (outputs[1].size (), 3);
+  for (std::size_t i = 0; i < 3; i++) {
+    fail_unless_equals_int (points (outputs[0][i]), points (outputs[1][i]));
+    fail_unless (depths_of_row (outputs[0][i], 99) == depths_of_row (outputs[1][i], 99));
+  }
+  unref_all (outputs[0]);
+  unref_all (outputs[1]);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_endless_frame_set_of_slices_stays_below_32_MiB)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = slice_decoder (rig);
+  const std::vector<guint8> chunk (1 << 20, 0x19);
+  for (int i = 0; i < 40; i++)
+    push_slices (h, {chunk}, 0, false);
+  push_slices (h, {chunk}, 0, true);
+  gst_buffer_unref (gst_harness_pull (h));
+  fail_unless (stat (h, "neighbourcodedec", "coded-bytes") <= 32 << 20);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_latency_is_that_of_upstream)
+{
+  GstHarness *h = decoder_harness (ring_rig (1));
+  gst_harness_set_upstream_latency (h, 40 * GST_MSECOND);
+  fail_unless_equals_uint64 (gst_harness_query_latency (h), 40 * GST_MSECOND);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodedec_suite ()
 {
@@ -242,6 +494,18 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_settings_change_while_playing);
   tcase_add_test (tc, test_new_caps_in_the_stream_are_taken);
   tcase_add_test (tc, test_works_again_after_null);
+  tcase_add_test (tc, test_conceal_last_shows_the_last_good_pixels_of_damaged_slices);
+  tcase_add_test (
+      tc, test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does);
+  tcase_add_test (tc, test_stray_slice_that_comes_first_costs_only_itself);
+  tcase_add_test (tc, test_repeated_slices_count_their_points_once);
+  tcase_add_test (tc, test_frame_set_of_slices_ends_with_its_marker);
+  tcase_add_test (tc, test_frame_set_of_slices_without_marker_ends_at_the_next_capture_time);
+  tcase_add_test (tc, test_last_slices_come_out_before_eos_gap_and_new_caps);
+  tcase_add_test (tc, test_flush_and_null_drop_slices_that_wait);
+  tcase_add_test (tc, test_slices_and_access_units_decode_to_the_same);
+  tcase_add_test (tc, test_endless_frame_set_of_slices_stays_below_32_MiB);
+  tcase_add_test (tc, test_latency_is_that_of_upstream);
   return suite;
 }
 

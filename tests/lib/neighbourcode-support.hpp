@@ -33,6 +33,11 @@ struct Picture {
             clip (120 + 50 * v + n (random)), clip (100 + 40 * u * v + n (random)), 0};
       }
   }
+  void fill (std::uint16_t value)
+  {
+    for (int y = 0; y < roi.height; y++)
+      std::fill_n (depth.view ().row (y), roi.width, value);
+  }
   RangeImage image () { return {view_id, roi, depth.view (), colour.view (), 77}; }
 };
 
@@ -60,21 +65,27 @@ struct Decoded {
 };
 
 inline Decoded
-decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes)
+decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
+    std::span<const RangeImage> older = {})
 {
   Decoded decoded;
   decoder.plan (bytes, decoded.result);
-  for (const auto &view : decoder.views ()) {
-    Picture &picture = decoded.pictures.emplace_back (view.view_id, view.roi);
-    for (int y = 0; y < view.roi.height; y++)
-      for (int x = 0; x < view.roi.width; x++)
-        picture.depth.view ().at (x, y) = kInvalidDepth;
-  }
+  for (const auto &view : decoder.views ())
+    decoded.pictures.emplace_back (view.view_id, view.roi).fill (0x5a5a);
   std::vector<RangeImage> images;
   for (Picture &picture : decoded.pictures)
     images.push_back (picture.image ());
-  decoder.decode (images, 1, decoded.result);
+  decoder.decode (images, 1, decoded.result, older);
   return decoded;
+}
+
+inline std::vector<std::uint8_t>
+joined (const std::vector<std::vector<std::uint8_t>> &units)
+{
+  std::vector<std::uint8_t> bytes;
+  for (const auto &unit : units)
+    bytes.insert (bytes.end (), unit.begin (), unit.end ());
+  return bytes;
 }
 
 /** The units of an access unit, apart. */

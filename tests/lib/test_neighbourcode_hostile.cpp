@@ -28,12 +28,13 @@ small_stream ()
 
 /* In a copy of exactly its size, so that one byte too far is seen. */
 Decoded
-decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes)
+decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
+    std::span<const RangeImage> older = {})
 {
   const auto copy = std::make_unique<std::uint8_t[]> (bytes.size ());
   if (!bytes.empty ())
     std::memcpy (copy.get (), bytes.data (), bytes.size ());
-  return decode (decoder, {copy.get (), bytes.size ()});
+  return decode (decoder, {copy.get (), bytes.size ()}, older);
 }
 
 struct Hostile : ::testing::Test {
@@ -90,19 +91,15 @@ TEST_F (Hostile, random_symbols_under_a_good_header_stay_in_their_rows)
     for (std::size_t k = kSliceHeaderSize; k < unit.size (); k++)
       unit[k] = static_cast<std::uint8_t> (random ());
     Picture canvas (header.view_id, header.roi);
-    for (int y = 0; y < header.roi.height; y++)
-      for (int x = 0; x < header.roi.width; x++)
-        canvas.depth.view ().at (x, y) = 0xabcd;
-    DecoderResult result;
-    decoder.plan (unit, result);
-    ASSERT_EQ (decoder.views ().size (), 1u);
-    const RangeImage image = canvas.image ();
-    decoder.decode ({&image, 1}, 1, result);
+    canvas.fill (0xabcd);
+    const RangeImage older = canvas.image ();
+    Decoded decoded = decode_exact (decoder, unit, {&older, 1});
+    ASSERT_EQ (decoded.pictures.size (), 1u);
     for (int y = 0; y < header.roi.height; y++)
       for (int x = 0; x < header.roi.width; x++) {
         const bool own = y >= header.first_row && y < header.first_row + header.rows;
         if (!own) {
-          ASSERT_EQ (canvas.depth.view ().at (x, y), 0xabcd);
+          ASSERT_EQ (decoded.pictures[0].depth.view ().at (x, y), 0xabcd);
         }
       }
   }
@@ -247,4 +244,181 @@ TEST_F (Hostile, stray_slice_of_another_frame_clears_nothing)
   for (int y = 0; y < 20; y++)
     for (int x = 0; x < 24; x++)
       ASSERT_EQ (decoded.pictures[0].depth.view ().at (x, y), pictures[0].depth.view ().at (x, y));
+}
+
+namespace {
+
+/* One view in many slices, and what of it a test compares. */
+struct Slices : Hostile {
+  std::vector<Picture> pictures;
+  std::vector<std::vector<std::uint8_t>> units;
+  std::uint64_t points = 0;
+
+  void SetUp () override
+  {
+    Hostile::SetUp ();
+    pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
+    EncoderResult result;
+    units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, &result));
+    points = result.points;
+    ASSERT_GT (units.size (), 3u);
+  }
+  SliceHeader header_of (std::size_t i)
+  {
+    SliceHeader header;
+    EXPECT_TRUE (read_slice_header (units[i], header).ok ());
+    return header;
+  }
+  static void put_u16 (std::vector<std::uint8_t> &unit, std::size_t at, int value)
+  {
+    unit[at] = static_cast<std::uint8_t> (value);
+    unit[at + 1] = static_cast<std::uint8_t> (value >> 8);
+  }
+  /* Rows first to first + n - 1 are those of `of`; n < 0: all. */
+  static void expect_rows (Picture &is, Picture &of, int first = 0, int n = -1)
+  {
+    for (int y = first; y < (n < 0 ? is.roi.height : first + n); y++)
+      for (int x = 0; x < is.roi.width; x++)
+        ASSERT_EQ (is.depth.view ().at (x, y), of.depth.view ().at (x, y)) << x << " " << y;
+  }
+};
+
+} // namespace
+
+TEST_F (Slices, strays_of_another_frame_that_come_first_cost_nothing_but_themselves)
+{
+  const auto strays = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77));
+  auto sent = units;
+  sent.insert (sent.begin (), strays.begin (), strays.begin () + 2);
+  Decoded decoded = decode_exact (decoder, joined (sent));
+  EXPECT_EQ (decoded.result.slices, units.size ());
+  EXPECT_EQ (decoded.result.bad_slices, 2u);
+  EXPECT_EQ (decoded.result.points, points);
+  EXPECT_EQ (decoded.result.missing_pixels, 0u);
+  expect_rows (decoded.pictures[0], pictures[0]);
+}
+
+TEST_F (Slices, stray_with_another_roi_that_comes_first_costs_nothing_but_itself)
+{
+  std::vector<Picture> others;
+  others.emplace_back (0, Roi{30, 2, 50, 60}, 2, 6);
+  auto sent = units;
+  sent.insert (sent.begin (), units_of (encode (rig (), others, {16, 8, 0, 0, 256}))[1]);
+  Decoded decoded = decode_exact (decoder, joined (sent));
+  EXPECT_EQ (decoded.result.slices, units.size ());
+  EXPECT_EQ (decoded.result.bad_slices, 1u);
+  ASSERT_TRUE (decoded.pictures[0].roi == pictures[0].roi);
+  expect_rows (decoded.pictures[0], pictures[0]);
+}
+
+TEST_F (Slices, of_as_many_strays_as_right_ones_the_first_that_came_stay)
+{
+  const auto stray = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77))[2];
+  for (const bool stray_first : {false, true}) {
+    const Decoded decoded = decode_exact (
+        decoder, joined ({stray_first ? stray : units[0], stray_first ? units[0] : stray}));
+    EXPECT_EQ (decoder.views ()[0].reference.frame_number, stray_first ? 77u : 5u);
+    EXPECT_EQ (decoded.result.bad_slices, 1u);
+  }
+}
+
+TEST_F (Slices, stray_with_wrong_rows_leaves_all_others_right)
+{
+  const SliceHeader first = header_of (0), second = header_of (1);
+  auto stray = units[0];
+  put_u16 (stray, 28, second.first_row + 1);
+  auto sent = units;
+  sent.insert (sent.begin (), stray);
+  Decoded decoded = decode_exact (decoder, joined (sent));
+  EXPECT_EQ (decoded.result.slices, units.size () + 1);
+  EXPECT_EQ (decoded.result.bad_slices, 0u);
+  const int wrong_end = second.first_row + 1 + first.rows;
+  expect_rows (decoded.pictures[0], pictures[0], 0, second.first_row);
+  for (std::size_t i = 2; i < units.size (); i++)
+    expect_rows (decoded.pictures[0], pictures[0], std::max (wrong_end, header_of (i).first_row),
+        header_of (i).rows - 1);
+}
+
+TEST_F (Slices, points_of_overlapping_slices_are_those_that_can_be_seen)
+{
+  auto stray = units[0];
+  put_u16 (stray, 28, header_of (1).first_row + 1);
+  auto sent = units;
+  sent.push_back (stray);
+  Decoded decoded = decode_exact (decoder, joined (sent));
+  std::uint64_t seen = 0;
+  for (int y = 0; y < 20; y++)
+    for (int x = 0; x < 24; x++)
+      seen += decoded.pictures[0].depth.view ().at (x, y) != 0;
+  EXPECT_EQ (decoded.result.points, seen);
+  EXPECT_EQ (decoded.result.missing_pixels, 0u);
+}
+
+TEST_F (Slices, repeated_slices_count_once)
+{
+  auto sent = units;
+  sent.insert (sent.end (), units.begin (), units.end ());
+  sent.insert (sent.end (), units.begin (), units.end ());
+  const Decoded decoded = decode_exact (decoder, joined (sent));
+  EXPECT_EQ (decoded.result.slices, units.size ());
+  EXPECT_EQ (decoded.result.bad_slices, 0u);
+  EXPECT_EQ (decoded.result.points, points);
+  EXPECT_EQ (decoded.result.raw_bits, points * 40 + 24 * 20);
+}
+
+TEST_F (Slices, sound_copy_stands_in_for_a_damaged_slice)
+{
+  for (const bool damaged_first : {false, true}) {
+    auto sent = units;
+    sent.insert (sent.begin () + 1, units[1]);
+    sent[damaged_first ? 1 : 2][kSliceHeaderSize] = 0xff;
+    Decoded decoded = decode_exact (decoder, joined (sent));
+    EXPECT_EQ (decoded.result.slices, units.size ());
+    EXPECT_EQ (decoded.result.points, points);
+    expect_rows (decoded.pictures[0], pictures[0]);
+  }
+}
+
+TEST_F (Slices, damaged_and_lost_and_short_slices_show_the_older_picture)
+{
+  Picture older (0, {0, 0, 60, 40}, 9, 6);
+  const RangeImage older_image = older.image ();
+  const SliceHeader header = header_of (1);
+  auto damaged = units, lost = units, cut = units;
+  damaged[1].push_back (0); /* a byte left over: all rows are written when that is found */
+  put_u16 (damaged[1], 2, int (damaged[1].size ()));
+  lost.erase (lost.begin () + 1);
+  cut[1].resize (kSliceHeaderSize + 3);
+  put_u16 (cut[1], 2, kSliceHeaderSize + 3);
+  Picture expected = pictures[0];
+  for (int y = header.first_row; y < header.first_row + header.rows; y++)
+    for (int x = 0; x < 24; x++)
+      expected.depth.view ().at (x, y) = older.depth.view ().at (x + 7, y + 9);
+  for (const auto &sent : {damaged, lost, cut}) {
+    Decoded decoded = decode_exact (decoder, joined (sent), {&older_image, 1});
+    EXPECT_EQ (decoded.result.slices, units.size () - 1);
+    expect_rows (decoded.pictures[0], expected);
+  }
+}
+
+TEST_F (Slices, many_short_slices_of_many_rows_take_little_time)
+{
+  Rig large;
+  large.views.push_back (ring_view (0, 0, 0.8, 4096, 4096));
+  ASSERT_TRUE (decoder.set_rig (large).ok ());
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < 100000; i++) {
+    SliceHeader header;
+    header.depth_bits = 8;
+    header.colour_bits = 8;
+    header.roi = {0, 0, 4096, 4096};
+    header.first_row = i % 4000;
+    header.rows = 4096 - header.first_row;
+    header.columns = 4096;
+    std::uint8_t unit[kSliceHeaderSize];
+    write_slice_header (header, sizeof unit, unit);
+    bytes.insert (bytes.end (), unit, unit + sizeof unit);
+  }
+  const Decoded decoded = decode_exact (decoder, bytes); /* else minutes: the test would time out */
+  EXPECT_EQ (decoded.result.bad_slices, 100000u);
 }

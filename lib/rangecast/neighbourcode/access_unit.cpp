@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
+#include <tuple>
 #include <utility>
 
 namespace rangecast {
@@ -97,6 +98,45 @@ AccessUnitDecoder::set_rig (const Rig &rig)
   return {};
 }
 
+/* What slices of one view agree in, then where they lie, then when they came. */
+static auto
+sort_key (const SliceHeader &h)
+{
+  return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
+      h.colour_bits, h.frame_number, h.first_column, h.first_row, h.columns, h.rows};
+}
+
+static bool
+agrees (const SliceHeader &a, const SliceHeader &b)
+{
+  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.colour_bits == b.colour_bits &&
+         a.frame_number == b.frame_number;
+}
+
+static bool
+same_place (const SliceHeader &a, const SliceHeader &b)
+{
+  return a.first_row == b.first_row && a.rows == b.rows && a.first_column == b.first_column &&
+         a.columns == b.columns;
+}
+
+static Roi
+place_of (const SliceHeader &h)
+{
+  return {h.first_column, h.first_row, h.columns, h.rows};
+}
+
+/* The elements at the beginning of `all` that are like its first one. */
+template <typename T, typename Like>
+static std::span<const T>
+leading (std::span<const T> all, const Like &like)
+{
+  std::size_t n = 0;
+  while (n < all.size () && like (all[n].header, all[0].header))
+    n++;
+  return all.first (n);
+}
+
 void
 AccessUnitDecoder::plan (std::span<const std::uint8_t> bytes, DecoderResult &result)
 {
@@ -107,42 +147,47 @@ AccessUnitDecoder::plan (std::span<const std::uint8_t> bytes, DecoderResult &res
   while (const auto unit = units.next (unit_header)) {
     if (unit_header.type != static_cast<std::uint8_t> (UnitType::kSlice))
       continue;
-    PlannedSlice slice = {*unit, {}};
-    if (header_reader_.read_header (*unit, slice.header).ok ())
-      slices_.push_back (slice);
-    else
+    PlannedSlice slice = {*unit, {}, slices_.size (), false};
+    if (!header_reader_.read_header (*unit, slice.header).ok ()) {
       result.bad_slices++;
+      continue;
+    }
+    slice.too_short = SliceDecoder::smallest_size (slice.header) > unit->size ();
+    slices_.push_back (slice);
   }
   result.bad_slices += !units.status ().ok ();
 
-  std::ranges::stable_sort (slices_, {}, [] (const PlannedSlice &s) { return s.header.view_id; });
-  for (std::size_t i = 0; i < slices_.size (); i++) {
-    const SliceHeader &header = slices_[i].header;
-    if (count_ == 0 || planned_[count_ - 1].view_id != header.view_id)
-      planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns, i, 0, header};
-    planned_[count_ - 1].slice_count++;
-  }
-  for (std::size_t i = 0; i < count_; i++) {
-    const auto first = slices_.begin () + std::ptrdiff_t (planned_[i].first_slice);
-    std::ranges::sort (
-        first, first + std::ptrdiff_t (planned_[i].slice_count), {}, [] (const PlannedSlice &s) {
-          return std::pair{s.header.first_column, s.header.first_row};
-        });
+  std::ranges::sort (slices_, {}, [] (const PlannedSlice &s) {
+    return std::pair{sort_key (s.header), s.arrival};
+  });
+  for (std::span<const PlannedSlice> rest = slices_; !rest.empty ();) {
+    const auto view = leading (rest, [] (auto &a, auto &b) { return a.view_id == b.view_id; });
+    plan_view (view, result);
+    rest = rest.subspan (view.size ());
   }
 }
 
-static bool
-same_place (const SliceHeader &a, const SliceHeader &b)
+/* Most slices of a view are right, also where a stray one of another frame set came first. */
+void
+AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResult &result)
 {
-  return a.first_row == b.first_row && a.rows == b.rows && a.first_column == b.first_column &&
-         a.columns == b.columns;
-}
-
-static bool
-agrees (const SliceHeader &a, const SliceHeader &b)
-{
-  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.colour_bits == b.colour_bits &&
-         a.frame_number == b.frame_number;
+  const auto by_arrival = [] (const PlannedSlice &s) { return s.arrival; };
+  std::span<const PlannedSlice> best;
+  const PlannedSlice *best_first = nullptr;
+  for (auto rest = slices; !rest.empty ();) {
+    const auto run = leading (rest, agrees);
+    const PlannedSlice *first = &*std::ranges::min_element (run, {}, by_arrival);
+    if (run.size () > best.size () ||
+        (run.size () == best.size () && first->arrival < best_first->arrival)) {
+      best = run;
+      best_first = first;
+    }
+    rest = rest.subspan (run.size ());
+  }
+  result.bad_slices += slices.size () - best.size ();
+  const SliceHeader &header = best_first->header;
+  planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns,
+      static_cast<std::size_t> (best.data () - slices_.data ()), best.size (), header};
 }
 
 /* The slices lie in the order of their columns, then rows. What an encoder makes is bands of
@@ -157,8 +202,9 @@ AccessUnitDecoder::missing_pixels (std::size_t view) const
   std::uint64_t have = 0;
   bool tiled = true;
   for (std::size_t i = 0; i < planned.slice_count; i++) {
-    const SliceHeader &h = slices_[planned.first_slice + i].header;
-    if (!agrees (h, planned.reference) || (last && same_place (h, *last)))
+    const PlannedSlice &slice = slices_[planned.first_slice + i];
+    const SliceHeader &h = slice.header;
+    if (slice.too_short || (last && same_place (h, *last)))
       continue;
     const bool below = last && h.first_column == last->first_column && h.columns == last->columns &&
                        h.first_row == last->first_row + last->rows;
@@ -177,40 +223,93 @@ AccessUnitDecoder::missing_pixels (std::size_t view) const
   return all > have ? all - have : 1;
 }
 
-void
-AccessUnitDecoder::decode_view (std::size_t index, const RangeImage &image)
+/* Slices of one place: the first sound one counts, the others are copies of it. */
+AccessUnitDecoder::Place
+AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
+    const ConstRangeImage &older, DecoderResult &result)
 {
-  const PlannedView &planned = planned_[index];
-  const SliceHeader &first = planned.reference;
-  DecoderResult &result = results_[index];
-  result = {};
-  for (std::size_t i = 0; i < planned.slice_count; i++) {
-    const PlannedSlice &slice = slices_[planned.first_slice + i];
-    if (!agrees (slice.header, first)) { /* a stray one: nothing of it is written */
-      result.bad_slices++;
-      continue;
-    }
+  Place place = Place::kNothing;
+  for (const PlannedSlice &slice : same) {
     std::uint64_t points = 0;
-    if (decoders_[planned.view_id].decode (slice.unit, slice.header, image, points).ok ()) {
+    if (!slice.too_short &&
+        decoders_[slice.header.view_id].decode (slice.unit, slice.header, image, points).ok ()) {
       result.slices++;
       result.points += points;
-    } else {
-      result.bad_slices++;
-      SliceDecoder::invalidate (slice.header, image);
+      return Place::kSound;
     }
+    result.bad_slices++;
+    if (!slice.too_short)
+      place = Place::kDamaged;
   }
-  result.missing_pixels = missing_pixels (index);
-  result.raw_bits =
-      result.points * static_cast<std::uint64_t> (first.depth_bits + 3 * first.colour_bits) +
-      static_cast<std::uint64_t> (planned.roi.width) *
-          static_cast<std::uint64_t> (planned.roi.height);
+  if (place == Place::kDamaged)
+    fill_from (older, image, place_of (same[0].header));
+  return place;
 }
 
 void
-AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result)
+AccessUnitDecoder::decode_view (
+    std::size_t index, const RangeImage &image, const ConstRangeImage &older)
+{
+  const PlannedView &planned = planned_[index];
+  DecoderResult &result = results_[index];
+  std::vector<Place> &covered = covered_[index];
+  result = {};
+  const bool tiled = missing_pixels (index) == 0;
+  const auto pixels =
+      static_cast<std::size_t> (planned.roi.width) * static_cast<std::size_t> (planned.roi.height);
+  if (!tiled) {
+    fill_from (older, image);
+    covered.assign (pixels, Place::kNothing);
+  }
+  std::span<const PlannedSlice> rest (&slices_[planned.first_slice], planned.slice_count);
+  while (!rest.empty ()) {
+    const auto same = leading (rest, same_place);
+    const Place place = decode_place (same, image, older, result);
+    if (!tiled && place != Place::kNothing)
+      for (int y = same[0].header.first_row, n = same[0].header.rows; n > 0; y++, n--)
+        std::fill_n (
+            covered.begin () + std::ptrdiff_t{y} * planned.roi.width + same[0].header.first_column,
+            same[0].header.columns, place);
+    rest = rest.subspan (same.size ());
+  }
+  if (!tiled)
+    count_pixels (index, image, result);
+  const SliceHeader &first = planned.reference;
+  result.raw_bits =
+      result.points * static_cast<std::uint64_t> (first.depth_bits + 3 * first.colour_bits) +
+      pixels;
+}
+
+/* Where slices may overlap, the sum of their points is not what is there. */
+void
+AccessUnitDecoder::count_pixels (
+    std::size_t index, const RangeImage &image, DecoderResult &result) const
+{
+  const Place *place = covered_[index].data ();
+  result.points = 0;
+  for (int y = 0; y < image.roi.height; y++)
+    for (int x = 0; x < image.roi.width; x++, place++) {
+      result.missing_pixels += *place == Place::kNothing;
+      result.points += *place == Place::kSound && image.depth.at (x, y) != kInvalidDepth;
+    }
+}
+
+static ConstRangeImage
+image_of (std::span<const RangeImage> images, int view_id)
+{
+  for (const RangeImage &image : images)
+    if (image.view_id == view_id)
+      return image;
+  return {}; /* an empty one: everything becomes invalid */
+}
+
+void
+AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
+    std::span<const RangeImage> older)
 {
   const std::size_t n = std::min (images.size (), count_);
-  in_parallel (n, threads, [&] (std::size_t i) { decode_view (i, images[i]); });
+  in_parallel (n, threads,
+      [&] (std::size_t i) { decode_view (i, images[i], image_of (older, planned_[i].view_id)); });
   for (std::size_t i = 0; i < n; i++) {
     const DecoderResult &r = results_[i];
     result.slices += r.slices;
@@ -222,24 +321,31 @@ AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, Deco
 }
 
 void
-fill_from (const ConstRangeImage &older, const RangeImage &image)
+fill_from (const ConstRangeImage &older, const RangeImage &image, const Roi &part)
 {
   const Roi &a = older.roi, &b = image.roi;
-  const int left = std::clamp (a.x - b.x, 0, b.width);
-  const int right = std::clamp (a.x + a.width - b.x, left, b.width);
-  for (int y = 0; y < b.height; y++) {
+  const int begin = part.x, end = part.x + part.width;
+  const int left = std::clamp (a.x - b.x, begin, end);
+  const int right = std::clamp (a.x + a.width - b.x, left, end);
+  for (int y = part.y; y < part.y + part.height; y++) {
     std::uint16_t *depth = image.depth.row (y);
     const int from_y = b.y + y - a.y;
     if (from_y < 0 || from_y >= a.height || left == right) {
-      std::fill_n (depth, b.width, kInvalidDepth);
+      std::fill (depth + begin, depth + end, kInvalidDepth);
       continue;
     }
     const int from_x = b.x + left - a.x;
-    std::fill (depth, depth + left, kInvalidDepth);
+    std::fill (depth + begin, depth + left, kInvalidDepth);
     std::copy_n (older.depth.row (from_y) + from_x, right - left, depth + left);
     std::copy_n (older.colour.row (from_y) + from_x, right - left, image.colour.row (y) + left);
-    std::fill (depth + right, depth + b.width, kInvalidDepth);
+    std::fill (depth + right, depth + end, kInvalidDepth);
   }
+}
+
+void
+fill_from (const ConstRangeImage &older, const RangeImage &image)
+{
+  fill_from (older, image, {0, 0, image.roi.width, image.roi.height});
 }
 
 } // namespace rangecast

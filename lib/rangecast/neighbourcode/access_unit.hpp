@@ -43,7 +43,7 @@ private:
 };
 
 struct DecoderResult {
-  std::uint64_t slices = 0;     ///< decoded
+  std::uint64_t slices = 0;     ///< decoded; a repeated one counts once
   std::uint64_t bad_slices = 0; ///< damaged, of another rig or version, or at odds with the others
   std::uint64_t missing_pixels = 0; ///< of the views' ROIs, in slices that did not come
   std::uint64_t points = 0;         ///< valid pixels
@@ -59,43 +59,59 @@ public:
     int view_id = 0;
     Roi roi;
     std::uint64_t capture_time_ns = 0;
-    std::size_t first_slice = 0, slice_count = 0; ///< in the order of views
-    SliceHeader reference; ///< the first slice that came: the others must agree with it
+    std::size_t first_slice = 0, slice_count = 0; ///< those that agree; by column, row, arrival
+    SliceHeader reference;                        ///< of these the first that came
   };
 
   Status set_rig (const Rig &rig);
   [[nodiscard]] const Rig &rig () const { return rig_; }
 
-  /** Reads all headers. Views are sorted by view-id; the first slice of a view says its ROI and
-   *  bits, others that differ are bad. `bytes` must live until decode() is done. */
+  /** Reads all headers. Views are sorted by view-id. ROI, bits and frame number of a view are those
+   *  that most of its slices have (of two as frequent: those that came first); slices that differ
+   *  are bad and take no further part. `bytes` must live until decode() is done. */
   void plan (std::span<const std::uint8_t> bytes, DecoderResult &result);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
   /** Pixels of a view's ROI that no slice holds; at least 1 unless the slices cover it for sure. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
 
-  /** @param images  one for each of views(), with its ROI; pixels without a slice are left as they
-   *  are, those of damaged slices become invalid.
-   *  @param threads  views at a time; 0 = number of cores */
-  void decode (std::span<const RangeImage> images, int threads, DecoderResult &result);
+  /** Fills all pixels of `images`. Those that no sound slice gives become what they are in `older`,
+   *  or invalid. Where slices overlap, the later by column, then row, replaces the earlier.
+   *  @param images  one for each of views(), with its ROI
+   *  @param threads  views at a time; 0 = number of cores
+   *  @param older  earlier images of any views, also with other ROIs; none: invalid pixels */
+  void decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
+      std::span<const RangeImage> older = {});
 
 private:
   struct PlannedSlice {
     std::span<const std::uint8_t> unit;
     SliceHeader header;
+    std::size_t arrival; /* number in the access unit */
+    bool too_short; /* for its symbols; it writes nothing, or small units would cost much time */
   };
-  void decode_view (std::size_t index, const RangeImage &image);
+  enum class Place : std::uint8_t { kNothing, kDamaged, kSound };
+
+  void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
+  void decode_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
+  Place decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
+      const ConstRangeImage &older, DecoderResult &result);
+  void count_pixels (std::size_t index, const RangeImage &image, DecoderResult &result) const;
 
   Rig rig_;
   SliceDecoder header_reader_;
   std::array<SliceDecoder, kMaxViews> decoders_; /* by view-id */
   std::array<PlannedView, kMaxViews> planned_;
-  std::array<DecoderResult, kMaxViews> results_; /* by planned view */
+  /* by planned view */
+  std::array<DecoderResult, kMaxViews> results_;
+  std::array<std::vector<Place>, kMaxViews> covered_; /* pixels of views that slices do not tile */
   std::size_t count_ = 0;
   std::vector<PlannedSlice> slices_;
 };
 
-/** Fills an image from an older one of the same view: where their ROIs overlap its pixels,
- * elsewhere invalid ones. For views of which slices are missing. */
+/** Fills part of an image (rows and columns of its ROI) from an older one of the same view: where
+ *  their ROIs overlap its pixels, elsewhere invalid ones. */
+void fill_from (const ConstRangeImage &older, const RangeImage &image, const Roi &part);
+/** The same for the whole image. */
 void fill_from (const ConstRangeImage &older, const RangeImage &image);
 
 } // namespace rangecast

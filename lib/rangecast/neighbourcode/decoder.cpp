@@ -175,11 +175,11 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   return symbols.at_clean_end () && full.bits.at_clean_end () ? Status{} : damaged ();
 }
 
-void
-SliceDecoder::invalidate (const SliceHeader &header, const RangeImage &image)
+std::size_t
+SliceDecoder::smallest_size (const SliceHeader &header)
 {
-  for (int y = header.first_row; y < header.first_row + header.rows; y++)
-    std::fill_n (image.depth.row (y) + header.first_column, header.columns, kInvalidDepth);
+  return kSliceHeaderSize + symbol_bytes (static_cast<std::size_t> (header.rows) *
+                                          static_cast<std::size_t> (header.columns));
 }
 
 } // namespace rangecast

@@ -24,7 +24,7 @@ public:
   Status read_header (std::span<const std::uint8_t> unit, SliceHeader &header) const;
 
   /** Decodes one slice into the planes of its view. Writes only pixels of its own rows and
-   *  columns; where it returns an error, those may be partly written: see invalidate().
+   *  columns; where it returns an error, those may be partly written.
    *  @param unit    the whole unit
    *  @param header  as read_header() gave it
    *  @param image   has the slice's ROI
@@ -33,8 +33,8 @@ public:
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
       const RangeImage &image, std::uint64_t &points);
 
-  /** Clears the depths of a slice's rows and columns. */
-  static void invalidate (const SliceHeader &header, const RangeImage &image);
+  /** Bytes of a slice all of whose pixels are invalid or equal a neighbour; no slice has fewer. */
+  static std::size_t smallest_size (const SliceHeader &header);
 
 private:
   struct ViewTables {
