@@ -52,6 +52,9 @@ AvatarStream::add_pad (GstPad *pad, AvatarPadKind kind)
   std::lock_guard guard (lock_);
   pads_.push_back (std::make_shared<AvatarPad> (pad, kind));
   gst_flow_combiner_add_pad (combiner_, pad);
+  /* RECONFIGURE says it too, but for links that are made without. */
+  g_signal_connect_swapped (
+      pad, "linked", G_CALLBACK (+[] (AvatarStream *stream) { stream->pad_linked (); }), this);
   run_task ();
 }
 
@@ -62,6 +65,7 @@ AvatarStream::remove_pad (GstPad *pad)
   const auto found = std::ranges::find_if (pads_, [&] (const auto &p) { return p->pad () == pad; });
   if (found == pads_.end ())
     return;
+  g_signal_handlers_disconnect_by_data (pad, this);
   (*found)->set_flushing (true);
   pads_.erase (found);
   gst_flow_combiner_remove_pad (combiner_, pad);
@@ -206,6 +210,7 @@ AvatarStream::push_picture (AvatarPad &pad, const AvatarMoment &moment)
   if (moment.discont)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   gst_range_buffer_set_capture_time (buffer, moment.capture_time);
+  pad.push_segment (segment_, segment_seqnum_);
   return pad.push (buffer);
 }
 
@@ -223,36 +228,50 @@ AvatarStream::push_pictures (const AvatarPads &pads, const AvatarMoment &moment)
 {
   GstFlowReturn flow = GST_FLOW_OK;
   for (const auto &pad : pads) {
-    pad->push_segment (segment_, segment_seqnum_);
     const GstFlowReturn pushed = push_picture (*pad, moment);
     flow = combine (*pad, pushed);
-    if (flow != GST_FLOW_OK)
+    if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* that counts when all are asked */
       return flow;
   }
   return flow;
 }
 
-GstFlowReturn
-AvatarStream::one_frame (const AvatarPads &pads)
+bool
+AvatarStream::any_stale (const AvatarPads &pads)
 {
   bool stale = false;
   for (const auto &pad : pads)
     stale |= pad->needs_negotiation ();
-  GstFlowReturn flow = stale ? negotiate (pads) : GST_FLOW_OK;
-  if (flow == kAgain)
-    return GST_FLOW_OK;
+  return stale;
+}
+
+GstFlowReturn
+AvatarStream::negotiate_if_stale (const AvatarPads &pads)
+{
+  return any_stale (pads) ? negotiate (pads) : GST_FLOW_OK;
+}
+
+GstFlowReturn
+AvatarStream::one_frame (const AvatarPads &pads)
+{
+  GstFlowReturn flow = negotiate_if_stale (pads);
   if (flow != GST_FLOW_OK)
-    return flow;
+    return flow == kAgain ? GST_FLOW_OK : flow;
   AvatarMoment moment{};
   if (!is_live_)
     moment = clock_.next ();
   else if (!clock_.wait (element_, moment))
-    return GST_FLOW_OK; /* the loop looks why */
+    return GST_FLOW_OK;             /* the loop looks why */
+  flow = negotiate_if_stale (pads); /* pads may have been linked anew during the wait */
+  if (flow != GST_FLOW_OK)
+    return flow == kAgain ? GST_FLOW_OK : flow;
   if (GST_CLOCK_TIME_IS_VALID (segment_.stop) && moment.pts >= segment_.stop)
     return GST_FLOW_EOS;
   flow = push_pictures (pads, moment);
+  if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED)
+    return all_unlinked () || any_stale (pads) ? GST_FLOW_OK : flow; /* overtaken, too */
   if (flow != GST_FLOW_OK)
-    return flow == GST_FLOW_NOT_LINKED && all_unlinked () ? GST_FLOW_OK : flow;
+    return flow;
   segment_.position = moment.pts + moment.duration;
   sent_++;
   std::lock_guard guard (lock_);

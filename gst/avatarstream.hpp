@@ -16,7 +16,8 @@
  *
  *  Locks, in this order: task_lock_, lock_, those inside of AvatarClock and AvatarPad. The thread
  *  holds task_lock_ all through a frame, as it would a pad's stream lock. No other is held while
- *  pushing, querying, posting or waiting. */
+ *  pushing, querying, posting or waiting; lock_ and AvatarPad's are held while a pool, which may be
+ *  downstream's, is told to flush. */
 class AvatarStream {
 public:
   /** @param element  owns this, and outlives it */
@@ -70,6 +71,8 @@ private:
   GstFlowReturn no_common_format ();
 
   static void loop (gpointer stream);
+  static bool any_stale (const AvatarPads &pads);
+  GstFlowReturn negotiate_if_stale (const AvatarPads &pads);
   GstFlowReturn one_frame (const AvatarPads &pads);
   GstFlowReturn push_pictures (const AvatarPads &pads, const AvatarMoment &moment);
   GstFlowReturn combine (const AvatarPad &pad, GstFlowReturn flow);

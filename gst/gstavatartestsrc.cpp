@@ -223,8 +223,8 @@ gst_avatar_test_src_get_property (GObject *object, guint id, GValue *value, GPar
   auto priv = GST_AVATAR_TEST_SRC (object)->priv;
   if (id == PROP_STATS) {
     g_value_take_boxed (value,
-        gst_structure_new ("avatartestsrc-stats", "frames", G_TYPE_UINT64, priv->stream.frames (),
-            "skipped", G_TYPE_UINT64, priv->stream.skipped (), nullptr));
+        gst_structure_new ("application/x-avatartestsrc-stats", "frames", G_TYPE_UINT64,
+            priv->stream.frames (), "skipped", G_TYPE_UINT64, priv->stream.skipped (), nullptr));
     return;
   }
   std::lock_guard guard (priv->lock);
@@ -256,7 +256,7 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
   object_class->finalize = gst_avatar_test_src_finalize;
   AvatarSettings::install (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "stats", "Counters since the element was last started",
+      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was last started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   for (GstStaticPadTemplate *pad_template :

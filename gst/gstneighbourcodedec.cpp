@@ -21,6 +21,7 @@
 
 #include <gst/base/base.h>
 
+#include <atomic>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -51,8 +52,8 @@ struct GstNeighbourCodeDecPrivate {
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
-  GstBuffer *last = nullptr; /* what conceal=last takes pixels from */
-  bool by_slices = false;    /* alignment of the input */
+  GstBuffer *last = nullptr;          /* what conceal=last takes pixels from */
+  std::atomic<bool> by_slices{false}; /* alignment of the input */
   std::vector<guint8> slices;
   GstBuffer *first = nullptr; /* of slices: gives times and flags */
   bool complete = false;      /* nothing more comes to slices */
@@ -132,12 +133,20 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   forget_stream (priv);
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
-  /* It would drop single slices. */
-  gst_base_transform_set_qos_enabled (base, !priv->by_slices);
   drop_pool (priv);
   priv->pool = gst_range_buffer_pool_new ();
   return gst_range_buffer_pool_configure (priv->pool, out, 2, 0) &&
          gst_buffer_pool_set_active (priv->pool, TRUE);
+}
+
+/* With alignment=slice the base class does not learn of late frames: it would drop single slices.
+ */
+static gboolean
+gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS && GST_NEIGHBOUR_CODE_DEC (base)->priv->by_slices)
+    return gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (base), event);
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->src_event (base, event);
 }
 
 /* ---- data ---- */
@@ -496,6 +505,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
       "Codec/Decoder/Video", "Decodes range images from the neighbour code", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CONCEAL, GstPluginAPIFlags (0));
 
+  transform_class->src_event = gst_neighbour_code_dec_src_event;
   transform_class->start = gst_neighbour_code_dec_start;
   transform_class->stop = gst_neighbour_code_dec_stop;
   transform_class->transform_caps = gst_neighbour_code_dec_transform_caps;

@@ -558,6 +558,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   aggregator_class->stop = gst_range_combine_stop;
   aggregator_class->sink_event = gst_range_combine_sink_event;
   aggregator_class->update_src_caps = gst_range_combine_update_src_caps;
+  aggregator_class->clip = gstrange::clip_to_segment;
   aggregator_class->aggregate = gst_range_combine_aggregate;
 
   GST_DEBUG_CATEGORY_INIT (gst_range_combine_debug, "rangecombine", 0, "Range image combiner");

@@ -548,6 +548,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   aggregator_class->sink_event = gst_range_mux_sink_event;
   aggregator_class->update_src_caps = gst_range_mux_update_src_caps;
   aggregator_class->get_next_time = gst_range_mux_get_next_time;
+  aggregator_class->clip = gstrange::clip_to_segment;
   aggregator_class->aggregate = gst_range_mux_aggregate;
 
   GST_DEBUG_CATEGORY_INIT (gst_range_mux_debug, "rangemux", 0, "Range multiplexer");

@@ -25,8 +25,8 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/parallel.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
 #include <rangecast/roi/segmentation.hpp>
@@ -332,14 +332,10 @@ process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSet
     return s;
   if (Status s = check_views (priv, frame); !s.ok ())
     return s;
-  cv::parallel_for_ (
-      cv::Range (0, static_cast<int> (images.size ())),
-      [&] (const cv::Range &range) {
-        for (int i = range.start; i < range.end; i++)
-          process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
-              images[i], settings);
-      },
-      settings.n_threads > 0 ? settings.n_threads : -1);
+  rangecast::in_parallel (images.size (), settings.n_threads, [&] (std::size_t i) {
+    process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
+        images[i], settings);
+  });
   for (std::size_t i = 0; i < images.size (); i++) {
     const ViewState &state = *priv->views[images[i].view_id];
     if (!state.status.ok ())

@@ -732,6 +732,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->sink_event = gst_stereo_depth_sink_event;
   aggregator_class->src_event = gst_stereo_depth_src_event;
   aggregator_class->update_src_caps = gst_stereo_depth_update_src_caps;
+  aggregator_class->clip = gstrange::clip_to_segment;
   aggregator_class->aggregate = gst_stereo_depth_aggregate;
 
   GST_DEBUG_CATEGORY_INIT (gst_stereo_depth_debug, "stereodepth", 0, "Stereo depth");

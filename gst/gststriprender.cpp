@@ -28,7 +28,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
+#include <rangecast/parallel.hpp>
 #include <vector>
 
 #include "strippainter.hpp"
@@ -298,9 +298,8 @@ build_all (GstStripRenderPrivate *priv, std::span<const RangeImage> images,
     const rangecast::StripSettings &settings, RenderStats &stats)
 {
   std::array<rangecast::StripResult, rangecast::kMaxViews> results{};
-  cv::parallel_for_ (cv::Range (0, int (images.size ())), [&] (const cv::Range &range) {
-    for (int i = range.start; i < range.end; i++)
-      rangecast::build_strips (images[i], settings, priv->vertices[i], results[i]);
+  rangecast::in_parallel (images.size (), 0, [&] (std::size_t i) {
+    rangecast::build_strips (images[i], settings, priv->vertices[i], results[i]);
   });
   for (std::size_t i = 0; i < images.size (); i++) {
     stats.points += results[i].points;

@@ -178,15 +178,18 @@ count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   const GstClockTime now = clock ? gst_clock_get_time (clock) : gst_util_get_timestamp ();
   gst_clear_object (&clock);
 
-  std::lock_guard guard (runner->lock);
-  const auto frames = static_cast<gint> (runner->latencies_ms.size ());
-  if (runner->options.frames > 0 && frames >= runner->options.frames)
-    return GST_PAD_PROBE_DROP;
-  if (!GST_CLOCK_TIME_IS_VALID (runner->first_frame))
-    runner->first_frame = now;
-  runner->last_frame = now;
-  runner->latencies_ms.push_back (
-      GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
+  gint frames;
+  {
+    std::lock_guard guard (runner->lock);
+    frames = static_cast<gint> (runner->latencies_ms.size ());
+    if (runner->options.frames > 0 && frames >= runner->options.frames)
+      return GST_PAD_PROBE_DROP;
+    if (!GST_CLOCK_TIME_IS_VALID (runner->first_frame))
+      runner->first_frame = now;
+    runner->last_frame = now;
+    runner->latencies_ms.push_back (
+        GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
+  }
   if (runner->options.frames > 0 && frames + 1 == runner->options.frames)
     g_idle_add (send_eos, runner);
   if (runner->turned) /* the next picture; the last one is the first view's again */

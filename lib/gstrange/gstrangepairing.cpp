@@ -34,13 +34,29 @@ running_time_of (GstAggregatorPad *pad, GstBuffer *buffer)
   return time;
 }
 
+GstBuffer *
+clip_to_segment (GstAggregator *, GstAggregatorPad *pad, GstBuffer *buffer)
+{
+  const GstClockTime begin = GST_BUFFER_PTS (buffer);
+  if (pad->segment.format != GST_FORMAT_TIME || !GST_CLOCK_TIME_IS_VALID (begin))
+    return buffer;
+  GstClockTime end = begin;
+  if (GST_BUFFER_DURATION_IS_VALID (buffer))
+    end += std::min (GST_BUFFER_DURATION (buffer), GST_CLOCK_TIME_NONE - begin);
+  guint64 from, to;
+  if (gst_segment_clip (&pad->segment, GST_FORMAT_TIME, begin, end, &from, &to))
+    return buffer;
+  gst_buffer_unref (buffer);
+  return nullptr;
+}
+
 GstClockTime
 gap_end (GstClockTime running_time, GstBuffer *gap, GstClockTime tolerance)
 {
-  if (!GST_BUFFER_DURATION_IS_VALID (gap))
-    return running_time + tolerance;
-  const GstClockTime duration = GST_BUFFER_DURATION (gap);
-  return running_time + duration - std::min (tolerance, duration);
+  GstClockTime length = tolerance;
+  if (GST_BUFFER_DURATION_IS_VALID (gap))
+    length = GST_BUFFER_DURATION (gap) - std::min (tolerance, GST_BUFFER_DURATION (gap));
+  return running_time + std::min (length, GST_CLOCK_TIME_NONE - running_time);
 }
 
 /* Which of the two fronts to drop (0, 1), or -1 where they are a pair. A gap stands for all that
@@ -52,11 +68,7 @@ without_partner (GstBuffer *const buffers[2], const GstClockTime times[2], GstCl
   const bool gaps[2] = {is_gap (buffers[0]), is_gap (buffers[1])};
   if (gaps[0] != gaps[1] && timed) {
     const int gap = gaps[0] ? 0 : 1;
-    const GstClockTime length = GST_BUFFER_DURATION_IS_VALID (buffers[gap])
-                                    ? GST_BUFFER_DURATION (buffers[gap]) -
-                                          MIN (tolerance, GST_BUFFER_DURATION (buffers[gap]))
-                                    : tolerance;
-    return times[1 - gap] > times[gap] + length ? gap : 1 - gap;
+    return times[1 - gap] > gap_end (times[gap], buffers[gap], tolerance) ? gap : 1 - gap;
   }
   if (gaps[0] || gaps[1])
     return gaps[0] ? 0 : 1;

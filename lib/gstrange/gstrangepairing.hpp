@@ -46,6 +46,11 @@ GST_RANGE_API GstAggregatorPad *add_sink_pad (GstElement *aggregator, const char
 /** Whether this is the empty buffer that GstAggregator makes of a GAP event. */
 GST_RANGE_API bool is_gap (GstBuffer *buffer);
 
+/** GstAggregator's clip: drops what lies wholly outside of the pad's segment, as the first frames
+ *  after an accurate seek do. Pictures are not cut. */
+GST_RANGE_API GstBuffer *clip_to_segment (
+    GstAggregator *aggregator, GstAggregatorPad *pad, GstBuffer *buffer);
+
 /** The last running time of a frame that a gap stands for, ns: the gap's end less the tolerance;
  *  one frame is in a gap without duration. */
 GST_RANGE_API GstClockTime gap_end (

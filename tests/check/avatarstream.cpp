@@ -310,10 +310,20 @@ drop (GstPad *, GstObject *, GstBuffer *buffer)
   return GST_FLOW_OK;
 }
 
+/* @param caps  what it takes; nullptr: anything */
 static GstPad *
-make_sink_pad ()
+make_sink_pad (const char *caps = nullptr)
 {
-  GstPad *sink = GST_PAD (gst_object_ref_sink (gst_pad_new ("sink", GST_PAD_SINK)));
+  GstPad *sink;
+  if (caps) {
+    GstStaticPadTemplate pad_template =
+        GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (nullptr));
+    pad_template.static_caps.string = caps;
+    sink = gst_pad_new_from_static_template (&pad_template, "sink");
+  } else {
+    sink = gst_pad_new ("sink", GST_PAD_SINK);
+  }
+  gst_object_ref_sink (sink);
   gst_pad_set_chain_function (sink, drop);
   gst_pad_set_active (sink, TRUE);
   return sink;
@@ -354,6 +364,36 @@ change_states (gpointer element)
     }
   return nullptr;
 }
+
+/* Live, a link changes while the source waits for the next tick. */
+GST_START_TEST (test_live_pads_may_be_linked_to_peers_of_another_size)
+{
+  GstElement *source = make_source (TRUE), *pipeline = gst_pipeline_new (nullptr);
+  gst_bin_add (GST_BIN (pipeline), GST_ELEMENT (gst_object_ref (source)));
+  GstPad *left = gst_element_request_pad_simple (source, "left");
+  GstPad *right = gst_element_request_pad_simple (source, "right");
+  GstPad *small = make_sink_pad ("video/x-raw,width=32,height=24,framerate=50/1");
+  GstPad *large = make_sink_pad ("video/x-raw,width=64,height=48,framerate=50/1");
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  for (int i = 0; i < 6; i++) { /* another pad each time, and another peer */
+    GstPad *pad = i % 2 ? right : left, *sink = i % 3 ? small : large;
+    const guint64 before = stat (source, "frames");
+    fail_unless_equals_int (
+        gst_pad_link_full (
+            pad, sink, i < 3 ? GST_PAD_LINK_CHECK_DEFAULT : GST_PAD_LINK_CHECK_NO_RECONFIGURE),
+        GST_PAD_LINK_OK);
+    fail_unless (wait_for_frames (source, before + 3), "link %d", i);
+    g_usleep (5000);
+    gst_pad_unlink (pad, sink);
+  }
+  GstBus *bus = gst_element_get_bus (pipeline);
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  for (gpointer object : {gpointer (bus), gpointer (left), gpointer (right), gpointer (small),
+           gpointer (large), gpointer (source), gpointer (pipeline)})
+    gst_object_unref (object);
+}
+GST_END_TEST;
 
 GST_START_TEST (test_pads_may_come_and_go_while_states_change)
 {
@@ -546,6 +586,7 @@ avatarstream_suite ()
   tcase_add_test (tc, test_stream_rests_without_pads_and_goes_on_with_a_new_one);
   tcase_add_test (tc, test_pad_requested_after_eos_ends_too);
   tcase_add_test (tc, test_pad_may_be_linked_and_unlinked_at_leisure);
+  tcase_add_test (tc, test_live_pads_may_be_linked_to_peers_of_another_size);
   tcase_add_test (tc, test_pads_may_come_and_go_while_states_change);
   tcase_add_test (tc, test_flush_events_go_through_and_restart_running_time);
   tcase_add_test (tc, test_flush_seek_gives_the_frames_of_its_segment_once);

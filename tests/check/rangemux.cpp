@@ -211,6 +211,24 @@ GST_START_TEST (test_gap_lets_the_others_go_on_until_it_is_over)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frames_before_the_segment_are_left_out)
+{
+  Mux m (2);
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 2 * kFrame;
+  for (int i : {0, 1})
+    gst_harness_push_event (m.in[i], gst_event_new_segment (&segment));
+  for (int frame : {0, 2})
+    for (int i : {0, 1})
+      m.push (i, frame * kFrame, frame * kFrame);
+  GstClockTime capture = 0;
+  fail_unless_equals_int (m.pull (&capture), 0b11);
+  fail_unless_equals_uint64 (capture, 2 * kFrame);
+  fail_unless (gst_harness_try_pull (m.out) == nullptr);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_clock_an_hour_off_is_left_out)
 {
   Mux mux (3);
@@ -295,6 +313,7 @@ rangemux_suite ()
   Suite *suite = suite_create ("rangemux");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_frames_before_the_segment_are_left_out);
   tcase_add_test (tc, test_gap_lets_the_others_go_on_until_it_is_over);
   tcase_add_test (tc, test_views_are_matched_by_capture_time_not_by_arrival_or_pts);
   tcase_add_test (tc, test_skew_beyond_half_a_period_is_another_frame_set);

@@ -121,7 +121,10 @@ error_of (const std::string &properties, const char *right_caps)
   Stereo s (properties, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1", right_caps);
   s.push (s.left, 0);
   s.push (s.right, 0);
-  return next_message_text (s.bus, GST_MESSAGE_ERROR);
+  const std::string text = next_message_text (s.bus, GST_MESSAGE_ERROR);
+  GstMessage *another = gst_bus_pop_filtered (s.bus, GST_MESSAGE_ERROR);
+  fail_unless (another == nullptr, "a second error after '%s'", text.c_str ());
+  return text;
 }
 
 static void
@@ -306,7 +309,8 @@ GST_START_TEST (test_rig_without_the_view_or_of_another_size_is_one_error)
   Rig rig = ring_rig (2);
   fail_unless (save_rig (path, rig).ok ());
   const std::string file = std::string ("rig=") + path;
-  fail_unless (error_of (file + " view-id=7", same).find ("7") != std::string::npos);
+  const std::string missing = error_of (file + " view-id=7", same);
+  fail_unless (missing.find ("no view with view-id 7") != std::string::npos, missing.c_str ());
   fail_unless (error_of (file, same).find ("320x240") != std::string::npos);
   g_unlink (path);
   g_free (path);

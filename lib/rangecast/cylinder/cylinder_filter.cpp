@@ -5,7 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <opencv2/core/utility.hpp>
+
+#include "../parallel.hpp"
 
 namespace rangecast {
 
@@ -67,29 +68,10 @@ CylinderFilter::take_cameras (std::span<const RangeImage> images)
   return {};
 }
 
-/* Runs work (i) for each image, several at a time if that is wanted. */
-template <typename Work>
-static void
-for_each_image (std::size_t images, int threads, const Work &work)
-{
-  if (threads == 1 || images < 2) {
-    for (std::size_t i = 0; i < images; i++)
-      work (i);
-    return;
-  }
-  cv::parallel_for_ (
-      cv::Range (0, static_cast<int> (images)),
-      [&] (const cv::Range &range) {
-        for (int i = range.start; i < range.end; i++)
-          work (static_cast<std::size_t> (i));
-      },
-      threads > 0 ? threads : -1.0);
-}
-
 void
 CylinderFilter::make_points (std::span<const RangeImage> images, int threads)
 {
-  for_each_image (images.size (), threads, [&] (std::size_t i) {
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
     cloud_.fill (i, images[i], rays_[i]);
     moments_[i] = {};
     moments_[i].add (cloud_, cloud_.parts ()[i]);
@@ -120,7 +102,7 @@ CylinderFilter::unroll (int columns, int threads)
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
-  for_each_image (cloud_.parts ().size (), threads, [&] (std::size_t i) {
+  in_parallel (cloud_.parts ().size (), threads, [&] (std::size_t i) {
     ranges_[i] =
         to_wall (cloud_, cloud_.parts ()[i], frame, columns, radius_.data (), column_.data ());
     const float *a = rays_[i].optical_axis;

@@ -2,30 +2,12 @@
 #include "access_unit.hpp"
 
 #include <algorithm>
-#include <opencv2/core/utility.hpp>
 #include <tuple>
 #include <utility>
 
-namespace rangecast {
+#include "../parallel.hpp"
 
-/* Runs work (i) for i below n, some at a time; threads 0 = number of cores. */
-template <typename Work>
-static void
-in_parallel (std::size_t n, int threads, const Work &work)
-{
-  if (threads == 1 || n < 2) {
-    for (std::size_t i = 0; i < n; i++)
-      work (i);
-    return;
-  }
-  cv::parallel_for_ (
-      cv::Range (0, static_cast<int> (n)),
-      [&] (const cv::Range &range) {
-        for (int i = range.start; i < range.end; i++)
-          work (static_cast<std::size_t> (i));
-      },
-      threads > 0 ? threads : -1.0);
-}
+namespace rangecast {
 
 /* ---- encoder ---- */
 
