@@ -53,8 +53,12 @@ AvatarStream::add_pad (GstPad *pad, AvatarPadKind kind)
   pads_.push_back (std::make_shared<AvatarPad> (pad, kind));
   gst_flow_combiner_add_pad (combiner_, pad);
   /* RECONFIGURE says it too, but for links that are made without. */
-  g_signal_connect_swapped (
-      pad, "linked", G_CALLBACK (+[] (AvatarStream *stream) { stream->pad_linked (); }), this);
+  g_signal_connect (pad, "linked",
+      G_CALLBACK (+[] (GstPad *linked, GstPad *, AvatarStream *stream) {
+        gst_pad_mark_reconfigure (linked);
+        stream->pad_linked ();
+      }),
+      this);
   run_task ();
 }
 
