@@ -231,11 +231,12 @@ AvatarPad::push_segment (const GstSegment &segment, guint32 seqnum)
 void
 AvatarPad::push_end (GstEvent *event)
 {
-  if (ended_ || !gst_pad_is_linked (pad_)) /* a pad that is linked later is told then */
+  if (ended_ || !gst_pad_is_linked (pad_)) { /* a pad that is linked later is told then */
     gst_event_unref (event);
-  else
-    gst_pad_push_event (pad_, event);
+    return;
+  }
   ended_ = true;
+  gst_pad_push_event (pad_, event);
 }
 
 /* ---- life ---- */
