@@ -50,11 +50,13 @@ struct Rig {
   [[nodiscard]] const View *find (int view_id) const;
 };
 
-/** Checks every field against the ranges above; the message names view and field. */
+/** Checks every field against the ranges above; the message names view and field.
+ *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadValue for what is wrong */
 Status validate (const Rig &rig);
 
 /** Union of two rigs. A view that both have must be the same in both.
- *  @return kBadValue if a view-id stands for two different cameras (`into` is then untouched). */
+ *  @return kBadValue if a view-id stands for two different cameras, kBadSize if the union is larger
+ *  than kMaxRigPixels (`into` is then untouched). */
 Status merge (Rig &into, const Rig &other);
 
 /** @name The file form
