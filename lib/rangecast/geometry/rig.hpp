@@ -69,7 +69,8 @@ Status save_rig (const std::string &path, const Rig &rig);
 /** @name The binary form
  *  Versioned, little-endian, for caps, byte streams and SDP; layout in docs/rig.md. @{ */
 std::vector<std::uint8_t> encode_rig (const Rig &rig);
-/** Decodes and validates. Trailing bytes are an error: a blob's length is always known. */
+/** Decodes and validates. Trailing bytes are an error: a blob's length is always known.
+ *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadData or kTruncated */
 Status decode_rig (std::span<const std::uint8_t> blob, Rig &rig);
 /** @} */
 

@@ -200,14 +200,18 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
       area_of (header.roi)};
 }
 
+/* An encoder gives at most 8/3 pixels a byte, so this is no ROI of which less than nine tenths are
+ * lost: it stays as it is, the same from one frame set to the next. */
+static constexpr std::uint64_t kMaxPixelsPerByte = 32;
+
 void
 AccessUnitDecoder::crop_to_slices (PlannedView &planned)
 {
-  if (planned.roi.empty ())
-    return;
   const std::span<PlannedSlice> slices (&slices_[planned.first_slice], planned.slice_count);
   int left = planned.roi.width, top = planned.roi.height, right = 0, bottom = 0;
+  std::uint64_t bytes = 0;
   for (const PlannedSlice &slice : slices) {
+    bytes += slice.unit.size ();
     if (slice.too_short)
       continue;
     const Roi place = place_of (slice.header);
@@ -216,6 +220,8 @@ AccessUnitDecoder::crop_to_slices (PlannedView &planned)
     right = std::max (right, place.x + place.width);
     bottom = std::max (bottom, place.y + place.height);
   }
+  if (planned.coded_pixels <= kMaxPixelsPerByte * bytes)
+    return;
   planned.roi = right == 0
                     ? Roi{}
                     : Roi{planned.roi.x + left, planned.roi.y + top, right - left, bottom - top};

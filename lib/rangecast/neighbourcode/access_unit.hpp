@@ -70,9 +70,9 @@ public:
   /** Reads all headers. Views are sorted by view-id. ROI, bits and frame number of a view are those
    *  that most of its slices have (of two as frequent: those that came first); slices that differ
    *  are bad and take no further part. `bytes` must live until decode() is done.
-   *  @param whole_rois  false: ROIs shrink to the box around their slices, beyond which all pixels
-   *  would be invalid, so that a few bytes do not claim a large image; pass true with older images
-   *  to decode() */
+   *  @param whole_rois  false: ROIs of which nearly nothing came shrink to the box around their
+   *  slices, beyond which all pixels would be invalid, so that a few bytes do not claim a large
+   *  image; pass true with older images to decode() */
   void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
   /** Pixels of a view's coded ROI that no slice holds; at least 1 unless the slices cover it for
