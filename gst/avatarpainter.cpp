@@ -3,7 +3,6 @@
 
 #include <array>
 #include <gstrange/gstrange.h>
-#include <gstrange/gstrangebufferpool.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 
@@ -110,8 +109,10 @@ AvatarPainter::draw_range (const AvatarMoment &moment, GstBuffer *buffer)
 {
   for (const auto &view : scene_->range_rig ().views)
     if (settings_.view_id == AvatarSettings::kAllViews || settings_.view_id == view.id)
-      gst_range_buffer_add_view (buffer, guint (view.id), 0, 0, guint (view.width),
-          guint (view.height), moment.capture_time);
+      if (Status s = gstrange::add_view (
+              buffer, view.id, {0, 0, view.width, view.height}, moment.capture_time);
+          !s.ok ())
+        return s;
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
   if (!frame.status ().ok ())
     return frame.status ();

@@ -196,6 +196,9 @@ AvatarStream::push_picture (AvatarPad &pad, const AvatarMoment &moment)
 {
   GstBuffer *buffer = nullptr;
   GstFlowReturn flow = pad.acquire (&buffer);
+  if (flow == GST_FLOW_ERROR)
+    return gst_range_flow_return (
+        element_, {rangecast::StatusCode::kNoSpace, "no memory left for a picture"});
   if (flow != GST_FLOW_OK)
     return flow;
   flow = gst_range_flow_return (

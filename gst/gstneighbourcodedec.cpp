@@ -134,9 +134,8 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   drop_pool (priv);
-  priv->pool = gst_range_buffer_pool_new ();
-  return gst_range_buffer_pool_configure (priv->pool, out, 2, 0) &&
-         gst_buffer_pool_set_active (priv->pool, TRUE);
+  status = gstrange::make_pool (out, priv->pool);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* With alignment=slice the base class does not learn of late frames: it would drop single slices.
@@ -151,20 +150,15 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- data ---- */
 
-/* Lays out the planned views in a fresh buffer; views of the rig that did not come are left out. */
-static GstBuffer *
-make_frame_set (GstNeighbourCodeDecPrivate *priv)
+/* Makes room for the planned views; views of the rig that did not come are left out. */
+static Status
+lay_out (const rangecast::AccessUnitDecoder &decoder, GstBuffer *buffer)
 {
-  GstBuffer *buffer = nullptr;
-  if (gst_buffer_pool_acquire_buffer (priv->pool, &buffer, nullptr) != GST_FLOW_OK)
-    return nullptr;
-  for (const auto &view : priv->decoder.views ())
-    gst_range_buffer_add_view (buffer, guint (view.view_id), guint (view.roi.x), guint (view.roi.y),
-        guint (view.roi.width), guint (view.roi.height), view.capture_time_ns);
-  /* Memories beyond the planned views hold nothing. */
-  for (guint i = guint (priv->decoder.views ().size ()); i < gst_buffer_n_memory (buffer); i++)
-    gst_memory_resize (gst_buffer_peek_memory (buffer, i), 0, 0);
-  return buffer;
+  for (const auto &view : decoder.views ())
+    if (Status s = gstrange::add_view (buffer, view.view_id, view.roi, view.capture_time_ns);
+        !s.ok ())
+      return s;
+  return {};
 }
 
 static Status
@@ -174,13 +168,10 @@ decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, 
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  if (conceal && priv->last) {
-    gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
-    priv->decoder.decode (frame.views (), n_threads, result, older.views ());
-  } else {
-    priv->decoder.decode (frame.views (), n_threads, result);
-  }
-  return {};
+  if (!conceal)
+    return priv->decoder.decode (frame.views (), n_threads, result);
+  gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
+  return priv->decoder.decode (frame.views (), n_threads, result, older.views ());
 }
 
 static void
@@ -205,15 +196,18 @@ decode_bytes (GstNeighbourCodeDec *self, std::span<const guint8> bytes, GstBuffe
   int n_threads;
   {
     std::lock_guard guard (priv->lock);
-    conceal = priv->conceal == CONCEAL_LAST;
+    conceal = priv->conceal == CONCEAL_LAST && priv->last;
     n_threads = priv->n_threads;
   }
   DecoderResult result;
-  priv->decoder.plan (bytes, result);
-  GstBuffer *buffer = make_frame_set (priv);
-  if (!buffer)
-    return GST_FLOW_FLUSHING;
-  const Status status = decode_into (priv, buffer, conceal, n_threads, result);
+  priv->decoder.plan (bytes, result, conceal);
+  GstBuffer *buffer = nullptr;
+  const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  Status status = lay_out (priv->decoder, buffer);
+  if (status.ok ())
+    status = decode_into (priv, buffer, conceal, n_threads, result);
   count_frame (priv, result, bytes.size ());
   if (result.bad_slices)
     GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});

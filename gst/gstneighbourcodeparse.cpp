@@ -79,6 +79,7 @@ struct Stream {               /* streaming thread only */
   Seen seen = Seen::kNothing;
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector;
+  std::string too_large; /* why a rig was refused */
   unsigned used_generation = 0;
   gstrange::RangeInfo info; /* of the source caps */
   std::vector<Range> output;
@@ -214,15 +215,17 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 
 /* ---- errors ---- */
 
-static const char *
-what_is_missing (Seen seen)
+static std::string
+what_is_missing (const Stream &stream)
 {
-  switch (seen) {
+  switch (stream.seen) {
     case Seen::kNothing:
       return "No access unit found: expected a neighbour code byte stream of version 1, which "
              "begins "
              "with the start code 00 52 43 55";
     case Seen::kAccessUnit:
+      if (!stream.too_large.empty ())
+        return "The rig is too large: " + stream.too_large;
       return "No complete rig found: expected the rig views of a neighbour code byte stream in "
              "front of its slices";
     default:
@@ -233,8 +236,8 @@ what_is_missing (Seen seen)
 static void
 post_what_is_missing (GstBaseParse *base)
 {
-  const Seen seen = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.seen;
-  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", what_is_missing (seen)), (nullptr));
+  const std::string text = what_is_missing (GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream);
+  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", text.c_str ()), (nullptr));
 }
 
 /* Where the base class says "No valid frames found" we know what is missing. */
@@ -245,9 +248,9 @@ say_what_is_missing (GstElement *element, GstMessage *message)
   gchar *debug = nullptr;
   gst_message_parse_error (message, &error, &debug);
   if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
-    const Seen seen = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream.seen;
     g_free (error->message);
-    error->message = g_strdup (what_is_missing (seen));
+    error->message =
+        g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream).c_str ());
     gst_message_unref (message);
     message = gst_message_new_error (GST_OBJECT (element), error, debug);
   }
@@ -458,8 +461,12 @@ drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 static void
 add_rig_view (GstBaseParse *base, Bytes unit)
 {
-  if (!GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.collector.add (unit).ok ())
-    GST_DEBUG_OBJECT (base, "a damaged rig view");
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const rangecast::Status status = stream.collector.add (unit);
+  if (status.code () == rangecast::StatusCode::kBadSize)
+    stream.too_large = status.message ();
+  if (!status.ok ())
+    GST_DEBUG_OBJECT (base, "a bad rig view: %s", status.message ().c_str ());
 }
 
 /* After a seek: the rig that the file had last there. */

@@ -224,12 +224,13 @@ negotiate (GstRangeCombine *self)
   priv->frame_duration = info.frame_duration ();
   GstCaps *caps = gstrange::make_range_caps (info);
   drop_pool_and_converter (priv);
-  priv->pool = gst_range_buffer_pool_new ();
-  const bool good = gst_range_buffer_pool_configure (priv->pool, caps, 2, 0) &&
-                    gst_buffer_pool_set_active (priv->pool, TRUE) && make_converter (priv);
-  gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
+  const Status pooled = gstrange::make_pool (caps, priv->pool);
+  if (pooled.ok ())
+    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
-  if (!good) {
+  if (!pooled.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), pooled);
+  if (!make_converter (priv)) {
     GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
         ("pad colour: cannot convert %s to RGBx",
             gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&priv->colour))),
@@ -319,15 +320,16 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
   GstRangeCombinePrivate *priv = self->priv;
   auto aggregator = GST_AGGREGATOR (self);
   GstBuffer *output = nullptr;
-  GstFlowReturn flow = gst_buffer_pool_acquire_buffer (priv->pool, &output, nullptr);
+  GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
   if (flow != GST_FLOW_OK)
     return flow;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const GstClockTime capture = gstrange::capture_time_of (priv->colour_pad, pair.first, live);
-  gst_range_buffer_add_view (output, guint (priv->view.id), 0, 0, guint (priv->view.width),
-      guint (priv->view.height), capture);
-  flow =
-      gst_range_flow_return (GST_ELEMENT (self), combine (priv, pair.first, pair.second, output));
+  const View &view = priv->view;
+  Status status = gstrange::add_view (output, view.id, {0, 0, view.width, view.height}, capture);
+  if (status.ok ())
+    status = combine (priv, pair.first, pair.second, output);
+  flow = gst_range_flow_return (GST_ELEMENT (self), status);
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;

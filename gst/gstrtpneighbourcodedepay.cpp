@@ -52,6 +52,7 @@ struct GstRtpNeighbourCodeDepayPrivate {
 
   /* streaming thread only */
   rangecast::RigCollector collector;
+  bool warned_of_size = false;
   unsigned used_generation = 0;
   bool have_caps = false;
   std::vector<guint8> access_unit; /* slices that arrived so far */
@@ -176,6 +177,19 @@ note_capture_time (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8
     priv->capture_time = slice.capture_time_ns;
 }
 
+/* Without a rig nothing can be decoded, so one that is too large is worth telling, once. */
+static bool
+take_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  const Status status = priv->collector.add (unit);
+  if (status.code () == rangecast::StatusCode::kBadSize && !priv->warned_of_size) {
+    priv->warned_of_size = true;
+    gst_range_post_warning (GST_ELEMENT (self), status);
+  }
+  return status.ok ();
+}
+
 static void
 take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
 {
@@ -185,7 +199,7 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   guint64 good = 0, bad = 0;
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView)) {
-      bad += !priv->collector.add (*unit).ok ();
+      bad += !take_rig_view (self, *unit);
     } else if (priv->access_unit.size () + unit->size () > kMaxAccessUnit) {
       bad++;
     } else {
@@ -263,7 +277,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
     forget_access_unit (priv);
     priv->collector.reset ();
     priv->used_generation = 0;
-    priv->have_caps = false;
+    priv->have_caps = priv->warned_of_size = false;
     std::lock_guard guard (priv->lock);
     priv->counters = {};
   }

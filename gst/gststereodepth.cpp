@@ -250,13 +250,12 @@ negotiate (GstStereoDepth *self)
   priv->frame_duration = info.frame_duration ();
   priv->since_refresh = 0;
   drop_pool (priv);
-  priv->pool = gst_range_buffer_pool_new ();
-  const bool pooled = gst_range_buffer_pool_configure (priv->pool, caps, 2, 0) &&
-                      gst_buffer_pool_set_active (priv->pool, TRUE);
-  gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
+  const Status pooled = gstrange::make_pool (caps, priv->pool);
+  if (pooled.ok ())
+    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
-  priv->negotiate = !pooled;
-  return pooled ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
+  priv->negotiate = !pooled.ok ();
+  return gst_range_flow_return (GST_ELEMENT (self), pooled);
 }
 
 static GstFlowReturn
@@ -347,8 +346,8 @@ match_pictures (GstStereoDepthPrivate *priv, GstBuffer *output, GstClockTime cap
   if (Status s = priv->core.take (priv->readers[0].view (), priv->readers[1].view ()); !s.ok ())
     return s;
   const Roi roi = next_roi (priv);
-  gst_range_buffer_add_view (output, guint (priv->core.range_view ().id), guint (roi.x),
-      guint (roi.y), guint (roi.width), guint (roi.height), capture);
+  if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, capture); !s.ok ())
+    return s;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
@@ -381,7 +380,7 @@ push_pair (GstStereoDepth *self, const gstrange::PairMatcher::Pair &pair)
   GstStereoDepthPrivate *priv = self->priv;
   auto aggregator = GST_AGGREGATOR (self);
   GstBuffer *output = nullptr;
-  GstFlowReturn flow = gst_buffer_pool_acquire_buffer (priv->pool, &output, nullptr);
+  GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
   if (flow != GST_FLOW_OK)
     return flow;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;

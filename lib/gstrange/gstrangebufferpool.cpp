@@ -4,13 +4,18 @@
  * @title: GstRangeBufferPool
  * @short_description: Recycles the buffers of frame sets
  *
- * Gives buffers with one #GstMemory for each of the caps' views, each large enough for the full
- * image. gst_range_buffer_add_view() then lays a view of any ROI into the next memory. On the way
- * back to the pool the views are forgotten and the memories get their size again.
+ * Gives buffers with room for the full image of each of the caps' views: one #GstMemory a view, or,
+ * above gst_buffer_get_max_memory() of them, which GStreamer would merge, one for all. The memories
+ * come with a size of 0; gst_range_buffer_add_view() lays a view of any ROI into the next one,
+ * which grows by what that ROI needs. On the way back to the pool the views are forgotten.
  *
  * Since: 0.1
  */
 #include "gstrangebufferpool.h"
+
+#include <cstdlib>
+#include <cstring>
+#include <rangecast/geometry/range_image.hpp>
 
 #include "gstrangecaps.h"
 
@@ -18,7 +23,7 @@ struct _GstRangeBufferPool {
   GstBufferPool parent;
 
   guint views;
-  gsize view_size; /* bytes of one memory */
+  gsize view_size; /* bytes of the full image of one view */
 };
 
 G_DEFINE_TYPE (GstRangeBufferPool, gst_range_buffer_pool, GST_TYPE_BUFFER_POOL)
@@ -38,11 +43,92 @@ full_view_size (gsize width, gsize height)
   return (row_stride (width, 2) + row_stride (width, 4)) * height;
 }
 
+static bool
+has_one_memory_for_all (guint views)
+{
+  return views > gst_buffer_get_max_memory ();
+}
+
+/* On a memory for all views: how many they are. */
+static GQuark
+views_quark ()
+{
+  static const GQuark quark = g_quark_from_static_string ("gst-range-views");
+  return quark;
+}
+
+static guint
+views_that_fit (GstMemory *memory)
+{
+  const guint views =
+      GPOINTER_TO_UINT (gst_mini_object_get_qdata (GST_MINI_OBJECT_CAST (memory), views_quark ()));
+  return MAX (views, 1);
+}
+
+/* Caps and callers may ask for anything. */
+static bool
+within_limits (gint64 views, gint64 width, gint64 height)
+{
+  using namespace rangecast;
+  return views <= kMaxViews && width <= kMaxImageSide && height <= kMaxImageSide &&
+         views * width * height <= kMaxRigPixels;
+}
+
+/* GStreamer's own allocator ends the process where memory is short. */
 static GstMemory *
-new_view_memory (GstAllocator *allocator, gsize size, GstAllocationParams params)
+try_system_memory (gsize size, const GstAllocationParams &params)
+{
+  const gsize all = (params.prefix + size + params.padding + params.align) & ~params.align;
+  auto data = static_cast<guint8 *> (std::aligned_alloc (params.align + 1, all));
+  if (!data)
+    return nullptr;
+  if (params.flags & GST_MEMORY_FLAG_ZERO_PREFIXED)
+    std::memset (data, 0, params.prefix);
+  if (params.flags & GST_MEMORY_FLAG_ZERO_PADDED)
+    std::memset (data + params.prefix + size, 0, all - params.prefix - size);
+  return gst_memory_new_wrapped (params.flags, data, all, params.prefix, size, data, std::free);
+}
+
+static GstMemory *
+try_memory (GstAllocator *wanted, gsize size, GstAllocationParams params)
 {
   params.align |= kRowAlign - 1;
-  return gst_allocator_alloc (allocator, size, &params);
+  GstAllocator *system = gst_allocator_find (GST_ALLOCATOR_SYSMEM);
+  GstAllocator *allocator =
+      wanted ? GST_ALLOCATOR (gst_object_ref (wanted)) : gst_allocator_find (nullptr);
+  GstMemory *memory = allocator == system ? try_system_memory (size, params)
+                                          : gst_allocator_alloc (allocator, size, &params);
+  gst_object_unref (allocator);
+  gst_object_unref (system);
+  return memory;
+}
+
+/* nullptr where memory is short */
+static GstBuffer *
+try_buffer (
+    GstAllocator *allocator, const GstAllocationParams &params, guint views, gsize view_size)
+{
+  const bool one_for_all = has_one_memory_for_all (views);
+  GstBuffer *buffer = gst_buffer_new ();
+  for (guint i = 0; i < (one_for_all ? 1 : views); i++) {
+    GstMemory *memory = try_memory (allocator, one_for_all ? views * view_size : view_size, params);
+    if (!memory) {
+      gst_buffer_unref (buffer);
+      return nullptr;
+    }
+    if (one_for_all)
+      gst_mini_object_set_qdata (
+          GST_MINI_OBJECT_CAST (memory), views_quark (), GUINT_TO_POINTER (views), nullptr);
+    gst_buffer_append_memory (buffer, memory);
+  }
+  return buffer;
+}
+
+static void
+empty_memories (GstBuffer *buffer)
+{
+  for (guint i = 0; i < gst_buffer_n_memory (buffer); i++)
+    gst_memory_resize (gst_buffer_peek_memory (buffer, i), 0, 0);
 }
 
 static gboolean
@@ -64,6 +150,10 @@ gst_range_buffer_pool_set_config (GstBufferPool *pool, GstStructure *config)
     GST_WARNING_OBJECT (pool, "caps without width, height or views: %" GST_PTR_FORMAT, caps);
     return FALSE;
   }
+  if (!within_limits (views, width, height)) {
+    GST_WARNING_OBJECT (pool, "caps larger than any rig: %" GST_PTR_FORMAT, caps);
+    return FALSE;
+  }
   self->views = static_cast<guint> (views);
   self->view_size = full_view_size (static_cast<gsize> (width), static_cast<gsize> (height));
   gst_buffer_pool_config_set_params (
@@ -82,30 +172,34 @@ gst_range_buffer_pool_alloc_buffer (
   GstStructure *config = gst_buffer_pool_get_config (pool);
   gst_buffer_pool_config_get_allocator (config, &allocator, &params);
 
-  GstBuffer *made = gst_buffer_new ();
-  for (guint i = 0; i < self->views; i++) {
-    GstMemory *memory = new_view_memory (allocator, self->view_size, params);
-    if (!memory) {
-      gst_buffer_unref (made);
-      gst_structure_free (config);
-      return GST_FLOW_ERROR;
-    }
-    gst_buffer_append_memory (made, memory);
-  }
+  *buffer = try_buffer (allocator, params, self->views, self->view_size);
   gst_structure_free (config);
-  *buffer = made;
-  return GST_FLOW_OK;
+  return *buffer ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
+static GstFlowReturn
+gst_range_buffer_pool_acquire_buffer (
+    GstBufferPool *pool, GstBuffer **buffer, GstBufferPoolAcquireParams *params)
+{
+  const GstFlowReturn flow = GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)
+                                 ->acquire_buffer (pool, buffer, params);
+  if (flow == GST_FLOW_OK)
+    empty_memories (*buffer);
+  return flow;
+}
+
+/* The base class keeps a buffer only if it comes back with the size that it had at first. */
 static void
 gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
 {
   auto self = GST_RANGE_BUFFER_POOL (pool);
+  const bool one_for_all = has_one_memory_for_all (self->views);
+  const gsize size = one_for_all ? self->views * self->view_size : self->view_size;
   const guint n = gst_buffer_n_memory (buffer);
-  for (guint i = 0; n == self->views && i < n; i++) {
+  for (guint i = 0; n == (one_for_all ? 1 : self->views) && i < n; i++) {
     GstMemory *memory = gst_buffer_peek_memory (buffer, i);
-    if (gst_memory_is_writable (memory) && memory->maxsize >= self->view_size)
-      gst_memory_resize (memory, -static_cast<gssize> (memory->offset), self->view_size);
+    if (gst_memory_is_writable (memory) && memory->maxsize >= size)
+      gst_memory_resize (memory, -static_cast<gssize> (memory->offset), size);
   }
   GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->reset_buffer (pool, buffer);
 }
@@ -121,6 +215,7 @@ gst_range_buffer_pool_class_init (GstRangeBufferPoolClass *klass)
   auto pool_class = GST_BUFFER_POOL_CLASS (klass);
   pool_class->set_config = gst_range_buffer_pool_set_config;
   pool_class->alloc_buffer = gst_range_buffer_pool_alloc_buffer;
+  pool_class->acquire_buffer = gst_range_buffer_pool_acquire_buffer;
   pool_class->reset_buffer = gst_range_buffer_pool_reset_buffer;
 }
 
@@ -144,7 +239,7 @@ gst_range_buffer_pool_new (void)
  * @min_buffers: how many buffers to allocate at once
  * @max_buffers: how many at most, 0 = no limit
  *
- * Returns: %FALSE if the caps have no size or number of views
+ * Returns: %FALSE if the caps have no size or number of views, or are larger than any rig may be
  */
 gboolean
 gst_range_buffer_pool_configure (
@@ -163,17 +258,19 @@ gst_range_buffer_pool_configure (
  *
  * The same as a buffer of a #GstRangeBufferPool, without a pool.
  *
- * Returns: (transfer full): a buffer without views
+ * Returns: (transfer full) (nullable): a buffer without views; %NULL if that is larger than any rig
+ *   may be, or memory is short
  */
 GstBuffer *
 gst_range_buffer_new (guint views, guint width, guint height)
 {
+  if (!within_limits (views, width, height))
+    return nullptr;
   GstAllocationParams params;
   gst_allocation_params_init (&params);
-  GstBuffer *buffer = gst_buffer_new ();
-  for (guint i = 0; i < views; i++)
-    gst_buffer_append_memory (
-        buffer, new_view_memory (nullptr, full_view_size (width, height), params));
+  GstBuffer *buffer = try_buffer (nullptr, params, views, full_view_size (width, height));
+  if (buffer)
+    empty_memories (buffer);
   return buffer;
 }
 
@@ -187,28 +284,29 @@ gst_range_buffer_new (guint views, guint width, guint height)
  * @height: of the ROI, pixels; 0 for an empty one
  * @capture_time: ns on the clock that the camera hosts share
  *
- * Lays a view into the buffer's next memory, which shrinks to what the ROI needs. Call it once
- * for every memory, with an empty ROI for a view that is missing. The pixels are not touched.
+ * Lays a view behind the buffer's other ones: into its next memory, or into the next bytes of the
+ * one that is for all views, with an empty ROI for a view that is missing. The pixels are not
+ * touched.
  *
- * Returns: (transfer none) (nullable): where its planes lie, or %NULL if the buffer has no
- *   memory left or the ROI does not fit into it
+ * Returns: (transfer none) (nullable): where its planes lie, or %NULL if the buffer has room for no
+ *   more views or the ROI does not fit
  */
 GstRangeMeta *
 gst_range_buffer_add_view (GstBuffer *buffer, guint view_id, guint x, guint y, guint width,
     guint height, GstClockTime capture_time)
 {
-  const guint index = gst_buffer_n_range_metas (buffer);
-  if (index >= gst_buffer_n_memory (buffer))
+  const guint index = gst_buffer_n_range_metas (buffer), memories = gst_buffer_n_memory (buffer);
+  if (memories == 0 || !within_limits (1, width, height))
+    return nullptr;
+  GstMemory *memory = gst_buffer_peek_memory (buffer, MIN (index, memories - 1));
+  if (index >= memories && index >= views_that_fit (memory))
     return nullptr;
   const gsize size = full_view_size (width, height);
-  GstMemory *memory = gst_buffer_peek_memory (buffer, index);
-  if (size > memory->size)
+  if (size > memory->maxsize - memory->offset - memory->size)
     return nullptr;
-  gst_memory_resize (memory, 0, size);
+  const gsize offset = gst_buffer_get_size (buffer);
+  gst_memory_resize (memory, 0, memory->size + size);
 
-  gsize offset = 0;
-  for (guint i = 0; i < index; i++)
-    offset += gst_buffer_peek_memory (buffer, i)->size;
   auto meta =
       reinterpret_cast<GstRangeMeta *> (gst_buffer_add_meta (buffer, GST_RANGE_META_INFO, nullptr));
   meta->view_id = view_id;

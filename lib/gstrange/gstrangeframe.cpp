@@ -3,12 +3,50 @@
 
 #include <string>
 
+#include "gstrangebufferpool.h"
+#include "gstrangestatus.hpp"
+
 using rangecast::RangeImage;
 using rangecast::Rgbx;
 using rangecast::Roi;
+using rangecast::Status;
 using rangecast::StatusCode;
 
 namespace gstrange {
+
+static Status
+no_memory ()
+{
+  return {StatusCode::kNoSpace, "no memory left for a frame set"};
+}
+
+Status
+make_pool (GstCaps *caps, GstBufferPool *&pool)
+{
+  pool = gst_range_buffer_pool_new ();
+  if (gst_range_buffer_pool_configure (pool, caps, 2, 0) && gst_buffer_pool_set_active (pool, TRUE))
+    return {};
+  gst_clear_object (&pool);
+  return no_memory ();
+}
+
+GstFlowReturn
+acquire (GstElement *element, GstBufferPool *pool, GstBuffer **buffer)
+{
+  const GstFlowReturn flow = gst_buffer_pool_acquire_buffer (pool, buffer, nullptr);
+  return flow == GST_FLOW_ERROR ? gst_range_flow_return (element, no_memory ()) : flow;
+}
+
+Status
+add_view (GstBuffer *buffer, int view_id, const Roi &roi, GstClockTime capture_time)
+{
+  if (gst_range_buffer_add_view (buffer, guint (view_id), guint (roi.x), guint (roi.y),
+          guint (roi.width), guint (roi.height), capture_time))
+    return {};
+  return {StatusCode::kNoSpace, "range buffer: no room for view " + std::to_string (view_id) +
+                                    " of " + std::to_string (roi.width) + "x" +
+                                    std::to_string (roi.height) + " pixels"};
+}
 
 static RangeImage
 image_of (const GstRangeView &view, GstClockTime capture_time)

@@ -10,6 +10,17 @@
 
 namespace gstrange {
 
+/** An active pool for frame sets of these caps.
+ *  @return kNoSpace, and no pool, if memory is short or the caps are larger than any rig may be */
+GST_RANGE_API rangecast::Status make_pool (GstCaps *caps, GstBufferPool *&pool);
+
+/** Takes a buffer. Where memory is short it posts the element's one error for it. */
+GST_RANGE_API GstFlowReturn acquire (GstElement *element, GstBufferPool *pool, GstBuffer **buffer);
+
+/** gst_range_buffer_add_view(). @return kNoSpace if the buffer has no room for that view */
+GST_RANGE_API rangecast::Status add_view (
+    GstBuffer *buffer, int view_id, const rangecast::Roi &roi, GstClockTime capture_time);
+
 /** Maps all views of a frame set, for as long as it lives. Lives on the stack, allocates nothing.
  *  After a failure views() is empty and status() says which view is at fault.
  *  crop() changes a view's ROI in its meta, without touching pixels. */

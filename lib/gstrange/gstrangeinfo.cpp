@@ -47,6 +47,9 @@ parse_caps (const GstCaps *caps, RangeInfo &info)
   if (parsed.views () != views)
     return {StatusCode::kBadValue, "caps: views=" + std::to_string (views) + " but the rig has " +
                                        std::to_string (parsed.views ())};
+  if (parsed.width > rangecast::kMaxRigPixels / parsed.height / std::max (views, 1))
+    return {StatusCode::kBadSize, "caps: views x width x height is beyond the limit of " +
+                                      std::to_string (rangecast::kMaxRigPixels) + " pixels"};
   for (const View &view : parsed.rig.views) {
     const std::string name = "caps: rig: view " + std::to_string (view.id);
     if (!view.is_range_view ())

@@ -188,7 +188,8 @@ run_plain (
   const double decode = median_ms (rounds, [&] {
     DecoderResult r;
     decoder.plan (bytes, r);
-    decoder.decode (outputs, 1, r);
+    if (!decoder.decode (outputs, 1, r).ok ())
+      std::abort ();
   });
   const std::string name = "plain d" + std::to_string (settings.depth_bits) + "/" +
                            std::to_string (settings.depth_threshold) + " c" +

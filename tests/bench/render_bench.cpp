@@ -83,8 +83,7 @@ code_and_decode (FrameSet &set)
   for (std::size_t i = 0; i < encoder.parts (); i++)
     bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
   decoder.plan (bytes, decoded);
-  decoder.decode (set.images, 1, decoded);
-  return true;
+  return decoder.decode (set.images, 1, decoded).ok ();
 }
 
 StripPainter::Picture

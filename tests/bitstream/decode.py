@@ -29,6 +29,7 @@ SLICE_FIELDS = struct.Struct("<BBBBIQ8H")
 RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
+MAX_RIG_PIXELS = 1 << 27
 KEY = 1
 FULL_PIXEL, INVALID = 4, 5
 NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
@@ -226,7 +227,8 @@ class Reader:
             self.parts = {}
         self.parts[number] = view
         by_id = {view.id: view for view in self.parts.values()}
-        if len(by_id) == total:
+        widest, tallest = (max(side) for side in zip(*((view.width, view.height) for view in by_id.values())))
+        if len(by_id) == total and total * widest * tallest <= MAX_RIG_PIXELS:
             self.views = by_id
 
 

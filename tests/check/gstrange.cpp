@@ -207,6 +207,176 @@ GST_START_TEST (test_pool_recycles_buffers_with_any_roi)
 }
 GST_END_TEST;
 
+/* Marks each view's corners in both planes, then finds them all: no view lies on another. */
+static void
+check_that_views_are_apart (GstBuffer *buffer, std::size_t views)
+{
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  fail_unless_equals_int (frame.views ().size (), views);
+  for (const auto &view : frame.views ()) {
+    if (view.roi.empty ())
+      continue;
+    const int right = view.roi.width - 1, bottom = view.roi.height - 1;
+    view.depth.at (0, 0) = view.depth.at (right, bottom) = guint16 (1000 + view.view_id);
+    view.colour.at (0, 0).r = view.colour.at (right, bottom).r = guint8 (view.view_id);
+  }
+  for (const auto &view : frame.views ()) {
+    if (view.roi.empty ())
+      continue;
+    const int right = view.roi.width - 1, bottom = view.roi.height - 1;
+    fail_unless_equals_int (view.depth.at (right, bottom), 1000 + view.view_id);
+    fail_unless_equals_int (view.depth.at (0, 0), 1000 + view.view_id);
+    fail_unless_equals_int (view.colour.at (right, bottom).r, view.view_id);
+    fail_unless_equals_int (view.colour.at (0, 0).r, view.view_id);
+  }
+}
+
+GST_START_TEST (test_pool_recycles_buffers_of_up_to_64_views_with_other_rois)
+{
+  for (const int views : {16, 17, 64}) {
+    GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (views), 30, 1));
+    GstBufferPool *pool = gst_range_buffer_pool_new ();
+    fail_unless (gst_range_buffer_pool_configure (pool, caps, 1, 1));
+    fail_unless (gst_buffer_pool_set_active (pool, TRUE));
+    GstMemory *memory = nullptr;
+    for (const guint side : {240u, 80u, 0u, 160u, 240u}) {
+      GstBuffer *buffer = nullptr;
+      fail_unless_equals_int (gst_buffer_pool_acquire_buffer (pool, &buffer, nullptr), GST_FLOW_OK);
+      fail_unless_equals_int (gst_buffer_n_memory (buffer), views > 16 ? 1 : views);
+      fail_unless (!memory || memory == gst_buffer_peek_memory (buffer, 0));
+      memory = gst_buffer_peek_memory (buffer, 0);
+      for (guint id = 0; id < guint (views); id++)
+        fail_unless (gst_range_buffer_add_view (buffer, id, 0, 0, side, side, 7));
+      fail_if (gst_range_buffer_add_view (buffer, 0, 0, 0, 0, 0, 7));
+      check_that_views_are_apart (buffer, std::size_t (views));
+      gst_buffer_unref (buffer);
+    }
+    gst_buffer_pool_set_active (pool, FALSE);
+    gst_object_unref (pool);
+    gst_caps_unref (caps);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_views_of_64_buffers_are_where_they_were_after_append)
+{
+  const Rig rig = ring_rig (64, 33, 24);
+  GstBuffer *all = gst_buffer_new ();
+  for (const View &view : rig.views) {
+    GstBuffer *one = make_frame_set ({{view}}, 5, {1, 2, 3 + view.id % 5, 4 + view.id % 7});
+    {
+      gstrange::RangeFrameMap frame (one, GST_MAP_READWRITE);
+      frame.views ()[0].depth.at (2, 3) = guint16 (1000 + view.id);
+    }
+    fail_unless (gst_range_buffer_append (all, one));
+    gst_buffer_unref (one);
+  }
+  {
+    gstrange::RangeFrameMap frame (all, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ().size (), 64);
+    for (const auto &view : frame.views ())
+      fail_unless_equals_int (view.depth.at (2, 3), 1000 + view.view_id);
+  }
+  gst_buffer_unref (all);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_larger_than_the_caps_is_refused)
+{
+  for (const guint views : {1u, 64u}) {
+    GstBuffer *buffer = gst_range_buffer_new (views, 32, 24);
+    fail_if (gst_range_buffer_add_view (buffer, 0, 0, 0, 16384, 16384, 0));
+    fail_if (gst_range_buffer_add_view (buffer, 0, 0, 0, G_MAXUINT, G_MAXUINT, 0));
+    fail_unless (gst_range_buffer_add_view (buffer, 0, 0, 0, 32, 24, 0));
+    gst_buffer_unref (buffer);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_frame_set_beyond_the_limit_is_refused)
+{
+  fail_if (gst_range_buffer_new (64, 16384, 16384));
+  fail_if (gst_range_buffer_new (65, 16, 16));
+  fail_if (gst_range_buffer_new (1, G_MAXUINT, G_MAXUINT));
+  GstCaps *caps = gst_caps_from_string (
+      "video/x-range,format=Z16_RGBx,width=16384,height=16384,views=64,framerate=30/1");
+  GstBufferPool *pool = gst_range_buffer_pool_new ();
+  fail_if (gst_range_buffer_pool_configure (pool, caps, 1, 0));
+  gst_object_unref (pool);
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_caps_beyond_the_limit_are_refused_by_name)
+{
+  gstrange::RangeInfo parsed;
+  GstCaps *caps =
+      gstrange::make_range_caps (gstrange::make_info (ring_rig (64, 2048, 2048), 30, 1));
+  fail_unless (
+      gstrange::parse_caps (caps, parsed).message ().find ("134217728") != std::string::npos);
+  gst_caps_unref (caps);
+  caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (2), 30, 1));
+  gst_caps_set_simple (
+      caps, "width", G_TYPE_INT, G_MAXINT, "height", G_TYPE_INT, G_MAXINT, nullptr);
+  fail_unless (
+      gstrange::parse_caps (caps, parsed).message ().find ("134217728") != std::string::npos);
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
+/* An allocator that never has memory. */
+struct NoMemory {
+  GstAllocator parent;
+};
+struct NoMemoryClass {
+  GstAllocatorClass parent;
+};
+G_DEFINE_TYPE (NoMemory, no_memory, GST_TYPE_ALLOCATOR)
+static void
+no_memory_init (NoMemory *)
+{
+}
+static void
+no_memory_class_init (NoMemoryClass *klass)
+{
+  GST_ALLOCATOR_CLASS (klass)->alloc = [] (GstAllocator *, gsize, GstAllocationParams *) {
+    return static_cast<GstMemory *> (nullptr);
+  };
+}
+
+GST_START_TEST (test_lack_of_memory_is_one_error_and_no_abort)
+{
+  GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (17), 30, 1));
+  auto allocator = static_cast<GstAllocator *> (g_object_new (no_memory_get_type (), nullptr));
+  gst_object_ref_sink (allocator);
+  GstBufferPool *pool = gst_range_buffer_pool_new ();
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  gst_buffer_pool_config_set_params (config, caps, 0, 0, 0);
+  gst_buffer_pool_config_set_allocator (config, allocator, nullptr);
+  fail_unless (gst_buffer_pool_set_config (pool, config));
+  fail_unless (gst_buffer_pool_set_active (pool, TRUE));
+  GstElement *element = gst_element_factory_make ("identity", nullptr);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (element, bus);
+  GstBuffer *buffer = nullptr;
+  fail_unless_equals_int (gstrange::acquire (element, pool, &buffer), GST_FLOW_ERROR);
+  GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
+  GError *error = nullptr;
+  gst_message_parse_error (message, &error, nullptr);
+  fail_unless (g_error_matches (error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT));
+  fail_if (gst_bus_have_pending (bus));
+  g_error_free (error);
+  gst_message_unref (message);
+  gst_element_set_bus (element, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (element);
+  gst_buffer_pool_set_active (pool, FALSE);
+  gst_object_unref (pool);
+  gst_object_unref (allocator);
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
 static Suite *
 gstrange_suite ()
 {
@@ -223,6 +393,12 @@ gstrange_suite ()
   tcase_add_test (tc, test_copies_of_whole_buffers_keep_views_and_regions_lose_them);
   tcase_add_test (tc, test_crop_moves_the_planes_without_touching_pixels);
   tcase_add_test (tc, test_pool_recycles_buffers_with_any_roi);
+  tcase_add_test (tc, test_pool_recycles_buffers_of_up_to_64_views_with_other_rois);
+  tcase_add_test (tc, test_views_of_64_buffers_are_where_they_were_after_append);
+  tcase_add_test (tc, test_view_larger_than_the_caps_is_refused);
+  tcase_add_test (tc, test_frame_set_beyond_the_limit_is_refused);
+  tcase_add_test (tc, test_caps_beyond_the_limit_are_refused_by_name);
+  tcase_add_test (tc, test_lack_of_memory_is_one_error_and_no_abort);
   return suite;
 }
 

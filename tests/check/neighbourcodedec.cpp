@@ -480,6 +480,137 @@ GST_START_TEST (test_latency_is_that_of_upstream)
 }
 GST_END_TEST;
 
+/* Points of each view of the one frame set that avatartestsrc with these properties gives. */
+static std::vector<std::size_t>
+points_by_view (const std::string &source, const char *rest)
+{
+  GstHarness *h = gst_harness_new_parse (("avatartestsrc num-buffers=1 " + source +
+                                          " ! video/x-range,width=40,height=30 ! identity" + rest)
+                                             .c_str ());
+  gst_harness_play (h);
+  GstBuffer *buffer = gst_harness_pull (h);
+  fail_unless (buffer != nullptr);
+  std::vector<std::size_t> counts;
+  {
+    gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
+    fail_unless (frame.status ().ok ());
+    for (const RangeImage &image : frame.views ()) {
+      fail_unless_equals_int (image.view_id, counts.size ());
+      std::size_t n = 0;
+      for (int y = 0; y < image.roi.height; y++)
+        for (int x = 0; x < image.roi.width; x++)
+          n += image.depth.at (x, y) != 0;
+      counts.push_back (n);
+    }
+  }
+  gst_buffer_unref (buffer);
+  gst_harness_teardown (h);
+  return counts;
+}
+
+static std::size_t
+points_of_view_alone (int views, int view)
+{
+  GstHarness *h = gst_harness_new_parse (
+      ("avatartestsrc num-buffers=1 views=" + std::to_string (views) +
+          " view-id=" + std::to_string (view) + " ! video/x-range,width=40,height=30 ! identity")
+          .c_str ());
+  gst_harness_play (h);
+  GstBuffer *buffer = gst_harness_pull (h);
+  const std::size_t n = points (buffer);
+  gst_buffer_unref (buffer);
+  gst_harness_teardown (h);
+  return n;
+}
+
+GST_START_TEST (test_17_and_64_views_keep_the_points_of_each_view_alone)
+{
+  for (const int views : {17, 64}) {
+    const std::string source = "views=" + std::to_string (views);
+    const auto raw = points_by_view (source, "");
+    fail_unless_equals_int (raw.size (), views);
+    for (const int view : {0, 1, 15, 16, views - 1}) {
+      fail_unless (raw[std::size_t (view)] > 0);
+      fail_unless_equals_int (raw[std::size_t (view)], points_of_view_alone (views, view));
+    }
+    fail_unless (raw == points_by_view (source, " ! rangemux"));
+    fail_unless (
+        raw == points_by_view (source, " ! neighbourcodeenc depth-bits=16 ! neighbourcodedec"));
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_64_views_with_other_rois_in_each_frame_set_decode_exactly)
+{
+  const Rig rig = ring_rig (64, 40, 30);
+  GstHarness *h = harness (rig,
+      "neighbourcodeenc depth-bits=16 depth-threshold=0 colour-threshold=0 ! neighbourcodedec");
+  for (const Roi &roi : {Roi{0, 0, 40, 30}, Roi{3, 4, 11, 7}, Roi{1, 0, 39, 30}, Roi{0, 0, 2, 2}}) {
+    GstBuffer *input = make_frame_set (rig, 1, roi);
+    const std::size_t expected = points (input);
+    GstBuffer *output = gst_harness_push_and_pull (h, input);
+    fail_unless_equals_int (gst_buffer_n_range_metas (output), 64);
+    fail_unless_equals_int (points (output), expected);
+    gst_buffer_unref (output);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_beyond_the_limit_is_an_error_that_names_it)
+{
+  GstHarness *h = harness_of ("neighbourcodedec");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  gst_harness_set_src_caps (h, coded_caps (ring_rig (64, 16384, 16384)));
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("134217728") != std::string::npos);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* A slice of `columns` invalid pixels in one row of a ROI that is the whole image. */
+static std::vector<guint8>
+thin_slice (const View &view, int row, int columns)
+{
+  SliceHeader header;
+  header.key = true;
+  header.view_id = decltype (header.view_id) (view.id);
+  header.depth_bits = 10;
+  header.colour_bits = 6;
+  header.roi = {0, 0, view.width, view.height};
+  header.first_row = row;
+  header.rows = 1;
+  header.columns = columns;
+  std::vector<guint8> unit (kSliceHeaderSize + (3 * std::size_t (columns) + 7) / 8);
+  write_slice_header (header, unit.size (), unit.data ());
+  for (int x = 0; x < columns; x++)
+    for (int bit = 0; bit < 3; bit++)
+      if (5 >> bit & 1)
+        unit[kSliceHeaderSize + std::size_t (3 * x + bit) / 8] |= guint8 (1 << (3 * x + bit) % 8);
+  return unit;
+}
+
+GST_START_TEST (test_one_row_of_a_huge_image_makes_a_small_one)
+{
+  const Rig rig = ring_rig (2, 4096, 4096);
+  GstHarness *h = decoder_harness (rig);
+  GstBuffer *output = gst_harness_push_and_pull (
+      h, buffer_of ({thin_slice (rig.views[0], 4000, 80), thin_slice (rig.views[1], 0, 80)}));
+  GstRangeMeta *meta = gst_buffer_get_range_meta (output, 0);
+  fail_unless_equals_int (meta->y, 4000);
+  fail_unless_equals_int (meta->width, 80);
+  fail_unless_equals_int (meta->height, 1);
+  fail_unless (gst_buffer_get_size (output) < 2000);
+  fail_unless_equals_uint64 (
+      stat (h, "neighbourcodedec", "missing-pixels"), 2 * (4096 * 4096 - 80));
+  fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "slices"), 2);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodedec_suite ()
 {
@@ -506,6 +637,10 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_slices_and_access_units_decode_to_the_same);
   tcase_add_test (tc, test_endless_frame_set_of_slices_stays_below_32_MiB);
   tcase_add_test (tc, test_latency_is_that_of_upstream);
+  tcase_add_test (tc, test_17_and_64_views_keep_the_points_of_each_view_alone);
+  tcase_add_test (tc, test_64_views_with_other_rois_in_each_frame_set_decode_exactly);
+  tcase_add_test (tc, test_rig_beyond_the_limit_is_an_error_that_names_it);
+  tcase_add_test (tc, test_one_row_of_a_huge_image_makes_a_small_one);
   return suite;
 }
 

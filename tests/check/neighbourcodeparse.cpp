@@ -845,6 +845,19 @@ GST_START_TEST (test_file_cut_before_its_first_slice_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_rig_beyond_the_limit_is_one_error_that_names_it)
+{
+  std::vector<guint8> units, bytes = {0x00, 0x52, 0x43, 0x55};
+  write_rig_units ({ring_rig (64, 16384, 16384), 25, 1}, units);
+  AccessUnitHeader header;
+  header.size = guint32 (units.size ());
+  bytes.resize (4 + kAccessUnitHeaderSize);
+  write_access_unit_header (header, bytes.data () + 4);
+  bytes.insert (bytes.end (), units.begin (), units.end ());
+  expect_one_error (bytes, "134217728");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_cut_file_that_plays_is_no_error)
 {
   const Recording recording (3, 16);
@@ -960,6 +973,7 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_other_file_is_one_error);
   tcase_add_test (tc, test_future_version_is_one_error);
   tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
+  tcase_add_test (tc, test_rig_beyond_the_limit_is_one_error_that_names_it);
   tcase_add_test (tc, test_cut_file_that_plays_is_no_error);
   tcase_add_test (tc, test_downstream_may_change_its_mind);
   tcase_add_test (tc, test_access_units_pass_as_they_are);

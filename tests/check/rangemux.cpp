@@ -307,6 +307,31 @@ GST_START_TEST (test_plays_twice)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_17_streams_keep_the_pixels_of_each_view)
+{
+  Mux mux (17);
+  for (int view = 0; view < 17; view++) {
+    GstBuffer *buffer = make_frame_set (mux.one (view), 5, {1, 2, 8 + view % 3, 12});
+    {
+      gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+      frame.views ()[0].depth.at (7, 11) = guint16 (1000 + view);
+    }
+    fail_unless_equals_int (gst_harness_push (mux.in[view], buffer), GST_FLOW_OK);
+  }
+  GstBuffer *output = gst_harness_pull (mux.out);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ().size (), 17);
+    for (const auto &view : frame.views ()) {
+      fail_unless (view.roi == (Roi{1, 2, 8 + view.view_id % 3, 12}));
+      fail_unless_equals_int (view.depth.at (7, 11), 1000 + view.view_id);
+      fail_unless_equals_int (view.colour.at (3, 4).b, (3 + 2 * 4 + 40 * view.view_id) & 255);
+    }
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
 static Suite *
 rangemux_suite ()
 {
@@ -327,6 +352,7 @@ rangemux_suite ()
   tcase_add_test (tc, test_raw_and_coded_together_are_one_error);
   tcase_add_test (tc, test_coded_access_units_are_joined);
   tcase_add_test (tc, test_plays_twice);
+  tcase_add_test (tc, test_17_streams_keep_the_pixels_of_each_view);
   return suite;
 }
 

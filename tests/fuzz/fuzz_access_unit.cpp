@@ -30,7 +30,8 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
     return made;
   }();
   DecoderResult result;
-  decoder.plan ({data, size}, result);
+  const bool whole_rois = size % 2;
+  decoder.plan ({data, size}, result, whole_rois);
   std::vector<std::unique_ptr<std::uint16_t[]>> depths;
   std::vector<std::unique_ptr<Rgbx[]>> colours;
   std::vector<RangeImage> images;
@@ -41,7 +42,8 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
     images.push_back ({view.view_id, view.roi, {depths.back ().get (), width, height, width * 2},
         {colours.back ().get (), width, height, width * 4}, 0});
   }
-  decoder.decode (images, 1, result);
+  if (!decoder.decode (images, 1, result).ok ())
+    std::abort ();
   RigCollector collector;
   UnitReader units ({data, size});
   UnitHeader header;

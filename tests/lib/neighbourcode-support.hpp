@@ -66,16 +66,16 @@ struct Decoded {
 
 inline Decoded
 decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
-    std::span<const RangeImage> older = {})
+    std::span<const RangeImage> older = {}, bool whole_rois = true)
 {
   Decoded decoded;
-  decoder.plan (bytes, decoded.result);
+  decoder.plan (bytes, decoded.result, whole_rois);
   for (const auto &view : decoder.views ())
     decoded.pictures.emplace_back (view.view_id, view.roi).fill (0x5a5a);
   std::vector<RangeImage> images;
   for (Picture &picture : decoded.pictures)
     images.push_back (picture.image ());
-  decoder.decode (images, 1, decoded.result, older);
+  EXPECT_TRUE (decoder.decode (images, 1, decoded.result, older).ok ());
   return decoded;
 }
 

@@ -212,6 +212,70 @@ TEST_F (Hostile, damaged_rig_units_are_refused)
   }
 }
 
+TEST_F (Hostile, rig_beyond_the_limit_is_refused_and_the_one_before_kept)
+{
+  RigCollector collector;
+  const auto add_all = [&] (const Rig &rig) {
+    std::vector<std::uint8_t> bytes;
+    write_rig_units ({rig, 30, 1}, bytes);
+    Status last;
+    for (const auto &unit : units_of (bytes))
+      last = collector.add (unit);
+    return last;
+  };
+  EXPECT_TRUE (add_all (ring_rig (3)).ok ());
+  Rig large = ring_rig (3);
+  for (View &view : large.views)
+    view.width = view.height = 8192;
+  EXPECT_EQ (add_all (large).code (), StatusCode::kBadSize);
+  EXPECT_EQ (collector.generation (), 1u);
+  EXPECT_EQ (collector.info ().rig.views[0].width, ring_rig (1).views[0].width);
+}
+
+TEST_F (Hostile, images_of_other_views_are_refused)
+{
+  const auto stream = small_stream ();
+  DecoderResult result;
+  decoder.plan (stream, result);
+  ASSERT_EQ (decoder.views ().size (), 2u);
+  Picture first (0, Roi{7, 9, 24, 20}), second (1, Roi{0, 0, 16, 12}), other (1, Roi{0, 0, 12, 16});
+  const RangeImage swapped[] = {second.image (), first.image ()};
+  const RangeImage too_few[] = {first.image ()};
+  const RangeImage of_other_roi[] = {first.image (), other.image ()};
+  const RangeImage right[] = {first.image (), second.image ()};
+  EXPECT_EQ (decoder.decode (swapped, 1, result).code (), StatusCode::kBadSize);
+  EXPECT_EQ (decoder.decode (too_few, 1, result).code (), StatusCode::kBadSize);
+  EXPECT_EQ (decoder.decode (of_other_roi, 1, result).code (), StatusCode::kBadSize);
+  EXPECT_EQ (result.slices, 0u);
+  EXPECT_TRUE (decoder.decode (right, 1, result).ok ());
+}
+
+/* What lies outside the smaller ROI is invalid in the whole one. */
+TEST_F (Hostile, roi_that_shrinks_to_its_slices_loses_no_pixel)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{7, 9, 200, 160}, 1, 6);
+  const auto units = units_of (encode (rig (), pictures, {10, 6, 2, 2, 256}));
+  for (std::size_t i = 0; i + 5 < units.size (); i += 7) {
+    const auto bytes = joined ({units[i], units[i + 2], units[i + 5]});
+    const Decoded whole = decode (decoder, bytes), small = decode (decoder, bytes, {}, false);
+    ASSERT_EQ (whole.pictures.size (), small.pictures.size ());
+    EXPECT_LT (small.pictures[0].roi.height, 160);
+    EXPECT_EQ (whole.result.points, small.result.points);
+    EXPECT_EQ (whole.result.missing_pixels, small.result.missing_pixels);
+    EXPECT_EQ (whole.result.raw_bits, small.result.raw_bits);
+    for (std::size_t i = 0; i < whole.pictures.size (); i++) {
+      Picture a = whole.pictures[i], b = small.pictures[i];
+      for (int y = 0; y < a.roi.height; y++)
+        for (int x = 0; x < a.roi.width; x++) {
+          const int column = x + a.roi.x - b.roi.x, row = y + a.roi.y - b.roi.y;
+          const bool inside = column >= 0 && row >= 0 && column < b.roi.width && row < b.roi.height;
+          EXPECT_EQ (a.depth.view ().at (x, y), inside ? b.depth.view ().at (column, row) : 0);
+        }
+    }
+  }
+}
+
 TEST_F (Hostile, duplicate_of_one_slice_does_not_hide_the_loss_of_another)
 {
   std::vector<Picture> pictures;

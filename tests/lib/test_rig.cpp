@@ -180,6 +180,40 @@ TEST (Rig, validate_names_view_and_field)
   EXPECT_NE (validate (rig).message ().find ("distortion"), std::string::npos);
 }
 
+static Rig
+ring_of_size (int views, int width, int height)
+{
+  Rig rig = ring_rig (views);
+  for (View &view : rig.views) {
+    view.width = width;
+    view.height = height;
+  }
+  return rig;
+}
+
+TEST (Rig, more_pixels_than_the_limit_are_refused_by_name)
+{
+  EXPECT_TRUE (validate (ring_of_size (64, 1920, 1080)).ok ());
+  EXPECT_TRUE (validate (ring_of_size (1, 16384, 8192)).ok ());
+  const Status status = validate (ring_of_size (64, 2048, 1080));
+  EXPECT_EQ (status.code (), StatusCode::kBadSize);
+  EXPECT_NE (status.message ().find ("134217728"), std::string::npos);
+  EXPECT_EQ (validate (ring_of_size (1, 16384, 16384)).code (), StatusCode::kBadSize);
+  Rig rig = ring_of_size (2, 16384, 16); /* neither view is large, a frame set of both is */
+  rig.views[1].width = 16;
+  rig.views[1].height = 16384;
+  EXPECT_EQ (validate (rig).code (), StatusCode::kBadSize);
+}
+
+TEST (Rig, merge_refuses_a_union_beyond_the_limit)
+{
+  Rig all = ring_of_size (2, 8192, 8192), one = all;
+  one.views.resize (1);
+  one.views[0].id = 5;
+  EXPECT_EQ (merge (all, one).code (), StatusCode::kBadSize);
+  EXPECT_EQ (all.views.size (), 2u);
+}
+
 TEST (Rig, merge_unites_and_refuses_one_id_for_two_cameras)
 {
   Rig all = ring_rig (4), some;

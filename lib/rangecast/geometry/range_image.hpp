@@ -20,6 +20,9 @@ inline constexpr std::uint16_t kInvalidDepth = 0;
 inline constexpr int kMaxViews = 64;
 /** No image side in a rig, a range image or a bitstream is longer, pixels. */
 inline constexpr int kMaxImageSide = 16384;
+/** Views times the widest times the tallest of a rig, pixels: 64 views of 1920x1080 are just below.
+ *  A frame set has room for that much, so this bounds the memory that foreign bytes can ask for. */
+inline constexpr std::int64_t kMaxRigPixels = std::int64_t{1} << 27;
 
 /** Depth and colour of one view at one capture time, cut to the ROI. Both planes have the ROI's
  *  size; plane pixel (0, 0) is image pixel (roi.x, roi.y). Depth is in the view's depth units,

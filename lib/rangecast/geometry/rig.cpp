@@ -104,6 +104,22 @@ check_view (const View &view)
   return check_partner (view, view.third, "third");
 }
 
+Status
+check_pixels (const Rig &rig)
+{
+  std::int64_t width = 0, height = 0;
+  for (const View &view : rig.views) {
+    width = std::max<std::int64_t> (width, view.width);
+    height = std::max<std::int64_t> (height, view.height);
+  }
+  if (static_cast<std::int64_t> (rig.views.size ()) * width * height <= kMaxRigPixels)
+    return {};
+  return {StatusCode::kBadSize, "a rig has at most " + std::to_string (kMaxRigPixels) +
+                                    " pixels (views x widest x tallest), this one " +
+                                    std::to_string (rig.views.size ()) + " x " +
+                                    std::to_string (width) + " x " + std::to_string (height)};
+}
+
 } // namespace
 
 const View *
@@ -127,7 +143,7 @@ validate (const Rig &rig)
       return bad_field (view, "view-id is used twice");
     seen |= std::uint64_t{1} << view.id;
   }
-  return {};
+  return check_pixels (rig);
 }
 
 Status
@@ -141,6 +157,8 @@ merge (Rig &into, const Rig &other)
     else if (encode_rig ({{*known}}) != encode_rig ({{view}}))
       return bad_field (view, "view-id stands for two different cameras");
   }
+  if (Status s = check_pixels (merged); !s.ok ())
+    return s;
   std::ranges::sort (merged.views, {}, &View::id);
   into = std::move (merged);
   return {};

@@ -50,11 +50,13 @@ struct Rig {
   [[nodiscard]] const View *find (int view_id) const;
 };
 
-/** Checks every field against the ranges above; the message names view and field. */
+/** Checks every field against the ranges above; the message names view and field.
+ *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadValue for what is wrong */
 Status validate (const Rig &rig);
 
 /** Union of two rigs. A view that both have must be the same in both.
- *  @return kBadValue if a view-id stands for two different cameras (`into` is then untouched). */
+ *  @return kBadValue if a view-id stands for two different cameras, kBadSize if the union is larger
+ *  than kMaxRigPixels (`into` is then untouched). */
 Status merge (Rig &into, const Rig &other);
 
 /** @name The file form
@@ -67,7 +69,8 @@ Status save_rig (const std::string &path, const Rig &rig);
 /** @name The binary form
  *  Versioned, little-endian, for caps, byte streams and SDP; layout in docs/rig.md. @{ */
 std::vector<std::uint8_t> encode_rig (const Rig &rig);
-/** Decodes and validates. Trailing bytes are an error: a blob's length is always known. */
+/** Decodes and validates. Trailing bytes are an error: a blob's length is always known.
+ *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadData or kTruncated */
 Status decode_rig (std::span<const std::uint8_t> blob, Rig &rig);
 /** @} */
 

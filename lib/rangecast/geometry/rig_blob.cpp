@@ -205,7 +205,8 @@ decode_rig (std::span<const std::uint8_t> blob, Rig &rig)
   if (!in.at_end ())
     return {StatusCode::kBadData, "rig blob: bytes after its last view"};
   if (Status s = validate (decoded); !s.ok ())
-    return {StatusCode::kBadData, "rig blob: " + s.message ()};
+    return {s.code () == StatusCode::kBadSize ? s.code () : StatusCode::kBadData,
+        "rig blob: " + s.message ()};
   rig = std::move (decoded);
   return {};
 }

@@ -108,6 +108,12 @@ place_of (const SliceHeader &h)
   return {h.first_column, h.first_row, h.columns, h.rows};
 }
 
+static std::uint64_t
+area_of (const Roi &roi)
+{
+  return static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
+}
+
 /* The elements at the beginning of `all` that are like its first one. */
 template <typename T, typename Like>
 static std::span<const T>
@@ -120,7 +126,8 @@ leading (std::span<const T> all, const Like &like)
 }
 
 void
-AccessUnitDecoder::plan (std::span<const std::uint8_t> bytes, DecoderResult &result)
+AccessUnitDecoder::plan (
+    std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois)
 {
   slices_.clear ();
   count_ = 0;
@@ -145,6 +152,8 @@ AccessUnitDecoder::plan (std::span<const std::uint8_t> bytes, DecoderResult &res
   for (std::span<const PlannedSlice> rest = slices_; !rest.empty ();) {
     const auto view = leading (rest, [] (auto &a, auto &b) { return a.view_id == b.view_id; });
     plan_view (view, result);
+    if (!whole_rois)
+      crop_to_slices (planned_[count_ - 1]);
     rest = rest.subspan (view.size ());
   }
 }
@@ -169,19 +178,51 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
   result.bad_slices += slices.size () - best.size ();
   const SliceHeader &header = best_first->header;
   planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns,
-      static_cast<std::size_t> (best.data () - slices_.data ()), best.size (), header};
+      static_cast<std::size_t> (best.data () - slices_.data ()), best.size (), header,
+      area_of (header.roi)};
+}
+
+/* An encoder gives at most 8/3 pixels a byte, so this is no ROI of which less than nine tenths are
+ * lost: it stays as it is, the same from one frame set to the next. */
+static constexpr std::uint64_t kMaxPixelsPerByte = 32;
+
+void
+AccessUnitDecoder::crop_to_slices (PlannedView &planned)
+{
+  const std::span<PlannedSlice> slices (&slices_[planned.first_slice], planned.slice_count);
+  int left = planned.roi.width, top = planned.roi.height, right = 0, bottom = 0;
+  std::uint64_t bytes = 0;
+  for (const PlannedSlice &slice : slices) {
+    bytes += slice.unit.size ();
+    if (slice.too_short)
+      continue;
+    const Roi place = place_of (slice.header);
+    left = std::min (left, place.x);
+    top = std::min (top, place.y);
+    right = std::max (right, place.x + place.width);
+    bottom = std::max (bottom, place.y + place.height);
+  }
+  if (planned.coded_pixels <= kMaxPixelsPerByte * bytes)
+    return;
+  planned.roi = right == 0
+                    ? Roi{}
+                    : Roi{planned.roi.x + left, planned.roi.y + top, right - left, bottom - top};
+  for (PlannedSlice &slice : slices) {
+    slice.header.roi = planned.roi;
+    slice.header.first_column -= left;
+    slice.header.first_row -= top;
+  }
 }
 
 /* The slices lie in the order of their columns, then rows. What an encoder makes is bands of
  * columns side by side, each of rows without a gap; whatever else they are (some lost, overlapping,
  * of other shapes) leaves pixels unwritten for all we know. */
-std::uint64_t
-AccessUnitDecoder::missing_pixels (std::size_t view) const
+bool
+AccessUnitDecoder::is_tiled (const PlannedView &planned, std::uint64_t &have) const
 {
-  const PlannedView &planned = planned_[view];
   const int width = planned.roi.width, height = planned.roi.height;
   const SliceHeader *last = nullptr;
-  std::uint64_t have = 0;
+  have = 0;
   bool tiled = true;
   for (std::size_t i = 0; i < planned.slice_count; i++) {
     const PlannedSlice &slice = slices_[planned.first_slice + i];
@@ -195,14 +236,21 @@ AccessUnitDecoder::missing_pixels (std::size_t view) const
                                         last->first_row + last->rows == height
                                   : h.first_column == 0);
     tiled &= below || beside;
-    have += static_cast<std::uint64_t> (h.rows) * static_cast<std::uint64_t> (h.columns);
+    have += area_of (place_of (h));
     last = &h;
   }
-  if (planned.roi.empty () || (tiled && last && last->first_row + last->rows == height &&
-                                  last->first_column + last->columns == width))
-    return 0;
-  const auto all = static_cast<std::uint64_t> (width) * static_cast<std::uint64_t> (height);
-  return all > have ? all - have : 1;
+  return planned.roi.empty () || (tiled && last && last->first_row + last->rows == height &&
+                                     last->first_column + last->columns == width);
+}
+
+std::uint64_t
+AccessUnitDecoder::missing_pixels (std::size_t view) const
+{
+  const PlannedView &planned = planned_[view];
+  std::uint64_t have;
+  if (is_tiled (planned, have))
+    return planned.coded_pixels - area_of (planned.roi);
+  return planned.coded_pixels > have ? planned.coded_pixels - have : 1;
 }
 
 /* Slices of one place: the first sound one counts, the others are copies of it. */
@@ -228,52 +276,56 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
   return place;
 }
 
+/* Where slices may overlap, the sum of their points is not what is there. Touches only pixels that
+ * came: a few small slices can claim a large image. */
+void
+AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image)
+{
+  for (int y = part.y; y < part.y + part.height; y++)
+    for (int x = part.x; x < part.x + part.width; x++) {
+      const auto i = static_cast<std::size_t> (y) * static_cast<std::size_t> (image.roi.width) +
+                     static_cast<std::size_t> (x);
+      const bool valid = place == Place::kSound && image.depth.at (x, y) != kInvalidDepth;
+      covered.seen_pixels += !covered.seen[i];
+      covered.points += valid;
+      covered.points -= covered.valid[i];
+      covered.seen[i] = true;
+      covered.valid[i] = valid;
+    }
+}
+
 void
 AccessUnitDecoder::decode_view (
     std::size_t index, const RangeImage &image, const ConstRangeImage &older)
 {
   const PlannedView &planned = planned_[index];
   DecoderResult &result = results_[index];
-  std::vector<Place> &covered = covered_[index];
+  Coverage &covered = covered_[index];
   result = {};
-  const bool tiled = missing_pixels (index) == 0;
-  const auto pixels =
-      static_cast<std::size_t> (planned.roi.width) * static_cast<std::size_t> (planned.roi.height);
+  std::uint64_t have;
+  const bool tiled = is_tiled (planned, have);
   if (!tiled) {
     fill_from (older, image);
-    covered.assign (pixels, Place::kNothing);
+    covered.seen.assign (area_of (planned.roi), false);
+    covered.valid.assign (area_of (planned.roi), false);
+    covered.seen_pixels = covered.points = 0;
   }
   std::span<const PlannedSlice> rest (&slices_[planned.first_slice], planned.slice_count);
   while (!rest.empty ()) {
     const auto same = leading (rest, same_place);
     const Place place = decode_place (same, image, older, result);
     if (!tiled && place != Place::kNothing)
-      for (int y = same[0].header.first_row, n = same[0].header.rows; n > 0; y++, n--)
-        std::fill_n (
-            covered.begin () + std::ptrdiff_t{y} * planned.roi.width + same[0].header.first_column,
-            same[0].header.columns, place);
+      cover (covered, place, place_of (same[0].header), image);
     rest = rest.subspan (same.size ());
   }
   if (!tiled)
-    count_pixels (index, image, result);
+    result.points = covered.points;
+  result.missing_pixels =
+      planned.coded_pixels - (tiled ? area_of (planned.roi) : covered.seen_pixels);
   const SliceHeader &first = planned.reference;
   result.raw_bits =
       result.points * static_cast<std::uint64_t> (first.depth_bits + 3 * first.colour_bits) +
-      pixels;
-}
-
-/* Where slices may overlap, the sum of their points is not what is there. */
-void
-AccessUnitDecoder::count_pixels (
-    std::size_t index, const RangeImage &image, DecoderResult &result) const
-{
-  const Place *place = covered_[index].data ();
-  result.points = 0;
-  for (int y = 0; y < image.roi.height; y++)
-    for (int x = 0; x < image.roi.width; x++, place++) {
-      result.missing_pixels += *place == Place::kNothing;
-      result.points += *place == Place::kSound && image.depth.at (x, y) != kInvalidDepth;
-    }
+      planned.coded_pixels;
 }
 
 static ConstRangeImage
@@ -285,14 +337,21 @@ image_of (std::span<const RangeImage> images, int view_id)
   return {}; /* an empty one: everything becomes invalid */
 }
 
-void
+static bool
+belongs_to (const RangeImage &image, const AccessUnitDecoder::PlannedView &planned)
+{
+  return image.view_id == planned.view_id && image.roi == planned.roi;
+}
+
+Status
 AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
     std::span<const RangeImage> older)
 {
-  const std::size_t n = std::min (images.size (), count_);
-  in_parallel (n, threads,
+  if (!std::ranges::equal (images, views (), belongs_to))
+    return {StatusCode::kBadSize, "decoder: the images are not those of the planned views"};
+  in_parallel (count_, threads,
       [&] (std::size_t i) { decode_view (i, images[i], image_of (older, planned_[i].view_id)); });
-  for (std::size_t i = 0; i < n; i++) {
+  for (std::size_t i = 0; i < count_; i++) {
     const DecoderResult &r = results_[i];
     result.slices += r.slices;
     result.bad_slices += r.bad_slices;
@@ -300,6 +359,7 @@ AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, Deco
     result.points += r.points;
     result.raw_bits += r.raw_bits;
   }
+  return {};
 }
 
 void

@@ -61,6 +61,7 @@ public:
     std::uint64_t capture_time_ns = 0;
     std::size_t first_slice = 0, slice_count = 0; ///< those that agree; by column, row, arrival
     SliceHeader reference;                        ///< of these the first that came
+    std::uint64_t coded_pixels = 0;               ///< of the ROI as the slices have it
   };
 
   Status set_rig (const Rig &rig);
@@ -68,18 +69,23 @@ public:
 
   /** Reads all headers. Views are sorted by view-id. ROI, bits and frame number of a view are those
    *  that most of its slices have (of two as frequent: those that came first); slices that differ
-   *  are bad and take no further part. `bytes` must live until decode() is done. */
-  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result);
+   *  are bad and take no further part. `bytes` must live until decode() is done.
+   *  @param whole_rois  false: ROIs of which nearly nothing came shrink to the box around their
+   *  slices, beyond which all pixels would be invalid, so that a few bytes do not claim a large
+   *  image; pass true with older images to decode() */
+  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
-  /** Pixels of a view's ROI that no slice holds; at least 1 unless the slices cover it for sure. */
+  /** Pixels of a view's coded ROI that no slice holds; at least 1 unless the slices cover it for
+   * sure. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
 
   /** Fills all pixels of `images`. Those that no sound slice gives become what they are in `older`,
    *  or invalid. Where slices overlap, the later by column, then row, replaces the earlier.
-   *  @param images  one for each of views(), with its ROI
+   *  @param images  one for each of views(), in that order, with its ROI
    *  @param threads  views at a time; 0 = number of cores
-   *  @param older  earlier images of any views, also with other ROIs; none: invalid pixels */
-  void decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
+   *  @param older  earlier images of any views, also with other ROIs; none: invalid pixels
+   *  @return kBadSize, with nothing decoded, if the images are not those of views() */
+  Status decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
       std::span<const RangeImage> older = {});
 
 private:
@@ -90,12 +96,18 @@ private:
     bool too_short; /* for its symbols; it writes nothing, or small units would cost much time */
   };
   enum class Place : std::uint8_t { kNothing, kDamaged, kSound };
+  struct Coverage { /* of a view that slices do not tile; a bit for each pixel of its ROI */
+    std::vector<bool> seen, valid;
+    std::uint64_t seen_pixels, points;
+  };
 
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
+  void crop_to_slices (PlannedView &planned);
+  [[nodiscard]] bool is_tiled (const PlannedView &planned, std::uint64_t &have) const;
+  static void cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image);
   void decode_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
   Place decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
       const ConstRangeImage &older, DecoderResult &result);
-  void count_pixels (std::size_t index, const RangeImage &image, DecoderResult &result) const;
 
   Rig rig_;
   SliceDecoder header_reader_;
@@ -103,7 +115,7 @@ private:
   std::array<PlannedView, kMaxViews> planned_;
   /* by planned view */
   std::array<DecoderResult, kMaxViews> results_;
-  std::array<std::vector<Place>, kMaxViews> covered_; /* pixels of views that slices do not tile */
+  std::array<Coverage, kMaxViews> covered_;
   std::size_t count_ = 0;
   std::vector<PlannedSlice> slices_;
 };

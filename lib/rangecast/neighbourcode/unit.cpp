@@ -184,11 +184,10 @@ RigCollector::add (std::span<const std::uint8_t> unit)
     fps_d_ = static_cast<int> (fps_d);
   }
   views_[index] = std::move (one.views[0]);
-  take_if_complete ();
-  return {};
+  return take_if_complete ();
 }
 
-void
+Status
 RigCollector::take_if_complete ()
 {
   StreamInfo info;
@@ -196,16 +195,19 @@ RigCollector::take_if_complete ()
   info.fps_d = fps_d_;
   for (int i = 0; i < total_; i++) {
     if (!views_[i])
-      return;
+      return {};
     info.rig.views.push_back (*views_[i]);
   }
-  if (!validate (info.rig).ok ()) /* two views with one id: a change half arrived */
-    return;
+  if (Status s = validate (info.rig); s.code () == StatusCode::kBadSize)
+    return s;
+  else if (!s.ok ()) /* two views with one id: a change half arrived */
+    return {};
   if (generation_ > 0 && info.fps_n == info_.fps_n && info.fps_d == info_.fps_d &&
       encode_rig (info.rig) == encode_rig (info_.rig))
-    return;
+    return {};
   info_ = std::move (info);
   generation_++;
+  return {};
 }
 
 Status

@@ -85,14 +85,15 @@ void write_rig_units (const StreamInfo &info, std::vector<std::uint8_t> &to);
 class RigCollector {
 public:
   void reset () { *this = RigCollector (); }
-  /** Takes a rig-view unit. @return kBadData or kUnsupported for a damaged one, which is ignored */
+  /** Takes a rig-view unit. @return kBadData or kUnsupported for a damaged one, kBadSize for one
+   *  that makes the rig larger than kMaxRigPixels; both are ignored */
   Status add (std::span<const std::uint8_t> unit);
   /** Grows whenever a complete rig differs from the one before; 0: none was complete so far. */
   [[nodiscard]] unsigned generation () const { return generation_; }
   [[nodiscard]] const StreamInfo &info () const { return info_; }
 
 private:
-  void take_if_complete ();
+  Status take_if_complete ();
 
   std::array<std::optional<View>, kMaxViews> views_;
   int total_ = 0, fps_n_ = 0, fps_d_ = 1;

@@ -303,6 +303,8 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
     view.third = PartnerCamera{view.intrinsics, {}, {kIdentity3, -1.0 * offsets[2]}};
     impl.rig.views.push_back (view);
   }
+  if (Status status = validate (impl.rig); !status.ok ())
+    return status;
   scene = std::move (made);
   return {};
 }
