@@ -540,7 +540,28 @@ time_of (GstBaseParse *base, const AccessUnitHeader &header)
   return header.pts_ns >= first_pts ? header.pts_ns - first_pts : 0;
 }
 
-/* The units that go on, sharing the input's memory. */
+static GstMemory *
+copy_ranges (GstBuffer *input, const std::vector<Range> &ranges)
+{
+  gsize size = 0;
+  for (const Range &range : ranges)
+    size += range.size;
+  GstMemory *memory = gst_allocator_alloc (nullptr, size, nullptr);
+  GstMapInfo from, to;
+  if (gst_memory_map (memory, &to, GST_MAP_WRITE)) {
+    guint8 *end = to.data;
+    if (gst_buffer_map (input, &from, GST_MAP_READ)) {
+      for (const Range &range : ranges)
+        end = std::copy_n (from.data + range.offset, range.size, end);
+      gst_buffer_unmap (input, &from);
+    }
+    gst_memory_unmap (memory, &to);
+  }
+  return memory;
+}
+
+/* The units that go on, sharing the input's memory where a buffer can hold that many pieces: with
+ * each one more it would copy all that it has. */
 static GstBuffer *
 make_output (Stream &stream, GstBuffer *input, gsize length)
 {
@@ -548,8 +569,11 @@ make_output (Stream &stream, GstBuffer *input, gsize length)
     stream.output.assign (1, {0, length});
   GstBuffer *output = gst_buffer_new ();
   gst_buffer_copy_into (output, input, GST_BUFFER_COPY_FLAGS, 0, gsize (-1));
-  for (const Range &range : stream.output)
-    gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
+  if (stream.output.size () * gst_buffer_n_memory (input) > gst_buffer_get_max_memory ())
+    gst_buffer_append_memory (output, copy_ranges (input, stream.output));
+  else
+    for (const Range &range : stream.output)
+      gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
   GST_BUFFER_PTS (output) = GST_BUFFER_PTS (input);
   GST_BUFFER_DTS (output) = GST_BUFFER_DTS (input);
   return output;

@@ -295,6 +295,51 @@ GST_START_TEST (test_longest_access_unit_in_small_pieces_takes_linear_time)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_longest_access_unit_of_short_units_takes_linear_time)
+{
+  const Recording recording (3, 16);
+  const std::vector<guint8> rig_view = {0x12, 0, 4, 0}, unknown = unknown_unit ({});
+  std::vector<guint8> padding, expected;
+  while (padding.size () < (31 << 20)) {
+    padding.insert (padding.end (), rig_view.begin (), rig_view.end ()); /* which does not go on */
+    padding.insert (padding.end (), unknown.begin (), unknown.end ());
+    expected.insert (expected.end (), unknown.begin (), unknown.end ());
+  }
+  const auto slices = bytes_of (recording.access_units[0]);
+  expected.insert (expected.end (), slices.begin (), slices.end ());
+  const auto bytes = pad_first_access_unit (recording, padding);
+  const gint64 begin = g_get_monotonic_time ();
+  auto parsed = parse (bytes, G_MAXINT);
+  /* Copying all again with each piece would take minutes. */
+  fail_unless (g_get_monotonic_time () - begin < 30 * G_USEC_PER_SEC);
+  fail_unless_equals_int (parsed.size (), 3);
+  /* Its own rig goes on neither: it stands behind the padding. */
+  fail_unless (bytes_of (parsed[0]) == expected);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pieces_of_an_access_unit_keep_their_order_however_many_they_are)
+{
+  const Recording recording (2, 16);
+  for (guint8 pieces = 1; pieces < 40; pieces++) {
+    std::vector<guint8> padding, expected;
+    for (guint8 i = 0; i < pieces; i++) {
+      const auto unit = unknown_unit ({i, guint8 (2 * i)});
+      padding.insert (padding.end (), unit.begin (), unit.end ());
+      expected.insert (expected.end (), unit.begin (), unit.end ());
+      padding.insert (padding.end (), {0x12, 0, 4, 0});
+    }
+    const auto slices = bytes_of (recording.access_units[0]);
+    expected.insert (expected.end (), slices.begin (), slices.end ());
+    auto parsed = parse (pad_first_access_unit (recording, padding), G_MAXINT);
+    fail_unless_equals_int (parsed.size (), 2);
+    fail_unless (bytes_of (parsed[0]) == expected);
+    unref_all (parsed);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_size_that_lies_delays_nothing)
 {
   const Recording recording;
@@ -952,3 +997,5 @@ neighbourcodeparse_suite ()
 }
 
 GST_CHECK_MAIN (neighbourcodeparse);
+  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
+  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
