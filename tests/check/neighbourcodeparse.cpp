@@ -368,7 +368,7 @@ GST_START_TEST (test_access_unit_goes_on_as_soon_as_it_is_whole)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_access_units_share_the_memory_of_the_input)
+GST_START_TEST (test_access_units_that_came_in_one_buffer_share_its_memory)
 {
   const Recording recording;
   GstHarness *h = new_parser ();
@@ -384,6 +384,19 @@ GST_START_TEST (test_access_units_share_the_memory_of_the_input)
   unref_all (parsed);
   gst_memory_unref (memory);
   gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_unit_that_came_in_pieces_is_one_copy)
+{
+  const Recording recording;
+  auto parsed = parse (recording.bytes, 1000);
+  fail_unless_equals_int (parsed.size (), 10);
+  for (GstBuffer *buffer : parsed) {
+    fail_unless (gst_buffer_get_size (buffer) > 1000);
+    fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
+  }
+  unref_all (parsed);
 }
 GST_END_TEST;
 
@@ -997,5 +1010,7 @@ neighbourcodeparse_suite ()
 }
 
 GST_CHECK_MAIN (neighbourcodeparse);
+  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
+  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
   tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
   tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
