@@ -656,9 +656,17 @@ gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *
 
 /* ---- seeking ---- */
 
-/* The one that the seek's flags ask for. */
+/* A time of the segment as the file tells it. */
+static guint64
+pts_at (GstClockTime first_pts, GstClockTime time)
+{
+  const guint64 latest = rangecast::kNoTime - 1;
+  return time < latest - std::min (first_pts, latest) ? first_pts + time : latest;
+}
+
+/* The one that the seek's flags ask for; none behind `last_pts`, where the segment ends. */
 static std::optional<AccessUnitPlace>
-choose (const StreamFile::Target &target, guint64 pts, GstSeekFlags flags)
+choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags flags)
 {
   const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
   const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
@@ -675,6 +683,8 @@ static void
 keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlace> &rig)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  if (target.after && target.after->header.pts_ns > last_pts)
+    target.after.reset ();
   std::vector<guint8> units;
   if (rig)
     read_file (GST_BASE_PARSE_SINK_PAD (base), rig->offset + kStreamPrefixSize,
@@ -694,14 +704,14 @@ first_pts_of (GstNeighbourCodeParsePrivate *priv)
 /* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
  * played. Returns: the time there; none if it could not be found. */
 static GstClockTime
-find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
+find_place (GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
 {
   const GstClockTime first_pts = first_pts_of (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   if (!GST_CLOCK_TIME_IS_VALID (first_pts))
     return GST_CLOCK_TIME_NONE;
-  const guint64 pts = first_pts + time;
+  const guint64 pts = pts_at (first_pts, time);
   const StreamFile::Target target = file_of (base).locate (pts);
-  const auto place = choose (target, pts, flags);
+  const auto place = choose (target, pts, pts_at (first_pts, stop), flags);
   if (!place)
     return GST_CLOCK_TIME_NONE;
   keep_rig (base, place->offset, target.rig);
@@ -722,10 +732,20 @@ aim (GstBaseParse *base, GstEvent *event)
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
   if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
     return event;
-  const GstClockTime found = find_place (base, GstClockTime (start), flags);
+  const GstClockTime end = end_of (base, stop_type, stop);
+  const GstClockTime found = find_place (base, GstClockTime (start), end, flags);
   if (!GST_CLOCK_TIME_IS_VALID (found))
     return event;
-  if (flags & GST_SEEK_FLAG_KEY_UNIT)
+/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
+static GstClockTime
+end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
+{
+  const GstClockTime end =
+      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
+  return std::min<GstClockTime> (end, G_MAXINT64);
+}
+
+  if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
     start = gint64 (found);
   /* The base class uses the place only where it shall be accurate. */
   flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);

@@ -563,11 +563,17 @@ struct Player {
   }
   bool seek (GstClockTime time, int flags)
   {
+  {
+    return seek_part (time, flags, GST_SEEK_TYPE_SET, GST_CLOCK_TIME_NONE);
+  }
+  /* The same for a part of the file, that ends at `stop`. */
+  bool seek_part (GstClockTime time, int flags, GstSeekType stop_type, GstClockTime stop)
     if (!wait ())
       return false;
     seen.clear ();
-    return gst_element_seek_simple (pipeline, GST_FORMAT_TIME,
-               GstSeekFlags (GST_SEEK_FLAG_FLUSH | flags), gint64 (time)) &&
+    return gst_element_seek (pipeline, 1, GST_FORMAT_TIME,
+               GstSeekFlags (GST_SEEK_FLAG_FLUSH | flags), GST_SEEK_TYPE_SET, gint64 (time),
+               stop_type, gint64 (stop)) &&
            wait ();
   }
   /* The buffer that the sink is paused on. */
@@ -651,6 +657,44 @@ GST_START_TEST (test_seek_can_snap_to_the_key_access_unit_after_or_nearest)
 GST_END_TEST;
 
 GST_START_TEST (test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time)
+GST_START_TEST (test_seek_snaps_to_no_key_access_unit_behind_its_stop)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file);
+  for (const int snap : {int (GST_SEEK_FLAG_SNAP_AFTER), int (GST_SEEK_FLAG_SNAP_NEAREST)}) {
+    const int flags = GST_SEEK_FLAG_KEY_UNIT | snap;
+    fail_unless (player.seek_part (9 * kFrame, flags, GST_SEEK_TYPE_SET, 10 * kFrame));
+    fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+    fail_unless (player.seek_part (8 * kFrame, flags, GST_SEEK_TYPE_SET, 9 * kFrame));
+    fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
+    fail_unless_equals_int64 (player.position (), 5 * kFrame);
+    fail_unless (player.seek_part (8 * kFrame, flags, GST_SEEK_TYPE_NONE, 0)); /* the stop stays */
+    fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
+  }
+}
+GST_END_TEST;
+
+/* With times that begin at `first`. */
+static std::vector<guint8>
+with_times_from (const Recording &recording, guint64 first)
+{
+  auto bytes = recording.bytes;
+  for (gsize i = 0; i < recording.offsets.size (); i++)
+    GST_WRITE_UINT64_LE (&bytes[recording.offsets[i] + 4 + 8], first + i * kFrame);
+  return bytes;
+}
+
+GST_START_TEST (test_seek_beyond_the_latest_time_there_is_lands_on_the_last_access_unit)
+{
+  const Recording recording (10, 16);
+  const TemporaryFile file (with_times_from (recording, G_MAXUINT64 - 10 * kFrame));
+  Player player (file);
+  fail_unless (player.seek (12 * kFrame, GST_SEEK_FLAG_KEY_UNIT)); /* 2 frames behind 2^64 ns */
+  fail_unless_equals_uint64 (player.shown (), 9 * kFrame);
+}
+GST_END_TEST;
+
 {
   const Recording recording (20, 16);
   const TemporaryFile file (with_delta_units (recording));
@@ -1010,6 +1054,8 @@ neighbourcodeparse_suite ()
 }
 
 GST_CHECK_MAIN (neighbourcodeparse);
+  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
+  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
   tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
   tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
   tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
