@@ -22,12 +22,14 @@
  * Since: 0.1
  */
 /* Locking: `lock` guards what a seek, in the application's thread, shares with the streaming
- * thread. It is never held while pulling, pushing, querying or posting. */
+ * thread. It is never held while pulling, pushing, querying or posting. Messages are posted in any
+ * thread: what they depend on is atomic. */
 #include "gstneighbourcodeparse.h"
 
 #include <gst/base/base.h>
 
 #include <algorithm>
+#include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
@@ -73,10 +75,8 @@ struct Stream {               /* streaming thread only */
   bool reads_stream = true;   /* sink: byte stream; else access units */
   bool writes_stream = false; /* src: byte stream; else access units */
   bool src_caps_set = false;
-  bool failed = false; /* an error was posted */
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
-  Seen seen = Seen::kNothing;
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector;
   unsigned used_generation = 0;
@@ -98,6 +98,8 @@ struct GstNeighbourCodeParsePrivate {
   std::mutex lock;
   SeekState seek;
   Stream stream;
+  std::atomic<Seen> seen = Seen::kNothing; /* written by the streaming thread */
+  std::atomic<bool> failed = false;        /* an error was posted since start or flush */
 };
 
 struct _GstNeighbourCodeParse {
@@ -233,7 +235,7 @@ what_is_missing (Seen seen)
 static void
 post_what_is_missing (GstBaseParse *base)
 {
-  const Seen seen = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.seen;
+  const Seen seen = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen;
   GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", what_is_missing (seen)), (nullptr));
 }
 
@@ -243,13 +245,17 @@ say_what_is_missing (GstElement *element, GstMessage *message)
 {
   GError *error = nullptr;
   gchar *debug = nullptr;
+  const GstStructure *details = nullptr;
   gst_message_parse_error (message, &error, &debug);
+  gst_message_parse_error_details (message, &details);
   if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
-    const Seen seen = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream.seen;
     g_free (error->message);
-    error->message = g_strdup (what_is_missing (seen));
+    error->message = g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv->seen));
+    GstMessage *told = gst_message_new_error_with_details (
+        GST_MESSAGE_SRC (message), error, debug, details ? gst_structure_copy (details) : nullptr);
+    gst_message_set_seqnum (told, gst_message_get_seqnum (message));
     gst_message_unref (message);
-    message = gst_message_new_error (GST_OBJECT (element), error, debug);
+    message = told;
   }
   g_clear_error (&error);
   g_free (debug);
@@ -261,16 +267,24 @@ say_what_is_missing (GstElement *element, GstMessage *message)
 static gboolean
 gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
-    if (stream.failed) {
+    if (GST_NEIGHBOUR_CODE_PARSE (element)->priv->failed.exchange (true)) {
       gst_message_unref (message);
       return TRUE;
     }
-    stream.failed = true;
     message = say_what_is_missing (element, message);
   }
   return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
+}
+
+/* Errors after a flush are news again. Asked at the source pad: there alone the flushes of upstream
+ * and those of seeks in files are both seen, and while no data flow. */
+static GstPadProbeReturn
+note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
+    static_cast<GstNeighbourCodeParsePrivate *> (data)->failed = false;
+  return GST_PAD_PROBE_OK;
 }
 
 /* ---- from access units ---- */
@@ -442,12 +456,12 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 static GstFlowReturn
 drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   GST_WARNING_OBJECT (base, "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are no access unit",
       size, guint64 (frame->offset));
-  if (stream.seen == Seen::kNothing) {
-    stream.leading_rubbish += size;
-    if (stream.leading_rubbish > kMaxLeadingRubbish) {
+  if (priv->seen == Seen::kNothing) {
+    priv->stream.leading_rubbish += size;
+    if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
       post_what_is_missing (base);
       return GST_FLOW_ERROR;
     }
@@ -595,7 +609,7 @@ finish_access_unit (
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   gst_range_buffer_set_capture_time (output, header.capture_time_ns);
   stream.discont = false;
-  stream.seen = Seen::kSlices;
+  GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen = Seen::kSlices;
   frame->out_buffer = output;
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
@@ -603,11 +617,12 @@ finish_access_unit (
 static GstFlowReturn
 handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const Stream &stream = priv->stream;
   ask_for_the_least (base);
   if (!update_caps (base))
     return refused (base);
-  stream.seen = std::max (stream.seen, stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
+  priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
   if (!stream.src_caps_set || stream.output.empty ()) /* of no use without its rig, or empty */
     return drop (base, frame, part.length);
   return finish_access_unit (base, frame, part.header, part.length);
@@ -668,6 +683,8 @@ pts_at (GstClockTime first_pts, GstClockTime time)
 static std::optional<AccessUnitPlace>
 choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags flags)
 {
+  if (target.after && target.after->header.pts_ns > last_pts)
+    target.after.reset ();
   const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
   const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
   const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
@@ -683,8 +700,6 @@ static void
 keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlace> &rig)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  if (target.after && target.after->header.pts_ns > last_pts)
-    target.after.reset ();
   std::vector<guint8> units;
   if (rig)
     read_file (GST_BASE_PARSE_SINK_PAD (base), rig->offset + kStreamPrefixSize,
@@ -720,6 +735,15 @@ find_place (GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFla
   return found;
 }
 
+/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
+static GstClockTime
+end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
+{
+  const GstClockTime end =
+      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
+  return std::min<GstClockTime> (end, G_MAXINT64);
+}
+
 /* Returns: (transfer full): the seek that the base class shall do. */
 static GstEvent *
 aim (GstBaseParse *base, GstEvent *event)
@@ -736,15 +760,6 @@ aim (GstBaseParse *base, GstEvent *event)
   const GstClockTime found = find_place (base, GstClockTime (start), end, flags);
   if (!GST_CLOCK_TIME_IS_VALID (found))
     return event;
-/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
-static GstClockTime
-end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
-{
-  const GstClockTime end =
-      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
-  return std::min<GstClockTime> (end, G_MAXINT64);
-}
-
   if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
     start = gint64 (found);
   /* The base class uses the place only where it shall be accurate. */
@@ -773,10 +788,10 @@ gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
 static void
 finish_stream (GstBaseParse *base)
 {
-  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   if (base->segment.rate > 0)
     gst_base_parse_drain (base);
-  if (stream.reads_stream && stream.seen != Seen::kSlices && !stream.had_gaps)
+  if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
     post_what_is_missing (base);
 }
 
@@ -803,6 +818,8 @@ forget_stream (GstNeighbourCodeParsePrivate *priv)
   std::lock_guard guard (priv->lock);
   priv->stream = {};
   priv->seek = {};
+  priv->seen = Seen::kNothing;
+  priv->failed = false;
 }
 
 static gboolean
@@ -833,6 +850,8 @@ gst_neighbour_code_parse_init (GstNeighbourCodeParse *self)
   self->priv = new GstNeighbourCodeParsePrivate;
   GST_PAD_SET_ACCEPT_INTERSECT (GST_BASE_PARSE_SINK_PAD (self));
   GST_PAD_SET_ACCEPT_TEMPLATE (GST_BASE_PARSE_SINK_PAD (self));
+  gst_pad_add_probe (GST_BASE_PARSE_SRC_PAD (self), GST_PAD_PROBE_TYPE_EVENT_FLUSH, note_flush,
+      self->priv, nullptr);
 }
 
 static void

@@ -508,16 +508,17 @@ struct TemporaryFile {
   ~TemporaryFile () { g_unlink (path.c_str ()); }
 };
 
-/* filesrc ! between ! neighbourcodeparse ! fakesink, paused on its first buffer. */
+/* filesrc ! between ! neighbourcodeparse ! after fakesink, paused on its first buffer. */
 struct Player {
   GstElement *pipeline, *sink;
   std::vector<GstClockTime> seen; /* times of what reached the sink since the last seek */
   std::vector<int> widths;        /* caps that reached it */
 
-  explicit Player (const TemporaryFile &file, const char *between = "")
+  explicit Player (
+      const TemporaryFile &file, const char *between = "", const std::string &after = "")
   {
     const std::string line = "filesrc name=file ! " + std::string (between) +
-                             " neighbourcodeparse ! fakesink name=sink sync=false";
+                             " neighbourcodeparse ! " + after + " fakesink name=sink sync=false";
     pipeline = gst_parse_launch (line.c_str (), nullptr);
     GstElement *source = gst_bin_get_by_name (GST_BIN (pipeline), "file");
     g_object_set (source, "location", file.path.c_str (), nullptr);
@@ -563,11 +564,11 @@ struct Player {
   }
   bool seek (GstClockTime time, int flags)
   {
-  {
     return seek_part (time, flags, GST_SEEK_TYPE_SET, GST_CLOCK_TIME_NONE);
   }
   /* The same for a part of the file, that ends at `stop`. */
   bool seek_part (GstClockTime time, int flags, GstSeekType stop_type, GstClockTime stop)
+  {
     if (!wait ())
       return false;
     seen.clear ();
@@ -656,7 +657,6 @@ GST_START_TEST (test_seek_can_snap_to_the_key_access_unit_after_or_nearest)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time)
 GST_START_TEST (test_seek_snaps_to_no_key_access_unit_behind_its_stop)
 {
   const Recording recording (20, 16);
@@ -695,6 +695,7 @@ GST_START_TEST (test_seek_beyond_the_latest_time_there_is_lands_on_the_last_acce
 }
 GST_END_TEST;
 
+GST_START_TEST (test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time)
 {
   const Recording recording (20, 16);
   const TemporaryFile file (with_delta_units (recording));
@@ -938,6 +939,104 @@ GST_START_TEST (test_cut_file_that_plays_is_no_error)
 }
 GST_END_TEST;
 
+/* A parser that writes the byte stream of access units. */
+static GstHarness *
+new_writer (const Rig &rig)
+{
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_sink_caps_str (h, kStreamCaps);
+  gst_harness_set_src_caps (h, coded_caps (rig));
+  return h;
+}
+
+GST_START_TEST (test_access_unit_that_no_reader_would_take_is_one_error)
+{
+  const Rig rig = ring_rig (2);
+  std::vector<guint8> rig_units;
+  write_rig_units ({rig, 30, 1}, rig_units);
+  const gsize longest = kMaxAccessUnitSize - rig_units.size ();
+  GstHarness *h = new_writer (rig);
+  {
+    ErrorCounter errors (h);
+    GstBuffer *fits = gst_buffer_new_allocate (nullptr, longest, nullptr);
+    gst_buffer_memset (fits, 0, 0, longest);
+    fail_unless_equals_int (gst_harness_push (h, fits), GST_FLOW_OK);
+    fail_unless_equals_int (errors.take (), 0);
+    GstBuffer *longer = gst_buffer_new_allocate (nullptr, longest + 1, nullptr);
+    gst_buffer_memset (longer, 0, 0, longest + 1);
+    fail_unless_equals_int (gst_harness_push (h, longer), GST_FLOW_ERROR);
+    const std::string text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
+    fail_unless (text.find ("32 MiB") != std::string::npos, "%s", text.c_str ());
+    fail_unless_equals_int (errors.take (), 0);
+  }
+  fail_unless_equals_int (gst_harness_buffers_received (h), 1);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_after_a_flush_is_posted_too)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = new_writer (rig);
+  {
+    ErrorCounter errors (h);
+    for (int round = 0; round < 2; round++) {
+      GstBuffer *longer = gst_buffer_new_allocate (nullptr, kMaxAccessUnitSize + 1, nullptr);
+      gst_buffer_memset (longer, 0, 0, kMaxAccessUnitSize + 1);
+      fail_unless_equals_int (gst_harness_push (h, longer), GST_FLOW_ERROR);
+      fail_unless_equals_int (errors.take (), 1);
+      flush (h);
+    }
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_after_a_seek_in_a_file_is_posted_too)
+{
+  const Recording first (40, 64), second (40, 32, GST_SECOND + 40 * kFrame);
+  auto bytes = first.bytes;
+  bytes.insert (bytes.end (), second.bytes.begin (), second.bytes.end ());
+  const TemporaryFile file (bytes);
+  Player player (file, "", "application/x-neighbour-code,width=64 !");
+  GstBus *bus = gst_element_get_bus (player.pipeline);
+  for (int round = 0; round < 2; round++) {
+    fail_unless (player.seek (0, GST_SEEK_FLAG_KEY_UNIT));
+    gst_element_set_state (player.pipeline, GST_STATE_PLAYING);
+    fail_unless (next_message_text (bus, GST_MESSAGE_ERROR) != "", "round %d", round);
+    gst_element_set_state (player.pipeline, GST_STATE_PAUSED);
+  }
+  gst_object_unref (bus);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_that_is_put_better_keeps_its_seqnum_and_details)
+{
+  GstHarness *h = new_parser ();
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  GError *error = g_error_new (GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE, "No valid frames");
+  GstMessage *message = gst_message_new_error_with_details (GST_OBJECT (h->element), error, "why",
+      gst_structure_new ("details", "n", G_TYPE_INT, 7, nullptr));
+  g_error_free (error);
+  gst_message_set_seqnum (message, 4711);
+  fail_unless (gst_element_post_message (h->element, message));
+  message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
+  fail_unless (message != nullptr);
+  fail_unless_equals_int (gst_message_get_seqnum (message), 4711);
+  const GstStructure *details = nullptr;
+  gst_message_parse_error_details (message, &details);
+  fail_unless (details && gst_structure_has_field_typed (details, "n", G_TYPE_INT));
+  gst_message_parse_error (message, &error, nullptr);
+  fail_unless (g_str_has_prefix (error->message, "No access unit found"));
+  g_error_free (error);
+  gst_message_unref (message);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_downstream_may_change_its_mind)
 {
   const Recording recording;
@@ -1021,9 +1120,12 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_lost_header_of_a_long_access_unit_is_no_error);
   tcase_add_test (tc, test_start_code_inside_a_unit_does_not_end_the_access_unit);
   tcase_add_test (tc, test_longest_access_unit_in_small_pieces_takes_linear_time);
+  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
+  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
   tcase_add_test (tc, test_size_that_lies_delays_nothing);
   tcase_add_test (tc, test_access_unit_goes_on_as_soon_as_it_is_whole);
-  tcase_add_test (tc, test_access_units_share_the_memory_of_the_input);
+  tcase_add_test (tc, test_access_units_that_came_in_one_buffer_share_its_memory);
+  tcase_add_test (tc, test_access_unit_that_came_in_pieces_is_one_copy);
   tcase_add_test (tc, test_delta_unit_is_set_where_the_header_says_no_key);
   tcase_add_test (tc, test_written_header_is_key_only_if_all_slices_are);
   tcase_add_test (tc, test_rig_that_changes_gives_new_caps);
@@ -1031,6 +1133,8 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_file_tells_its_duration_before_it_plays);
   tcase_add_test (tc, test_key_unit_seek_lands_on_the_key_access_unit_at_or_before);
   tcase_add_test (tc, test_seek_can_snap_to_the_key_access_unit_after_or_nearest);
+  tcase_add_test (tc, test_seek_snaps_to_no_key_access_unit_behind_its_stop);
+  tcase_add_test (tc, test_seek_beyond_the_latest_time_there_is_lands_on_the_last_access_unit);
   tcase_add_test (tc, test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time);
   tcase_add_test (tc, test_seek_in_a_long_file_finds_its_place_by_bisection);
   tcase_add_test (tc, test_seek_beyond_the_end_ends);
@@ -1046,6 +1150,10 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_future_version_is_one_error);
   tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
   tcase_add_test (tc, test_cut_file_that_plays_is_no_error);
+  tcase_add_test (tc, test_access_unit_that_no_reader_would_take_is_one_error);
+  tcase_add_test (tc, test_error_after_a_flush_is_posted_too);
+  tcase_add_test (tc, test_error_after_a_seek_in_a_file_is_posted_too);
+  tcase_add_test (tc, test_error_that_is_put_better_keeps_its_seqnum_and_details);
   tcase_add_test (tc, test_downstream_may_change_its_mind);
   tcase_add_test (tc, test_access_units_pass_as_they_are);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
@@ -1054,9 +1162,3 @@ neighbourcodeparse_suite ()
 }
 
 GST_CHECK_MAIN (neighbourcodeparse);
-  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
-  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
-  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
-  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
-  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
-  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
