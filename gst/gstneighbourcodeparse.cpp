@@ -34,18 +34,17 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <optional>
 #include <rangecast/neighbourcode/byte_stream.hpp>
 #include <span>
 #include <vector>
 
+#include "neighbourcodefile.hpp"
+
 using rangecast::AccessUnitHeader;
-using rangecast::AccessUnitPlace;
 using rangecast::kAccessUnitHeaderSize;
 using rangecast::kStartCode;
 using rangecast::kStreamPrefixSize;
 using rangecast::SliceHeader;
-using rangecast::StreamFile;
 using rangecast::StreamPart;
 using rangecast::UnitHeader;
 using rangecast::UnitReader;
@@ -60,8 +59,6 @@ using Bytes = std::span<const guint8>;
 static constexpr GstClockTime kRigInterval = GST_SECOND;
 /* A stream that begins with more rubbish is taken for something else. */
 static constexpr gsize kMaxLeadingRubbish = 2 << 20;
-/* The rig views of an access unit are in its first bytes: 64 units of at most 500 bytes. */
-static constexpr gsize kMaxRigBytes = 32000;
 
 /* What a stream has shown so far: what to complain of at its end. */
 enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
@@ -402,39 +399,14 @@ reads_file (GstBaseParse *base)
   return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
 }
 
-static void
-read_file (GstPad *pad, guint64 offset, gsize size, std::vector<guint8> &to)
-{
-  to.clear ();
-  GstBuffer *buffer = nullptr;
-  if (gst_pad_pull_range (pad, offset, guint (size), &buffer) != GST_FLOW_OK)
-    return;
-  to.resize (std::min (gst_buffer_get_size (buffer), size));
-  gst_buffer_extract (buffer, 0, to.data (), to.size ());
-  gst_buffer_unref (buffer);
-}
-
-static StreamFile
-file_of (GstBaseParse *base)
-{
-  GstPad *pad = GST_BASE_PARSE_SINK_PAD (base);
-  gint64 size = 0;
-  if (!gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size))
-    size = 0;
-  return {[pad] (guint64 offset, gsize bytes, std::vector<guint8> &to) {
-            read_file (pad, offset, bytes, to);
-          },
-      guint64 (std::max<gint64> (size, 0))};
-}
-
 /* From the first time of a file to the end of its last access unit. */
 static void
 find_duration (GstBaseParse *base, GstClockTime first_pts)
 {
-  const auto last = file_of (base).last ();
-  if (!last || last->header.pts_ns == rangecast::kNoTime || last->header.pts_ns < first_pts)
+  GstClockTime duration =
+      NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
+  if (!GST_CLOCK_TIME_IS_VALID (duration))
     return; /* the base class goes on estimating */
-  GstClockTime duration = last->header.pts_ns - first_pts;
   const auto &info = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.info;
   if (GST_CLOCK_TIME_IS_VALID (info.frame_duration ()))
     duration += info.frame_duration ();
@@ -671,42 +643,13 @@ gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *
 
 /* ---- seeking ---- */
 
-/* A time of the segment as the file tells it. */
-static guint64
-pts_at (GstClockTime first_pts, GstClockTime time)
-{
-  const guint64 latest = rangecast::kNoTime - 1;
-  return time < latest - std::min (first_pts, latest) ? first_pts + time : latest;
-}
-
-/* The one that the seek's flags ask for; none behind `last_pts`, where the segment ends. */
-static std::optional<AccessUnitPlace>
-choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags flags)
-{
-  if (target.after && target.after->header.pts_ns > last_pts)
-    target.after.reset ();
-  const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
-  const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
-  const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
-  if (!target.before || !target.after || !snap || !after)
-    return target.before ? target.before : target.after;
-  if (nearest && pts - target.before->header.pts_ns <= target.after->header.pts_ns - pts)
-    return target.before;
-  return target.after;
-}
-
 /* The rig is not with each access unit: keep it until the streaming thread is there. */
 static void
-keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlace> &rig)
+keep_rig (GstNeighbourCodeParsePrivate *priv, NeighbourCodeFile::Place &place)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  std::vector<guint8> units;
-  if (rig)
-    read_file (GST_BASE_PARSE_SINK_PAD (base), rig->offset + kStreamPrefixSize,
-        std::min<gsize> (rig->header.size, kMaxRigBytes), units);
   std::lock_guard guard (priv->lock);
-  priv->seek.rig_offset = offset;
-  priv->seek.rig_units = std::move (units);
+  priv->seek.rig_offset = place.offset;
+  priv->seek.rig_units = std::move (place.rig_units);
 }
 
 static GstClockTime
@@ -721,18 +664,17 @@ first_pts_of (GstNeighbourCodeParsePrivate *priv)
 static GstClockTime
 find_place (GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
 {
-  const GstClockTime first_pts = first_pts_of (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const GstClockTime first_pts = first_pts_of (priv);
   if (!GST_CLOCK_TIME_IS_VALID (first_pts))
     return GST_CLOCK_TIME_NONE;
-  const guint64 pts = pts_at (first_pts, time);
-  const StreamFile::Target target = file_of (base).locate (pts);
-  const auto place = choose (target, pts, pts_at (first_pts, stop), flags);
+  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first_pts);
+  auto place = file.find (time, stop, flags);
   if (!place)
     return GST_CLOCK_TIME_NONE;
-  keep_rig (base, place->offset, target.rig);
-  const GstClockTime found = place->header.pts_ns - std::min (first_pts, place->header.pts_ns);
-  gst_base_parse_add_index_entry (base, place->offset, found, TRUE, TRUE);
-  return found;
+  keep_rig (priv, *place);
+  gst_base_parse_add_index_entry (base, place->offset, place->time, TRUE, TRUE);
+  return place->time;
 }
 
 /* Where the segment of a seek will end: G_MAXINT64 if it is open. */
