@@ -469,8 +469,9 @@ install_properties (GObjectClass *object_class)
       "65535, default 8; 0 and colour-threshold 0: lossless after quantisation)",
       0, 65535, kDefaults.depth_threshold);
   install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "and if R, G and B each differ by no more than so many codes (0 to 255, default 10)", 0, 255,
-      kDefaults.colour_threshold);
+      "Neighbours replace a pixel if also R, G and B each differ by no more than so many codes (0 "
+      "to 255, default 10)",
+      0, 255, kDefaults.colour_threshold);
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
       "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
       int (rangecast::kMaxUnitSize), kDefaults.max_slice_size);

@@ -22,28 +22,29 @@
  * Since: 0.1
  */
 /* Locking: `lock` guards what a seek, in the application's thread, shares with the streaming
- * thread. It is never held while pulling, pushing, querying or posting. */
+ * thread. It is never held while pulling, pushing, querying or posting. Messages are posted in any
+ * thread: what they depend on is atomic. */
 #include "gstneighbourcodeparse.h"
 
 #include <gst/base/base.h>
 
 #include <algorithm>
+#include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <optional>
 #include <rangecast/neighbourcode/byte_stream.hpp>
 #include <span>
 #include <vector>
 
+#include "neighbourcodefile.hpp"
+
 using rangecast::AccessUnitHeader;
-using rangecast::AccessUnitPlace;
 using rangecast::kAccessUnitHeaderSize;
 using rangecast::kStartCode;
 using rangecast::kStreamPrefixSize;
 using rangecast::SliceHeader;
-using rangecast::StreamFile;
 using rangecast::StreamPart;
 using rangecast::UnitHeader;
 using rangecast::UnitReader;
@@ -58,8 +59,6 @@ using Bytes = std::span<const guint8>;
 static constexpr GstClockTime kRigInterval = GST_SECOND;
 /* A stream that begins with more rubbish is taken for something else. */
 static constexpr gsize kMaxLeadingRubbish = 2 << 20;
-/* The rig views of an access unit are in its first bytes: 64 units of at most 500 bytes. */
-static constexpr gsize kMaxRigBytes = 32000;
 
 /* What a stream has shown so far: what to complain of at its end. */
 enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
@@ -73,10 +72,8 @@ struct Stream {               /* streaming thread only */
   bool reads_stream = true;   /* sink: byte stream; else access units */
   bool writes_stream = false; /* src: byte stream; else access units */
   bool src_caps_set = false;
-  bool failed = false; /* an error was posted */
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
-  Seen seen = Seen::kNothing;
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector;
   std::string too_large; /* why a rig was refused */
@@ -99,6 +96,8 @@ struct GstNeighbourCodeParsePrivate {
   std::mutex lock;
   SeekState seek;
   Stream stream;
+  std::atomic<Seen> seen = Seen::kNothing; /* written by the streaming thread */
+  std::atomic<bool> failed = false;        /* an error was posted since start or flush */
 };
 
 struct _GstNeighbourCodeParse {
@@ -216,16 +215,16 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 /* ---- errors ---- */
 
 static std::string
-what_is_missing (const Stream &stream)
+what_is_missing (const GstNeighbourCodeParsePrivate *priv)
 {
-  switch (stream.seen) {
+  switch (priv->seen) {
     case Seen::kNothing:
       return "No access unit found: expected a neighbour code byte stream of version 1, which "
              "begins "
              "with the start code 00 52 43 55";
     case Seen::kAccessUnit:
-      if (!stream.too_large.empty ())
-        return "The rig is too large: " + stream.too_large;
+      if (!priv->stream.too_large.empty ())
+        return "The rig is too large: " + priv->stream.too_large;
       return "No complete rig found: expected the rig views of a neighbour code byte stream in "
              "front of its slices";
     default:
@@ -236,7 +235,7 @@ what_is_missing (const Stream &stream)
 static void
 post_what_is_missing (GstBaseParse *base)
 {
-  const std::string text = what_is_missing (GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream);
+  const std::string text = what_is_missing (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", text.c_str ()), (nullptr));
 }
 
@@ -246,13 +245,17 @@ say_what_is_missing (GstElement *element, GstMessage *message)
 {
   GError *error = nullptr;
   gchar *debug = nullptr;
+  const GstStructure *details = nullptr;
   gst_message_parse_error (message, &error, &debug);
+  gst_message_parse_error_details (message, &details);
   if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
     g_free (error->message);
-    error->message =
-        g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream).c_str ());
+    error->message = g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv).c_str ());
+    GstMessage *told = gst_message_new_error_with_details (
+        GST_MESSAGE_SRC (message), error, debug, details ? gst_structure_copy (details) : nullptr);
+    gst_message_set_seqnum (told, gst_message_get_seqnum (message));
     gst_message_unref (message);
-    message = gst_message_new_error (GST_OBJECT (element), error, debug);
+    message = told;
   }
   g_clear_error (&error);
   g_free (debug);
@@ -264,16 +267,24 @@ say_what_is_missing (GstElement *element, GstMessage *message)
 static gboolean
 gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (element)->priv->stream;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
-    if (stream.failed) {
+    if (GST_NEIGHBOUR_CODE_PARSE (element)->priv->failed.exchange (true)) {
       gst_message_unref (message);
       return TRUE;
     }
-    stream.failed = true;
     message = say_what_is_missing (element, message);
   }
   return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
+}
+
+/* Errors after a flush are news again. Asked at the source pad: there alone the flushes of upstream
+ * and those of seeks in files are both seen, and while no data flow. */
+static GstPadProbeReturn
+note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
+    static_cast<GstNeighbourCodeParsePrivate *> (data)->failed = false;
+  return GST_PAD_PROBE_OK;
 }
 
 /* ---- from access units ---- */
@@ -391,39 +402,14 @@ reads_file (GstBaseParse *base)
   return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
 }
 
-static void
-read_file (GstPad *pad, guint64 offset, gsize size, std::vector<guint8> &to)
-{
-  to.clear ();
-  GstBuffer *buffer = nullptr;
-  if (gst_pad_pull_range (pad, offset, guint (size), &buffer) != GST_FLOW_OK)
-    return;
-  to.resize (std::min (gst_buffer_get_size (buffer), size));
-  gst_buffer_extract (buffer, 0, to.data (), to.size ());
-  gst_buffer_unref (buffer);
-}
-
-static StreamFile
-file_of (GstBaseParse *base)
-{
-  GstPad *pad = GST_BASE_PARSE_SINK_PAD (base);
-  gint64 size = 0;
-  if (!gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size))
-    size = 0;
-  return {[pad] (guint64 offset, gsize bytes, std::vector<guint8> &to) {
-            read_file (pad, offset, bytes, to);
-          },
-      guint64 (std::max<gint64> (size, 0))};
-}
-
 /* From the first time of a file to the end of its last access unit. */
 static void
 find_duration (GstBaseParse *base, GstClockTime first_pts)
 {
-  const auto last = file_of (base).last ();
-  if (!last || last->header.pts_ns == rangecast::kNoTime || last->header.pts_ns < first_pts)
+  GstClockTime duration =
+      NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
+  if (!GST_CLOCK_TIME_IS_VALID (duration))
     return; /* the base class goes on estimating */
-  GstClockTime duration = last->header.pts_ns - first_pts;
   const auto &info = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.info;
   if (GST_CLOCK_TIME_IS_VALID (info.frame_duration ()))
     duration += info.frame_duration ();
@@ -445,12 +431,12 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 static GstFlowReturn
 drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   GST_WARNING_OBJECT (base, "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are no access unit",
       size, guint64 (frame->offset));
-  if (stream.seen == Seen::kNothing) {
-    stream.leading_rubbish += size;
-    if (stream.leading_rubbish > kMaxLeadingRubbish) {
+  if (priv->seen == Seen::kNothing) {
+    priv->stream.leading_rubbish += size;
+    if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
       post_what_is_missing (base);
       return GST_FLOW_ERROR;
     }
@@ -547,7 +533,28 @@ time_of (GstBaseParse *base, const AccessUnitHeader &header)
   return header.pts_ns >= first_pts ? header.pts_ns - first_pts : 0;
 }
 
-/* The units that go on, sharing the input's memory. */
+static GstMemory *
+copy_ranges (GstBuffer *input, const std::vector<Range> &ranges)
+{
+  gsize size = 0;
+  for (const Range &range : ranges)
+    size += range.size;
+  GstMemory *memory = gst_allocator_alloc (nullptr, size, nullptr);
+  GstMapInfo from, to;
+  if (gst_memory_map (memory, &to, GST_MAP_WRITE)) {
+    guint8 *end = to.data;
+    if (gst_buffer_map (input, &from, GST_MAP_READ)) {
+      for (const Range &range : ranges)
+        end = std::copy_n (from.data + range.offset, range.size, end);
+      gst_buffer_unmap (input, &from);
+    }
+    gst_memory_unmap (memory, &to);
+  }
+  return memory;
+}
+
+/* The units that go on, sharing the input's memory where a buffer can hold that many pieces: with
+ * each one more it would copy all that it has. */
 static GstBuffer *
 make_output (Stream &stream, GstBuffer *input, gsize length)
 {
@@ -555,8 +562,11 @@ make_output (Stream &stream, GstBuffer *input, gsize length)
     stream.output.assign (1, {0, length});
   GstBuffer *output = gst_buffer_new ();
   gst_buffer_copy_into (output, input, GST_BUFFER_COPY_FLAGS, 0, gsize (-1));
-  for (const Range &range : stream.output)
-    gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
+  if (stream.output.size () * gst_buffer_n_memory (input) > gst_buffer_get_max_memory ())
+    gst_buffer_append_memory (output, copy_ranges (input, stream.output));
+  else
+    for (const Range &range : stream.output)
+      gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
   GST_BUFFER_PTS (output) = GST_BUFFER_PTS (input);
   GST_BUFFER_DTS (output) = GST_BUFFER_DTS (input);
   return output;
@@ -578,7 +588,7 @@ finish_access_unit (
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   gst_range_buffer_set_capture_time (output, header.capture_time_ns);
   stream.discont = false;
-  stream.seen = Seen::kSlices;
+  GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen = Seen::kSlices;
   frame->out_buffer = output;
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
@@ -586,11 +596,12 @@ finish_access_unit (
 static GstFlowReturn
 handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const Stream &stream = priv->stream;
   ask_for_the_least (base);
   if (!update_caps (base))
     return refused (base);
-  stream.seen = std::max (stream.seen, stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
+  priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
   if (!stream.src_caps_set || stream.output.empty ()) /* of no use without its rig, or empty */
     return drop (base, frame, part.length);
   return finish_access_unit (base, frame, part.header, part.length);
@@ -639,32 +650,13 @@ gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *
 
 /* ---- seeking ---- */
 
-/* The one that the seek's flags ask for. */
-static std::optional<AccessUnitPlace>
-choose (const StreamFile::Target &target, guint64 pts, GstSeekFlags flags)
-{
-  const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
-  const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
-  const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
-  if (!target.before || !target.after || !snap || !after)
-    return target.before ? target.before : target.after;
-  if (nearest && pts - target.before->header.pts_ns <= target.after->header.pts_ns - pts)
-    return target.before;
-  return target.after;
-}
-
 /* The rig is not with each access unit: keep it until the streaming thread is there. */
 static void
-keep_rig (GstBaseParse *base, guint64 offset, const std::optional<AccessUnitPlace> &rig)
+keep_rig (GstNeighbourCodeParsePrivate *priv, NeighbourCodeFile::Place &place)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  std::vector<guint8> units;
-  if (rig)
-    read_file (GST_BASE_PARSE_SINK_PAD (base), rig->offset + kStreamPrefixSize,
-        std::min<gsize> (rig->header.size, kMaxRigBytes), units);
   std::lock_guard guard (priv->lock);
-  priv->seek.rig_offset = offset;
-  priv->seek.rig_units = std::move (units);
+  priv->seek.rig_offset = place.offset;
+  priv->seek.rig_units = std::move (place.rig_units);
 }
 
 static GstClockTime
@@ -677,20 +669,28 @@ first_pts_of (GstNeighbourCodeParsePrivate *priv)
 /* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
  * played. Returns: the time there; none if it could not be found. */
 static GstClockTime
-find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
+find_place (GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
 {
-  const GstClockTime first_pts = first_pts_of (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const GstClockTime first_pts = first_pts_of (priv);
   if (!GST_CLOCK_TIME_IS_VALID (first_pts))
     return GST_CLOCK_TIME_NONE;
-  const guint64 pts = first_pts + time;
-  const StreamFile::Target target = file_of (base).locate (pts);
-  const auto place = choose (target, pts, flags);
+  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first_pts);
+  auto place = file.find (time, stop, flags);
   if (!place)
     return GST_CLOCK_TIME_NONE;
-  keep_rig (base, place->offset, target.rig);
-  const GstClockTime found = place->header.pts_ns - std::min (first_pts, place->header.pts_ns);
-  gst_base_parse_add_index_entry (base, place->offset, found, TRUE, TRUE);
-  return found;
+  keep_rig (priv, *place);
+  gst_base_parse_add_index_entry (base, place->offset, place->time, TRUE, TRUE);
+  return place->time;
+}
+
+/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
+static GstClockTime
+end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
+{
+  const GstClockTime end =
+      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
+  return std::min<GstClockTime> (end, G_MAXINT64);
 }
 
 /* Returns: (transfer full): the seek that the base class shall do. */
@@ -705,10 +705,11 @@ aim (GstBaseParse *base, GstEvent *event)
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
   if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
     return event;
-  const GstClockTime found = find_place (base, GstClockTime (start), flags);
+  const GstClockTime end = end_of (base, stop_type, stop);
+  const GstClockTime found = find_place (base, GstClockTime (start), end, flags);
   if (!GST_CLOCK_TIME_IS_VALID (found))
     return event;
-  if (flags & GST_SEEK_FLAG_KEY_UNIT)
+  if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
     start = gint64 (found);
   /* The base class uses the place only where it shall be accurate. */
   flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
@@ -736,10 +737,10 @@ gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
 static void
 finish_stream (GstBaseParse *base)
 {
-  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   if (base->segment.rate > 0)
     gst_base_parse_drain (base);
-  if (stream.reads_stream && stream.seen != Seen::kSlices && !stream.had_gaps)
+  if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
     post_what_is_missing (base);
 }
 
@@ -766,6 +767,8 @@ forget_stream (GstNeighbourCodeParsePrivate *priv)
   std::lock_guard guard (priv->lock);
   priv->stream = {};
   priv->seek = {};
+  priv->seen = Seen::kNothing;
+  priv->failed = false;
 }
 
 static gboolean
@@ -796,6 +799,8 @@ gst_neighbour_code_parse_init (GstNeighbourCodeParse *self)
   self->priv = new GstNeighbourCodeParsePrivate;
   GST_PAD_SET_ACCEPT_INTERSECT (GST_BASE_PARSE_SINK_PAD (self));
   GST_PAD_SET_ACCEPT_TEMPLATE (GST_BASE_PARSE_SINK_PAD (self));
+  gst_pad_add_probe (GST_BASE_PARSE_SRC_PAD (self), GST_PAD_PROBE_TYPE_EVENT_FLUSH, note_flush,
+      self->priv, nullptr);
 }
 
 static void

@@ -606,11 +606,13 @@ install_segmentation_properties (GObjectClass *object_class)
       "4)",
       0, 100, kDefaults.noise_factor);
   install_double (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
-      "and from so many metres nearer than the background (0 to 10, default 0.02)", 0, 10,
-      kDefaults.depth_threshold_m);
+      "Depth speaks for a pixel from so many metres nearer than the background (0 to 10, default "
+      "0.02)",
+      0, 10, kDefaults.depth_threshold_m);
   install_double (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "and from so many grey levels of chromatic distortion (0 to 255, default 18)", 0, 255,
-      kDefaults.colour_threshold);
+      "Colour speaks for a pixel from so many grey levels of chromatic distortion (0 to 255, "
+      "default 18)",
+      0, 255, kDefaults.colour_threshold);
   install_double (PROP_SHADOW, "shadow", "Shadow",
       "A pixel darker than this share of the background is no shadow (0 to 1, default 0.5)", 0, 1,
       kDefaults.shadow);

@@ -39,9 +39,6 @@ GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
 
 enum { PROP_0, PROP_UNIT_STATS };
 
-/* An access unit that grows beyond this is hostile; what is too much is dropped. */
-static constexpr std::size_t kMaxAccessUnit = 32u << 20;
-
 struct DepayCounters {
   guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0;
 };
@@ -200,8 +197,8 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView)) {
       bad += !take_rig_view (self, *unit);
-    } else if (priv->access_unit.size () + unit->size () > kMaxAccessUnit) {
-      bad++;
+    } else if (priv->access_unit.size () + unit->size () > rangecast::kMaxAccessUnitSize) {
+      bad++; /* it is hostile */
     } else {
       good++;
       if (header.type == static_cast<guint8> (UnitType::kSlice))

@@ -22,6 +22,7 @@
 #include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <optional>
 #include <rangecast/neighbourcode/unit.hpp>
 #include <string>
 #include <vector>
@@ -29,6 +30,7 @@
 using rangecast::Status;
 using rangecast::UnitHeader;
 using rangecast::UnitReader;
+using rangecast::UnitType;
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
@@ -36,6 +38,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 enum { PROP_0, PROP_CONFIG_INTERVAL };
 
 static constexpr int kDefaultConfigInterval = 1;
+/* The least max-slice-size of neighbourcodeenc. */
+static constexpr gsize kSmallestSliceLimit = 256;
 
 struct GstRtpNeighbourCodePayPrivate {
   std::atomic<int> config_interval{kDefaultConfigInterval};
@@ -119,18 +123,19 @@ struct Packer {
     gst_buffer_list_add (packets, gst_buffer_append (packet, payload));
   }
 
-  /* @return the first unit's size that is too long for a packet, or 0 */
-  gsize pack (GstBuffer *buffer)
+  /* @return the first unit that is too long for a packet, if there is one */
+  std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
     GstMapInfo map;
     if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
-      return 0;
+      return {};
     UnitReader reader ({map.data, map.size});
     UnitHeader header;
-    gsize begin = 0, end = 0, too_long = 0;
+    gsize begin = 0, end = 0;
+    std::optional<UnitHeader> too_long;
     while (const auto unit = reader.next (header)) {
       if (unit->size () > room) {
-        too_long = unit->size ();
+        too_long = header;
         break;
       }
       if (end - begin + unit->size () > room) {
@@ -184,6 +189,33 @@ set_marker (GstBufferList *packets)
   GST_BUFFER_FLAG_SET (last, GST_BUFFER_FLAG_MARKER);
 }
 
+/* What to change so that a unit fits. */
+static std::string
+advice (const UnitHeader &unit, gsize room, gsize mtu_needed)
+{
+  const std::string larger_mtu = "mtu=" + std::to_string (mtu_needed) + " at least";
+  if (unit.type == guint8 (UnitType::kRigView))
+    return larger_mtu + ", or config-interval=0 where receivers have the rig from caps or SDP";
+  if (unit.type == guint8 (UnitType::kSlice) && room >= kSmallestSliceLimit)
+    return "max-slice-size=" + std::to_string (room) + " of neighbourcodeenc at most, or " +
+           larger_mtu;
+  return larger_mtu;
+}
+
+static GstFlowReturn
+refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gsize room)
+{
+  const char *name = unit.type == guint8 (UnitType::kSlice)     ? "slice"
+                     : unit.type == guint8 (UnitType::kRigView) ? "rig view"
+                                                                : "unit";
+  const gsize mtu_needed = unit.size + gst_rtp_buffer_calc_header_len (0);
+  GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
+      ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
+          int (unit.size), mtu, advice (unit, room, mtu_needed).c_str ()),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
 static GstFlowReturn
 gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *buffer)
 {
@@ -196,7 +228,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
       gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
   const bool is_last =
       !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
-  gsize too_long = 0;
+  std::optional<UnitHeader> too_long;
   if (begins_frame_set (self->priv, buffer, is_last) && config_is_due (self, running)) {
     GstBuffer *rig =
         gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
@@ -208,12 +240,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   gst_buffer_unref (buffer);
   if (too_long) {
     gst_buffer_list_unref (packer.packets);
-    GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
-        ("a unit of %" G_GSIZE_FORMAT " bytes does not fit into RTP packets of mtu=%u; expected a "
-         "smaller max-slice-size of neighbourcodeenc, at most %" G_GSIZE_FORMAT,
-            too_long, mtu, packer.room),
-        (nullptr));
-    return GST_FLOW_ERROR;
+    return refuse_long_unit (base, *too_long, mtu, packer.room);
   }
   if (gst_buffer_list_length (packer.packets) == 0) {
     gst_buffer_list_unref (packer.packets);

@@ -34,7 +34,7 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift
+  shift || { echo "camera-host.sh: the last option lacks its value" >&2; exit 2; }
 done
 need_number "$view" --view 0 63
 need_number "$views" --views 1 64

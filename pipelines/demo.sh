@@ -38,12 +38,14 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; echo "demo.sh: unknown option '$1'" >&2; exit 2 ;;
   esac
-  shift
+  shift || { echo "demo.sh: the last option lacks its value" >&2; exit 2; }
 done
 
 ./setup.sh
 source pipelines/env.sh
 need_size "$size" --size
+[ "${size%x*}" -ge 16 ] && [ "${size#*x}" -ge 16 ] && [ "${size%x*}" -le 4096 ] && [ "${size#*x}" -le 4096 ] ||
+  die "--size: expected 16x16 to 4096x4096, got '$size'"
 need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
@@ -83,7 +85,7 @@ trap stop_hosts EXIT
 start () { # name command...
   local name=$1
   shift
-  RANGECAST_LAUNCH="rangecast-run $run_options --report $out/log/$name.json" \
+  RANGECAST_LAUNCH="rangecast-run $run_options --report $(printf %q "$out/log/$name.json")" \
     "$@" >"$out/log/$name.log" 2>&1 &
   pids+=($!)
   names[$!]=$name
@@ -107,7 +109,7 @@ run_options=
 start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port"
 
 RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
-  --snapshot $out/avatar.png --report $out/log/viewer.json" \
+  --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
   pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" $window &
 viewer=$!
 pids+=($viewer)

@@ -13,7 +13,11 @@ if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
 fi
 
 # What runs the launch strings; demo.sh replaces it by rangecast-run, which measures.
-launch () { exec ${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q} "$@"; }
+launch () {
+  local runner
+  eval "runner=(${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q})" # a command line, quoted where it must be
+  exec "${runner[@]}" "$@"
+}
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 

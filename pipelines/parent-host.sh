@@ -26,7 +26,7 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift
+  shift || { echo "parent-host.sh: the last option lacks its value" >&2; exit 2; }
 done
 need_number "$views" --views 1 64
 need_number "$listen" --listen 1 $((65535 - views))

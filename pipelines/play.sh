@@ -23,7 +23,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) file=$1 ;;
   esac
-  shift
+  shift || { echo "play.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to play"; }
 [ -f "$file" ] || die "no file '$file'"

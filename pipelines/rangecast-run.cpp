@@ -42,7 +42,8 @@ struct Runner {
   std::vector<double> latencies_ms;
   GstClockTime first_frame = GST_CLOCK_TIME_NONE, last_frame = GST_CLOCK_TIME_NONE;
   bool seen_points = false;
-  gint64 first_points_us = 0; /* monotonic; 0: none yet */
+  guint64 decoded = 0, whole = 0; /* frame sets; those in which all views have points */
+  gint64 first_points_us = 0;     /* monotonic; 0: none yet */
 };
 
 struct StreamStats {
@@ -142,7 +143,7 @@ percentile (std::vector<double> values, double p)
 /* Until all views see somebody (the hosts are still learning their backgrounds) nothing is drawn,
  * recorded or counted. A view that has nobody in it is not waited for for ever. */
 static GstPadProbeReturn
-drop_until_points (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
   GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
@@ -151,11 +152,17 @@ drop_until_points (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   gint seen = 0;
   while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (buffer, &state))
     seen += meta->width > 0 && meta->height > 0;
+  const bool whole = seen >= std::max (1, runner->options.views);
+  std::lock_guard guard (runner->lock);
   if (seen > 0 && runner->first_points_us == 0)
     runner->first_points_us = g_get_monotonic_time ();
   const bool tired = seen > 0 && g_get_monotonic_time () - runner->first_points_us > kPatienceUs;
-  runner->seen_points |= seen >= std::max (1, runner->options.views) || tired;
-  return runner->seen_points ? GST_PAD_PROBE_REMOVE : GST_PAD_PROBE_DROP;
+  runner->seen_points |= whole || tired;
+  if (runner->seen_points) {
+    runner->decoded++;
+    runner->whole += whole;
+  }
+  return runner->seen_points ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
 }
 
 static gboolean
@@ -259,17 +266,19 @@ write_report (Runner &runner)
     return false;
   }
   std::fprintf (file,
-      "{\n  \"frames\": %" G_GUINT64_FORMAT ",\n  \"views\": %" G_GUINT64_FORMAT
+      "{\n  \"frames\": %" G_GUINT64_FORMAT ",\n  \"whole_frame_sets\": %" G_GUINT64_FORMAT
+      ",\n  \"views\": %" G_GUINT64_FORMAT
       ",\n  \"fps\": %.2f,\n  \"points_per_frame_set\": %.1f,\n"
       "  \"points_after_cylinder\": %.1f,\n  \"raw_bytes_per_frame_set\": %.1f,\n"
       "  \"coded_bytes_per_frame_set\": %.1f,\n"
       "  \"latency_ms\": {\"p50\": %.2f, \"p99\": %.2f},\n"
       "  \"rtp_packets\": %" G_GUINT64_FORMAT ",\n  \"rtp_lost\": %" G_GUINT64_FORMAT
       ",\n  \"cpu_seconds\": %.3f\n}\n",
-      s.frames, s.views, fps, per_frame (s.points_in, s.cylinder_frames),
-      per_frame (s.points_out, s.cylinder_frames), per_frame (s.raw_bytes, s.coded_frames),
-      per_frame (s.coded_bytes, s.coded_frames), percentile (runner.latencies_ms, 0.5),
-      percentile (runner.latencies_ms, 0.99), s.rtp_packets, s.rtp_lost, cpu_seconds ());
+      s.frames, runner.decoded ? s.frames * runner.whole / runner.decoded : 0, s.views, fps,
+      per_frame (s.points_in, s.cylinder_frames), per_frame (s.points_out, s.cylinder_frames),
+      per_frame (s.raw_bytes, s.coded_frames), per_frame (s.coded_bytes, s.coded_frames),
+      percentile (runner.latencies_ms, 0.5), percentile (runner.latencies_ms, 0.99), s.rtp_packets,
+      s.rtp_lost, cpu_seconds ());
   std::fclose (file);
   return true;
 }
@@ -370,7 +379,7 @@ play (Runner &runner)
   }
   if (runner.options.turn && runner.options.frames > 0)
     runner.turned = gst_bin_get_by_name (GST_BIN (runner.pipeline), "view");
-  add_probe (runner, "decoder", drop_until_points);
+  add_probe (runner, "decoder", count_views);
   add_probe (runner, "rendered", count_rendered);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)

@@ -29,7 +29,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift
+  shift || { echo "rgbd-to-ply.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ ${#files[@]} = 3 ] || { usage >&2; die "expected COLOUR DEPTH OUT"; }
 
@@ -45,6 +45,16 @@ read_pictures () {
       reader=(filesrc "location=$1") ;;
   esac
 }
+# A depth picture has 16 bits of grey; what is not one would become nothing, without a word.
+is_depth () {
+  local kind
+  kind=$(head -c 26 "$1" 2>/dev/null | tail -c 2 | od -An -tu1 | tr -s ' ') # PNG: bit depth, colour type
+  [ "$(head -c 4 "$1" | tail -c 3)" = PNG ] && [ "$kind" = " 16 0" ]
+}
+case "${files[1]}" in
+  *%*) ;;
+  *) is_depth "${files[1]}" || die "'${files[1]}': expected a PNG of 16 bits of grey as depth" ;;
+esac
 read_pictures "${files[0]}"
 colour=("${reader[@]}")
 read_pictures "${files[1]}"

@@ -33,7 +33,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift
+  shift || { echo "stereo-to-cutout.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ ${#files[@]} = 3 ] && [ -n "$rig" ] || { usage >&2; die "expected LEFT RIGHT OUT-DIR and --rig"; }
 [ -f "${files[0]}" ] || die "no file '${files[0]}'"

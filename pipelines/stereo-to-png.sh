@@ -30,7 +30,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift
+  shift || { echo "stereo-to-png.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ ${#files[@]} = 3 ] && [ -n "$focal" ] && [ -n "$baseline" ] && [ -n "$near" ] && [ -n "$far" ] ||
   { usage >&2; die "expected LEFT RIGHT PNG, --focal-length, --baseline, --near and --far"; }

@@ -43,17 +43,34 @@ GST_START_TEST (test_states_change_twice_and_frames_count_from_0_again)
 }
 GST_END_TEST;
 
+/* Writes 'b' for each buffer and 'e' for EOS, in the order in which they leave. */
+static GstPadProbeReturn
+note_order (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  auto &order = *static_cast<std::string *> (data);
+  if (info->type & GST_PAD_PROBE_TYPE_BUFFER)
+    order += 'b';
+  else if (info->type & GST_PAD_PROBE_TYPE_BUFFER_LIST)
+    order.append (gst_buffer_list_length (GST_PAD_PROBE_INFO_BUFFER_LIST (info)), 'b');
+  else if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS)
+    order += 'e';
+  return GST_PAD_PROBE_OK;
+}
+
 GST_START_TEST (test_eos_comes_out_after_the_last_frame_set)
 {
   for (const char *caps : {"application/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
     const Rig rig = ring_rig (1);
     GstHarness *h = encoder (rig, "", caps);
+    std::string order;
+    gst_pad_add_probe (h->sinkpad, GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, note_order, &order, nullptr);
     gst_harness_push (h, make_frame_set (rig));
     fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
     auto buffers = pull_all (h);
     fail_unless (!buffers.empty ());
+    const std::string expected = std::string (buffers.size (), 'b') + 'e';
+    fail_unless_equals_string (order.c_str (), expected.c_str ());
     unref_all (buffers);
-    fail_unless (pulls_event (h, GST_EVENT_EOS));
     gst_harness_teardown (h);
   }
 }

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "rangecast-check.hpp"
+#include "coded-check.hpp"
 
 #include <glib/gstdio.h>
 #include <gst/base/base.h>
 
 #include <algorithm>
-#include <rangecast/neighbourcode/unit.hpp>
-#include <vector>
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -73,15 +71,6 @@ push_bytes (GstHarness *h, std::span<const guint8> bytes, gsize piece)
         h, gst_buffer_new_memdup (bytes.data () + at, std::min (piece, bytes.size () - at)));
 }
 
-static std::vector<GstBuffer *>
-pull_all (GstHarness *h)
-{
-  std::vector<GstBuffer *> parsed;
-  while (GstBuffer *buffer = gst_harness_try_pull (h))
-    parsed.push_back (buffer);
-  return parsed;
-}
-
 /* What the parser gives for a file of these bytes, read in pieces. */
 static std::vector<GstBuffer *>
 parse (std::span<const guint8> bytes, gsize piece)
@@ -89,7 +78,7 @@ parse (std::span<const guint8> bytes, gsize piece)
   GstHarness *h = new_parser ();
   push_bytes (h, bytes, piece);
   gst_harness_push_event (h, gst_event_new_eos ());
-  const auto parsed = pull_all (h);
+  auto parsed = pull_all (h);
   gst_harness_teardown (h);
   return parsed;
 }
@@ -105,18 +94,11 @@ same_bytes (GstBuffer *a, GstBuffer *b)
   return same;
 }
 
-static void
-unref_all (const std::vector<GstBuffer *> &buffers)
-{
-  for (GstBuffer *buffer : buffers)
-    gst_buffer_unref (buffer);
-}
-
 GST_START_TEST (test_what_is_written_reads_the_same_in_pieces_of_any_size)
 {
   const Recording recording;
   for (gsize piece : {gsize{1000}, gsize{4096}, recording.bytes.size ()}) {
-    const auto parsed = parse (recording.bytes, piece);
+    auto parsed = parse (recording.bytes, piece);
     fail_unless_equals_int (parsed.size (), 10);
     for (std::size_t i = 0; i < parsed.size (); i++) {
       fail_unless (same_bytes (parsed[i], recording.access_units[i]));
@@ -136,7 +118,7 @@ GST_START_TEST (test_rubbish_before_and_between_costs_nothing_else)
   bytes.insert (bytes.end (), recording.bytes.begin (), recording.bytes.end ());
   bytes.insert (bytes.end (), 333, 0x00);
   bytes.insert (bytes.end (), recording.bytes.begin (), recording.bytes.end ());
-  const auto parsed = parse (bytes, 5000);
+  auto parsed = parse (bytes, 5000);
   fail_unless_equals_int (parsed.size (), 20);
   fail_unless (same_bytes (parsed[0], recording.access_units[0]));
   fail_unless (same_bytes (parsed[19], recording.access_units[9]));
@@ -151,7 +133,7 @@ GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_
   for (gsize size = 0; size < recording.bytes.size (); size++) {
     /* exact: reading on would be seen */
     const std::vector<guint8> cut (recording.bytes.begin (), recording.bytes.begin () + size);
-    const auto parsed = parse (cut, G_MAXINT);
+    auto parsed = parse (cut, G_MAXINT);
     const auto whole = gsize (size >= ends[1]) + gsize (size >= ends[2]);
     fail_unless (parsed.size () >= whole && parsed.size () <= whole + 1);
     for (gsize i = 0; i < whole; i++)
@@ -168,7 +150,7 @@ GST_START_TEST (test_trailing_bytes_cost_nothing)
     auto bytes = recording.bytes;
     for (gsize i = 0; i < extra; i++) /* the beginning of one more access unit, for the first */
       bytes.push_back (i < 4 ? kStartCode[i] : 0x77);
-    const auto parsed = parse (bytes, 5000);
+    auto parsed = parse (bytes, 5000);
     fail_unless_equals_int (parsed.size (), 10);
     fail_unless (same_bytes (parsed[9], recording.access_units[9]));
     unref_all (parsed);
@@ -181,7 +163,7 @@ GST_START_TEST (test_size_field_that_lies_costs_no_later_access_unit)
   const Recording recording;
   auto bytes = recording.bytes;
   bytes[4 + 4 + 2] = 0xff; /* the first one claims to be 16 MB long */
-  const auto parsed = parse (bytes, 8000);
+  auto parsed = parse (bytes, 8000);
   fail_unless_equals_int (parsed.size (), 10);
   fail_unless (same_bytes (parsed[1], recording.access_units[1]));
   unref_all (parsed);
@@ -207,7 +189,7 @@ GST_START_TEST (test_every_flipped_bit_costs_its_own_access_unit_only)
   for (gsize bit = 8 * recording.offsets[1]; bit < 8 * recording.offsets[2]; bit++) {
     auto bytes = recording.bytes;
     bytes[bit / 8] ^= guint8 (1 << bit % 8);
-    const auto parsed = parse (bytes, G_MAXINT);
+    auto parsed = parse (bytes, G_MAXINT);
     fail_unless (ends_with (parsed, recording, 2), "bit %" G_GSIZE_FORMAT, bit);
     fail_unless (same_bytes (parsed[0], recording.access_units[0]));
     unref_all (parsed);
@@ -222,7 +204,7 @@ GST_START_TEST (test_lost_bytes_cost_their_own_access_unit_only)
     for (gsize at = recording.offsets[2] - lost; at > recording.offsets[1]; at -= lost) {
       auto bytes = recording.bytes;
       bytes.erase (bytes.begin () + at, bytes.begin () + at + lost);
-      const auto parsed = parse (bytes, G_MAXINT);
+      auto parsed = parse (bytes, G_MAXINT);
       fail_unless (ends_with (parsed, recording, 2), "%d lost at %d", int (lost), int (at));
       unref_all (parsed);
       if (at < lost)
@@ -236,7 +218,7 @@ GST_START_TEST (test_damage_is_told_by_discont)
   const Recording recording;
   auto bytes = recording.bytes;
   bytes[recording.offsets[4]] ^= 1;
-  const auto parsed = parse (bytes, 5000);
+  auto parsed = parse (bytes, 5000);
   fail_unless_equals_int (parsed.size (), 9);
   for (gsize i = 0; i < 9; i++)
     fail_unless_equals_int (GST_BUFFER_IS_DISCONT (parsed[i]), i == 0 || i == 4);
@@ -250,7 +232,7 @@ GST_START_TEST (test_lost_header_of_a_long_access_unit_is_no_error)
   std::vector<guint8> bytes (recording.bytes);
   bytes.insert (bytes.end (), 5 << 20, 0x55); /* the base class would give up after 2 MiB */
   bytes.insert (bytes.end (), recording.bytes.begin (), recording.bytes.end ());
-  const auto parsed = parse (bytes, 100000);
+  auto parsed = parse (bytes, 100000);
   fail_unless_equals_int (parsed.size (), 20);
   unref_all (parsed);
 }
@@ -286,7 +268,7 @@ GST_START_TEST (test_start_code_inside_a_unit_does_not_end_the_access_unit)
   std::vector<guint8> inner (recording.bytes.begin (), recording.bytes.begin () + 200);
   const auto bytes = pad_first_access_unit (recording, unknown_unit (inner));
   for (gsize piece : {100, 5000, G_MAXINT}) {
-    const auto parsed = parse (bytes, piece);
+    auto parsed = parse (bytes, piece);
     fail_unless_equals_int (parsed.size (), 10);
     const gsize size = gst_buffer_get_size (recording.access_units[0]);
     fail_unless_equals_int (gst_buffer_get_size (parsed[0]), size + 204);
@@ -305,11 +287,57 @@ GST_START_TEST (test_longest_access_unit_in_small_pieces_takes_linear_time)
     padding.insert (padding.end (), unit.begin (), unit.end ());
   const auto bytes = pad_first_access_unit (recording, padding);
   const gint64 begin = g_get_monotonic_time ();
-  const auto parsed = parse (bytes, 4096);
+  auto parsed = parse (bytes, 4096);
   fail_unless_equals_int (parsed.size (), 10);
   unref_all (parsed);
   /* Looking at it all again with each piece would copy 120 GB. */
   fail_unless (g_get_monotonic_time () - begin < 15 * G_USEC_PER_SEC);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_longest_access_unit_of_short_units_takes_linear_time)
+{
+  const Recording recording (3, 16);
+  const std::vector<guint8> rig_view = {0x12, 0, 4, 0};
+  const auto unknown = unknown_unit (std::vector<guint8> (24, 0));
+  std::vector<guint8> padding, expected;
+  while (padding.size () < (31 << 20)) {
+    padding.insert (padding.end (), rig_view.begin (), rig_view.end ()); /* which does not go on */
+    padding.insert (padding.end (), unknown.begin (), unknown.end ());
+    expected.insert (expected.end (), unknown.begin (), unknown.end ());
+  }
+  const auto slices = bytes_of (recording.access_units[0]);
+  expected.insert (expected.end (), slices.begin (), slices.end ());
+  const auto bytes = pad_first_access_unit (recording, padding);
+  const gint64 begin = g_get_monotonic_time ();
+  auto parsed = parse (bytes, G_MAXINT);
+  /* Copying all again with every 16th piece would take more than a minute. */
+  fail_unless (g_get_monotonic_time () - begin < 30 * G_USEC_PER_SEC);
+  fail_unless_equals_int (parsed.size (), 3);
+  /* Its own rig goes on neither: it stands behind the padding. */
+  fail_unless (bytes_of (parsed[0]) == expected);
+  unref_all (parsed);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pieces_of_an_access_unit_keep_their_order_however_many_they_are)
+{
+  const Recording recording (2, 16);
+  for (guint8 pieces = 1; pieces < 40; pieces++) {
+    std::vector<guint8> padding, expected;
+    for (guint8 i = 0; i < pieces; i++) {
+      const auto unit = unknown_unit ({i, guint8 (2 * i)});
+      padding.insert (padding.end (), unit.begin (), unit.end ());
+      expected.insert (expected.end (), unit.begin (), unit.end ());
+      padding.insert (padding.end (), {0x12, 0, 4, 0});
+    }
+    const auto slices = bytes_of (recording.access_units[0]);
+    expected.insert (expected.end (), slices.begin (), slices.end ());
+    auto parsed = parse (pad_first_access_unit (recording, padding), G_MAXINT);
+    fail_unless_equals_int (parsed.size (), 2);
+    fail_unless (bytes_of (parsed[0]) == expected);
+    unref_all (parsed);
+  }
 }
 GST_END_TEST;
 
@@ -341,14 +369,14 @@ GST_START_TEST (test_access_unit_goes_on_as_soon_as_it_is_whole)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_access_units_share_the_memory_of_the_input)
+GST_START_TEST (test_access_units_that_came_in_one_buffer_share_its_memory)
 {
   const Recording recording;
   GstHarness *h = new_parser ();
   GstBuffer *input = gst_buffer_new_memdup (recording.bytes.data (), recording.bytes.size ());
   GstMemory *memory = gst_buffer_get_memory (input, 0);
   gst_harness_push (h, input);
-  const auto parsed = pull_all (h);
+  auto parsed = pull_all (h);
   fail_unless_equals_int (parsed.size (), 10);
   for (GstBuffer *buffer : parsed) {
     fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
@@ -357,6 +385,19 @@ GST_START_TEST (test_access_units_share_the_memory_of_the_input)
   unref_all (parsed);
   gst_memory_unref (memory);
   gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_unit_that_came_in_pieces_is_one_copy)
+{
+  const Recording recording;
+  auto parsed = parse (recording.bytes, 1000);
+  fail_unless_equals_int (parsed.size (), 10);
+  for (GstBuffer *buffer : parsed) {
+    fail_unless (gst_buffer_get_size (buffer) > 1000);
+    fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
+  }
+  unref_all (parsed);
 }
 GST_END_TEST;
 
@@ -374,7 +415,7 @@ with_delta_units (const Recording &recording)
 GST_START_TEST (test_delta_unit_is_set_where_the_header_says_no_key)
 {
   const Recording recording;
-  const auto parsed = parse (with_delta_units (recording), 5000);
+  auto parsed = parse (with_delta_units (recording), 5000);
   fail_unless_equals_int (parsed.size (), 10);
   for (gsize i = 0; i < 10; i++)
     fail_unless_equals_int (
@@ -441,7 +482,7 @@ GST_START_TEST (test_flush_forgets_what_was_half_there)
   gst_segment_init (&segment, GST_FORMAT_BYTES);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
   push_bytes (h, {recording.bytes.data (), recording.offsets[1]}, 500);
-  const auto parsed = pull_all (h);
+  auto parsed = pull_all (h);
   fail_unless_equals_int (parsed.size (), 1);
   fail_unless (same_bytes (parsed[0], recording.access_units[0]));
   unref_all (parsed);
@@ -468,16 +509,17 @@ struct TemporaryFile {
   ~TemporaryFile () { g_unlink (path.c_str ()); }
 };
 
-/* filesrc ! between ! neighbourcodeparse ! fakesink, paused on its first buffer. */
+/* filesrc ! between ! neighbourcodeparse ! after fakesink, paused on its first buffer. */
 struct Player {
   GstElement *pipeline, *sink;
   std::vector<GstClockTime> seen; /* times of what reached the sink since the last seek */
   std::vector<int> widths;        /* caps that reached it */
 
-  explicit Player (const TemporaryFile &file, const char *between = "")
+  explicit Player (
+      const TemporaryFile &file, const char *between = "", const std::string &after = "")
   {
     const std::string line = "filesrc name=file ! " + std::string (between) +
-                             " neighbourcodeparse ! fakesink name=sink sync=false";
+                             " neighbourcodeparse ! " + after + " fakesink name=sink sync=false";
     pipeline = gst_parse_launch (line.c_str (), nullptr);
     GstElement *source = gst_bin_get_by_name (GST_BIN (pipeline), "file");
     g_object_set (source, "location", file.path.c_str (), nullptr);
@@ -523,11 +565,17 @@ struct Player {
   }
   bool seek (GstClockTime time, int flags)
   {
+    return seek_part (time, flags, GST_SEEK_TYPE_SET, GST_CLOCK_TIME_NONE);
+  }
+  /* The same for a part of the file, that ends at `stop`. */
+  bool seek_part (GstClockTime time, int flags, GstSeekType stop_type, GstClockTime stop)
+  {
     if (!wait ())
       return false;
     seen.clear ();
-    return gst_element_seek_simple (pipeline, GST_FORMAT_TIME,
-               GstSeekFlags (GST_SEEK_FLAG_FLUSH | flags), gint64 (time)) &&
+    return gst_element_seek (pipeline, 1, GST_FORMAT_TIME,
+               GstSeekFlags (GST_SEEK_FLAG_FLUSH | flags), GST_SEEK_TYPE_SET, gint64 (time),
+               stop_type, gint64 (stop)) &&
            wait ();
   }
   /* The buffer that the sink is paused on. */
@@ -607,6 +655,44 @@ GST_START_TEST (test_seek_can_snap_to_the_key_access_unit_after_or_nearest)
   fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
   fail_unless (player.seek (9 * kFrame, nearest));
   fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_snaps_to_no_key_access_unit_behind_its_stop)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file);
+  for (const int snap : {int (GST_SEEK_FLAG_SNAP_AFTER), int (GST_SEEK_FLAG_SNAP_NEAREST)}) {
+    const int flags = GST_SEEK_FLAG_KEY_UNIT | snap;
+    fail_unless (player.seek_part (9 * kFrame, flags, GST_SEEK_TYPE_SET, 10 * kFrame));
+    fail_unless_equals_uint64 (player.shown (), 10 * kFrame);
+    fail_unless (player.seek_part (8 * kFrame, flags, GST_SEEK_TYPE_SET, 9 * kFrame));
+    fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
+    fail_unless_equals_int64 (player.position (), 5 * kFrame);
+    fail_unless (player.seek_part (8 * kFrame, flags, GST_SEEK_TYPE_NONE, 0)); /* the stop stays */
+    fail_unless_equals_uint64 (player.shown (), 5 * kFrame);
+  }
+}
+GST_END_TEST;
+
+/* With times that begin at `first`. */
+static std::vector<guint8>
+with_times_from (const Recording &recording, guint64 first)
+{
+  auto bytes = recording.bytes;
+  for (gsize i = 0; i < recording.offsets.size (); i++)
+    GST_WRITE_UINT64_LE (&bytes[recording.offsets[i] + 4 + 8], first + i * kFrame);
+  return bytes;
+}
+
+GST_START_TEST (test_seek_beyond_the_latest_time_there_is_lands_on_the_last_access_unit)
+{
+  const Recording recording (10, 16);
+  const TemporaryFile file (with_times_from (recording, G_MAXUINT64 - 10 * kFrame));
+  Player player (file);
+  fail_unless (player.seek (12 * kFrame, GST_SEEK_FLAG_KEY_UNIT)); /* 2 frames behind 2^64 ns */
+  fail_unless_equals_uint64 (player.shown (), 9 * kFrame);
 }
 GST_END_TEST;
 
@@ -700,7 +786,7 @@ without_times (const Recording &recording)
 GST_START_TEST (test_times_that_are_missing_are_counted)
 {
   const Recording recording;
-  const auto parsed = parse (without_times (recording), 5000);
+  auto parsed = parse (without_times (recording), 5000);
   fail_unless_equals_int (parsed.size (), 10);
   for (gsize i = 0; i < 10; i++)
     fail_unless_equals_uint64 (GST_BUFFER_PTS (parsed[i]), i * kFrame);
@@ -867,16 +953,115 @@ GST_START_TEST (test_cut_file_that_plays_is_no_error)
 }
 GST_END_TEST;
 
+/* A parser that writes the byte stream of access units. */
+static GstHarness *
+new_writer (const Rig &rig)
+{
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_sink_caps_str (h, kStreamCaps);
+  gst_harness_set_src_caps (h, coded_caps (rig));
+  return h;
+}
+
+GST_START_TEST (test_access_unit_that_no_reader_would_take_is_one_error)
+{
+  const Rig rig = ring_rig (2);
+  std::vector<guint8> rig_units;
+  write_rig_units ({rig, 30, 1}, rig_units);
+  const gsize longest = kMaxAccessUnitSize - rig_units.size ();
+  GstHarness *h = new_writer (rig);
+  {
+    ErrorCounter errors (h);
+    GstBuffer *fits = gst_buffer_new_allocate (nullptr, longest, nullptr);
+    gst_buffer_memset (fits, 0, 0, longest);
+    fail_unless_equals_int (gst_harness_push (h, fits), GST_FLOW_OK);
+    fail_unless_equals_int (errors.take (), 0);
+    GstBuffer *longer = gst_buffer_new_allocate (nullptr, longest + 1, nullptr);
+    gst_buffer_memset (longer, 0, 0, longest + 1);
+    fail_unless_equals_int (gst_harness_push (h, longer), GST_FLOW_ERROR);
+    const std::string text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
+    fail_unless (text.find ("32 MiB") != std::string::npos, "%s", text.c_str ());
+    fail_unless_equals_int (errors.take (), 0);
+  }
+  fail_unless_equals_int (gst_harness_buffers_received (h), 1);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_after_a_flush_is_posted_too)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = new_writer (rig);
+  {
+    ErrorCounter errors (h);
+    for (int round = 0; round < 2; round++) {
+      GstBuffer *longer = gst_buffer_new_allocate (nullptr, kMaxAccessUnitSize + 1, nullptr);
+      gst_buffer_memset (longer, 0, 0, kMaxAccessUnitSize + 1);
+      fail_unless_equals_int (gst_harness_push (h, longer), GST_FLOW_ERROR);
+      fail_unless_equals_int (errors.take (), 1);
+      flush (h);
+    }
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_after_a_seek_in_a_file_is_posted_too)
+{
+  const Recording first (40, 64), second (40, 32, GST_SECOND + 40 * kFrame);
+  auto bytes = first.bytes;
+  bytes.insert (bytes.end (), second.bytes.begin (), second.bytes.end ());
+  const TemporaryFile file (bytes);
+  Player player (file, "", "application/x-neighbour-code,width=64 !");
+  GstBus *bus = gst_element_get_bus (player.pipeline);
+  for (int round = 0; round < 2; round++) {
+    fail_unless (player.seek (0, GST_SEEK_FLAG_KEY_UNIT));
+    gst_element_set_state (player.pipeline, GST_STATE_PLAYING);
+    fail_unless (next_message_text (bus, GST_MESSAGE_ERROR) != "", "round %d", round);
+    gst_element_set_state (player.pipeline, GST_STATE_PAUSED);
+  }
+  gst_object_unref (bus);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_that_is_put_better_keeps_its_seqnum_and_details)
+{
+  GstHarness *h = new_parser ();
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  GError *error = g_error_new (GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE, "No valid frames");
+  GstMessage *message = gst_message_new_error_with_details (GST_OBJECT (h->element), error, "why",
+      gst_structure_new ("details", "n", G_TYPE_INT, 7, nullptr));
+  g_error_free (error);
+  gst_message_set_seqnum (message, 4711);
+  fail_unless (gst_element_post_message (h->element, message));
+  message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
+  fail_unless (message != nullptr);
+  fail_unless_equals_int (gst_message_get_seqnum (message), 4711);
+  const GstStructure *details = nullptr;
+  gst_message_parse_error_details (message, &details);
+  fail_unless (details && gst_structure_has_field_typed (details, "n", G_TYPE_INT));
+  gst_message_parse_error (message, &error, nullptr);
+  fail_unless (g_str_has_prefix (error->message, "No access unit found"));
+  g_error_free (error);
+  gst_message_unref (message);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_downstream_may_change_its_mind)
 {
   const Recording recording;
   GstHarness *h = new_parser ();
   const std::span<const guint8> bytes (recording.bytes);
   push_bytes (h, bytes.first (recording.offsets[5]), 5000);
-  unref_all (pull_all (h));
+  auto before = pull_all (h);
+  unref_all (before);
   gst_harness_set_sink_caps_str (h, kStreamCaps);
   push_bytes (h, bytes.subspan (recording.offsets[5]), 5000);
-  const auto parsed = pull_all (h);
+  auto parsed = pull_all (h);
   fail_unless_equals_int (parsed.size (), 5);
   for (GstBuffer *buffer : parsed)
     fail_unless (gst_buffer_memcmp (buffer, 0, kStartCode.data (), kStartCode.size ()) == 0);
@@ -949,9 +1134,12 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_lost_header_of_a_long_access_unit_is_no_error);
   tcase_add_test (tc, test_start_code_inside_a_unit_does_not_end_the_access_unit);
   tcase_add_test (tc, test_longest_access_unit_in_small_pieces_takes_linear_time);
+  tcase_add_test (tc, test_longest_access_unit_of_short_units_takes_linear_time);
+  tcase_add_test (tc, test_pieces_of_an_access_unit_keep_their_order_however_many_they_are);
   tcase_add_test (tc, test_size_that_lies_delays_nothing);
   tcase_add_test (tc, test_access_unit_goes_on_as_soon_as_it_is_whole);
-  tcase_add_test (tc, test_access_units_share_the_memory_of_the_input);
+  tcase_add_test (tc, test_access_units_that_came_in_one_buffer_share_its_memory);
+  tcase_add_test (tc, test_access_unit_that_came_in_pieces_is_one_copy);
   tcase_add_test (tc, test_delta_unit_is_set_where_the_header_says_no_key);
   tcase_add_test (tc, test_written_header_is_key_only_if_all_slices_are);
   tcase_add_test (tc, test_rig_that_changes_gives_new_caps);
@@ -959,6 +1147,8 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_file_tells_its_duration_before_it_plays);
   tcase_add_test (tc, test_key_unit_seek_lands_on_the_key_access_unit_at_or_before);
   tcase_add_test (tc, test_seek_can_snap_to_the_key_access_unit_after_or_nearest);
+  tcase_add_test (tc, test_seek_snaps_to_no_key_access_unit_behind_its_stop);
+  tcase_add_test (tc, test_seek_beyond_the_latest_time_there_is_lands_on_the_last_access_unit);
   tcase_add_test (tc, test_accurate_seek_decodes_from_the_key_access_unit_and_shows_the_time);
   tcase_add_test (tc, test_seek_in_a_long_file_finds_its_place_by_bisection);
   tcase_add_test (tc, test_seek_beyond_the_end_ends);
@@ -975,6 +1165,10 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
   tcase_add_test (tc, test_rig_beyond_the_limit_is_one_error_that_names_it);
   tcase_add_test (tc, test_cut_file_that_plays_is_no_error);
+  tcase_add_test (tc, test_access_unit_that_no_reader_would_take_is_one_error);
+  tcase_add_test (tc, test_error_after_a_flush_is_posted_too);
+  tcase_add_test (tc, test_error_after_a_seek_in_a_file_is_posted_too);
+  tcase_add_test (tc, test_error_that_is_put_better_keeps_its_seqnum_and_details);
   tcase_add_test (tc, test_downstream_may_change_its_mind);
   tcase_add_test (tc, test_access_units_pass_as_they_are);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);

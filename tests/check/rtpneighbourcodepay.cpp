@@ -142,6 +142,65 @@ GST_START_TEST (test_slice_or_rig_longer_than_the_mtu_is_one_error)
 }
 GST_END_TEST;
 
+/* What the payloader says of an access unit that it refuses. */
+static std::string
+refusal (const Rig &rig, const char *properties, GstBuffer *buffer)
+{
+  GstHarness *h = payloader (rig, properties);
+  std::string text;
+  {
+    ErrorCounter errors (h);
+    fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_ERROR);
+    text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
+  }
+  gst_harness_teardown (h);
+  return text;
+}
+
+static bool
+says (const std::string &text, const std::string &part)
+{
+  return text.find (part) != std::string::npos;
+}
+
+GST_START_TEST (test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit)
+{
+  const Rig rig = ring_rig (1);
+  const auto slices = encoded_units (rig, make_frame_set (rig), "max-slice-size=1200");
+  gsize first_long = 0;
+  for (const auto &slice : slices)
+    if (first_long == 0 && slice.size () > 1000 - 12)
+      first_long = slice.size ();
+  const std::string text = refusal (rig, "mtu=1000", buffer_of (slices));
+  fail_unless (says (text, "A slice of " + std::to_string (first_long)), "%s", text.c_str ());
+  fail_unless (says (text, "max-slice-size=988"), "%s", text.c_str ());
+  fail_unless (says (text, "mtu=" + std::to_string (first_long + 12)), "%s", text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set)
+{
+  const Rig rig = ring_rig (1);
+  const std::string text = refusal (rig, "mtu=200 config-interval=0", access_unit (rig));
+  fail_unless (says (text, "A slice of "), "%s", text.c_str ());
+  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_for_a_long_rig_view_names_mtu_and_config_interval)
+{
+  const Rig rig = ring_rig (1);
+  std::vector<guint8> rig_units;
+  write_rig_units ({rig, 30, 1}, rig_units); /* one: the rig has one view */
+  const std::string text = refusal (rig, "mtu=60", access_unit (rig));
+  fail_unless (
+      says (text, "A rig view of " + std::to_string (rig_units.size ())), "%s", text.c_str ());
+  fail_unless (says (text, "mtu=" + std::to_string (rig_units.size () + 12)), "%s", text.c_str ());
+  fail_unless (says (text, "config-interval=0"), "%s", text.c_str ());
+  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
+}
+GST_END_TEST;
+
 GST_START_TEST (test_caps_without_a_rig_are_an_error)
 {
   GstHarness *h = gst_harness_new ("rtpneighbourcodepay");
@@ -340,6 +399,9 @@ rtpneighbourcodepay_suite ()
   tcase_add_test (tc, test_every_packet_decodes_alone);
   tcase_add_test (tc, test_mtu_may_change_while_playing);
   tcase_add_test (tc, test_slice_or_rig_longer_than_the_mtu_is_one_error);
+  tcase_add_test (tc, test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit);
+  tcase_add_test (tc, test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set);
+  tcase_add_test (tc, test_error_for_a_long_rig_view_names_mtu_and_config_interval);
   tcase_add_test (tc, test_caps_without_a_rig_are_an_error);
   tcase_add_test (tc, test_states_change_twice);
   tcase_add_test (tc, test_eos_and_gap_go_by);

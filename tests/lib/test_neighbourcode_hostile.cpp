@@ -2,6 +2,7 @@
 /* Damaged and hostile streams: nothing crashes, and nothing is written where it should not. */
 #include "neighbourcode-support.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 
@@ -42,6 +43,55 @@ struct Hostile : ::testing::Test {
   void SetUp () override { ASSERT_TRUE (decoder.set_rig (rig ()).ok ()); }
 };
 
+/* Two views in some slices each, one bit of which is wrong. */
+struct Flips : Hostile {
+  std::vector<std::vector<std::uint8_t>> units = units_of (small_stream ());
+  std::vector<SliceHeader> headers;
+  Decoded good;
+
+  void SetUp () override
+  {
+    Hostile::SetUp ();
+    good = decode_exact (decoder, joined (units));
+    ASSERT_EQ (good.pictures.size (), 2u);
+    for (const auto &unit : units)
+      ASSERT_TRUE (read_slice_header (unit, headers.emplace_back ()).ok ());
+    for (const int view : {0, 1}) /* a stray alone outvotes none of them */
+      ASSERT_GT (std::ranges::count (headers, view, &SliceHeader::view_id), 1);
+  }
+  Decoded decode_flipped (std::size_t k, std::size_t bit)
+  {
+    auto bad = units;
+    bad[k][bit / 8] ^= 1 << bit % 8;
+    return decode_exact (decoder, joined (bad));
+  }
+  static Roi place_of (const SliceHeader &header)
+  {
+    return {header.first_column, header.first_row, header.columns, header.rows};
+  }
+  static bool same_pixel (Picture &a, Picture &b, int x, int y)
+  {
+    const auto depth = a.depth.view ().at (x, y);
+    const Rgbx c = a.colour.view ().at (x, y), d = b.colour.view ().at (x, y);
+    return depth == b.depth.view ().at (x, y) &&
+           (depth == 0 || (c.r == d.r && c.g == d.g && c.b == d.b));
+  }
+  /* All but a part is the same, in depth and, where there is any, colour. */
+  static bool same_outside (Picture &a, Picture &b, const Roi &part)
+  {
+    if (!(a.roi == b.roi))
+      return false;
+    for (int y = 0; y < a.roi.height; y++)
+      for (int x = 0; x < a.roi.width; x++) {
+        const bool inside =
+            x >= part.x && x < part.x + part.width && y >= part.y && y < part.y + part.height;
+        if (!inside && !same_pixel (a, b, x, y))
+          return false;
+      }
+    return true;
+  }
+};
+
 } // namespace
 
 TEST_F (Hostile, every_truncated_prefix_costs_only_its_last_slice)
@@ -58,16 +108,34 @@ TEST_F (Hostile, every_truncated_prefix_costs_only_its_last_slice)
   }
 }
 
-TEST_F (Hostile, no_bit_flip_crashes_and_other_slices_stay)
+TEST_F (Flips, in_the_symbols_of_a_slice_changes_no_pixel_outside_it)
 {
-  const auto good = small_stream ();
-  const auto n = units_of (good).size ();
-  for (std::size_t bit = 0; bit < good.size () * 8; bit++) {
-    auto bad = good;
-    bad[bit / 8] ^= 1 << bit % 8;
-    const Decoded decoded = decode_exact (decoder, bad);
-    EXPECT_LE (decoded.result.slices, n + 1);
-  }
+  for (std::size_t k = 0; k < units.size (); k++)
+    for (std::size_t bit = 8 * kSliceHeaderSize; bit < 8 * units[k].size (); bit++) {
+      Decoded decoded = decode_flipped (k, bit);
+      ASSERT_EQ (decoded.pictures.size (), 2u);
+      for (std::size_t view = 0; view < 2; view++)
+        EXPECT_TRUE (same_outside (decoded.pictures[view], good.pictures[view],
+            headers[k].view_id == int (view) ? place_of (headers[k]) : Roi{}))
+            << k << " " << bit;
+    }
+}
+
+/* In its own view a slice may claim another place, or be the one that the others must agree with.
+ */
+TEST_F (Flips, in_the_header_of_a_slice_changes_no_pixel_of_another_view)
+{
+  for (std::size_t k = 0; k < units.size (); k++)
+    for (std::size_t bit = 0; bit < 8 * kSliceHeaderSize; bit++) {
+      Decoded decoded = decode_flipped (k, bit);
+      const int other = 1 - headers[k].view_id;
+      const bool ends_access_unit = bit < 8 || (bit >= 16 && bit < 32); /* version and size */
+      if (other == 1 && ends_access_unit)
+        continue; /* it comes behind */
+      const auto is = std::ranges::find (decoded.pictures, other, &Picture::view_id);
+      ASSERT_TRUE (is != decoded.pictures.end ()) << k << " " << bit;
+      EXPECT_TRUE (same_outside (*is, good.pictures[std::size_t (other)], {})) << k << " " << bit;
+    }
 }
 
 TEST_F (Hostile, random_bytes_decode_to_nothing)
@@ -77,7 +145,10 @@ TEST_F (Hostile, random_bytes_decode_to_nothing)
     std::vector<std::uint8_t> bytes (random () % 400);
     for (auto &byte : bytes)
       byte = static_cast<std::uint8_t> (random ());
-    decode_exact (decoder, bytes);
+    const Decoded decoded = decode_exact (decoder, bytes);
+    EXPECT_TRUE (decoded.pictures.empty ());
+    EXPECT_EQ (decoded.result.slices, 0u);
+    EXPECT_EQ (decoded.result.points, 0u);
   }
 }
 
