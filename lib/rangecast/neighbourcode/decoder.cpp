@@ -149,6 +149,13 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   if (Status s = read_unit_header (unit, unit_header); !s.ok ())
     return s;
   const std::size_t size = unit_header.size, symbols_size = symbol_bytes (pixels);
+  if (header.profile != Profile::kPlain && pixels > 0 && size >= kSliceHeaderSize) {
+    const DepthQuantiser *quantiser = depth_of (header);
+    const bool good =
+        quantiser && compact_.decode (unit.first (size).subspan (kSliceHeaderSize), header,
+                         {*quantiser, colours_[header.colour_bits - 4]}, image, points);
+    return good ? Status{} : damaged ();
+  }
   if (size < kSliceHeaderSize || symbols_size > size - kSliceHeaderSize)
     return {StatusCode::kTruncated, "slice: shorter than its symbols"};
   if (pixels == 0)

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+#include "coded_pixel.hpp"
+#include "compact_encoder.hpp"
+
+namespace rangecast {
+
+/** Decodes slices of the profiles packed and entropy. Keeps its memory. */
+class CompactDecoder {
+public:
+  /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
+   *  @param body    what is behind the slice header
+   *  @param header  checked, and not empty; its ROI is the image's
+   *  @param[out] points  grows by the valid pixels
+   *  @return false for damage: the pixels may then be partly written */
+  bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+      const CompactQuantisers &quantisers, const RangeImage &image, std::uint64_t &points);
+
+private:
+  template <class Code>
+  bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
+      const RangeImage &image, std::uint64_t &points);
+  template <class Code>
+  bool decode_row (Code &code, const CompactQuantisers &quantisers, std::size_t columns);
+  template <class Code>
+  bool decode_full (Code &code, const Neighbours &n, bool corrected,
+      const CompactQuantisers &quantisers, std::size_t x);
+
+  struct Row { /* one invalid pixel before and behind */
+    std::vector<CodedPixel> pixels;
+    std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
+    std::vector<std::uint8_t> valid;
+  };
+  Row row_, upper_;
+  Components steps_{};
+  Limits limits_{};
+  PixelCode last_ = kNoPixel;
+};
+
+} // namespace rangecast

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "../geometry/quantiser.hpp"
+#include "../geometry/range_image.hpp"
+#include "coded_pixel.hpp"
+#include "pixel_lanes.hpp"
+
+namespace rangecast {
+
+struct CompactSettings {
+  int depth_threshold, colour_threshold; ///< codes
+  int max_slice_size;                    ///< bytes
+  bool best; ///< the neighbour that differs least, not the first that is near enough
+};
+
+struct CompactResult {
+  std::uint64_t slices = 0;
+  std::uint64_t full_pixels = 0; ///< those without a neighbour that is near enough
+};
+
+struct CompactQuantisers {
+  const DepthQuantiser &depth;
+  const ColourQuantiser &colour;
+};
+
+/** The steps of residuals that keep every pixel within the thresholds; all 1 for thresholds of 0.
+ */
+Steps steps_within (int depth_threshold, int colour_threshold);
+
+/** Codes range images in the profiles packed and entropy. Keeps its memory. */
+class CompactEncoder {
+public:
+  /** Appends the slices of one range image whose ROI is not empty.
+   *  @param header  of all slices: profile, bits, ROI, times */
+  CompactResult encode (const ConstRangeImage &image, const CompactQuantisers &quantisers,
+      const CompactSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to);
+
+private:
+  template <class Code>
+  bool code_piece (
+      const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to);
+  template <class Code> bool code_row (Code &code);
+  template <class Code> void code_pixel (Code &code, std::size_t x);
+  template <class Code> Code begin_slice (int first_row);
+  template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
+  int near_neighbour (std::size_t x) const;
+  int nearest_neighbour (std::size_t x) const;
+  void write_full (std::size_t x, const Neighbours &n, Components &residual);
+  void load_row (const ConstRangeImage &image, int y);
+  void resize (int columns, int max_slice_size);
+  std::size_t header_size () const;
+
+  CompactSettings settings_{};
+  const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
+  SliceHeader header_;
+  CompactResult result_;
+  Components steps_{};
+  std::array<std::uint64_t, kComponents> reciprocals_{};
+  Limits limits_{};
+  Lanes threshold_{};
+
+  struct Row { /* one invalid pixel before and behind */
+    std::vector<CodedPixel> pixels;
+    std::vector<Lanes> colours; /* depth, R, G, B as decoded */
+    std::vector<std::uint8_t> valid;
+  };
+  Row row_, upper_;
+  std::vector<Lanes> own_; /* the row as it is to be coded */
+  PixelCode last_ = kNoPixel;
+  int columns_ = 0;
+  std::vector<std::uint8_t> bytes_; /* of the open slice, behind its header */
+  std::array<std::uint64_t, 4> size_sums_{}, size_counts_{}; /* of residuals, of the open slice */
+  GolombOrders orders_{};
+};
+
+} // namespace rangecast
