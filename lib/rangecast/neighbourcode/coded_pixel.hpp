@@ -7,6 +7,8 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
+#include <span>
 
 #include "unit.hpp"
 
@@ -60,12 +62,24 @@ components_of (PixelCode code)
 /** Of an invalid pixel. No valid one has it, because Y is not negative. */
 inline constexpr PixelCode kNoPixel = ~PixelCode{0};
 
+/** Sizes of a residual, at most 9 each, one a byte from the least significant; 0 for copies. */
+using Activity = std::uint32_t;
+
+/** Two plain numbers: it is copied for every pixel, and whole. */
 struct CodedPixel {
   PixelCode code = kNoPixel;
-  std::array<std::uint8_t, 4> activity{}; ///< size of its residual, at most 9; 0 for copies
-  Origin origin = Origin::kNone;
+  std::uint64_t state = 0; /* its origin, and above bit 31 its activity */
 
-  [[nodiscard]] constexpr bool valid () const { return origin != Origin::kNone; }
+  constexpr CodedPixel () = default;
+  constexpr CodedPixel (PixelCode pixel, Origin origin, Activity activity = 0)
+      : code (pixel), state (static_cast<std::uint64_t> (origin) | std::uint64_t{activity} << 32)
+  {
+  }
+  [[nodiscard]] constexpr bool valid () const { return state != 0; }
+  [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
+  /** The same, without a difference between predicted and corrected pixels. */
+  [[nodiscard]] constexpr int kind () const { return std::min (origin (), 3); }
+  [[nodiscard]] constexpr Activity activity () const { return static_cast<Activity> (state >> 32); }
 };
 
 /** R, G, B codes to Y, Co, Cg and back without loss (YCoCg-R); back, they are cut to 0..maximum,
@@ -86,7 +100,16 @@ to_rgb (const Components &c, std::int32_t maximum)
 
 /** The four neighbours that a pixel may equal. */
 struct Neighbours {
-  const CodedPixel &left, &upper_left, &upper, &upper_right;
+  CodedPixel left, upper_left, upper, upper_right;
+
+  /** Goes on to the pixel on the right, whose upper right neighbour is `next`. */
+  constexpr void move (const CodedPixel &coded, const CodedPixel &next)
+  {
+    left = coded;
+    upper_left = upper;
+    upper = upper_right;
+    upper_right = next;
+  }
 
   [[nodiscard]] constexpr bool any () const
   {
@@ -150,13 +173,23 @@ correct (const Components &predicted, const Components &residual, const Componen
 /** Residuals of greater size are damage: no pixel needs one. */
 inline constexpr std::uint32_t kMaxResidual = 1u << 18;
 
-constexpr std::array<std::uint8_t, 4>
+constexpr Activity
 activity_of (const Components &residual)
 {
-  std::array<std::uint8_t, 4> activity{};
+  Activity activity = 0;
   for (int i = 0; i < kComponents; i++)
-    activity[i] = static_cast<std::uint8_t> (std::min (std::abs (residual[i]), 9));
+    activity |= static_cast<Activity> (std::min (std::abs (residual[i]), 9)) << 8 * i;
   return activity;
+}
+
+/** Where the run that begins at `begin` ends, in a row of one byte a pixel, 0 = invalid. */
+inline int
+run_end (std::span<const std::uint8_t> row, int begin, bool valid)
+{
+  const auto at = static_cast<std::size_t> (begin);
+  const void *end = std::memchr (row.data () + at, !valid, row.size () - at);
+  return end ? static_cast<int> (static_cast<const std::uint8_t *> (end) - row.data ())
+             : static_cast<int> (row.size ());
 }
 
 /** Bytes behind the slice header: u16 depth step, u8 luma step, u8 chroma step. */

@@ -7,24 +7,19 @@
 namespace rangecast {
 namespace {
 
-/* Both codes as decode_rows() sees them. */
-class EntropyReader {
+/* An EntropyCode that looks like a PackedReader. */
+class EntropyReader : public EntropyCode<EntropyReading> {
 public:
-  EntropyReader (const std::uint8_t *from, std::size_t bytes)
-      : code_ (EntropyReading (from, bytes)), clean_ (bytes == 0 || from[bytes - 1] != 0)
+  EntropyReader (std::span<const std::uint8_t> bytes, EntropyModel &model)
+      : EntropyCode (EntropyReading (bytes.data (), bytes.size ()), model),
+        clean_ (bytes.empty () || bytes.back () != 0)
   {
+    model = kInitialModel;
   }
-  bool row (std::span<std::uint8_t>, std::span<const std::uint8_t>) { return true; }
-  bool valid (const Neighbours &n, bool) { return code_.valid (n, false); }
-  int choice (const Neighbours &n) { return code_.choice (n, -1); }
-  bool residual (const Neighbours &n, bool has_neighbour, Components &r)
-  {
-    return code_.residual (n, has_neighbour, r);
-  }
-  [[nodiscard]] bool at_clean_end () const { return clean_ && code_.coder ().at_end (); }
+  int choice (const Neighbours &n) { return EntropyCode::choice (n, -1); }
+  [[nodiscard]] bool at_clean_end () const { return clean_ && coder ().at_end (); }
 
 private:
-  EntropyCode<EntropyReading> code_;
   bool clean_; /* an encoder leaves zeros at the end out */
 };
 
@@ -63,49 +58,99 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected,
     const CompactQuantisers &quantisers, std::size_t x)
 {
   Components c = predict (n, last_, limits_.last_depth);
-  CodedPixel &pixel = row_.pixels[x + 1];
-  pixel = {0, {}, corrected ? Origin::kCorrected : Origin::kPredicted};
+  Activity activity = 0;
   if (corrected) {
     Components residual;
     if (!code.residual (n, n.any (), residual))
       return false;
     c = correct (c, residual, steps_, limits_);
-    pixel.activity = activity_of (residual);
+    activity = activity_of (residual);
   }
-  pixel.code = pack_components (c);
+  row_.pixels[x + 1] = {
+      pack_components (c), corrected ? Origin::kCorrected : Origin::kPredicted, activity};
   row_.shown[x + 1] = shown_as (c, quantisers);
+  return true;
+}
+
+/* Decodes a run of valid pixels. What the loop needs of this object it holds in variables of its
+ * own, the code too, so that it stays in registers. */
+template <class Code>
+bool
+CompactDecoder::decode_run (
+    Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  CodedPixel *const pixels = row_.pixels.data () + 1;
+  const CodedPixel *const upper = upper_.pixels.data () + 1;
+  std::uint64_t *const shown = row_.shown.data () + 1;
+  const std::uint64_t *const upper_shown = upper_.shown.data () + 1;
+  Neighbours n = {pixels[begin - 1], upper[begin - 1], upper[begin], upper[begin + 1]};
+  Code code = slice_code;
+  for (std::size_t x = begin; x < end; x++) {
+    const int chosen = n.any () ? code.choice (n) : kCorrect;
+    if (chosen == kTakeLeft) {
+      pixels[x] = {n.left.code, Origin::kLeft};
+      shown[x] = shown[x - 1];
+    } else if (chosen >= kTakeUpperLeft && chosen <= kTakeUpperRight) {
+      const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
+      pixels[x] = {upper[from].code, Origin::kUpper};
+      shown[x] = upper_shown[from];
+    } else {
+      if (chosen < 0)
+        return false;
+      Code copy = code;
+      if (!decode_full (copy, Neighbours (n), chosen == kCorrect, quantisers, x))
+        return false;
+      code = copy;
+    }
+    if (pixels[x].code == kNoPixel) /* equals an invalid one */
+      return false;
+    n.move (pixels[x], upper[x + 2]);
+  }
+  last_ = n.left.code;
+  slice_code = code;
+  return true;
+}
+
+/* Reads which pixels of a row are valid. */
+template <class Code>
+bool
+CompactDecoder::decode_runs (Code &code, int columns)
+{
+  const auto size = static_cast<std::size_t> (columns);
+  const std::span<const std::uint8_t> upper (upper_.valid.data (), size);
+  bool now = false;
+  for (int x = 0; x < columns; now = !now) {
+    std::int32_t later = 0;
+    if (!code.run (now, later))
+      return false;
+    const int end = run_end (upper, x, now) + later;
+    if (end > columns || end < x || (end == x && (x > 0 || now)))
+      return false;
+    std::fill (row_.valid.begin () + x, row_.valid.begin () + end, std::uint8_t{now});
+    x = end;
+  }
   return true;
 }
 
 template <class Code>
 bool
-CompactDecoder::decode_row (Code &code, const CompactQuantisers &quantisers, std::size_t columns)
+CompactDecoder::decode_row (Code &code, const CompactQuantisers &quantisers, int columns)
 {
-  if (!code.row ({row_.valid.data (), columns}, {upper_.valid.data (), columns}))
+  if (!decode_runs (code, columns))
     return false;
-  for (std::size_t x = 0; x < columns; x++) {
-    CodedPixel &pixel = row_.pixels[x + 1];
-    const Neighbours n = {
-        row_.pixels[x], upper_.pixels[x], upper_.pixels[x + 1], upper_.pixels[x + 2]};
-    if (!code.valid (n, row_.valid[x])) {
-      pixel = {};
-      row_.shown[x + 1] = 0;
-      continue;
-    }
-    const int chosen = n.any () ? code.choice (n) : kCorrect;
-    if (chosen == kTakeLeft) {
-      pixel = {n.left.code, {}, Origin::kLeft};
-      row_.shown[x + 1] = row_.shown[x];
-    } else if (chosen >= kTakeUpperLeft && chosen <= kTakeUpperRight) {
-      const std::size_t at = x + static_cast<std::size_t> (chosen) - kTakeUpperLeft;
-      pixel = {upper_.pixels[at].code, {}, Origin::kUpper};
-      row_.shown[x + 1] = upper_.shown[at];
-    } else if (chosen < 0 || !decode_full (code, n, chosen == kCorrect, quantisers, x)) {
+  const std::span<const std::uint8_t> valid (
+      row_.valid.data (), static_cast<std::size_t> (columns));
+  bool now = false;
+  for (int x = 0; x < columns; now = !now) {
+    const int end = run_end (valid, x, now);
+    const auto first = static_cast<std::size_t> (x), behind = static_cast<std::size_t> (end);
+    if (!now) {
+      std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
+      std::fill (&row_.shown[first + 1], &row_.shown[behind + 1], std::uint64_t{0});
+    } else if (!decode_run (code, quantisers, first, behind)) {
       return false;
     }
-    if (pixel.code == kNoPixel) /* equals an invalid one */
-      return false;
-    last_ = pixel.code;
+    x = end;
   }
   return true;
 }
@@ -124,7 +169,7 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
   limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
   last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
   for (int y = 0; y < header.rows; y++) {
-    if (!decode_row (code, quantisers, columns))
+    if (!decode_row (code, quantisers, header.columns))
       return false;
     const int image_row = header.first_row + y;
     points += write_row (row_.shown.data () + 1, header.columns,
@@ -149,7 +194,7 @@ CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &h
   steps_ = steps.components ();
   const auto data = body.subspan (own_header);
   if (!packed) {
-    EntropyReader code (data.data (), data.size ());
+    EntropyReader code (data, model_);
     return decode_rows (code, header, quantisers, image, points);
   }
   const auto order = [&] (std::size_t i) {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "coded_pixel.hpp"
 #include "compact_encoder.hpp"
+#include "entropy_code.hpp"
 
 namespace rangecast {
 
@@ -26,18 +26,23 @@ private:
   template <class Code>
   bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
       const RangeImage &image, std::uint64_t &points);
+  template <class Code> bool decode_runs (Code &code, int columns);
   template <class Code>
-  bool decode_row (Code &code, const CompactQuantisers &quantisers, std::size_t columns);
+  bool decode_row (Code &code, const CompactQuantisers &quantisers, int columns);
+  template <class Code>
+  bool decode_run (
+      Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code>
   bool decode_full (Code &code, const Neighbours &n, bool corrected,
       const CompactQuantisers &quantisers, std::size_t x);
 
-  struct Row { /* one invalid pixel before and behind */
+  struct Row { /* one invalid pixel before and behind, which `pixels` and `shown` count */
     std::vector<CodedPixel> pixels;
     std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
     std::vector<std::uint8_t> valid;
   };
   Row row_, upper_;
+  EntropyModel model_{};
   Components steps_{};
   Limits limits_{};
   PixelCode last_ = kNoPixel;

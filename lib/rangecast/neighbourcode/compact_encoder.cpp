@@ -9,31 +9,28 @@
 namespace rangecast {
 namespace {
 
-/* What one pixel may add to a slice at most, whatever its code. */
-constexpr std::size_t kMostBytesOfPixel = 512;
-/* And one row of a packed slice for its runs: one a pixel. */
-constexpr std::size_t kMostBytesOfRun = 5;
+/* What one pixel may add to a slice at most, whatever its code; and one run. */
+constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
 
-/* A slice needs a side of this many pixels for each byte^(1/2) of its size: then it is about as
- * wide as high, and few of its pixels lack their upper neighbours. */
+/* About as wide as high, so that few pixels lack their upper neighbours: a slice has so many
+ * columns for each byte^(1/2) of its size. */
 constexpr double kColumnsOfSlice = 2.8;
 
-/* EntropyCode as a PackedWriter looks. */
-class EntropyWriter {
+/* An EntropyCode that looks like a PackedWriter. */
+class EntropyWriter : public EntropyCode<EntropyWriting> {
 public:
-  EntropyWriter (std::uint8_t *to, const GolombOrders &) : code_ (EntropyWriting (to)) {}
-  void row (std::span<const std::uint8_t>, std::span<const std::uint8_t>) {}
-  void valid (const Neighbours &n, bool is_valid) { code_.valid (n, is_valid); }
-  void choice (const Neighbours &n, int chosen) { code_.choice (n, chosen); }
+  EntropyWriter (std::uint8_t *to, EntropyModel &model, const GolombOrders &)
+      : EntropyCode (EntropyWriting (to), model)
+  {
+    model = kInitialModel;
+  }
+  void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
   void residual (const Neighbours &n, bool has_neighbour, Components r)
   {
-    (void)code_.residual (n, has_neighbour, r);
+    (void)EntropyCode::residual (n, has_neighbour, r);
   }
-  [[nodiscard]] std::size_t bound () const { return code_.coder ().bound (); }
-  std::size_t finish () { return code_.coder ().finish (); }
-
-private:
-  EntropyCode<EntropyWriting> code_;
+  [[nodiscard]] std::size_t bound () const { return coder ().bound (); }
+  std::size_t finish () { return coder ().finish (); }
 };
 
 /* Residuals are divided by multiplication: with this reciprocal it is exact for all there are. */
@@ -90,6 +87,11 @@ CompactEncoder::encode (const ConstRangeImage &image, const CompactQuantisers &q
     reciprocals_[i] = reciprocal_of (steps_[i]);
   const int c = settings.colour_threshold;
   threshold_ = Lanes{settings.depth_threshold, c, c, c};
+  const auto weight = [] (int threshold) {
+    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
+  };
+  depth_weight_ = 2 * weight (settings.depth_threshold);
+  colour_weight_ = weight (c);
 
   const int width = image.roi.width;
   const double side = kColumnsOfSlice * std::sqrt (settings.max_slice_size);
@@ -119,7 +121,7 @@ CompactEncoder::header_size () const
 }
 
 void
-CompactEncoder::resize (int columns, int max_slice_size)
+CompactEncoder::resize (int columns)
 {
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
@@ -129,8 +131,9 @@ CompactEncoder::resize (int columns, int max_slice_size)
     row->valid.assign (n, 0);
   }
   own_.resize (std::max (own_.size (), n));
-  bytes_.resize (std::max (bytes_.size (),
-      static_cast<std::size_t> (max_slice_size) + kMostBytesOfPixel + kMostBytesOfRun * (n + 1)));
+  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) + kMostBytesOfPixel +
+                           kMostBytesOfRun * (n + 1);
+  bytes_.resize (std::max (bytes_.size (), most));
 }
 
 void
@@ -150,26 +153,11 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
   }
 }
 
-/* The first neighbour that is near enough to own_[x], or kPredict for none. */
-int
-CompactEncoder::near_neighbour (std::size_t x) const
-{
-  const Lanes own = own_[x];
-  if (are_near (own, row_.colours[x], threshold_))
-    return kTakeLeft;
-  for (std::size_t i = 0; i < 3; i++)
-    if (are_near (own, upper_.colours[x + i], threshold_))
-      return kTakeUpperLeft + static_cast<int> (i);
-  return kPredict;
-}
-
 /* The one that differs least, in parts of the thresholds. */
 int
 CompactEncoder::nearest_neighbour (std::size_t x) const
 {
   const Lanes own = own_[x];
-  const float depth_weight = 2 / ((float (threshold_[0]) + 0.5f) * (float (threshold_[0]) + 0.5f));
-  const float colour_weight = 1 / ((float (threshold_[1]) + 0.5f) * (float (threshold_[1]) + 0.5f));
   int best = kPredict;
   float least = 0;
   for (std::size_t i = 0; i < 4; i++) {
@@ -177,8 +165,8 @@ CompactEncoder::nearest_neighbour (std::size_t x) const
     if (!are_near (own, other, threshold_))
       continue;
     const Lanes d = own - other;
-    const float distance = depth_weight * float (d[0]) * float (d[0]) +
-                           colour_weight * float (d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
+    const float distance = depth_weight_ * float (d[0]) * float (d[0]) +
+                           colour_weight_ * float (d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
     if (best == kPredict || distance < least) {
       best = static_cast<int> (i);
       least = distance;
@@ -187,77 +175,133 @@ CompactEncoder::nearest_neighbour (std::size_t x) const
   return best;
 }
 
-/* Sets pixel x + 1 of the row to what the decoder will make of a prediction and a residual. */
-void
-CompactEncoder::write_full (std::size_t x, const Neighbours &n, Components &residual)
+/* Makes pixel x what the decoder will make of a prediction and a residual. @return that residual */
+Components
+CompactEncoder::make_full (std::size_t x, const Neighbours &n)
 {
   const Components expected = predict (n, last_, limits_.last_depth);
   const Lanes own = own_[x];
   const auto colour = to_luma_chroma (own[1], own[2], own[3]);
   const Components wanted = {own[0], colour[0], colour[1], colour[2]};
+  Components residual;
   for (std::size_t i = 0; i < kComponents; i++)
     residual[i] = rounded (wanted[i] - expected[i], steps_[i], reciprocals_[i]);
   const Components made = correct (expected, residual, steps_, limits_);
   const auto rgb = to_rgb (made, limits_.maximum);
-  CodedPixel &pixel = row_.pixels[x + 1];
-  pixel.code = pack_components (made);
-  pixel.activity = activity_of (residual);
-  pixel.origin = residual == Components{} ? Origin::kPredicted : Origin::kCorrected;
+  row_.pixels[x + 1] = {pack_components (made), Origin::kCorrected, activity_of (residual)};
   row_.colours[x + 1] = Lanes{made[0], rgb[0], rgb[1], rgb[2]};
+  return residual;
 }
 
+/* Codes a pixel that no neighbour replaces. */
 template <class Code>
 void
-CompactEncoder::code_pixel (Code &code, std::size_t x)
+CompactEncoder::code_full (Code &code, const Neighbours &n, std::size_t x)
 {
-  CodedPixel &pixel = row_.pixels[x + 1];
-  const Neighbours n = {
-      row_.pixels[x], upper_.pixels[x], upper_.pixels[x + 1], upper_.pixels[x + 2]};
-  code.valid (n, row_.valid[x]);
-  if (!row_.valid[x]) {
-    pixel = {};
-    row_.colours[x + 1] = own_[x];
+  const Components residual = make_full (x, n);
+  const bool has_neighbour = n.any (), predicted = has_neighbour && residual == Components{};
+  result_.full_pixels++;
+  if (has_neighbour)
+    code.choice (n, predicted ? kPredict : kCorrect);
+  if (predicted) {
+    row_.pixels[x + 1] = {row_.pixels[x + 1].code, Origin::kPredicted};
     return;
   }
-  int chosen = settings_.best ? nearest_neighbour (x) : near_neighbour (x);
-  if (chosen != kPredict) {
-    code.choice (n, chosen);
-    const bool left = chosen == kTakeLeft;
-    const auto at = x + static_cast<std::size_t> (chosen) - kTakeUpperLeft;
-    row_.colours[x + 1] = left ? row_.colours[x] : upper_.colours[at];
-    pixel = {
-        left ? n.left.code : upper_.pixels[at].code, {}, left ? Origin::kLeft : Origin::kUpper};
-  } else {
-    Components residual;
-    write_full (x, n, residual);
-    const bool has_neighbour = n.any ();
-    chosen = pixel.origin == Origin::kPredicted ? kPredict : kCorrect;
-    if (has_neighbour)
-      code.choice (n, chosen);
-    if (!has_neighbour || chosen == kCorrect) {
-      pixel.origin = Origin::kCorrected;
-      code.residual (n, has_neighbour, residual);
-      for (std::size_t i = 0; i < kComponents; i++) {
-        size_sums_[i] += static_cast<std::uint64_t> (std::max (std::abs (residual[i]) - 1, 0));
-        size_counts_[i] += residual[i] != 0;
-      }
-    }
-    result_.full_pixels++;
+  code.residual (n, has_neighbour, residual);
+  for (std::size_t i = 0; i < kComponents; i++) {
+    size_sums_[i] += static_cast<std::uint64_t> (std::max (std::abs (residual[i]) - 1, 0));
+    size_counts_[i] += residual[i] != 0;
   }
-  last_ = pixel.code;
+}
+
+/* Codes a run of valid pixels. @return false if the slice has become too long
+ *
+ * What the loop needs of this object it holds in variables of its own, the code too: bytes are
+ * written in it, and for all that the compiler knows any byte may be one of this object's. */
+template <class Code>
+bool
+CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
+{
+  const std::size_t limit = static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
+  CodedPixel *const pixels = row_.pixels.data () + 1;
+  const CodedPixel *const upper = upper_.pixels.data () + 1;
+  Lanes *const colours = row_.colours.data () + 1;
+  const Lanes *const upper_colours = upper_.colours.data () + 1;
+  const Lanes *const own = own_.data ();
+  const Lanes threshold = threshold_;
+  const bool best = settings_.best;
+  Neighbours n = {pixels[begin - 1], upper[begin - 1], upper[begin], upper[begin + 1]};
+  Code code = slice_code;
+  std::size_t x = begin;
+  for (; x < end && code.bound () <= limit; x++) {
+    int chosen = kPredict;
+    if (best)
+      chosen = nearest_neighbour (x);
+    else if (are_near (own[x], colours[x - 1], threshold))
+      chosen = kTakeLeft;
+    else
+      for (int i = 0; i < 3 && chosen == kPredict; i++)
+        if (are_near (own[x], upper_colours[x + static_cast<std::size_t> (i) - 1], threshold))
+          chosen = kTakeUpperLeft + i;
+    if (chosen == kTakeLeft) {
+      code.choice (n, chosen);
+      colours[x] = colours[x - 1];
+      pixels[x] = {n.left.code, Origin::kLeft};
+    } else if (chosen != kPredict) {
+      code.choice (n, chosen);
+      const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
+      colours[x] = upper_colours[from];
+      pixels[x] = {upper[from].code, Origin::kUpper};
+    } else {
+      Code copy = code;
+      code_full (copy, Neighbours (n), x);
+      code = copy;
+    }
+    n.move (pixels[x], upper[x + 2]);
+  }
+  last_ = n.left.code;
+  slice_code = code;
+  return code.bound () <= limit;
+}
+
+/* Codes which pixels of the row are valid. */
+template <class Code>
+void
+CompactEncoder::code_runs (Code &code)
+{
+  const auto columns = static_cast<std::size_t> (columns_);
+  const std::span<const std::uint8_t> valid (row_.valid.data (), columns),
+      upper (upper_.valid.data (), columns);
+  bool now = false;
+  for (int x = 0; x < columns_; now = !now) {
+    const int end = run_end (valid, x, now);
+    code.run (now, end - run_end (upper, x, now));
+    x = end;
+  }
 }
 
 /* @return false if the slice has become too long; the row is then to be coded again */
 template <class Code>
 bool
-CompactEncoder::code_row (Code &code)
+CompactEncoder::code_row (Code &slice_code)
 {
+  code_runs (slice_code);
   const auto columns = static_cast<std::size_t> (columns_);
-  const std::size_t limit = static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
-  code.row ({row_.valid.data (), columns}, {upper_.valid.data (), columns});
-  for (std::size_t x = 0; x < columns && code.bound () <= limit; x++)
-    code_pixel (code, x);
-  return code.bound () <= limit;
+  const std::span<const std::uint8_t> valid (row_.valid.data (), columns);
+  bool now = false;
+  for (int x = 0; x < columns_; now = !now) {
+    const int end = run_end (valid, x, now);
+    const auto first = static_cast<std::size_t> (x), behind = static_cast<std::size_t> (end);
+    if (!now) {
+      std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
+      std::fill (&row_.colours[first + 1], &row_.colours[behind + 1], Lanes{kNoDepthCode, 0, 0, 0});
+    } else if (!code_run (slice_code, first, behind)) {
+      return false;
+    }
+    x = end;
+  }
+  return slice_code.bound () <=
+         static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
 }
 
 template <class Code>
@@ -274,7 +318,7 @@ CompactEncoder::begin_slice (int first_row)
   std::ranges::fill (upper_.pixels, CodedPixel{});
   std::ranges::fill (upper_.colours, Lanes{kNoDepthCode, 0, 0, 0});
   std::ranges::fill (upper_.valid, std::uint8_t{0});
-  return Code (bytes_.data (), orders_);
+  return Code (bytes_.data (), model_, orders_);
 }
 
 template <class Code>
@@ -306,13 +350,14 @@ CompactEncoder::code_piece (
 {
   header_.first_column = first_column;
   header_.columns = columns;
-  resize (columns, settings_.max_slice_size);
+  resize (columns);
   size_sums_ = size_counts_ = {};
   Code code = begin_slice<Code> (0);
   for (int y = 0; y < image.roi.height; y++) {
     load_row (image, y);
-    Code before = code;
     const CompactResult result = result_;
+    Code before = code;
+    model_before_ = model_;
     if (!code_row (code)) {
       if (header_.rows == 0)
         return false;

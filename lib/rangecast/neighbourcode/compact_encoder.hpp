@@ -6,7 +6,7 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
-#include "coded_pixel.hpp"
+#include "entropy_code.hpp"
 #include "pixel_lanes.hpp"
 
 namespace rangecast {
@@ -43,16 +43,17 @@ private:
   template <class Code>
   bool code_piece (
       const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to);
-  template <class Code> bool code_row (Code &code);
-  template <class Code> void code_pixel (Code &code, std::size_t x);
+  template <class Code> bool code_row (Code &slice_code);
+  template <class Code> void code_runs (Code &code);
+  template <class Code> bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code> void code_full (Code &code, const Neighbours &n, std::size_t x);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int near_neighbour (std::size_t x) const;
   int nearest_neighbour (std::size_t x) const;
-  void write_full (std::size_t x, const Neighbours &n, Components &residual);
+  Components make_full (std::size_t x, const Neighbours &n);
   void load_row (const ConstRangeImage &image, int y);
-  void resize (int columns, int max_slice_size);
-  std::size_t header_size () const;
+  void resize (int columns);
+  [[nodiscard]] std::size_t header_size () const;
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
@@ -62,8 +63,9 @@ private:
   std::array<std::uint64_t, kComponents> reciprocals_{};
   Limits limits_{};
   Lanes threshold_{};
+  float depth_weight_ = 0, colour_weight_ = 0;
 
-  struct Row { /* one invalid pixel before and behind */
+  struct Row { /* one invalid pixel before and behind, which `pixels` and `colours` count */
     std::vector<CodedPixel> pixels;
     std::vector<Lanes> colours; /* depth, R, G, B as decoded */
     std::vector<std::uint8_t> valid;
@@ -72,8 +74,9 @@ private:
   std::vector<Lanes> own_; /* the row as it is to be coded */
   PixelCode last_ = kNoPixel;
   int columns_ = 0;
+  EntropyModel model_{}, model_before_{};
   std::vector<std::uint8_t> bytes_; /* of the open slice, behind its header */
-  std::array<std::uint64_t, 4> size_sums_{}, size_counts_{}; /* of residuals, of the open slice */
+  std::array<std::uint64_t, kComponents> size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};
 };
 

@@ -9,8 +9,9 @@ namespace rangecast {
 
 /** Where the contexts of each kind of decision begin among a slice's probabilities. */
 namespace context {
-inline constexpr int kValid = 0;
-inline constexpr int kLeft = kValid + 16;
+inline constexpr int kRunExact = 0;            /* of invalid and of valid pixels */
+inline constexpr int kRunSize = kRunExact + 2; /* 16 each */
+inline constexpr int kLeft = kRunSize + 2 * 16;
 inline constexpr int kOther = kLeft + 64;
 inline constexpr int kPredicted = kOther + 48;
 inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
@@ -30,19 +31,20 @@ inline constexpr int kUnarySizes = 4;
 inline constexpr int kMaxPrefix = 17;
 
 /** The decisions of a slice in their order, the same for both directions: Coder::code (probability,
- *  yes) writes `yes`, or reads it and pays no heed to the argument; so does Coder::bits. */
+ *  yes) writes `yes`, or reads it and pays no heed to the argument; so does Coder::bits. Small, so
+ *  that a loop can keep a copy in registers; the probabilities are the caller's. */
 template <class Coder> class EntropyCode {
 public:
-  explicit EntropyCode (Coder coder) : coder_ (coder), model_ (kInitialModel) {}
+  EntropyCode (Coder coder, EntropyModel &model) : coder_ (coder), model_ (model.data ()) {}
 
   [[nodiscard]] Coder &coder () { return coder_; }
   [[nodiscard]] const Coder &coder () const { return coder_; }
 
-  bool valid (const Neighbours &n, bool is_valid)
+  /** By how much a run of valid or invalid pixels ends later than the one above.
+   *  @return false for a number that is too large */
+  bool run (bool valid, std::int32_t &later)
   {
-    const int known = n.left.valid () + 2 * n.upper.valid () + 4 * n.upper_left.valid () +
-                      8 * n.upper_right.valid ();
-    return code (context::kValid + known, is_valid);
+    return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
   }
 
   /** Of a valid pixel that has a neighbour. */
@@ -50,25 +52,30 @@ public:
   {
     if (n.left.valid ()) {
       const int at =
-          context::kLeft + kind (n.left) + 4 * kind (n.upper) + 16 * kind (n.upper_right);
+          context::kLeft + n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ();
       if (code (at, chosen == kTakeLeft))
         return kTakeLeft;
     }
     const int other = other_choice (n, chosen);
     if (other != kPredict)
       return other;
-    const int at = context::kPredicted + static_cast<int> (n.left.origin) +
-                   5 * static_cast<int> (n.upper.origin);
+    const int at = context::kPredicted + n.left.origin () + 5 * n.upper.origin ();
     return code (at, chosen == kPredict) ? kPredict : kCorrect;
   }
 
   /** @return false for a residual that is too large */
   bool residual (const Neighbours &n, bool has_neighbour, Components &r)
   {
+    const Activity sums = n.left.activity () + n.upper.activity () + n.upper_right.activity ();
+    const bool alone = !n.left.valid () || !n.upper.valid ();
     bool previous = false;
     for (int i = 0; i < kComponents; i++) {
-      const int surroundings = has_neighbour ? activity (n, i) : 5;
-      if (!component (i, surroundings, previous, r[i]))
+      const int surroundings = !has_neighbour ? 5
+                               : alone        ? 4
+                                              : kActivityClass[sums >> 8 * i & 0xff];
+      const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
+      const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
+      if (!number (zero, size, r[i]))
         return false;
       previous = i == 2 ? previous : r[i] != 0;
     }
@@ -76,9 +83,7 @@ public:
   }
 
 private:
-  bool code (int at, bool yes) { return coder_.code (model_[static_cast<std::size_t> (at)], yes); }
-
-  static int kind (const CodedPixel &p) { return std::min (static_cast<int> (p.origin), 3); }
+  bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
 
   /* One of the three above, or kPredict for none of them. Those that equal an earlier neighbour
    * are passed over. */
@@ -89,8 +94,7 @@ private:
     const bool differs[] = {ul != l, u != l && u != ul, ur != l && ur != ul && ur != u};
     const bool candidate[] = {n.upper_left.valid () && differs[0], n.upper.valid () && differs[1],
         n.upper_right.valid () && differs[2]};
-    const int full =
-        2 * (n.left.origin >= Origin::kPredicted) + (n.upper.origin >= Origin::kPredicted);
+    const int full = 2 * (n.left.kind () == 3) + (n.upper.kind () == 3);
     for (int i = 0; i < 3; i++) {
       if (!candidate[i])
         continue;
@@ -101,23 +105,16 @@ private:
     return kPredict;
   }
 
-  static int activity (const Neighbours &n, int i)
-  {
-    const auto at = static_cast<std::size_t> (i);
-    const int sum = n.left.activity[at] + n.upper.activity[at] + n.upper_right.activity[at];
-    if (!n.left.valid () || !n.upper.valid () || sum > 6)
-      return 4;
-    return sum > 3 ? 3 : sum > 1 ? 2 : sum;
-  }
+  /* Of the sum of three activities. */
+  static constexpr std::uint8_t kActivityClass[] = {
+      0, 1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4};
 
-  bool component (int i, int surroundings, bool previous, std::int32_t &r)
+  bool number (int zero, int at, std::int32_t &r)
   {
-    const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
     if (!code (zero, r != 0)) {
       r = 0;
       return true;
     }
-    const int at = context::kSize + 32 * i + 16 * (surroundings >= 3);
     const bool negative = code (at, r < 0);
     std::uint32_t size = static_cast<std::uint32_t> (std::abs (r)) - 1;
     if (!magnitude (at + 1, size))
@@ -146,7 +143,7 @@ private:
   }
 
   Coder coder_;
-  EntropyModel model_;
+  Probability *model_;
 };
 
 /** Directions of an EntropyCode. */

@@ -3,10 +3,8 @@
 #pragma once
 
 #include <bit>
-#include <cstring>
-#include <span>
 
-#include "coded_pixel.hpp"
+#include "entropy_code.hpp"
 
 namespace rangecast {
 
@@ -45,8 +43,8 @@ const PackedTables &packed_tables ();
 constexpr std::size_t
 packed_context (const Neighbours &n)
 {
-  const auto kind = [] (const CodedPixel &p) { return std::min (static_cast<int> (p.origin), 3); };
-  return static_cast<std::size_t> (kind (n.left) + 4 * kind (n.upper) + 16 * kind (n.upper_right));
+  return static_cast<std::size_t> (
+      n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ());
 }
 
 constexpr std::uint32_t
@@ -61,42 +59,20 @@ unzigzag (std::uint32_t v)
   return static_cast<std::int32_t> (v >> 1) ^ -static_cast<std::int32_t> (v & 1);
 }
 
-/** Where the run that begins at `begin` would end if this row were valid where the one above is. */
-inline int
-expected_run_end (std::span<const std::uint8_t> upper, int begin, bool valid)
-{
-  auto x = static_cast<std::size_t> (begin);
-  while (x < upper.size () && (upper[x] != 0) == valid)
-    x++;
-  return static_cast<int> (x);
-}
-
 /** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
 class PackedWriter {
 public:
-  PackedWriter (std::uint8_t *to, const GolombOrders &orders)
+  PackedWriter (std::uint8_t *to, EntropyModel &, const GolombOrders &orders)
       : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
   {
   }
 
-  /** Which pixels of a row are valid; one byte each, as in the row above. */
-  void row (std::span<const std::uint8_t> valid, std::span<const std::uint8_t> upper)
-  {
-    bool now = false;
-    const int columns = static_cast<int> (valid.size ());
-    for (int x = 0; x < columns; now = !now) {
-      int end = x;
-      while (end < columns && (valid[static_cast<std::size_t> (end)] != 0) == now)
-        end++;
-      golomb (zigzag (end - expected_run_end (upper, x, now)), kRunOrder);
-      x = end;
-    }
-  }
+  /** By how much a run ends later than the one above. */
+  void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
   void choice (const Neighbours &n, int chosen)
   {
     put (tables_->choice[packed_context (n)][static_cast<std::size_t> (chosen)]);
   }
-  void valid (const Neighbours &, bool) {}
   void residual (const Neighbours &, bool has_neighbour, const Components &r)
   {
     const unsigned pattern = (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3;
@@ -154,29 +130,18 @@ public:
   {
   }
 
-  /** @return false for damage: nothing is then known of `valid` */
-  bool row (std::span<std::uint8_t> valid, std::span<const std::uint8_t> upper)
+  bool run (bool, std::int32_t &later)
   {
-    bool now = false;
-    const int columns = static_cast<int> (valid.size ());
-    for (int x = 0; x < columns; now = !now) {
-      std::uint32_t value = 0;
-      if (!golomb (kRunOrder, value))
-        return false;
-      const int end = expected_run_end (upper, x, now) + unzigzag (value);
-      if (end > columns || end < x || (end == x && (x > 0 || now)))
-        return false;
-      std::memset (valid.data () + x, now, static_cast<std::size_t> (end - x));
-      x = end;
-    }
-    return true;
+    std::uint32_t value = 0;
+    const bool good = golomb (kRunOrder, value);
+    later = unzigzag (value);
+    return good;
   }
   /** A PixelChoice, or -1 for damage. */
   int choice (const Neighbours &n)
   {
     return get (tables_->choice_of[packed_context (n)], kMaxChoiceBits);
   }
-  bool valid (const Neighbours &, bool as_row_said) { return as_row_said; }
   bool residual (const Neighbours &, bool has_neighbour, Components &r)
   {
     const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
