@@ -11,16 +11,13 @@ namespace {
 class EntropyReader : public EntropyCode<EntropyReading> {
 public:
   EntropyReader (std::span<const std::uint8_t> bytes, EntropyModel &model)
-      : EntropyCode (EntropyReading (bytes.data (), bytes.size ()), model),
-        clean_ (bytes.empty () || bytes.back () != 0)
+      : EntropyCode (EntropyReading (bytes.data (), bytes.size ()), model)
   {
     model = kInitialModel;
   }
   int choice (const Neighbours &n) { return EntropyCode::choice (n, -1); }
-  [[nodiscard]] bool at_clean_end () const { return clean_ && coder ().at_end (); }
-
-private:
-  bool clean_; /* an encoder leaves zeros at the end out */
+  [[nodiscard]] bool overrun () const { return coder ().overrun (); }
+  [[nodiscard]] bool at_clean_end () const { return coder ().at_end (); }
 };
 
 std::uint64_t
@@ -169,7 +166,7 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
   limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
   last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
   for (int y = 0; y < header.rows; y++) {
-    if (!decode_row (code, quantisers, header.columns))
+    if (!decode_row (code, quantisers, header.columns) || code.overrun ())
       return false;
     const int image_row = header.first_row + y;
     points += write_row (row_.shown.data () + 1, header.columns,

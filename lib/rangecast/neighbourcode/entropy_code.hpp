@@ -77,7 +77,7 @@ public:
       const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
       if (!number (zero, size, r[i]))
         return false;
-      previous = i == 2 ? previous : r[i] != 0;
+      previous = r[i] != 0;
     }
     return true;
   }

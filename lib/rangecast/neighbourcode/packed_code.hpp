@@ -162,6 +162,8 @@ public:
     }
     return true;
   }
+  /** More was taken than there is. */
+  [[nodiscard]] bool overrun () const { return count_ < 0; }
   /** Nothing is left but the zero bits that fill the last byte, and no more was read. */
   [[nodiscard]] bool at_clean_end () const
   {

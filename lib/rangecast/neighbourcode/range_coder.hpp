@@ -13,6 +13,9 @@ namespace rangecast {
 using Probability = std::uint16_t;
 inline constexpr int kAdaptationShift = 5;
 inline constexpr std::uint32_t kMinRange = 1u << 24;
+/** Bytes behind the end that a reader takes for zeros; who reads more has been led astray. Without
+ *  a limit, a few bytes could keep it busy for long. */
+inline constexpr std::size_t kMaxOverrun = 16;
 
 /** What one decision splits off the range for yes; at least 1 and less than the range. */
 constexpr std::uint32_t
@@ -59,7 +62,8 @@ public:
   {
     return static_cast<std::size_t> (to_ - begin_) + pending_ + 5;
   }
-  /** Writes the fewest bytes that say which number in the range is meant. @return how many */
+  /** Writes the fewest bytes that say which number in the range is meant, and that let a reader go
+   *  no more than kMaxOverrun bytes beyond them. @return how many */
   std::size_t finish ()
   {
     std::uint64_t value = low_;
@@ -70,11 +74,14 @@ public:
         break;
     }
     low_ = value;
+    const std::size_t read = static_cast<std::size_t> (to_ - begin_) + pending_ + holds_ + 4;
+    const std::size_t least = read > kMaxOverrun ? read - kMaxOverrun : 0;
     for (int i = 0; i < 5; i++)
       shift ();
-    while (to_ > begin_ && to_[-1] == 0)
-      to_--;
-    return static_cast<std::size_t> (to_ - begin_);
+    auto size = static_cast<std::size_t> (to_ - begin_);
+    while (size > least && begin_[size - 1] == 0)
+      size--;
+    return size;
   }
 
 private:
@@ -143,9 +150,17 @@ public:
   }
   /** Every byte has been read. */
   [[nodiscard]] bool at_end () const { return from_ == end_; }
+  /** More has been read than an encoder leaves out. */
+  [[nodiscard]] bool overrun () const { return overrun_ > kMaxOverrun; }
 
 private:
-  std::uint32_t next_byte () { return from_ != end_ ? *from_++ : 0; }
+  std::uint32_t next_byte ()
+  {
+    if (from_ != end_)
+      return *from_++;
+    overrun_++;
+    return 0;
+  }
   void normalise ()
   {
     while (range_ < kMinRange) {
@@ -156,6 +171,7 @@ private:
 
   const std::uint8_t *from_, *end_;
   std::uint32_t range_ = 0xffffffff, code_ = 0;
+  std::size_t overrun_ = 0;
 };
 
 } // namespace rangecast
