@@ -68,17 +68,19 @@ using Activity = std::uint32_t;
 /** Two plain numbers: it is copied for every pixel, and whole. */
 struct CodedPixel {
   PixelCode code = kNoPixel;
-  std::uint64_t state = 0; /* its origin, and above bit 31 its activity */
+  std::uint64_t state = 0; /* its origin, from bit 8 its kind, from bit 32 its activity */
 
   constexpr CodedPixel () = default;
   constexpr CodedPixel (PixelCode pixel, Origin origin, Activity activity = 0)
-      : code (pixel), state (static_cast<std::uint64_t> (origin) | std::uint64_t{activity} << 32)
+      : code (pixel), state (static_cast<std::uint64_t> (origin) |
+                             static_cast<std::uint64_t> (std::min (int (origin), 3)) << 8 |
+                             std::uint64_t{activity} << 32)
   {
   }
   [[nodiscard]] constexpr bool valid () const { return state != 0; }
   [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
   /** The same, without a difference between predicted and corrected pixels. */
-  [[nodiscard]] constexpr int kind () const { return std::min (origin (), 3); }
+  [[nodiscard]] constexpr int kind () const { return static_cast<int> (state >> 8 & 3); }
   [[nodiscard]] constexpr Activity activity () const { return static_cast<Activity> (state >> 32); }
 };
 

@@ -41,10 +41,12 @@ public:
   void put (Probability &p, bool yes)
   {
     const std::uint32_t part = yes_part (range_, p);
-    /* Without a branch: outcomes are what nobody can predict. */
-    const std::uint32_t no = static_cast<std::uint32_t> (yes) - 1;
-    low_ += part & no;
-    range_ = (part & ~no) | ((range_ - part) & no);
+    if (yes) {
+      range_ = part;
+    } else {
+      low_ += part;
+      range_ -= part;
+    }
     learn (p, yes);
     normalise ();
   }
@@ -128,13 +130,17 @@ public:
   bool get (Probability &p)
   {
     const std::uint32_t part = yes_part (range_, p);
-    const bool yes = code_ < part;
-    const std::uint32_t no = static_cast<std::uint32_t> (yes) - 1;
-    code_ -= part & no;
-    range_ = (part & ~no) | ((range_ - part) & no);
-    learn (p, yes);
+    if (code_ < part) {
+      range_ = part;
+      learn (p, true);
+      normalise ();
+      return true;
+    }
+    code_ -= part;
+    range_ -= part;
+    learn (p, false);
     normalise ();
-    return yes;
+    return false;
   }
   std::uint32_t get_bits (int count)
   {
