@@ -163,7 +163,7 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
 {
   const auto columns = static_cast<std::size_t> (header.columns);
   for (Row *row : {&row_, &upper_}) {
-    row->pixels.assign (columns + 2, {});
+    row->pixels.assign (columns + 3, {});
     row->shown.assign (columns + 2, 0);
     row->valid.assign (columns, 0);
   }

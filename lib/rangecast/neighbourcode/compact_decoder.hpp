@@ -36,7 +36,9 @@ private:
   bool decode_full (Code &code, const Neighbours &n, bool corrected,
       const CompactQuantisers &quantisers, std::size_t x);
 
-  struct Row { /* one invalid pixel before and behind, which `pixels` and `shown` count */
+  /* One invalid pixel before and one behind the row, which `pixels` and `shown` count; pixels one
+   * more, because Neighbours look ahead. */
+  struct Row {
     std::vector<CodedPixel> pixels;
     std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
     std::vector<std::uint8_t> valid;

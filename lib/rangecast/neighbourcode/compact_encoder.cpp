@@ -126,7 +126,7 @@ CompactEncoder::resize (int columns)
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
   for (Row *row : {&row_, &upper_}) {
-    row->pixels.assign (n + 2, {});
+    row->pixels.assign (n + 3, {});
     row->colours.assign (n + 2, Lanes{kNoDepthCode, 0, 0, 0});
     row->valid.assign (n, 0);
   }

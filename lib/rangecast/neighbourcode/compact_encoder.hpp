@@ -65,7 +65,9 @@ private:
   Lanes threshold_{};
   float depth_weight_ = 0, colour_weight_ = 0;
 
-  struct Row { /* one invalid pixel before and behind, which `pixels` and `colours` count */
+  /* One invalid pixel before and one behind the row, which `pixels` and `colours` count; pixels one
+   * more, because Neighbours look ahead. */
+  struct Row {
     std::vector<CodedPixel> pixels;
     std::vector<Lanes> colours; /* depth, R, G, B as decoded */
     std::vector<std::uint8_t> valid;
