@@ -237,7 +237,8 @@ run_profile (
                            std::to_string (settings.depth_bits) + "/" +
                            std::to_string (settings.depth_threshold) + " c" +
                            std::to_string (settings.colour_bits) + "/" +
-                           std::to_string (settings.colour_threshold);
+                           std::to_string (settings.colour_threshold) +
+                           (settings.max_slice_size > 1200 ? " long slices" : "");
   return {name, bytes.size (), result.points, double (result.raw_bits) / 8,
       compare (pictures, decoded, rig.views[0].depth_unit_m), encode, decode};
 }
