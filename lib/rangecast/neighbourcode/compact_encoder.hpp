@@ -14,7 +14,7 @@ namespace rangecast {
 struct CompactSettings {
   int depth_threshold, colour_threshold; ///< codes
   int max_slice_size;                    ///< bytes
-  bool best; ///< the neighbour that differs least, not the first that is near enough
+  bool best; ///< what costs least in error and bits, not the first that is near enough
 };
 
 struct CompactResult {
@@ -46,10 +46,11 @@ private:
   template <class Code> bool code_row (Code &slice_code);
   template <class Code> void code_runs (Code &code);
   template <class Code> bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
-  template <class Code> void code_full (Code &code, const Neighbours &n, std::size_t x);
+  template <class Code>
+  void code_full (Code &code, const Neighbours &n, std::size_t x, const Components &residual);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int nearest_neighbour (std::size_t x) const;
+  int best_choice (std::size_t x, const Neighbours &n, Components &residual);
   Components make_full (std::size_t x, const Neighbours &n);
   void load_row (const ConstRangeImage &image, int y);
   void resize (int columns);

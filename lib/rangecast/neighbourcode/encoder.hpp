@@ -12,10 +12,10 @@
 
 namespace rangecast {
 
-/** Which of the neighbours that are near enough replaces a pixel. */
+/** Which of the neighbours that are near enough replaces a pixel, if any. */
 enum class NeighbourChoice : std::uint8_t {
   kFirst, ///< the first: left, upper-left, upper, upper-right
-  kBest,  ///< the one that differs least; profiles packed and entropy
+  kBest,  ///< what costs least in error and bits, in full too; profiles packed and entropy
 };
 
 struct EncoderSettings {
