@@ -103,7 +103,9 @@ gst_neighbour_code_choice_get_type (void)
   static const GType type = [] {
     static const GEnumValue values[] = {
         {int (rangecast::NeighbourChoice::kFirst), "Left, upper-left, upper, upper-right", "first"},
-        {int (rangecast::NeighbourChoice::kBest), "The one that differs least", "best"}, {}};
+        {int (rangecast::NeighbourChoice::kBest), "What costs least in error and bits, slower",
+            "best"},
+        {}};
     return g_enum_register_static ("GstNeighbourCodeChoice", values);
   }();
   return type;
@@ -415,8 +417,8 @@ install_properties (GObjectClass *object_class)
           GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (kDefaults.profile), live));
   g_object_class_install_property (object_class, PROP_CHOICE,
       g_param_spec_enum ("choice", "Choice",
-          "Which neighbour within the thresholds replaces a pixel; plain always takes the first "
-          "(first, best, default first)",
+          "Which neighbour within the thresholds replaces a pixel, if any; plain always takes the "
+          "first (first, best, default first)",
           GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), live));
   install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
       "Bits of a depth code; linear between the view's near and far (6 to 16, default 12)", 6, 16,
