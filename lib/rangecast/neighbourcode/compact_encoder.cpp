@@ -36,6 +36,18 @@ bits_of (const Components &residual)
   return bits;
 }
 
+/* The first neighbour that is near enough, or kPredict; `above` is the pixel above. */
+inline int
+first_near (Lanes own, const Lanes &left, const Lanes *above, Lanes threshold)
+{
+  if (are_near (own, left, threshold))
+    return kTakeLeft;
+  for (int i = 0; i < 3; i++)
+    if (are_near (own, above[i - 1], threshold))
+      return kTakeUpperLeft + i;
+  return kPredict;
+}
+
 /* An EntropyCode that looks like a PackedWriter. */
 class EntropyWriter : public EntropyCode<EntropyWriting> {
 public:
@@ -261,16 +273,9 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   Code code = slice_code;
   std::size_t x = begin;
   for (; x < end && code.bound () <= limit; x++) {
-    int chosen = kPredict;
     Components residual;
-    if (best)
-      chosen = best_choice (x, Neighbours (n), residual);
-    else if (are_near (own[x], colours[x - 1], threshold))
-      chosen = kTakeLeft;
-    else
-      for (int i = 0; i < 3 && chosen == kPredict; i++)
-        if (are_near (own[x], upper_colours[x + static_cast<std::size_t> (i) - 1], threshold))
-          chosen = kTakeUpperLeft + i;
+    const int chosen = best ? best_choice (x, Neighbours (n), residual)
+                            : first_near (own[x], colours[x - 1], upper_colours + x, threshold);
     if (chosen == kTakeLeft) {
       code.choice (n, chosen);
       colours[x] = colours[x - 1];
