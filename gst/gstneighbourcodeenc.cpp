@@ -37,6 +37,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
 enum {
   PROP_0,
   PROP_PROFILE,
+  PROP_CHOICE,
   PROP_DEPTH_BITS,
   PROP_COLOUR_BITS,
   PROP_DEPTH_THRESHOLD,
@@ -92,8 +93,26 @@ gst_neighbour_code_profile_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"}, {}};
+        {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
+        {int (rangecast::Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
+        {int (rangecast::Profile::kEntropy), "Adaptive probabilities and a range coder", "entropy"},
+        {}};
     return g_enum_register_static ("GstNeighbourCodeProfile", values);
+  }();
+  return type;
+}
+
+#define GST_TYPE_NEIGHBOUR_CODE_CHOICE (gst_neighbour_code_choice_get_type ())
+static GType
+gst_neighbour_code_choice_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (rangecast::NeighbourChoice::kFirst), "Left, upper-left, upper, upper-right", "first"},
+        {int (rangecast::NeighbourChoice::kBest), "What costs least in error and bits, slower",
+            "best"},
+        {}};
+    return g_enum_register_static ("GstNeighbourCodeChoice", values);
   }();
   return type;
 }
@@ -357,7 +376,11 @@ gst_neighbour_code_enc_set_property (
   std::lock_guard guard (priv->lock);
   EncoderSettings &settings = priv->settings;
   switch (id) {
-    case PROP_PROFILE: /* there is one so far, and the enum refuses others */
+    case PROP_PROFILE:
+      settings.profile = rangecast::Profile (g_value_get_enum (value));
+      break;
+    case PROP_CHOICE:
+      settings.choice = rangecast::NeighbourChoice (g_value_get_enum (value));
       break;
     case PROP_DEPTH_BITS:
       settings.depth_bits = g_value_get_int (value);
@@ -400,7 +423,10 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
   const EncoderSettings &settings = priv->settings;
   switch (id) {
     case PROP_PROFILE:
-      g_value_set_enum (value, int (rangecast::Profile::kPlain));
+      g_value_set_enum (value, int (settings.profile));
+      break;
+    case PROP_CHOICE:
+      g_value_set_enum (value, int (settings.choice));
       break;
     case PROP_DEPTH_BITS:
       g_value_set_int (value, settings.depth_bits);
@@ -457,8 +483,14 @@ install_properties (GObjectClass *object_class)
         object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, live));
   };
   g_object_class_install_property (object_class, PROP_PROFILE,
-      g_param_spec_enum ("profile", "Profile", "How symbols are written (default: plain)",
-          GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (rangecast::Profile::kPlain), live));
+      g_param_spec_enum ("profile", "Profile",
+          "How pixels are written (plain, packed, entropy, default plain)",
+          GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (kDefaults.profile), live));
+  g_object_class_install_property (object_class, PROP_CHOICE,
+      g_param_spec_enum ("choice", "Choice",
+          "Which neighbour within the thresholds replaces a pixel, if any; plain always takes the "
+          "first (first, best, default first)",
+          GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), live));
   install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
       "Bits of a depth code; linear between the view's near and far (6 to 16, default 12)", 6, 16,
       kDefaults.depth_bits);
@@ -506,6 +538,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
       "Codes depth and colour of range images together, in slices that decode alone",
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
 
   transform_class->start = gst_neighbour_code_enc_start;
   transform_class->stop = gst_neighbour_code_enc_stop;

@@ -20,6 +20,8 @@ from dataclasses import dataclass, field
 from math import floor, hypot
 from typing import BinaryIO, Iterable, Iterator, NamedTuple
 
+import compact
+
 VERSION = 1
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
@@ -285,7 +287,7 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     if flags & ~KEY or len(payload) < SLICE_FIELDS.size:
         raise Damaged("flags or size")
     part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :])
-    if part.view > 63 or part.profile != 0 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
+    if part.view > 63 or part.profile > 2 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
         raise Damaged("view, profile or bits")
     if any(part[6:14]):
         if not part.rows or not part.columns:
@@ -297,6 +299,8 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
 
 def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
     """The pixels of a slice, row by row; None: invalid."""
+    if part.profile and part.rows:
+        return decode_compact_slice(part, view)
     count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
     if part.too_short():
@@ -324,6 +328,25 @@ def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
                 raise Damaged("names a pixel that does not exist or is invalid")
             pixels.append(pixel)
     return pixels
+
+
+def decode_compact_slice(part: Slice, view: View) -> list[Pixel | None]:
+    """The same for the profiles packed and entropy."""
+    extent = view.far - view.near
+    last = min(extent, (1 << part.depth_bits) - 1)
+    if last < 1:
+        raise Damaged("near and far are less than one depth unit apart")
+    maximum = (1 << part.colour_bits) - 1
+    values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
+
+    def shown(codes: Pixel) -> Pixel:
+        z, red, green, blue = codes
+        return (view.near + (z * extent + last // 2) // last, values[red], values[green], values[blue])
+
+    try:
+        return compact.decode(part.profile, part.body, part.rows, part.columns, last, maximum, shown)
+    except compact.Damage as damage:
+        raise Damaged(str(damage)) from None
 
 
 def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:

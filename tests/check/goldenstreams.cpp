@@ -136,6 +136,13 @@ GST_START_TEST (test_default_settings_decode_as_ever)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_packed_and_entropy_decode_as_ever)
+{
+  expect_digests ("packed");
+  expect_digests ("entropy");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_exact_pictures_decode_as_ever)
 {
   expect_digests ("exact");
@@ -181,6 +188,7 @@ goldenstreams_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_default_settings_decode_as_ever);
+  tcase_add_test (tc, test_packed_and_entropy_decode_as_ever);
   tcase_add_test (tc, test_exact_pictures_decode_as_ever);
   tcase_add_test (tc, test_few_bits_and_empty_views_decode_as_ever);
   tcase_add_test (tc, test_damage_costs_what_it_ever_did);

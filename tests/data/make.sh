@@ -17,8 +17,11 @@ record default "num-buffers=2 range-person-only=true"
 record exact "num-buffers=1" depth-bits=16 depth-threshold=0 colour-threshold=0 max-slice-size=256
 record coarse "num-buffers=3 empty-frames=1 range-person-only=true" \
   depth-bits=7 colour-bits=5 depth-threshold=2 colour-threshold=3 max-slice-size=256
+for profile in packed entropy; do
+  record "$profile" "num-buffers=2 range-person-only=true" "profile=$profile" max-slice-size=400
+done
 "$here/make-damaged.py" coarse.rcnc damaged.rcnc
-for stream in default exact coarse damaged; do
+for stream in default exact coarse damaged packed entropy; do
   "$here/../bitstream/decode.py" "$stream.rcnc" "$stream" >/dev/null
 done
 sha256sum -- *-depth-?.raw *-colour-?.raw >SHA256SUMS

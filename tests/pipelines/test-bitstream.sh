@@ -72,12 +72,34 @@ depth-bits=16 colour-bits=8 depth-threshold=100
 END
 }
 
+test_packed_and_entropy_decode_the_same () {
+  local settings profile
+  while read -r settings; do
+    for profile in packed entropy; do
+      # shellcheck disable=SC2086
+      record settings.rcnc 2 96x72 "num-buffers=2 range-person-only=true" "profile=$profile" $settings
+      expect_decoders_agree settings.rcnc 2 "$profile $settings"
+      expect_nothing_damaged "$profile $settings"
+    done
+  done <<'END'
+choice=best
+depth-threshold=0 colour-threshold=0 depth-bits=16
+depth-threshold=0 colour-threshold=0 depth-bits=6 colour-bits=4
+depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=1
+depth-bits=9 colour-bits=6 depth-threshold=65535 colour-threshold=2
+depth-bits=11 colour-bits=7 depth-threshold=4 colour-threshold=255
+depth-bits=16 colour-bits=8 depth-threshold=16 max-slice-size=400
+END
+}
+
 test_short_and_long_slices_decode_the_same () {
-  local size
-  for size in 256 257 300 65535; do
-    record slices.rcnc 1 160x64 num-buffers=1 "max-slice-size=$size" depth-bits=16 depth-threshold=0 colour-threshold=0
-    expect_decoders_agree slices.rcnc 1 "max-slice-size=$size"
-    expect_nothing_damaged "max-slice-size=$size"
+  local size profile
+  for profile in plain packed entropy; do
+    for size in 256 257 300 65535; do
+      record slices.rcnc 1 160x64 num-buffers=1 "profile=$profile" "max-slice-size=$size" depth-bits=16 depth-threshold=0 colour-threshold=0
+      expect_decoders_agree slices.rcnc 1 "$profile max-slice-size=$size"
+      expect_nothing_damaged "$profile max-slice-size=$size"
+    done
   done
 }
 
@@ -136,7 +158,7 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged; do
+  for stream in default exact coarse damaged packed entropy; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"
@@ -145,15 +167,16 @@ test_recorded_streams_decode_as_ever () {
 # What the document says of damage: both decoders find the same. The rig, at the beginning, stays
 # whole, or there would be nothing to see.
 test_damaged_files_decode_the_same () {
-  local seed
-  record good.rcnc 2 64x48 "num-buffers=5 range-person-only=true" max-slice-size=400
-  for seed in {1..12}; do
+  local seed profile profiles=(plain packed entropy)
+  for seed in {1..18}; do
+    profile=${profiles[seed % 3]}
+    record good.rcnc 2 64x48 "num-buffers=5 range-person-only=true" max-slice-size=400 "profile=$profile"
     python3 - "$seed" <<'END'
 import random, sys
 random.seed(int(sys.argv[1]))
 data = bytearray(open("good.rcnc", "rb").read())
 first = 28 + 2 * 200
-slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x11\x01" and data[i + 5] == 0]
+slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x11\x01" and data[i + 5] <= 2 and data[i + 4] < 2]
 for i in range(20):
     at = random.choice((random.randrange(first, len(data)), random.choice(slices) + random.randrange(36)))
     data[at] ^= 1 << random.randrange(8)
@@ -163,6 +186,6 @@ at = random.randrange(first, len(data))
 data[at:at] = random.randbytes(random.randrange(30))
 open("bad.rcnc", "wb").write(data)
 END
-    expect_decoders_agree bad.rcnc 2 "damage with seed $seed"
+    expect_decoders_agree bad.rcnc 2 "$profile, damage with seed $seed"
   done
 }

@@ -180,6 +180,24 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
   planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns,
       static_cast<std::size_t> (best.data () - slices_.data ()), best.size (), header,
       area_of (header.roi)};
+  limit_pixels (planned_[count_ - 1]);
+}
+
+/* An encoder gives no pixel to two slices, and a network repeats packets a few times at most. Of
+ * more than that a few bytes each would keep the decoder busy for minutes. */
+constexpr std::uint64_t kMostRepeats = 8;
+
+void
+AccessUnitDecoder::limit_pixels (const PlannedView &planned)
+{
+  std::uint64_t pixels = 0;
+  for (PlannedSlice &slice : std::span (&slices_[planned.first_slice], planned.slice_count)) {
+    if (slice.too_short)
+      continue;
+    pixels += static_cast<std::uint64_t> (slice.header.rows) *
+              static_cast<std::uint64_t> (slice.header.columns);
+    slice.too_short = pixels > kMostRepeats * planned.coded_pixels;
+  }
 }
 
 /* An encoder gives at most 8/3 pixels a byte, so this is no ROI of which less than nine tenths are

@@ -93,7 +93,8 @@ private:
     std::span<const std::uint8_t> unit;
     SliceHeader header;
     std::size_t arrival; /* number in the access unit */
-    bool too_short; /* for its symbols; it writes nothing, or small units would cost much time */
+    bool too_short;      /* for its symbols, or far beyond the ROI's pixels: it writes nothing, or
+                            small units would cost much time */
   };
   enum class Place : std::uint8_t { kNothing, kDamaged, kSound };
   struct Coverage { /* of a view that slices do not tile; a bit for each pixel of its ROI */
@@ -102,6 +103,7 @@ private:
   };
 
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
+  void limit_pixels (const PlannedView &planned);
   void crop_to_slices (PlannedView &planned);
   [[nodiscard]] bool is_tiled (const PlannedView &planned, std::uint64_t &have) const;
   static void cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image);

@@ -149,6 +149,13 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   if (Status s = read_unit_header (unit, unit_header); !s.ok ())
     return s;
   const std::size_t size = unit_header.size, symbols_size = symbol_bytes (pixels);
+  if (header.profile != Profile::kPlain && pixels > 0 && size >= kSliceHeaderSize) {
+    const DepthQuantiser *quantiser = depth_of (header);
+    const bool good =
+        quantiser && compact_.decode (unit.first (size).subspan (kSliceHeaderSize), header,
+                         {*quantiser, colours_[header.colour_bits - 4]}, image, points);
+    return good ? Status{} : damaged ();
+  }
   if (size < kSliceHeaderSize || symbols_size > size - kSliceHeaderSize)
     return {StatusCode::kTruncated, "slice: shorter than its symbols"};
   if (pixels == 0)
@@ -178,8 +185,17 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
 std::size_t
 SliceDecoder::smallest_size (const SliceHeader &header)
 {
-  return kSliceHeaderSize + symbol_bytes (static_cast<std::size_t> (header.rows) *
-                                          static_cast<std::size_t> (header.columns));
+  const auto rows = static_cast<std::size_t> (header.rows);
+  if (rows == 0)
+    return kSliceHeaderSize;
+  switch (header.profile) {
+    case Profile::kPacked:
+      return kPackedHeaderSize + (2 * rows + 7) / 8; /* a row is one run at least: two bits */
+    case Profile::kEntropy:
+      return kEntropyHeaderSize; /* zeros at the end are left out */
+    default:
+      return kSliceHeaderSize + symbol_bytes (rows * static_cast<std::size_t> (header.columns));
+  }
 }
 
 } // namespace rangecast

@@ -9,11 +9,12 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "compact_decoder.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
 
-/** Decodes slices of profile plain into range images, and keeps tables and memory between them. */
+/** Decodes slices into range images, and keeps tables and memory between them. */
 class SliceDecoder {
 public:
   /** The cameras whose views may come. Forgets the tables. */
@@ -47,6 +48,7 @@ private:
   std::array<std::unique_ptr<ViewTables>, kMaxViews> views_;
   std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
       ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
+  CompactDecoder compact_;          /* profiles packed and entropy */
   std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
 };
 

@@ -60,6 +60,8 @@ validate (const EncoderSettings &s)
     return bad ("encoder: thresholds, expected 0 to 65535 for depth and 0 to 255 for colour");
   if (s.max_slice_size < 256 || s.max_slice_size > int (kMaxUnitSize))
     return bad ("encoder: maximum slice size, expected 256 to 65535 bytes");
+  if (s.profile > Profile::kEntropy)
+    return bad ("encoder: profile, expected plain, packed or entropy");
   return {};
 }
 
@@ -223,6 +225,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   header.view_id = static_cast<std::uint8_t> (view_.id);
   header.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
   header.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
+  header.profile = settings_.profile;
   header.frame_number = frame_number;
   header.capture_time_ns = image.capture_time_ns;
   if (roi.empty ()) {
@@ -230,6 +233,15 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     return {};
   }
   header.roi = roi;
+  if (settings_.profile != Profile::kPlain) {
+    const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
+        settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
+    const CompactResult done = compact_.encode (image, {depth_, colour_}, compact, header, to);
+    result.slices += done.slices;
+    result.full_pixels += done.full_pixels;
+    count_points (image, result);
+    return {};
+  }
   /* As many columns as fit in one row even if every pixel of it is written in full. */
   const int bits = kSymbolBits + settings_.depth_bits + 3 * settings_.colour_bits;
   const int most = (settings_.max_slice_size - int (kSliceHeaderSize) - 2) * 8 / bits;
@@ -238,6 +250,14 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     const int begin = roi.width * i / pieces, end = roi.width * (i + 1) / pieces;
     code_piece (image, begin, end - begin, header, to, result);
   }
+  count_points (image, result);
+  return {};
+}
+
+void
+ViewEncoder::count_points (const ConstRangeImage &image, EncoderResult &result) const
+{
+  const Roi &roi = image.roi;
   std::uint64_t points = 0;
   for (int y = 0; y < roi.height; y++) {
     const std::uint16_t *row = image.depth.row (y);
@@ -248,7 +268,6 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   result.raw_bits +=
       points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
       static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
-  return {};
 }
 
 } // namespace rangecast

@@ -7,9 +7,16 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "compact_encoder.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
+
+/** Which of the neighbours that are near enough replaces a pixel, if any. */
+enum class NeighbourChoice : std::uint8_t {
+  kFirst, ///< the first: left, upper-left, upper, upper-right
+  kBest,  ///< what costs least in error and bits, in full too; profiles packed and entropy
+};
 
 struct EncoderSettings {
   int depth_bits = 12;       ///< 6 to 16
@@ -17,6 +24,8 @@ struct EncoderSettings {
   int depth_threshold = 8;   ///< codes; 0 to 65535
   int colour_threshold = 10; ///< codes of each of R, G, B; 0 to 255
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
+  Profile profile = Profile::kPlain;
+  NeighbourChoice choice = NeighbourChoice::kFirst;
 
   friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
 };
@@ -31,7 +40,7 @@ struct EncoderResult {
   std::uint64_t raw_bits = 0; ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
 };
 
-/** Codes range images of one view, profile plain, and keeps its memory from frame to frame. */
+/** Codes range images of one view and keeps its memory from frame to frame. */
 class ViewEncoder {
 public:
   /** Sets up for a view. Builds tables only if something changed. */
@@ -50,6 +59,7 @@ public:
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
+  void count_points (const ConstRangeImage &image, EncoderResult &result) const;
   void load_row (const ConstRangeImage &image, int y, int first_column, int columns);
   std::size_t code_row (bool has_upper, std::size_t symbols_at, std::size_t full_at);
   void code_piece (const ConstRangeImage &image, int first_column, int columns, SliceHeader header,
@@ -63,6 +73,7 @@ private:
   bool configured_ = false;
   DepthQuantiser depth_;
   ColourQuantiser colour_;
+  CompactEncoder compact_; /* profiles packed and entropy */
 
   /* Rows as four int32 a pixel (depth, R, G, B), with one invalid pixel on each side. */
   std::vector<std::int32_t> row_, upper_;

@@ -100,7 +100,7 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
   h.rows = get<std::uint16_t> (p + 30);
   h.first_column = get<std::uint16_t> (p + 32);
   h.columns = get<std::uint16_t> (p + 34);
-  if (h.profile != Profile::kPlain)
+  if (h.profile > Profile::kEntropy)
     return {StatusCode::kUnsupported, "slice: profile " + std::to_string (p[5])};
   if (h.view_id >= kMaxViews || h.depth_bits < 6 || h.depth_bits > 16 || h.colour_bits < 4 ||
       h.colour_bits > 8)

@@ -33,7 +33,11 @@ struct UnitHeader {
   std::uint16_t size = 0; ///< bytes of the whole unit, this header included
 };
 
-enum class Profile : std::uint8_t { kPlain = 0 };
+enum class Profile : std::uint8_t {
+  kPlain = 0,   ///< codes of fixed length
+  kPacked = 1,  ///< run lengths and prefix codes that never change
+  kEntropy = 2, ///< adaptive probabilities and a range coder
+};
 
 /** What a slice says of itself. */
 struct SliceHeader {

@@ -1,0 +1,170 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Profile entropy: every decision of a pixel under a probability of its own context. */
+#pragma once
+
+#include "coded_pixel.hpp"
+#include "range_coder.hpp"
+
+namespace rangecast {
+
+/** Where the contexts of each kind of decision begin among a slice's probabilities. */
+namespace context {
+inline constexpr int kRunExact = 0;            /* of invalid and of valid pixels */
+inline constexpr int kRunSize = kRunExact + 2; /* 16 each */
+inline constexpr int kLeft = kRunSize + 2 * 16;
+inline constexpr int kOther = kLeft + 64;
+inline constexpr int kPredicted = kOther + 48;
+inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
+inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
+inline constexpr int kCount = kSize + kComponents * 2 * 16;
+} // namespace context
+
+using EntropyModel = std::array<Probability, context::kCount>;
+
+/** What every slice begins with: learnt from scans and recordings, so that small slices do not pay
+ *  for learning. Part of the format. */
+extern const EntropyModel kInitialModel;
+
+/** Sizes that have decisions of their own; greater ones are an exponential Golomb code. */
+inline constexpr int kUnarySizes = 4;
+/** Longest prefix of that code: longer ones are damage. */
+inline constexpr int kMaxPrefix = 17;
+
+/** The decisions of a slice in their order, the same for both directions: Coder::code (probability,
+ *  yes) writes `yes`, or reads it and pays no heed to the argument; so does Coder::bits. Small, so
+ *  that a loop can keep a copy in registers; the probabilities are the caller's. */
+template <class Coder> class EntropyCode {
+public:
+  EntropyCode (Coder coder, EntropyModel &model) : coder_ (coder), model_ (model.data ()) {}
+
+  [[nodiscard]] Coder &coder () { return coder_; }
+  [[nodiscard]] const Coder &coder () const { return coder_; }
+
+  /** By how much a run of valid or invalid pixels ends later than the one above.
+   *  @return false for a number that is too large */
+  bool run (bool valid, std::int32_t &later)
+  {
+    return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
+  }
+
+  /** Of a valid pixel that has a neighbour. */
+  int choice (const Neighbours &n, int chosen)
+  {
+    if (n.left.valid ()) {
+      const int at =
+          context::kLeft + n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ();
+      if (code (at, chosen == kTakeLeft))
+        return kTakeLeft;
+    }
+    const int other = other_choice (n, chosen);
+    if (other != kPredict)
+      return other;
+    const int at = context::kPredicted + n.left.origin () + 5 * n.upper.origin ();
+    return code (at, chosen == kPredict) ? kPredict : kCorrect;
+  }
+
+  /** @return false for a residual that is too large */
+  bool residual (const Neighbours &n, bool has_neighbour, Components &r)
+  {
+    const Activity sums = n.left.activity () + n.upper.activity () + n.upper_right.activity ();
+    const bool alone = !n.left.valid () || !n.upper.valid ();
+    bool previous = false;
+    for (int i = 0; i < kComponents; i++) {
+      const int surroundings = !has_neighbour ? 5
+                               : alone        ? 4
+                                              : kActivityClass[sums >> 8 * i & 0xff];
+      const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
+      const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
+      if (!number (zero, size, r[i]))
+        return false;
+      previous = r[i] != 0;
+    }
+    return true;
+  }
+
+private:
+  bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
+
+  /* One of the three above, or kPredict for none of them. Those that equal an earlier neighbour
+   * are passed over. */
+  int other_choice (const Neighbours &n, int chosen)
+  {
+    const PixelCode l = n.left.code, ul = n.upper_left.code, u = n.upper.code,
+                    ur = n.upper_right.code;
+    const bool differs[] = {ul != l, u != l && u != ul, ur != l && ur != ul && ur != u};
+    const bool candidate[] = {n.upper_left.valid () && differs[0], n.upper.valid () && differs[1],
+        n.upper_right.valid () && differs[2]};
+    const int full = 2 * (n.left.kind () == 3) + (n.upper.kind () == 3);
+    for (int i = 0; i < 3; i++) {
+      if (!candidate[i])
+        continue;
+      const int later = i == 0 ? candidate[1] + 2 * candidate[2] : i == 1 ? candidate[2] : 0;
+      if (code (context::kOther + 16 * i + 4 * full + later, chosen == kTakeUpperLeft + i))
+        return kTakeUpperLeft + i;
+    }
+    return kPredict;
+  }
+
+  /* Of the sum of three activities. */
+  static constexpr std::uint8_t kActivityClass[] = {
+      0, 1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4};
+
+  bool number (int zero, int at, std::int32_t &r)
+  {
+    if (!code (zero, r != 0)) {
+      r = 0;
+      return true;
+    }
+    const bool negative = code (at, r < 0);
+    std::uint32_t size = static_cast<std::uint32_t> (std::abs (r)) - 1;
+    if (!magnitude (at + 1, size))
+      return false;
+    r = static_cast<std::int32_t> (size) + 1;
+    r = negative ? -r : r;
+    return true;
+  }
+
+  bool magnitude (int at, std::uint32_t &size)
+  {
+    for (std::uint32_t i = 0; i < kUnarySizes; i++)
+      if (!code (at + static_cast<int> (i), size > i)) {
+        size = i;
+        return true;
+      }
+    const std::uint32_t rest = size - kUnarySizes + 1;
+    const int width = std::bit_width (rest) - 1;
+    int prefix = 0;
+    while (code (at + kUnarySizes + std::min (prefix, 10), prefix < width))
+      if (++prefix > kMaxPrefix)
+        return false;
+    const std::uint32_t low = coder_.bits (rest & ((1u << prefix) - 1), prefix);
+    size = (1u << prefix) + low - 1 + kUnarySizes;
+    return true;
+  }
+
+  Coder coder_;
+  Probability *model_;
+};
+
+/** Directions of an EntropyCode. */
+struct EntropyWriting : RangeEncoder {
+  using RangeEncoder::RangeEncoder;
+  bool code (Probability &p, bool yes)
+  {
+    put (p, yes);
+    return yes;
+  }
+  std::uint32_t bits (std::uint32_t value, int count)
+  {
+    put_bits (value, count);
+    return value;
+  }
+};
+
+struct EntropyReading : RangeDecoder {
+  using RangeDecoder::RangeDecoder;
+  bool code (Probability &p, bool) { return get (p); }
+  std::uint32_t bits (std::uint32_t, int count) { return get_bits (count); }
+};
+
+} // namespace rangecast

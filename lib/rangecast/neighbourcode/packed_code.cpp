@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "packed_code.hpp"
+
+namespace rangecast {
+namespace {
+
+/* Canonical codes: shorter ones first, equal lengths in the order of the symbols. Their first bit
+ * comes first, so the bits are turned round to be written from the least significant one. */
+template <std::size_t N>
+std::array<PrefixCode, N>
+codes_of (const std::array<std::uint8_t, N> &lengths)
+{
+  std::array<PrefixCode, N> codes{};
+  std::uint32_t next = 0;
+  for (std::uint8_t length = 1; length <= kMaxPatternBits; length++, next <<= 1)
+    for (std::size_t symbol = 0; symbol < N; symbol++)
+      if (lengths[symbol] == length) {
+        codes[symbol].length = length;
+        for (int i = 0; i < length; i++)
+          codes[symbol].bits |= static_cast<std::uint16_t> ((next >> i & 1) << (length - 1 - i));
+        next++;
+      }
+  return codes;
+}
+
+/* For every number that may come next, the symbol whose code it begins with. */
+template <std::size_t N, std::size_t Size>
+void
+invert (const std::array<PrefixCode, N> &codes, std::array<PackedTables::Entry, Size> &table)
+{
+  table = {};
+  for (std::size_t symbol = 0; symbol < N; symbol++)
+    if (codes[symbol].length > 0)
+      for (std::size_t i = codes[symbol].bits; i < Size;
+           i += std::size_t{1} << codes[symbol].length)
+        table[i] = {static_cast<std::uint8_t> (symbol), codes[symbol].length};
+}
+
+PackedTables
+build ()
+{
+  PackedTables tables;
+  for (std::size_t i = 0; i < kPackedContexts; i++) {
+    tables.choice[i] = codes_of (kChoiceLengths[i]);
+    invert (tables.choice[i], tables.choice_of[i]);
+  }
+  for (std::size_t i = 0; i < 2; i++) {
+    tables.pattern[i] = codes_of (kPatternLengths[i]);
+    invert (tables.pattern[i], tables.pattern_of[i]);
+  }
+  return tables;
+}
+
+} // namespace
+
+/* clang-format off */
+const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths = {{
+    {0, 2, 0, 0, 2, 1}, {1, 3, 0, 0, 3, 2}, {3, 2, 0, 0, 3, 1}, {2, 3, 0, 0, 3, 1},
+    {0, 2, 3, 0, 3, 1}, {1, 3, 4, 0, 4, 2}, {1, 3, 4, 0, 4, 2}, {1, 3, 4, 0, 4, 2},
+    {0, 2, 3, 0, 3, 1}, {1, 4, 2, 0, 4, 3}, {3, 4, 1, 0, 4, 2}, {4, 4, 2, 0, 3, 1},
+    {0, 3, 2, 0, 3, 1}, {1, 4, 3, 0, 4, 2}, {3, 4, 2, 0, 4, 1}, {4, 4, 3, 0, 2, 1},
+    {0, 1, 0, 2, 3, 3}, {1, 2, 0, 3, 4, 4}, {1, 2, 0, 3, 4, 4}, {1, 2, 0, 3, 4, 4},
+    {0, 2, 4, 4, 3, 1}, {1, 3, 5, 5, 4, 2}, {1, 3, 5, 5, 4, 2}, {1, 3, 5, 5, 4, 2},
+    {0, 4, 1, 4, 3, 2}, {1, 4, 2, 5, 5, 3}, {1, 4, 2, 5, 5, 3}, {1, 5, 2, 5, 4, 3},
+    {0, 4, 2, 4, 3, 1}, {1, 5, 2, 5, 4, 3}, {1, 5, 3, 5, 4, 2}, {1, 5, 3, 5, 4, 2},
+    {0, 3, 0, 2, 3, 1}, {1, 3, 0, 3, 3, 3}, {3, 2, 0, 4, 4, 1}, {3, 4, 0, 2, 4, 1},
+    {0, 2, 4, 4, 3, 1}, {1, 3, 5, 2, 5, 4}, {1, 4, 5, 2, 5, 3}, {1, 2, 5, 4, 5, 3},
+    {0, 4, 2, 3, 4, 1}, {2, 3, 2, 4, 4, 2}, {3, 4, 1, 3, 4, 3}, {3, 3, 2, 3, 3, 2},
+    {0, 4, 2, 3, 4, 1}, {2, 3, 2, 4, 4, 2}, {2, 4, 2, 3, 4, 2}, {4, 5, 2, 5, 3, 1},
+    {0, 3, 0, 2, 3, 1}, {2, 4, 0, 3, 4, 1}, {4, 2, 0, 3, 4, 1}, {2, 4, 0, 3, 4, 1},
+    {0, 2, 4, 3, 4, 1}, {1, 4, 5, 3, 5, 2}, {1, 4, 5, 3, 5, 2}, {1, 3, 5, 4, 5, 2},
+    {0, 4, 3, 2, 4, 1}, {2, 4, 2, 3, 4, 2}, {2, 4, 2, 3, 4, 2}, {3, 4, 3, 4, 3, 1},
+    {0, 4, 2, 3, 4, 1}, {2, 4, 2, 4, 3, 2}, {3, 4, 3, 4, 3, 1}, {3, 4, 3, 4, 3, 1},
+}};
+const std::array<std::array<std::uint8_t, 16>, 2> kPatternLengths = {{
+    {0, 3, 2, 2, 5, 4, 4, 4, 6, 6, 6, 6, 6, 6, 5, 5},
+    {8, 5, 6, 1, 8, 6, 6, 3, 9, 7, 9, 7, 9, 6, 9, 2},
+}};
+/* clang-format on */
+
+const PackedTables &
+packed_tables ()
+{
+  static const PackedTables tables = build ();
+  return tables;
+}
+
+} // namespace rangecast

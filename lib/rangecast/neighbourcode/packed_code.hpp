@@ -1,0 +1,231 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Profile packed: run lengths and prefix codes that never change. */
+#pragma once
+
+#include <bit>
+
+#include "entropy_code.hpp"
+
+namespace rangecast {
+
+inline constexpr int kPackedContexts = 64;
+inline constexpr int kMaxChoiceBits = 5;
+inline constexpr int kMaxPatternBits = 10;
+/** Longest prefix of an exponential Golomb code: longer ones are damage. */
+inline constexpr int kMaxGolombPrefix = 18;
+/** Bits of the greatest number that it says. */
+inline constexpr int kMaxGolombBits = 20;
+/** Order of the code of run ends. */
+inline constexpr int kRunOrder = 1;
+
+/** Lengths of the codes in bits, 0 = there is none. Part of the format. */
+extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
+/** Which components of a residual are not zero: of pixels with a neighbour, and of the others. */
+extern const std::array<std::array<std::uint8_t, 16>, 2> kPatternLengths;
+
+struct PrefixCode {
+  std::uint16_t bits = 0;
+  std::uint8_t length = 0;
+};
+
+/** Codes and the tables that read them, built once from the lengths. */
+struct PackedTables {
+  struct Entry {
+    std::uint8_t symbol = 0, length = 0; /* length 0: no such code */
+  };
+  std::array<std::array<PrefixCode, kChoices>, kPackedContexts> choice;
+  std::array<std::array<PrefixCode, 16>, 2> pattern;
+  std::array<std::array<Entry, 1 << kMaxChoiceBits>, kPackedContexts> choice_of;
+  std::array<std::array<Entry, 1 << kMaxPatternBits>, 2> pattern_of;
+};
+const PackedTables &packed_tables ();
+
+constexpr std::size_t
+packed_context (const Neighbours &n)
+{
+  return static_cast<std::size_t> (
+      n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ());
+}
+
+constexpr std::uint32_t
+zigzag (std::int32_t v)
+{
+  return static_cast<std::uint32_t> (v) << 1 ^ static_cast<std::uint32_t> (v >> 31);
+}
+
+constexpr std::int32_t
+unzigzag (std::uint32_t v)
+{
+  return static_cast<std::int32_t> (v >> 1) ^ -static_cast<std::int32_t> (v & 1);
+}
+
+/** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
+class PackedWriter {
+public:
+  PackedWriter (std::uint8_t *to, EntropyModel &, const GolombOrders &orders)
+      : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
+  {
+  }
+
+  /** By how much a run ends later than the one above. */
+  void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
+  void choice (const Neighbours &n, int chosen)
+  {
+    put (tables_->choice[packed_context (n)][static_cast<std::size_t> (chosen)]);
+  }
+  void residual (const Neighbours &, bool has_neighbour, const Components &r)
+  {
+    const unsigned pattern = (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3;
+    put (tables_->pattern[!has_neighbour][pattern]);
+    for (std::size_t i = 0; i < kComponents; i++)
+      if (r[i]) {
+        put (r[i] < 0, 1);
+        golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[i]);
+      }
+  }
+  [[nodiscard]] std::size_t bound () const { return static_cast<std::size_t> (to_ - begin_) + 8; }
+  std::size_t finish ()
+  {
+    for (; count_ > 0; count_ -= 8, held_ >>= 8)
+      *to_++ = static_cast<std::uint8_t> (held_);
+    return static_cast<std::size_t> (to_ - begin_);
+  }
+
+private:
+  /* Up to 32 bits. */
+  void put (std::uint64_t value, int bits)
+  {
+    held_ |= value << count_;
+    count_ += bits;
+    if (count_ >= 32) {
+      for (int i = 0; i < 4; i++)
+        to_[i] = static_cast<std::uint8_t> (held_ >> 8 * i);
+      to_ += 4;
+      held_ >>= 32;
+      count_ -= 32;
+    }
+  }
+  void put (const PrefixCode &code) { put (code.bits, code.length); }
+  void golomb (std::uint32_t value, int order)
+  {
+    const std::uint32_t upper = (value >> order) + 1;
+    const int width = std::bit_width (upper) - 1;
+    put (1u << width, width + 1);
+    put (upper & ((1u << width) - 1), width);
+    put (value & ((1u << order) - 1), order);
+  }
+
+  std::uint8_t *begin_, *to_;
+  std::uint64_t held_ = 0;
+  int count_ = 0;
+  GolombOrders orders_;
+  const PackedTables *tables_;
+};
+
+/** Reads what a PackedWriter wrote. Behind the end it reads zeros, which soon are no code. */
+class PackedReader {
+public:
+  PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
+      : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
+  {
+  }
+
+  bool run (bool, std::int32_t &later)
+  {
+    std::uint32_t value = 0;
+    const bool good = golomb (kRunOrder, value);
+    later = unzigzag (value);
+    return good;
+  }
+  /** A PixelChoice, or -1 for damage. */
+  int choice (const Neighbours &n)
+  {
+    return get (tables_->choice_of[packed_context (n)], kMaxChoiceBits);
+  }
+  bool residual (const Neighbours &, bool has_neighbour, Components &r)
+  {
+    const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
+    if (pattern < 0)
+      return false;
+    for (std::size_t i = 0; i < kComponents; i++) {
+      r[i] = 0;
+      if (!(pattern >> i & 1))
+        continue;
+      refill ();
+      const bool negative = held_ & 1;
+      consume (1);
+      std::uint32_t size = 0;
+      if (!golomb (orders_[i], size) || size >= kMaxResidual)
+        return false;
+      r[i] = static_cast<std::int32_t> (size) + 1;
+      r[i] = negative ? -r[i] : r[i];
+    }
+    return true;
+  }
+  /** More was taken than there is. */
+  [[nodiscard]] bool overrun () const { return count_ < 0; }
+  /** Nothing is left but the zero bits that fill the last byte, and no more was read. */
+  [[nodiscard]] bool at_clean_end () const
+  {
+    return from_ == end_ && count_ >= 0 && count_ < 8 && held_ == 0;
+  }
+
+private:
+  template <std::size_t N> int get (const std::array<PackedTables::Entry, N> &table, int most)
+  {
+    refill ();
+    const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
+    consume (e.length);
+    return e.length > 0 && count_ >= 0 ? e.symbol : -1;
+  }
+  bool golomb (int order, std::uint32_t &value)
+  {
+    refill ();
+    const int width = std::countr_zero (held_);
+    if (width > kMaxGolombPrefix)
+      return false;
+    consume (width + 1);
+    const std::uint32_t upper = (1u << width) + take (width) - 1;
+    if (upper >> (kMaxGolombBits - order))
+      return false;
+    refill ();
+    value = upper << order | take (order);
+    return count_ >= 0;
+  }
+  std::uint32_t take (int bits)
+  {
+    const auto value = static_cast<std::uint32_t> (held_ & ((std::uint64_t{1} << bits) - 1));
+    consume (bits);
+    return value;
+  }
+  /* At least 56 bits are there afterwards, or all that are left. */
+  void refill ()
+  {
+    if (end_ - from_ >= 8 && count_ >= 0) {
+      std::uint64_t word = 0;
+      for (int i = 0; i < 8; i++)
+        word |= std::uint64_t{from_[i]} << 8 * i;
+      held_ |= word << count_;
+      from_ += (63 - count_) >> 3;
+      count_ |= 56;
+      return;
+    }
+    while (count_ >= 0 && count_ <= 56 && from_ != end_) {
+      held_ |= std::uint64_t{*from_++} << count_;
+      count_ += 8;
+    }
+  }
+  void consume (int bits)
+  {
+    held_ >>= bits;
+    count_ -= bits;
+  }
+
+  const std::uint8_t *from_, *end_;
+  std::uint64_t held_ = 0; /* bits from count_ upwards are those of the next bytes, or zeros */
+  int count_ = 0;          /* below 0: more was taken than there is */
+  GolombOrders orders_;
+  const PackedTables *tables_;
+};
+
+} // namespace rangecast

@@ -1,0 +1,348 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Pixels of slices in the profiles packed and entropy, written from docs/bitstream.md alone.
+
+The tables of both profiles are read from that page, so that they are what it says.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Callable, NamedTuple, Optional, Union
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "bitstream.md"
+PACKED, ENTROPY = 1, 2
+MAX_OVERRUN = 16
+
+
+class Damage(Exception):
+    """The slice breaks a rule of the page."""
+
+
+def table(name: str) -> list[str]:
+    """The words of a table of the page."""
+    found = re.search(rf"<!-- table: {name} -->(.*?)<!-- end -->", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert found, name
+    return found[1].split()
+
+
+def prefix_code(lengths: list[int]) -> dict[tuple[int, int], int]:
+    """Symbols by length and bits of their codes."""
+    code, symbols = 0, {}
+    for length in range(1, max(lengths) + 1):
+        for symbol, its_length in enumerate(lengths):
+            if its_length == length:
+                symbols[length, code] = symbol
+                code += 1
+        code *= 2
+    return symbols
+
+
+INITIAL = [int(word, 16) for word in table("initial probabilities")]
+CHOICES = [prefix_code([int(digit) for digit in word]) for word in table("choice lengths")]
+PATTERN_LENGTHS = [int(word) for word in table("pattern lengths")]
+PATTERNS = [prefix_code(PATTERN_LENGTHS[:16]), prefix_code(PATTERN_LENGTHS[16:])]
+
+
+class Pixel(NamedTuple):
+    """A valid pixel: Z, Y, Co, Cg, where it came from, and the size of its residual."""
+
+    numbers: tuple[int, ...]
+    origin: int
+    activity: tuple[int, ...] = (0, 0, 0, 0)
+
+
+Place = Optional[Pixel]
+
+
+def origin(pixel: Place) -> int:
+    return pixel.origin if pixel else 0
+
+
+def kind(pixel: Place) -> int:
+    return min(origin(pixel), 3)
+
+
+class Neighbours(NamedTuple):
+    left: Place
+    upper_left: Place
+    upper: Place
+    upper_right: Place
+
+    def kinds(self) -> int:
+        return kind(self.left) + 4 * kind(self.upper) + 16 * kind(self.upper_right)
+
+
+class PackedData:
+    """Bits, and what packed makes of them."""
+
+    def __init__(self, data: bytes) -> None:
+        if len(data) < 2:
+            raise Damage("no orders")
+        self.orders = [data[i // 2] >> 4 * (i % 2) & 15 for i in range(4)]
+        self.size = 8 * len(data) - 16
+        self.data = data[2:]
+        self.position = 0
+
+    def take(self, count: int) -> int:
+        start, shift = divmod(self.position, 8)
+        value = int.from_bytes(self.data[start : start + 4], "little") >> shift & (1 << count) - 1
+        self.position += count
+        if self.position > self.size:
+            raise Damage("too few bits")
+        return value
+
+    def golomb(self, order: int) -> int:
+        zeros = 0
+        while not self.take(1):
+            zeros += 1
+            if zeros > 18:
+                raise Damage("prefix")
+        value = ((1 << zeros) + self.take(zeros) - 1 << order) + self.take(order)
+        if value >> 20:
+            raise Damage("too large")
+        return value
+
+    def symbol(self, code: dict[tuple[int, int], int]) -> int:
+        bits = 0
+        for length in range(1, 17):
+            bits = bits << 1 | self.take(1)
+            if (length, bits) in code:
+                return code[length, bits]
+        raise Damage("no such code")
+
+    def later(self, _valid: bool) -> int:
+        value = self.golomb(1)
+        return -(value + 1) // 2 if value % 2 else value // 2
+
+    def choice(self, near: Neighbours) -> int:
+        return self.symbol(CHOICES[near.kinds()])
+
+    def residual(self, near: Neighbours) -> tuple[int, ...]:
+        pattern = self.symbol(PATTERNS[not any(near)])
+        return tuple(self.number(self.orders[i]) if pattern >> i & 1 else 0 for i in range(4))
+
+    def number(self, order: int) -> int:
+        negative = self.take(1)
+        size = self.golomb(order) + 1
+        if size > 1 << 18:
+            raise Damage("residual")
+        return -size if negative else size
+
+    def finish(self) -> None:
+        left = self.size - self.position
+        if left >= 8 or left and self.data[-1] >> 8 - left:
+            raise Damage("something is left over")
+
+
+class EntropyData:
+    """Decisions, and what entropy makes of them."""
+
+    def __init__(self, data: bytes) -> None:
+        self.p = list(INITIAL)
+        self.data = data
+        self.position = 0
+        self.range = (1 << 32) - 1
+        self.code = 0
+        for _ in range(4):
+            self.code = self.code << 8 | self.next_byte()
+
+    def next_byte(self) -> int:
+        self.position += 1
+        if self.position > len(self.data) + MAX_OVERRUN:
+            raise Damage("read beyond the end")
+        return self.data[self.position - 1] if self.position <= len(self.data) else 0
+
+    def refill(self) -> None:
+        while self.range < 1 << 24:
+            self.range <<= 8
+            self.code = self.code << 8 | self.next_byte()
+
+    def decide(self, i: int) -> bool:
+        part = (self.range >> 12) * (self.p[i] >> 4)
+        yes = self.code < part
+        if yes:
+            self.range = part
+            self.p[i] += (65536 - self.p[i]) // 32
+        else:
+            self.code -= part
+            self.range -= part
+            self.p[i] -= self.p[i] // 32
+        self.refill()
+        return yes
+
+    def bit(self) -> int:
+        self.range >>= 1
+        one = self.code < self.range
+        if not one:
+            self.code -= self.range
+        self.refill()
+        return int(one)
+
+    def number(self, i: int, j: int) -> int:
+        if not self.decide(i):
+            return 0
+        negative = self.decide(j)
+        size = 1
+        while size <= 4 and self.decide(j + size):
+            size += 1
+        if size == 5:
+            n = 0
+            while self.decide(j + 5 + min(n, 10)):
+                n += 1
+                if n > 17:
+                    raise Damage("too large")
+            rest = 0
+            for _ in range(n):
+                rest = rest << 1 | self.bit()
+            size = 4 + (1 << n) + rest
+        return -size if negative else size
+
+    def later(self, valid: bool) -> int:
+        return self.number(int(valid), 2 + 16 * valid)
+
+    def choice(self, near: Neighbours) -> int:
+        if near.left and self.decide(34 + near.kinds()):
+            return 0
+        seen = {near.left.numbers} if near.left else set()
+        candidates = []
+        for pixel in near[1:]:
+            candidates.append(pixel is not None and pixel.numbers not in seen)
+            if pixel:
+                seen.add(pixel.numbers)
+        full = 2 * (kind(near.left) == 3) + (kind(near.upper) == 3)
+        others = (candidates[1] + 2 * candidates[2], int(candidates[2]), 0)
+        for i in range(3):
+            if candidates[i] and self.decide(98 + 16 * i + 4 * full + others[i]):
+                return i + 1
+        return 4 if self.decide(146 + origin(near.left) + 5 * origin(near.upper)) else 5
+
+    def residual(self, near: Neighbours) -> tuple[int, ...]:
+        r: list[int] = []
+        for i in range(4):
+            if not any(near):
+                a = 5
+            elif not near.left or not near.upper:
+                a = 4
+            else:
+                total = sum(pixel.activity[i] for pixel in (near.left, near.upper, near.upper_right) if pixel)
+                a = (0, 1, 2, 2, 3, 3, 3)[total] if total < 7 else 4
+            q = i > 0 and r[-1] != 0
+            r.append(self.number(171 + 12 * i + 6 * q + a, 219 + 32 * i + 16 * (a >= 3)))
+        return tuple(r)
+
+    def finish(self) -> None:
+        if self.position < len(self.data):
+            raise Damage("something is left over")
+
+
+Data = Union[PackedData, EntropyData]
+
+
+def cut(value: int, least: int, most: int) -> int:
+    return min(max(value, least), most)
+
+
+class CompactSlice:
+    """Reads the pixels of a slice. last and maximum are the greatest codes of depth and colour."""
+
+    def __init__(self, profile: int, body: bytes, columns: int, last: int, maximum: int) -> None:
+        if len(body) < 4:
+            raise Damage("no steps")
+        depth = int.from_bytes(body[:2], "little")
+        self.steps = (depth, body[2], body[3], body[3])
+        if 0 in self.steps:
+            raise Damage("a step of 0")
+        self.data: Data = PackedData(body[4:]) if profile == PACKED else EntropyData(body[4:])
+        self.columns = columns
+        self.limits = ((0, last), (0, maximum), (-maximum, maximum), (-maximum, maximum))
+        self.latest: tuple[int, ...] = (last // 2, maximum // 2, 0, 0)
+
+    def runs(self, above: list[Place]) -> list[bool]:
+        """Which pixels of a row are valid."""
+        valid: list[bool] = []
+        now = False
+        first = True
+        while len(valid) < self.columns:
+            begin = len(valid)
+            end = begin
+            while end < self.columns and (above[end] is not None) == now:
+                end += 1
+            end += self.data.later(now)
+            if end > self.columns or end < begin or end == begin and not first:
+                raise Damage("run")
+            valid += [now] * (end - begin)
+            now = not now
+            first = False
+        return valid
+
+    def row(self, above: list[Place]) -> list[Place]:
+        """The pixels of the next row."""
+        row: list[Place] = [None] * self.columns
+        for x, valid in enumerate(self.runs(above)):
+            if valid:
+                near = Neighbours(
+                    row[x - 1] if x > 0 else None,
+                    above[x - 1] if x > 0 else None,
+                    above[x],
+                    above[x + 1] if x + 1 < self.columns else None,
+                )
+                pixel = self.pixel(near)
+                self.latest = pixel.numbers
+                row[x] = pixel
+        return row
+
+    def pixel(self, near: Neighbours) -> Pixel:
+        choice = self.data.choice(near) if any(near) else 5
+        if choice < 4:
+            same = near[choice]
+            if not same:
+                raise Damage("equals an invalid pixel")
+            return Pixel(same.numbers, 1 if choice == 0 else 2)
+        numbers = self.predicted(near)
+        if choice == 4:
+            return Pixel(numbers, 3)
+        r = self.data.residual(near)
+        made = (cut(n + d * s, *limit) for n, d, s, limit in zip(numbers, r, self.steps, self.limits))
+        return Pixel(tuple(made), 4, tuple(min(abs(d), 9) for d in r))
+
+    def predicted(self, near: Neighbours) -> tuple[int, ...]:
+        left, upper_left, upper, upper_right = near
+        if not left and not upper:
+            other = upper_left or upper_right
+            return other.numbers if other else self.latest
+        if not left or not upper:
+            return (left or upper).numbers  # type: ignore[union-attr]
+        beyond = upper_right or upper
+        p = [(2 * a + b + c + 2) // 4 for a, b, c in zip(left.numbers, upper.numbers, beyond.numbers)]
+        z = left.numbers[0] + upper.numbers[0]
+        p[0] = cut(z - upper_left.numbers[0], *self.limits[0]) if upper_left else (z + 1) // 2
+        return tuple(p)
+
+    def codes(self, numbers: tuple[int, ...]) -> tuple[int, int, int, int]:
+        """Codes of depth, R, G and B."""
+        z, y, co, cg = numbers
+        t = y - cg // 2
+        b = t - co // 2
+        maximum = self.limits[1][1]
+        return z, cut(b + co, 0, maximum), cut(cg + t, 0, maximum), cut(b, 0, maximum)
+
+
+def decode(
+    profile: int,
+    body: bytes,
+    rows: int,
+    columns: int,
+    last: int,
+    maximum: int,
+    shown: Callable[[tuple[int, int, int, int]], tuple[int, int, int, int]],
+) -> list[Optional[tuple[int, int, int, int]]]:
+    """The pixels of a slice as `shown` makes them of their codes, row by row; None: invalid."""
+    part = CompactSlice(profile, body, columns, last, maximum)
+    above: list[Place] = [None] * columns
+    pixels: list[Optional[tuple[int, int, int, int]]] = []
+    for _ in range(rows):
+        above = part.row(above)
+        pixels += [shown(part.codes(pixel.numbers)) if pixel else None for pixel in above]
+    part.data.finish()
+    return pixels
