@@ -284,7 +284,7 @@ drop_past_gaps (const WaitingBuffers &waiting, GstClockTime tolerance, bool time
     first = std::min (first, w.running);
   bool any = false;
   for (const Waiting &gap : waiting.gaps)
-    if (first > gstrange::gap_end (gap.running, gap.buffer, tolerance)) {
+    if (waiting.list.empty () || first > gstrange::gap_end (gap.running, gap.buffer, tolerance)) {
       gst_aggregator_pad_drop_buffer (gap.entry->pad);
       any = true;
     }
