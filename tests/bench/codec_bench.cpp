@@ -12,9 +12,7 @@
  * written here from its description: runs of zeros and of values, zigzag differences, in nibbles of
  * three bits and a continuation bit. */
 #include <turbojpeg.h>
-#ifdef RANGECAST_HAVE_ZSTD
 #include <zstd.h>
-#endif
 
 #include <algorithm>
 #include <chrono>
@@ -248,23 +246,14 @@ run_profile (
 std::size_t
 compress (const std::vector<std::uint8_t> &from, std::vector<std::uint8_t> &to)
 {
-#ifdef RANGECAST_HAVE_ZSTD
   to.resize (ZSTD_compressBound (from.size ()));
   return ZSTD_compress (to.data (), to.size (), from.data (), from.size (), 1);
-#else
-  to = from;
-  return to.size ();
-#endif
 }
 
 void
 expand (const std::vector<std::uint8_t> &from, std::size_t size, std::vector<std::uint8_t> &to)
 {
-#ifdef RANGECAST_HAVE_ZSTD
   ZSTD_decompress (to.data (), to.size (), from.data (), size);
-#else
-  std::copy_n (from.begin (), size, to.begin ());
-#endif
 }
 
 Row
