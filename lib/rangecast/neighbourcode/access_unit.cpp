@@ -50,10 +50,18 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
     result.points += work.result.points;
     result.full_pixels += work.result.full_pixels;
     result.slices += work.result.slices;
+    result.delta_slices += work.result.delta_slices;
     result.raw_bits += work.result.raw_bits;
   }
   count_ = images.size ();
   return {};
+}
+
+void
+AccessUnitEncoder::request_key ()
+{
+  for (ViewEncoder &view : views_)
+    view.request_key ();
 }
 
 std::size_t
@@ -75,9 +83,17 @@ AccessUnitDecoder::set_rig (const Rig &rig)
   for (const View &view : rig.views)
     if (Status s = decoders_[view.id].set_rig ({{view}}); !s.ok ())
       return s;
+  forget_references ();
   rig_ = rig;
   count_ = 0;
   return {};
+}
+
+void
+AccessUnitDecoder::forget_references ()
+{
+  for (ReferencePair &pair : references_)
+    pair.forget ();
 }
 
 /* What slices of one view agree in, then where they lie, then when they came. */
@@ -85,14 +101,14 @@ static auto
 sort_key (const SliceHeader &h)
 {
   return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
-      h.colour_bits, h.frame_number, h.first_column, h.first_row, h.columns, h.rows};
+      h.colour_bits, h.frame_number, h.reference, h.first_column, h.first_row, h.columns, h.rows};
 }
 
 static bool
 agrees (const SliceHeader &a, const SliceHeader &b)
 {
   return a.roi == b.roi && a.depth_bits == b.depth_bits && a.colour_bits == b.colour_bits &&
-         a.frame_number == b.frame_number;
+         a.frame_number == b.frame_number && a.reference == b.reference;
 }
 
 static bool
@@ -278,16 +294,25 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
 {
   Place place = Place::kNothing;
   for (const PlannedSlice &slice : same) {
-    std::uint64_t points = 0;
+    const int id = slice.header.view_id;
+    ReferencePair &pair = references_[id];
+    ReferencePlane *now = slice.header.reference ? &pair.now () : nullptr;
+    DecodedPixels decoded;
     if (!slice.too_short &&
-        decoders_[slice.header.view_id].decode (slice.unit, slice.header, image, points).ok ()) {
+        decoders_[id]
+            .decode (slice.unit, slice.header, {&pair.before (), now, &older}, image, decoded)
+            .ok ()) {
       result.slices++;
-      result.points += points;
+      result.points += decoded.points;
+      result.unknown_pixels += decoded.unknown;
       return Place::kSound;
     }
     result.bad_slices++;
-    if (!slice.too_short)
-      place = Place::kDamaged;
+    if (slice.too_short)
+      continue;
+    place = Place::kDamaged;
+    if (now)
+      now->clear (slice.header);
   }
   if (place == Place::kDamaged)
     fill_from (older, image, place_of (same[0].header));
@@ -320,6 +345,11 @@ AccessUnitDecoder::decode_view (
   DecoderResult &result = results_[index];
   Coverage &covered = covered_[index];
   result = {};
+  if (planned.reference.reference) {
+    SliceHeader header = planned.reference;
+    header.roi = planned.roi;
+    references_[planned.view_id].begin (header);
+  }
   std::uint64_t have;
   const bool tiled = is_tiled (planned, have);
   if (!tiled) {
@@ -376,6 +406,7 @@ AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, Deco
     result.missing_pixels += r.missing_pixels;
     result.points += r.points;
     result.raw_bits += r.raw_bits;
+    result.unknown_pixels += r.unknown_pixels;
   }
   return {};
 }

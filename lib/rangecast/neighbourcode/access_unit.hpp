@@ -21,6 +21,9 @@ public:
   Status encode (std::span<const RangeImage> images, std::uint32_t frame_number, int threads,
       EncoderResult &result);
 
+  /** The next frame set is coded without reference to earlier ones. */
+  void request_key ();
+
   [[nodiscard]] std::size_t parts () const { return count_; }
   [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return work_[i].bytes; }
   [[nodiscard]] std::size_t size () const;
@@ -47,7 +50,10 @@ struct DecoderResult {
   std::uint64_t bad_slices = 0; ///< damaged, of another rig or version, or at odds with the others
   std::uint64_t missing_pixels = 0; ///< of the views' ROIs, in slices that did not come
   std::uint64_t points = 0;         ///< valid pixels
-  std::uint64_t raw_bits = 0;       ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+  /** Pixels of sound slices that are invalid only because they refer to ones of an earlier frame
+   * set that were not received. */
+  std::uint64_t unknown_pixels = 0;
+  std::uint64_t raw_bits = 0; ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
 };
 
 /** Decodes whole frame sets in two steps: plan() finds which views there are and how large, so that
@@ -66,6 +72,8 @@ public:
 
   Status set_rig (const Rig &rig);
   [[nodiscard]] const Rig &rig () const { return rig_; }
+  /** What comes next does not continue what was decoded last. */
+  void forget_references ();
 
   /** Reads all headers. Views are sorted by view-id. ROI, bits and frame number of a view are those
    *  that most of its slices have (of two as frequent: those that came first); slices that differ
@@ -113,7 +121,8 @@ private:
 
   Rig rig_;
   SliceDecoder header_reader_;
-  std::array<SliceDecoder, kMaxViews> decoders_; /* by view-id */
+  std::array<SliceDecoder, kMaxViews> decoders_;    /* by view-id */
+  std::array<ReferencePair, kMaxViews> references_; /* by view-id */
   std::array<PlannedView, kMaxViews> planned_;
   /* by planned view */
   std::array<DecoderResult, kMaxViews> results_;

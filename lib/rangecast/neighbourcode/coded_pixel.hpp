@@ -10,7 +10,7 @@
 #include <cstring>
 #include <span>
 
-#include "unit.hpp"
+#include "reference.hpp"
 
 namespace rangecast {
 
@@ -23,14 +23,16 @@ enum class Origin : std::uint8_t {
   kCorrected = 4, ///< the same and a residual
 };
 
-/** What a slice of these profiles holds for one pixel. The first four are places of neighbours. */
+/** What a slice of these profiles holds for one pixel. The first four are places of neighbours.
+ *  kTakeEarlier is said apart from the others: the same pixel of an earlier frame set. */
 enum PixelChoice : int {
   kTakeLeft,
   kTakeUpperLeft,
   kTakeUpper,
   kTakeUpperRight,
   kPredict,
-  kCorrect
+  kCorrect,
+  kTakeEarlier
 };
 inline constexpr int kChoices = 6;
 
@@ -59,8 +61,9 @@ components_of (PixelCode code)
   return {static_cast<std::int32_t> (code & 0xffff), colour (1), colour (2), colour (3)};
 }
 
-/** Of an invalid pixel. No valid one has it, because Y is not negative. */
-inline constexpr PixelCode kNoPixel = ~PixelCode{0};
+/** Of an invalid pixel, and of a valid one that refers to something that was not received. No other
+ *  has it, because Y is not negative. */
+inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
 
 /** Sizes of a residual, at most 9 each, one a byte from the least significant; 0 for copies. */
 using Activity = std::uint32_t;
@@ -68,7 +71,9 @@ using Activity = std::uint32_t;
 /** Two plain numbers: it is copied for every pixel, and whole. */
 struct CodedPixel {
   PixelCode code = kNoPixel;
-  std::uint64_t state = 0; /* its origin, from bit 8 its kind, from bit 32 its activity */
+  /* Its origin, from bit 8 its kind, from bit 16 its choice and one, from bit 32 its activity. The
+   * choice is kept only in slices that refer to earlier frame sets. */
+  std::uint64_t state = 0;
 
   constexpr CodedPixel () = default;
   constexpr CodedPixel (PixelCode pixel, Origin origin, Activity activity = 0)
@@ -77,7 +82,20 @@ struct CodedPixel {
                              std::uint64_t{activity} << 32)
   {
   }
+  /** One that equals another. */
+  static constexpr CodedPixel copy (PixelCode pixel, int choice)
+  {
+    const bool upper = choice >= kTakeUpperLeft && choice <= kTakeUpperRight;
+    CodedPixel copied (pixel, upper ? Origin::kUpper : Origin::kLeft);
+    copied.state |= static_cast<std::uint64_t> (choice + 1) << 16;
+    return copied;
+  }
   [[nodiscard]] constexpr bool valid () const { return state != 0; }
+  /** Whether it was made by copy (..., choice). */
+  [[nodiscard]] constexpr bool took (PixelChoice choice) const
+  {
+    return (state >> 16 & 0xff) == static_cast<std::uint64_t> (choice + 1);
+  }
   [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
   /** The same, without a difference between predicted and corrected pixels. */
   [[nodiscard]] constexpr int kind () const { return static_cast<int> (state >> 8 & 3); }
@@ -141,6 +159,19 @@ predict (const Neighbours &n, PixelCode last, std::int32_t last_depth)
                                : (left[0] + upper[0] + 1) >> 1;
   p[0] = std::clamp (p[0], 0, last_depth);
   return p;
+}
+
+/** Whether predict () uses only pixels that were received. */
+constexpr bool
+can_predict (const Neighbours &n, PixelCode last)
+{
+  const auto known = [] (const CodedPixel &p) { return !p.valid () || p.code != kNoPixel; };
+  const bool l = n.left.valid (), u = n.upper.valid (), ur = n.upper_right.valid ();
+  if (!l && !u)
+    return (n.upper_left.valid () ? n.upper_left.code : ur ? n.upper_right.code : last) != kNoPixel;
+  if (!l || !u)
+    return (l ? n.left : n.upper).code != kNoPixel;
+  return known (n.left) && known (n.upper) && known (n.upper_left) && known (n.upper_right);
 }
 
 /** By how much one step of a residual changes each component. */

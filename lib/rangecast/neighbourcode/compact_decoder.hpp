@@ -11,28 +11,51 @@
 
 namespace rangecast {
 
+/** What came of a slice. */
+struct DecodedPixels {
+  std::uint64_t points = 0;  ///< valid ones
+  std::uint64_t unknown = 0; ///< valid, but they refer to pixels that were not received
+};
+
+/** Where a slice's pixels refer to, and where they are kept. */
+struct DecoderReference {
+  const ReferencePlane *before = nullptr; ///< none: nothing is there to refer to
+  ReferencePlane *now = nullptr;          ///< takes the decoded pixels, if there is one
+  /** What is shown of pixels that refer to something that was not received; may be empty. */
+  const ConstRangeImage *older = nullptr;
+};
+
 /** Decodes slices of the profiles packed and entropy. Keeps its memory. */
 class CompactDecoder {
 public:
   /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
    *  @param body    what is behind the slice header
    *  @param header  checked, and not empty; its ROI is the image's
-   *  @param[out] points  grows by the valid pixels
+   *  @param[out] pixels  grows
    *  @return false for damage: the pixels may then be partly written */
   bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
-      const CompactQuantisers &quantisers, const RangeImage &image, std::uint64_t &points);
+      const CompactQuantisers &quantisers, const DecoderReference &reference,
+      const RangeImage &image, DecodedPixels &pixels);
 
 private:
-  template <class Code>
+  template <class Code, bool Delta>
   bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
-      const RangeImage &image, std::uint64_t &points);
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
+  template <class Code>
+  bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
+  void keep_row (std::uint64_t *kept, int columns) const;
+  void show_older (const ConstRangeImage &older, const SliceHeader &header, int row,
+      const RangeImage &image) const;
   template <class Code> bool decode_runs (Code &code, int columns);
-  template <class Code>
+  template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
   bool decode_row (Code &code, const CompactQuantisers &quantisers, int columns);
-  template <class Code>
+  template <class Code, bool Delta>
   bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
-  template <class Code>
+  void take_earlier (std::size_t x, const CompactQuantisers &quantisers);
+  template <class Code, bool Delta>
   bool decode_full (Code &code, const Neighbours &n, bool corrected,
       const CompactQuantisers &quantisers, std::size_t x);
 
@@ -42,8 +65,10 @@ private:
     std::vector<CodedPixel> pixels;
     std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
     std::vector<std::uint8_t> valid;
+    std::vector<std::uint8_t> earlier; /* pixels that equal those of the earlier frame set */
   };
   Row row_, upper_;
+  std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
   EntropyModel model_{};
   Components steps_{};
   Limits limits_{};

@@ -16,6 +16,9 @@ constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
  * columns for each byte^(1/2) of its size. */
 constexpr double kColumnsOfSlice = 2.8;
 
+/* How full slices with a reference are meant to be: then few of them break in their band. */
+constexpr double kFillOfDeltaSlice = 0.8;
+
 /* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
  * residuals come to on average in recordings; their price was found by trying. */
 constexpr float kPriceOfBit = 0.2f;
@@ -51,10 +54,13 @@ first_near (Lanes own, const Lanes &left, const Lanes *above, Lanes threshold)
 /* An EntropyCode that looks like a PackedWriter. */
 class EntropyWriter : public EntropyCode<EntropyWriting> {
 public:
-  EntropyWriter (std::uint8_t *to, EntropyModel &model, const GolombOrders &)
+  static constexpr bool kEarlierInRuns = false;
+
+  EntropyWriter (
+      std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const GolombOrders &)
       : EntropyCode (EntropyWriting (to), model)
   {
-    model = kInitialModel;
+    model = initial;
   }
   void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
   void residual (const Neighbours &n, bool has_neighbour, Components r)
@@ -106,10 +112,12 @@ steps_within (int depth_threshold, int colour_threshold)
 }
 
 CompactResult
-CompactEncoder::encode (const ConstRangeImage &image, const CompactQuantisers &quantisers,
-    const CompactSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to)
+CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> bands,
+    const CompactReference &reference, const CompactQuantisers &quantisers,
+    const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to)
 {
   settings_ = settings;
+  reference_ = reference;
   quantisers_ = &quantisers;
   header_ = header;
   result_ = {};
@@ -125,31 +133,70 @@ CompactEncoder::encode (const ConstRangeImage &image, const CompactQuantisers &q
   depth_weight_ = weight (settings.depth_threshold);
   colour_weight_ = weight (c);
 
+  std::size_t delta_bytes = 0, delta_pixels = 0;
+  for (const RowBand &band : bands) {
+    const std::size_t begin = to.size ();
+    header_.key = band.key;
+    header_.reference_distance = band.key ? std::uint8_t{0} : header.reference_distance;
+    code_band (image, band, to);
+    if (!band.key) {
+      delta_bytes += to.size () - begin;
+      delta_pixels +=
+          static_cast<std::size_t> (band.rows) * static_cast<std::size_t> (image.roi.width);
+    }
+  }
+  if (delta_pixels > 0)
+    delta_bytes_per_pixel_ = double (delta_bytes) / double (delta_pixels);
+  return result_;
+}
+
+/* Slices about as wide as high; but with a reference they are as high as their band, if last time
+ * is anything to go by. */
+int
+CompactEncoder::pieces_of (const RowBand &band, int width) const
+{
+  double side = kColumnsOfSlice * std::sqrt (settings_.max_slice_size);
+  if (!band.key && delta_bytes_per_pixel_ > 0) {
+    const double columns = kFillOfDeltaSlice * settings_.max_slice_size /
+                           (delta_bytes_per_pixel_ * RefreshSchedule::kBandRows);
+    side = std::clamp (columns, side, double (std::max (width, int (side) + 1)));
+  }
+  return std::clamp (int (std::lround (width / side)), 1, width);
+}
+
+void
+CompactEncoder::code_band (
+    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
+{
   const int width = image.roi.width;
-  const double side = kColumnsOfSlice * std::sqrt (settings.max_slice_size);
   const std::size_t begin = to.size ();
-  for (int pieces = std::max (1, int (std::lround (width / side)));; pieces *= 2) {
-    pieces = std::min (pieces, width);
+  const CompactResult before = result_;
+  const bool packed = header_.profile == Profile::kPacked;
+  for (int pieces = pieces_of (band, width);; pieces = std::min (2 * pieces, width)) {
     bool fits = true;
     orders_ = {};
     for (int i = 0; i < pieces && fits; i++) {
-      const int first = width * i / pieces, columns = width * (i + 1) / pieces - first;
-      fits = header.profile == Profile::kPacked
-                 ? code_piece<PackedWriter> (image, first, columns, to)
-                 : code_piece<EntropyWriter> (image, first, columns, to);
+      header_.first_column = width * i / pieces;
+      header_.columns = width * (i + 1) / pieces - header_.first_column;
+      if (band.key)
+        fits = packed ? code_piece<PackedWriter, false> (image, band, to)
+                      : code_piece<EntropyWriter, false> (image, band, to);
+      else
+        fits = packed ? code_piece<PackedWriter, true> (image, band, to)
+                      : code_piece<EntropyWriter, true> (image, band, to);
     }
     if (fits)
-      break;
+      return;
     to.resize (begin); /* a row alone was too long: narrower pieces */
-    result_ = {};
+    result_ = before;
   }
-  return result_;
 }
 
 std::size_t
 CompactEncoder::header_size () const
 {
-  return header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize;
+  return (header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize) +
+         !header_.key;
 }
 
 void
@@ -161,8 +208,11 @@ CompactEncoder::resize (int columns)
     row->pixels.assign (n + 3, {});
     row->colours.assign (n + 2, Lanes{kNoDepthCode, 0, 0, 0});
     row->valid.assign (n, 0);
+    row->earlier.assign (n, 0);
   }
   own_.resize (std::max (own_.size (), n));
+  earlier_codes_.resize (std::max (earlier_codes_.size (), n));
+  earlier_colours_.resize (std::max (earlier_colours_.size (), n));
   const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) + kMostBytesOfPixel +
                            kMostBytesOfRun * (n + 1);
   bytes_.resize (std::max (bytes_.size (), most));
@@ -182,6 +232,25 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
     own_[at] = valid ? Lanes{d.code (depth[x]), c.code (colour[x].r), c.code (colour[x].g),
                            c.code (colour[x].b)}
                      : Lanes{kNoDepthCode, 0, 0, 0};
+  }
+}
+
+/* Finds the pixels that equal those of the earlier frame set, as far as thresholds go. */
+void
+CompactEncoder::load_earlier (int y)
+{
+  const auto columns = static_cast<std::size_t> (columns_);
+  const Roi &roi = header_.roi;
+  reference_.before->fetch (
+      roi.x + header_.first_column, roi.y + y, std::span (earlier_codes_).first (columns));
+  for (std::size_t x = 0; x < columns; x++) {
+    row_.earlier[x] = 0;
+    if (!row_.valid[x] || earlier_codes_[x] == kNoPixel)
+      continue;
+    const Components c = components_of (earlier_codes_[x]);
+    const auto rgb = to_rgb (c, limits_.maximum);
+    earlier_colours_[x] = Lanes{c[0], rgb[0], rgb[1], rgb[2]};
+    row_.earlier[x] = are_near (own_[x], earlier_colours_[x], threshold_);
   }
 }
 
@@ -233,7 +302,7 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, Components &res
 }
 
 /* Codes a pixel that no neighbour replaces. */
-template <class Code>
+template <class Code, bool Delta>
 void
 CompactEncoder::code_full (
     Code &code, const Neighbours &n, std::size_t x, const Components &residual)
@@ -241,7 +310,7 @@ CompactEncoder::code_full (
   const bool has_neighbour = n.any (), predicted = has_neighbour && residual == Components{};
   result_.full_pixels++;
   if (has_neighbour)
-    code.choice (n, predicted ? kPredict : kCorrect);
+    code.template choice<Delta> (n, predicted ? kPredict : kCorrect);
   if (predicted) {
     row_.pixels[x + 1] = {row_.pixels[x + 1].code, Origin::kPredicted};
     return;
@@ -257,7 +326,7 @@ CompactEncoder::code_full (
  *
  * What the loop needs of this object it holds in variables of its own, the code too: bytes are
  * written in it, and for all that the compiler knows any byte may be one of this object's. */
-template <class Code>
+template <class Code, bool Delta>
 bool
 CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
 {
@@ -273,22 +342,35 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   Code code = slice_code;
   std::size_t x = begin;
   for (; x < end && code.bound () <= limit; x++) {
+    if constexpr (Delta) {
+      const bool earlier = row_.earlier[x];
+      if constexpr (!Code::kEarlierInRuns)
+        (void)code.earlier (n, earlier);
+      if (earlier) {
+        colours[x] = earlier_colours_[x];
+        pixels[x] = CodedPixel::copy (earlier_codes_[x], kTakeEarlier);
+        n.move (pixels[x], upper[x + 2]);
+        continue;
+      }
+    }
     Components residual;
     const int chosen = best ? best_choice (x, Neighbours (n), residual)
                             : first_near (own[x], colours[x - 1], upper_colours + x, threshold);
     if (chosen == kTakeLeft) {
-      code.choice (n, chosen);
+      code.template choice<Delta> (n, chosen);
       colours[x] = colours[x - 1];
-      pixels[x] = {n.left.code, Origin::kLeft};
+      pixels[x] =
+          Delta ? CodedPixel::copy (n.left.code, chosen) : CodedPixel (n.left.code, Origin::kLeft);
     } else if (chosen != kPredict) {
-      code.choice (n, chosen);
+      code.template choice<Delta> (n, chosen);
       const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
       colours[x] = upper_colours[from];
-      pixels[x] = {upper[from].code, Origin::kUpper};
+      pixels[x] = Delta ? CodedPixel::copy (upper[from].code, chosen)
+                        : CodedPixel (upper[from].code, Origin::kUpper);
     } else {
       Code copy = code;
       const Neighbours near = n;
-      code_full (copy, near, x, best ? Components (residual) : make_full (x, near));
+      code_full<Code, Delta> (copy, near, x, best ? Components (residual) : make_full (x, near));
       code = copy;
     }
     n.move (pixels[x], upper[x + 2]);
@@ -314,8 +396,23 @@ CompactEncoder::code_runs (Code &code)
   }
 }
 
-/* @return false if the slice has become too long; the row is then to be coded again */
+/* Codes which pixels of a run of valid ones equal those of the earlier frame set. */
 template <class Code>
+void
+CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t end)
+{
+  const std::span<const std::uint8_t> own (row_.earlier.data (), end),
+      upper (upper_.earlier.data (), end);
+  bool now = false;
+  for (auto x = static_cast<int> (begin); x < static_cast<int> (end); now = !now) {
+    const int to = run_end (own, x, now);
+    code.earlier_run (to - run_end (upper, x, now));
+    x = to;
+  }
+}
+
+/* @return false if the slice has become too long; the row is then to be coded again */
+template <class Code, bool Delta>
 bool
 CompactEncoder::code_row (Code &slice_code)
 {
@@ -329,8 +426,11 @@ CompactEncoder::code_row (Code &slice_code)
     if (!now) {
       std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
       std::fill (&row_.colours[first + 1], &row_.colours[behind + 1], Lanes{kNoDepthCode, 0, 0, 0});
-    } else if (!code_run (slice_code, first, behind)) {
-      return false;
+    } else {
+      if constexpr (Delta && Code::kEarlierInRuns)
+        code_earlier_runs (slice_code, first, behind);
+      if (!code_run<Code, Delta> (slice_code, first, behind))
+        return false;
     }
     x = end;
   }
@@ -338,7 +438,7 @@ CompactEncoder::code_row (Code &slice_code)
          static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
 }
 
-template <class Code>
+template <class Code, bool Delta>
 Code
 CompactEncoder::begin_slice (int first_row)
 {
@@ -352,7 +452,8 @@ CompactEncoder::begin_slice (int first_row)
   std::ranges::fill (upper_.pixels, CodedPixel{});
   std::ranges::fill (upper_.colours, Lanes{kNoDepthCode, 0, 0, 0});
   std::ranges::fill (upper_.valid, std::uint8_t{0});
-  return Code (bytes_.data (), model_, orders_);
+  std::ranges::fill (upper_.earlier, std::uint8_t{0});
+  return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel, orders_);
 }
 
 template <class Code>
@@ -363,7 +464,7 @@ CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
   to.resize (begin + header_bytes + size);
   std::uint8_t *p = to.data () + begin;
   write_slice_header (header_, header_bytes + size, p);
-  p += kSliceHeaderSize;
+  p += header_size_of (header_);
   *p++ = static_cast<std::uint8_t> (steps_[0]);
   *p++ = static_cast<std::uint8_t> (steps_[0] >> 8);
   *p++ = static_cast<std::uint8_t> (steps_[1]);
@@ -374,32 +475,39 @@ CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
   }
   std::copy_n (bytes_.data (), size, p);
   result_.slices++;
+  result_.delta_slices += !header_.key;
 }
 
-/* Codes all rows of some columns. @return false if one row alone is longer than a slice may be */
-template <class Code>
+/* Codes all rows of a band in the columns that the header says.
+ * @return false if one row alone is longer than a slice may be */
+template <class Code, bool Delta>
 bool
 CompactEncoder::code_piece (
-    const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to)
+    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
-  header_.first_column = first_column;
-  header_.columns = columns;
-  resize (columns);
+  resize (header_.columns);
   size_sums_ = size_counts_ = {};
-  Code code = begin_slice<Code> (0);
-  for (int y = 0; y < image.roi.height; y++) {
+  Code code = begin_slice<Code, Delta> (band.first_row);
+  for (int y = band.first_row; y < band.first_row + band.rows; y++) {
     load_row (image, y);
+    if constexpr (Delta)
+      load_earlier (y);
     const CompactResult result = result_;
     Code before = code;
     model_before_ = model_;
-    if (!code_row (code)) {
+    if (!code_row<Code, Delta> (code)) {
       if (header_.rows == 0)
         return false;
       result_ = result;
       close_slice (before, to);
-      code = begin_slice<Code> (y);
-      if (!code_row (code))
+      code = begin_slice<Code, Delta> (y);
+      if (!code_row<Code, Delta> (code))
         return false;
+    }
+    if (reference_.now) {
+      std::uint64_t *kept = reference_.now->row (y) + header_.first_column;
+      for (int x = 0; x < columns_; x++)
+        kept[x] = row_.pixels[static_cast<std::size_t> (x) + 1].code;
     }
     header_.rows++;
     std::swap (row_, upper_);

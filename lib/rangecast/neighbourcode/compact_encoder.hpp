@@ -8,6 +8,7 @@
 #include "../geometry/range_image.hpp"
 #include "entropy_code.hpp"
 #include "pixel_lanes.hpp"
+#include "refresh.hpp"
 
 namespace rangecast {
 
@@ -19,7 +20,14 @@ struct CompactSettings {
 
 struct CompactResult {
   std::uint64_t slices = 0;
-  std::uint64_t full_pixels = 0; ///< those without a neighbour that is near enough
+  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
+  std::uint64_t full_pixels = 0;  ///< those without a neighbour that is near enough
+};
+
+/** What slices may refer to. */
+struct CompactReference {
+  const ReferencePlane *before = nullptr; ///< for slices that are not key ones
+  ReferencePlane *now = nullptr;          ///< takes the coded pixels, if there is one
 };
 
 struct CompactQuantisers {
@@ -35,28 +43,37 @@ Steps steps_within (int depth_threshold, int colour_threshold);
 class CompactEncoder {
 public:
   /** Appends the slices of one range image whose ROI is not empty.
-   *  @param header  of all slices: profile, bits, ROI, times */
-  CompactResult encode (const ConstRangeImage &image, const CompactQuantisers &quantisers,
-      const CompactSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to);
+   *  @param bands  that make up the ROI
+   *  @param header  of all slices: profile, bits, ROI, times, distance of the reference */
+  CompactResult encode (const ConstRangeImage &image, std::span<const RowBand> bands,
+      const CompactReference &reference, const CompactQuantisers &quantisers,
+      const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
 
 private:
-  template <class Code>
+  void code_band (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  [[nodiscard]] int pieces_of (const RowBand &band, int width) const;
+  template <class Code, bool Delta>
   bool code_piece (
-      const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to);
-  template <class Code> bool code_row (Code &slice_code);
+      const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  template <class Code, bool Delta> bool code_row (Code &slice_code);
   template <class Code> void code_runs (Code &code);
-  template <class Code> bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
-  template <class Code>
+  template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
   void code_full (Code &code, const Neighbours &n, std::size_t x, const Components &residual);
-  template <class Code> Code begin_slice (int first_row);
+  template <class Code, bool Delta> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
   int best_choice (std::size_t x, const Neighbours &n, Components &residual);
   Components make_full (std::size_t x, const Neighbours &n);
   void load_row (const ConstRangeImage &image, int y);
+  void load_earlier (int y);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
 
   CompactSettings settings_{};
+  CompactReference reference_;
+  double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
   SliceHeader header_;
   CompactResult result_;
@@ -72,8 +89,11 @@ private:
     std::vector<CodedPixel> pixels;
     std::vector<Lanes> colours; /* depth, R, G, B as decoded */
     std::vector<std::uint8_t> valid;
+    std::vector<std::uint8_t> earlier; /* pixels that equal those of the earlier frame set */
   };
   Row row_, upper_;
+  std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
+  std::vector<Lanes> earlier_colours_;
   std::vector<Lanes> own_; /* the row as it is to be coded */
   PixelCode last_ = kNoPixel;
   int columns_ = 0;

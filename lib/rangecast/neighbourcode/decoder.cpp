@@ -138,7 +138,7 @@ SliceDecoder::depth_of (const SliceHeader &header)
 
 Status
 SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-    const RangeImage &image, std::uint64_t &points)
+    const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded)
 {
   if (!(image.roi == header.roi) || image.depth.width != header.roi.width ||
       image.depth.height != header.roi.height)
@@ -149,15 +149,19 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   if (Status s = read_unit_header (unit, unit_header); !s.ok ())
     return s;
   const std::size_t size = unit_header.size, symbols_size = symbol_bytes (pixels);
-  if (header.profile != Profile::kPlain && pixels > 0 && size >= kSliceHeaderSize) {
+  if (header.profile != Profile::kPlain && pixels > 0 && size >= header_size_of (header)) {
     const DepthQuantiser *quantiser = depth_of (header);
+    const bool serves = reference.before && reference.before->serves (header);
     const bool good =
-        quantiser && compact_.decode (unit.first (size).subspan (kSliceHeaderSize), header,
-                         {*quantiser, colours_[header.colour_bits - 4]}, image, points);
+        quantiser && compact_.decode (unit.first (size).subspan (header_size_of (header)), header,
+                         {*quantiser, colours_[header.colour_bits - 4]},
+                         {serves ? reference.before : nullptr, reference.now}, image, decoded);
     return good ? Status{} : damaged ();
   }
   if (size < kSliceHeaderSize || symbols_size > size - kSliceHeaderSize)
     return {StatusCode::kTruncated, "slice: shorter than its symbols"};
+  if (!header.key)
+    return {StatusCode::kUnsupported, "slice: profile plain without key"};
   if (pixels == 0)
     return size == kSliceHeaderSize ? Status{} : damaged ();
   const DepthQuantiser *depth = depth_of (header);
@@ -175,8 +179,9 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
     if (!decode_row (symbols, full, upper, row, header.columns))
       return damaged ();
     const int image_row = header.first_row + y;
-    points += write_row (row, header.columns, image.depth.row (image_row) + header.first_column,
-        image.colour.row (image_row) + header.first_column);
+    decoded.points +=
+        write_row (row, header.columns, image.depth.row (image_row) + header.first_column,
+            image.colour.row (image_row) + header.first_column);
     std::swap (row, upper);
   }
   return symbols.at_clean_end () && full.bits.at_clean_end () ? Status{} : damaged ();
@@ -190,9 +195,10 @@ SliceDecoder::smallest_size (const SliceHeader &header)
     return kSliceHeaderSize;
   switch (header.profile) {
     case Profile::kPacked:
-      return kPackedHeaderSize + (2 * rows + 7) / 8; /* a row is one run at least: two bits */
+      return kPackedHeaderSize + !header.key +
+             (2 * rows + 7) / 8; /* a row is one run at least: two bits */
     case Profile::kEntropy:
-      return kEntropyHeaderSize; /* zeros at the end are left out */
+      return kEntropyHeaderSize + !header.key; /* zeros at the end are left out */
     default:
       return kSliceHeaderSize + symbol_bytes (rows * static_cast<std::size_t> (header.columns));
   }

@@ -29,10 +29,11 @@ public:
    *  @param unit    the whole unit
    *  @param header  as read_header() gave it
    *  @param image   has the slice's ROI
-   *  @param[out] points  grows by the valid pixels
+   *  @param reference  of this view; pixels that refer to what is not there become invalid
+   *  @param[out] pixels  grows
    *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-      const RangeImage &image, std::uint64_t &points);
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels);
 
   /** Bytes of a slice all of whose pixels are invalid or equal a neighbour; no slice has fewer. */
   static std::size_t smallest_size (const SliceHeader &header);

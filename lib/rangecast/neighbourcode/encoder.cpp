@@ -76,6 +76,13 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
     return s;
   colour_ = ColourQuantiser (settings.colour_bits);
+  const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
+                          settings.colour_bits == settings_.colour_bits &&
+                          settings.profile == settings_.profile && settings.temporal;
+  if (!comparable)
+    references_.forget ();
+  if (!same_view)
+    refresh_.reset (view.height, view.id);
   view_ = view;
   settings_ = settings;
   configured_ = true;
@@ -210,6 +217,39 @@ ViewEncoder::code_piece (const ConstRangeImage &image, int first_column, int col
   close_slice (header, pixels, full, to, result);
 }
 
+/* Begins to keep the coded pixels, and plans what may refer to those of the frame set before. */
+void
+ViewEncoder::begin_temporal (SliceHeader &header)
+{
+  header.reference = true;
+  references_.begin (header);
+  const ReferencePlane &before = references_.before ();
+  const std::uint32_t distance = header.frame_number - before.frame_number ();
+  const bool key = !before.held () || distance == 0 || distance > 255;
+  header.reference_distance = key ? std::uint8_t{0} : static_cast<std::uint8_t> (distance);
+  refresh_.plan (header.roi, header.capture_time_ns, settings_.refresh_period_ns, key, bands_);
+}
+
+void
+ViewEncoder::encode_compact (const ConstRangeImage &image, SliceHeader header,
+    std::vector<std::uint8_t> &to, EncoderResult &result)
+{
+  CompactReference reference;
+  if (settings_.temporal) {
+    begin_temporal (header);
+    reference = {&references_.before (), &references_.now ()};
+  } else {
+    bands_.assign (1, {0, header.roi.height, true});
+  }
+  const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
+      settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
+  const CompactResult done =
+      compact_.encode (image, bands_, reference, {depth_, colour_}, compact, header, to);
+  result.slices += done.slices;
+  result.delta_slices += done.delta_slices;
+  result.full_pixels += done.full_pixels;
+}
+
 Status
 ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     std::vector<std::uint8_t> &to, EncoderResult &result)
@@ -234,11 +274,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   }
   header.roi = roi;
   if (settings_.profile != Profile::kPlain) {
-    const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
-        settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
-    const CompactResult done = compact_.encode (image, {depth_, colour_}, compact, header, to);
-    result.slices += done.slices;
-    result.full_pixels += done.full_pixels;
+    encode_compact (image, header, to, result);
     count_points (image, result);
     return {};
   }

@@ -26,6 +26,11 @@ struct EncoderSettings {
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
   Profile profile = Profile::kPlain;
   NeighbourChoice choice = NeighbourChoice::kFirst;
+  /** A pixel may equal the same one of the frame set before, too. */
+  bool temporal = false;
+  /** Within this time every pixel is coded without reference to earlier frame sets; 0: only in key
+   * frame sets. */
+  std::uint64_t refresh_period_ns = 1'000'000'000;
 
   friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
 };
@@ -37,7 +42,8 @@ struct EncoderResult {
   std::uint64_t points = 0;      ///< valid pixels
   std::uint64_t full_pixels = 0; ///< of these, written in full
   std::uint64_t slices = 0;
-  std::uint64_t raw_bits = 0; ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
+  std::uint64_t raw_bits = 0;     ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
 };
 
 /** Codes range images of one view and keeps its memory from frame to frame. */
@@ -56,9 +62,15 @@ public:
   Status encode (const ConstRangeImage &image, std::uint32_t frame_number,
       std::vector<std::uint8_t> &to, EncoderResult &result);
 
+  /** The next range image is coded without reference to earlier ones. */
+  void request_key () { references_.forget (); }
+
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
+  void begin_temporal (SliceHeader &header);
+  void encode_compact (const ConstRangeImage &image, SliceHeader header,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
   void count_points (const ConstRangeImage &image, EncoderResult &result) const;
   void load_row (const ConstRangeImage &image, int y, int first_column, int columns);
   std::size_t code_row (bool has_upper, std::size_t symbols_at, std::size_t full_at);
@@ -74,6 +86,9 @@ private:
   DepthQuantiser depth_;
   ColourQuantiser colour_;
   CompactEncoder compact_; /* profiles packed and entropy */
+  ReferencePair references_;
+  RefreshSchedule refresh_;
+  std::vector<RowBand> bands_;
 
   /* Rows as four int32 a pixel (depth, R, G, B), with one invalid pixel on each side. */
   std::vector<std::int32_t> row_, upper_;

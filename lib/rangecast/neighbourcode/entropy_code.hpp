@@ -16,7 +16,8 @@ inline constexpr int kOther = kLeft + 64;
 inline constexpr int kPredicted = kOther + 48;
 inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
 inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
-inline constexpr int kCount = kSize + kComponents * 2 * 16;
+inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
+inline constexpr int kCount = kEarlier + 36;
 } // namespace context
 
 using EntropyModel = std::array<Probability, context::kCount>;
@@ -24,6 +25,8 @@ using EntropyModel = std::array<Probability, context::kCount>;
 /** What every slice begins with: learnt from scans and recordings, so that small slices do not pay
  *  for learning. Part of the format. */
 extern const EntropyModel kInitialModel;
+/** The same for slices that refer to an earlier frame set. */
+extern const EntropyModel kInitialDeltaModel;
 
 /** Sizes that have decisions of their own; greater ones are an exponential Golomb code. */
 inline constexpr int kUnarySizes = 4;
@@ -47,8 +50,19 @@ public:
     return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
   }
 
-  /** Of a valid pixel that has a neighbour. */
-  int choice (const Neighbours &n, int chosen)
+  /** Whether a valid pixel equals the same one of the earlier frame set. */
+  bool earlier (const Neighbours &n, bool yes)
+  {
+    const auto of = [] (const CodedPixel &p) { return p.valid () + p.took (kTakeEarlier); };
+    const int at = of (n.left) + 3 * of (n.upper) + 9 * n.upper_right.took (kTakeEarlier) +
+                   18 * n.upper_left.took (kTakeEarlier);
+    return code (context::kEarlier + at, yes);
+  }
+
+  /** Of a valid pixel that has a neighbour.
+   *  @tparam Delta  the slice refers to an earlier frame set: nothing may depend on what pixels
+   *  are, because a decoder may not have them */
+  template <bool Delta> int choice (const Neighbours &n, int chosen)
   {
     if (n.left.valid ()) {
       const int at =
@@ -56,7 +70,7 @@ public:
       if (code (at, chosen == kTakeLeft))
         return kTakeLeft;
     }
-    const int other = other_choice (n, chosen);
+    const int other = other_choice (n, chosen, Delta ? known_equals (n) : equals (n));
     if (other != kPredict)
       return other;
     const int at = context::kPredicted + n.left.origin () + 5 * n.upper.origin ();
@@ -85,15 +99,28 @@ public:
 private:
   bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
 
-  /* One of the three above, or kPredict for none of them. Those that equal an earlier neighbour
-   * are passed over. */
-  int other_choice (const Neighbours &n, int chosen)
+  /* Which of the three above equal a neighbour before them: nobody needs to choose them. */
+  struct Equals {
+    bool upper_left, upper, upper_right;
+  };
+  static Equals equals (const Neighbours &n)
   {
     const PixelCode l = n.left.code, ul = n.upper_left.code, u = n.upper.code,
                     ur = n.upper_right.code;
-    const bool differs[] = {ul != l, u != l && u != ul, ur != l && ur != ul && ur != u};
-    const bool candidate[] = {n.upper_left.valid () && differs[0], n.upper.valid () && differs[1],
-        n.upper_right.valid () && differs[2]};
+    return {ul == l, u == l || u == ul, ur == l || ur == ul || ur == u};
+  }
+  /* As far as their choices tell. */
+  static Equals known_equals (const Neighbours &n)
+  {
+    return {n.left.took (kTakeUpper), n.upper.took (kTakeLeft) || n.left.took (kTakeUpperRight),
+        n.upper_right.took (kTakeLeft)};
+  }
+
+  /* One of the three above, or kPredict for none of them. */
+  int other_choice (const Neighbours &n, int chosen, const Equals &equal)
+  {
+    const bool candidate[] = {n.upper_left.valid () && !equal.upper_left,
+        n.upper.valid () && !equal.upper, n.upper_right.valid () && !equal.upper_right};
     const int full = 2 * (n.left.kind () == 3) + (n.upper.kind () == 3);
     for (int i = 0; i < 3; i++) {
       if (!candidate[i])

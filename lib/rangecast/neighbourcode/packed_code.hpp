@@ -16,7 +16,7 @@ inline constexpr int kMaxGolombPrefix = 18;
 /** Bits of the greatest number that it says. */
 inline constexpr int kMaxGolombBits = 20;
 /** Order of the code of run ends. */
-inline constexpr int kRunOrder = 1;
+inline constexpr int kRunOrder = 1, kEarlierRunOrder = 1;
 
 /** Lengths of the codes in bits, 0 = there is none. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
@@ -62,14 +62,17 @@ unzigzag (std::uint32_t v)
 /** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
 class PackedWriter {
 public:
-  PackedWriter (std::uint8_t *to, EntropyModel &, const GolombOrders &orders)
+  static constexpr bool kEarlierInRuns = true;
+  PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const GolombOrders &orders)
       : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
   {
   }
 
   /** By how much a run ends later than the one above. */
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
-  void choice (const Neighbours &n, int chosen)
+  /** The same for runs of pixels that equal those of the earlier frame set, or do not. */
+  void earlier_run (std::int32_t later) { golomb (zigzag (later), kEarlierRunOrder); }
+  template <bool> void choice (const Neighbours &n, int chosen)
   {
     put (tables_->choice[packed_context (n)][static_cast<std::size_t> (chosen)]);
   }
@@ -125,6 +128,7 @@ private:
 /** Reads what a PackedWriter wrote. Behind the end it reads zeros, which soon are no code. */
 class PackedReader {
 public:
+  static constexpr bool kEarlierInRuns = true;
   PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
       : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
   {
@@ -137,8 +141,15 @@ public:
     later = unzigzag (value);
     return good;
   }
+  bool earlier_run (std::int32_t &later)
+  {
+    std::uint32_t value = 0;
+    const bool good = golomb (kEarlierRunOrder, value);
+    later = unzigzag (value);
+    return good;
+  }
   /** A PixelChoice, or -1 for damage. */
-  int choice (const Neighbours &n)
+  template <bool> int choice (const Neighbours &n)
   {
     return get (tables_->choice_of[packed_context (n)], kMaxChoiceBits);
   }

@@ -6,7 +6,8 @@
 namespace rangecast {
 namespace {
 
-constexpr std::uint8_t kKeyFlag = 1;
+constexpr std::uint8_t kKeyFlag = 1, kReferenceFlag = 4;
+constexpr std::uint8_t kSliceFlags = kKeyFlag | kReferenceFlag;
 constexpr std::size_t kRigViewHeaderSize = kUnitHeaderSize + 10;
 
 template <typename T>
@@ -36,15 +37,15 @@ put_unit_header (std::uint8_t *to, UnitType type, std::uint8_t flags, std::size_
 }
 
 Status
-expect_type (
-    std::span<const std::uint8_t> unit, UnitType type, std::size_t minimum, const char *name)
+expect_type (std::span<const std::uint8_t> unit, UnitType type, std::size_t minimum,
+    const char *name, std::uint8_t flags = kKeyFlag)
 {
   UnitHeader header;
   if (Status s = read_unit_header (unit, header); !s.ok ())
     return s;
   if (header.type != static_cast<std::uint8_t> (type) || header.size < minimum)
     return {StatusCode::kBadData, std::string (name) + ": not one, or shorter than its header"};
-  if (header.flags & ~kKeyFlag)
+  if (header.flags & ~flags)
     return {StatusCode::kUnsupported, std::string (name) + ": reserved flags are set"};
   return {};
 }
@@ -54,7 +55,8 @@ inside (const SliceHeader &h)
 {
   const Roi &roi = h.roi;
   if (roi.empty ())
-    return roi == Roi{} && h.rows == 0 && h.columns == 0 && h.first_row == 0 && h.first_column == 0;
+    return h.key && roi == Roi{} && h.rows == 0 && h.columns == 0 && h.first_row == 0 &&
+           h.first_column == 0;
   return roi.x + roi.width <= kMaxImageSide && roi.y + roi.height <= kMaxImageSide && h.rows > 0 &&
          h.columns > 0 && h.first_row + h.rows <= roi.height &&
          h.first_column + h.columns <= roi.width;
@@ -84,10 +86,12 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
 Status
 read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 {
-  if (Status s = expect_type (unit, UnitType::kSlice, kSliceHeaderSize, "slice"); !s.ok ())
+  if (Status s = expect_type (unit, UnitType::kSlice, kSliceHeaderSize, "slice", kSliceFlags);
+      !s.ok ())
     return s;
   const std::uint8_t *p = unit.data ();
   h.key = p[1] & kKeyFlag;
+  h.reference = p[1] & kReferenceFlag;
   h.view_id = p[4];
   h.profile = Profile{p[5]};
   h.depth_bits = p[6];
@@ -105,6 +109,12 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
   if (h.view_id >= kMaxViews || h.depth_bits < 6 || h.depth_bits > 16 || h.colour_bits < 4 ||
       h.colour_bits > 8)
     return {StatusCode::kBadData, "slice: view-id, depth bits or colour bits out of range"};
+  h.reference_distance = 0;
+  if (!h.key) {
+    if (get<std::uint16_t> (p + 2) <= kSliceHeaderSize || p[kSliceHeaderSize] == 0)
+      return {StatusCode::kBadData, "slice: does not say which frame set it refers to"};
+    h.reference_distance = p[kSliceHeaderSize];
+  }
   if (!inside (h))
     return {StatusCode::kBadData, "slice: rows and columns do not lie in its ROI"};
   return {};
@@ -113,7 +123,9 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 void
 write_slice_header (const SliceHeader &h, std::size_t unit_size, std::uint8_t *to)
 {
-  put_unit_header (to, UnitType::kSlice, h.key ? kKeyFlag : 0, unit_size);
+  const auto flags =
+      static_cast<std::uint8_t> ((h.key ? kKeyFlag : 0) | (h.reference ? kReferenceFlag : 0));
+  put_unit_header (to, UnitType::kSlice, flags, unit_size);
   to[4] = h.view_id;
   to[5] = static_cast<std::uint8_t> (h.profile);
   to[6] = h.depth_bits;
@@ -124,6 +136,8 @@ write_slice_header (const SliceHeader &h, std::size_t unit_size, std::uint8_t *t
       h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.first_row, h.rows, h.first_column, h.columns};
   for (int i = 0; i < 8; i++)
     put (to + 20 + 2 * i, static_cast<std::uint16_t> (fields[i]));
+  if (!h.key)
+    to[kSliceHeaderSize] = h.reference_distance;
 }
 
 std::optional<std::span<const std::uint8_t>>

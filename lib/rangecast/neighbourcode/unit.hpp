@@ -16,7 +16,7 @@ namespace rangecast {
 
 inline constexpr int kBitstreamVersion = 1;
 inline constexpr std::size_t kUnitHeaderSize = 4;
-inline constexpr std::size_t kSliceHeaderSize = 36; ///< with the unit header
+inline constexpr std::size_t kSliceHeaderSize = 36; ///< of key slices, with the unit header
 inline constexpr std::size_t kMaxUnitSize = 65535;
 
 enum class UnitType : std::uint8_t {
@@ -41,7 +41,8 @@ enum class Profile : std::uint8_t {
 
 /** What a slice says of itself. */
 struct SliceHeader {
-  bool key = true; ///< decodes without any earlier frame set
+  bool key = true;        ///< decodes without any earlier frame set
+  bool reference = false; ///< later frame sets may refer to the pixels of this one
   std::uint8_t view_id = 0;
   Profile profile = Profile::kPlain;
   std::uint8_t depth_bits = 0;    ///< 6 to 16
@@ -51,7 +52,17 @@ struct SliceHeader {
   Roi roi;                           ///< the view's whole ROI, in its full image
   int first_row = 0, rows = 0;       ///< of the ROI
   int first_column = 0, columns = 0; ///< of the ROI
+  /** The frame set that a slice refers to has the number frame_number - reference_distance; 1 to
+   *  255, or 0 in key slices. */
+  std::uint8_t reference_distance = 0;
 };
+
+/** Bytes of a slice's header. */
+constexpr std::size_t
+header_size_of (const SliceHeader &header)
+{
+  return kSliceHeaderSize + !header.key;
+}
 
 /** Reads the header of the unit that `bytes` begins with.
  *  @return kTruncated if the unit is longer than `bytes`, kBadData if its size is impossible,
@@ -60,7 +71,7 @@ Status read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header
 
 /** Reads and checks the header of a slice unit: everything but its symbols. */
 Status read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &header);
-/** Writes a slice header of kSliceHeaderSize bytes; the unit is `unit_size` bytes long. */
+/** Writes a slice header of header_size_of() bytes; the unit is `unit_size` bytes long. */
 void write_slice_header (const SliceHeader &header, std::size_t unit_size, std::uint8_t *to);
 
 /** Goes through the units of an access unit. */

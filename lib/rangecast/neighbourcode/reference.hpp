@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "unit.hpp"
+
+namespace rangecast {
+
+/** The pixels of a view's last frame set, to which slices of the next one may refer. A pixel is one
+ *  number, made as the profile pleases. */
+class ReferencePlane {
+public:
+  /** Of pixels that are invalid, or were not received. */
+  static constexpr std::uint64_t kNone = ~std::uint64_t{0};
+
+  /** Begins a frame set: all pixels of the ROI are kNone. Keeps its memory. */
+  void begin (const SliceHeader &header);
+  void forget () { held_ = false; }
+
+  [[nodiscard]] bool held () const { return held_; }
+  /** Of the frame set that it holds. */
+  [[nodiscard]] std::uint32_t frame_number () const { return header_.frame_number; }
+  /** It is what such a slice refers to, pixels mean the same in both. */
+  [[nodiscard]] bool serves (const SliceHeader &header) const;
+
+  /** A row of the ROI. */
+  std::uint64_t *row (int y)
+  {
+    return pixels_.data () +
+           static_cast<std::size_t> (y) * static_cast<std::size_t> (header_.roi.width);
+  }
+  /** Pixels of a row of the view's full image from column x on; kNone outside the ROI. */
+  void fetch (int x, int y, std::span<std::uint64_t> to) const;
+  /** Pixels of the slice become kNone: it turned out to be damaged. */
+  void clear (const SliceHeader &slice);
+
+private:
+  bool held_ = false;
+  SliceHeader header_;
+  std::vector<std::uint64_t> pixels_;
+};
+
+/** The last frame set of a view and the one that is being coded or decoded. */
+class ReferencePair {
+public:
+  /** Begins a frame set. One that was begun before, of the same number, is begun anew. */
+  void begin (const SliceHeader &header);
+  void forget ();
+
+  [[nodiscard]] const ReferencePlane &before () const { return planes_[1 - now_]; }
+  ReferencePlane &now () { return planes_[now_]; }
+  [[nodiscard]] const ReferencePlane &now () const { return planes_[now_]; }
+
+private:
+  ReferencePlane planes_[2];
+  int now_ = 0;
+};
+
+} // namespace rangecast

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "refresh.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangecast {
+
+void
+RefreshSchedule::reset (int view_height, int view_id)
+{
+  age_ns_.assign (static_cast<std::size_t> ((view_height + kBandRows - 1) / kBandRows), 0);
+  last_time_ns_ = 0;
+  view_id_ = view_id;
+}
+
+/* Time since the frame set before. */
+std::uint64_t
+RefreshSchedule::advance (std::uint64_t time_ns)
+{
+  constexpr std::uint64_t kUnknown = 1'000'000'000 / 30;
+  const std::uint64_t elapsed = time_ns > last_time_ns_ ? time_ns - last_time_ns_ : kUnknown;
+  last_time_ns_ = time_ns;
+  return elapsed;
+}
+
+void
+RefreshSchedule::plan (const Roi &roi, std::uint64_t time_ns, std::uint64_t period_ns, bool key,
+    std::vector<RowBand> &bands)
+{
+  bands.clear ();
+  const std::uint64_t elapsed = advance (time_ns);
+  const std::size_t count = age_ns_.size ();
+  for (std::size_t i = 0; i < count; i++) {
+    std::uint64_t &age = age_ns_[i];
+    age += elapsed;
+    /* It must not be older than the period at the next frame set. */
+    const bool refresh = key || (period_ns > 0 && age + elapsed > period_ns);
+    if (key) {
+      /* The bands of all views come evenly spread, though all begin now: with a golden section
+       * between views, whatever their number. */
+      const double place = double (i) / double (count) + view_id_ * 0.6180339887498949;
+      age = static_cast<std::uint64_t> ((place - std::floor (place)) * double (period_ns));
+    } else if (refresh) {
+      age = 0;
+    }
+    const int top = std::max (int (i) * kBandRows, roi.y) - roi.y;
+    const int bottom = std::min ((int (i) + 1) * kBandRows, roi.y + roi.height) - roi.y;
+    if (top < bottom)
+      bands.push_back ({top, bottom - top, refresh});
+  }
+}
+
+} // namespace rangecast

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+
+namespace rangecast {
+
+/** Some rows of a ROI, coded without rows of others. */
+struct RowBand {
+  int first_row = 0, rows = 0; ///< of the ROI
+  bool key = true;             ///< without reference to an earlier frame set
+};
+
+/** Rolling intra refresh of one view. Its full image is cut into bands of kBandRows; each is coded
+ *  without reference to earlier frame sets at least once in a period, one after the other. Slices
+ *  do not cross bands, so what a lost packet damaged is whole again when its band has been
+ *  refreshed. */
+class RefreshSchedule {
+public:
+  static constexpr int kBandRows = 64;
+
+  /** @param view_id  spreads the bands of several views over time */
+  void reset (int view_height, int view_id);
+
+  /** Which bands of a ROI are coded how.
+   *  @param time_ns  of the frame set; times that do not grow count as a 30th of a second each
+   *  @param period_ns  0: no refresh
+   *  @param key  everything without reference */
+  void plan (const Roi &roi, std::uint64_t time_ns, std::uint64_t period_ns, bool key,
+      std::vector<RowBand> &bands);
+
+private:
+  std::uint64_t advance (std::uint64_t time_ns);
+
+  std::vector<std::uint64_t> age_ns_; /* of each band, since it was refreshed */
+  std::uint64_t last_time_ns_ = 0;
+  int view_id_ = 0;
+};
+
+} // namespace rangecast
