@@ -93,10 +93,10 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
   std::vector<Rgbx> colour (depth.size ());
   const RangeImage image = {0, header.roi, {depth.data (), width, height, width * 2},
       {colour.data (), width, height, width * 4}, 0};
-  std::uint64_t points = 0;
-  const bool good = decoder.decode (unit, header, image, points).ok ();
+  DecodedPixels decoded;
+  const bool good = decoder.decode (unit, header, {}, image, decoded).ok ();
   check_untouched (header, {depth.data (), width, height, width * 2});
-  if (good && points > static_cast<std::uint64_t> (header.rows) *
+  if (good && decoded.points > static_cast<std::uint64_t> (header.rows) *
                            static_cast<std::uint64_t> (header.columns))
     std::abort ();
   return 0;

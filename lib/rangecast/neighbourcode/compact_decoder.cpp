@@ -81,6 +81,20 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected,
   return true;
 }
 
+template <class Code>
+bool
+CompactDecoder::decode_motions (Code &code)
+{
+  BlockMotion expected;
+  for (BlockMotion &m : motions_) {
+    if (!code.motion (expected, m) || std::abs (m.dx) > kMaxMotion ||
+        std::abs (m.dy) > kMaxMotion || std::abs (m.dz) > kMaxMotionDepth)
+      return false;
+    expected = m;
+  }
+  return true;
+}
+
 /* A pixel that equals the same one of the earlier frame set, if that was received. */
 void
 CompactDecoder::take_earlier (std::size_t x, const CompactQuantisers &quantisers)
@@ -254,14 +268,20 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     row->earlier.assign (columns, 0);
   }
   earlier_codes_.assign (Delta ? columns : 0, kNoPixel);
+  if constexpr (Delta)
+    motions_.assign (
+        motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});
   limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
   last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
   for (int y = 0; y < header.rows; y++) {
     const int image_row = header.first_row + y;
     if constexpr (Delta) {
+      const int full_x = header.roi.x + header.first_column, full_y = header.roi.y + image_row;
+      if ((y == 0 || full_y % kMotionBlock == 0) && !decode_motions (code))
+        return false;
       if (reference.before)
-        reference.before->fetch (
-            header.roi.x + header.first_column, header.roi.y + image_row, earlier_codes_);
+        fetch_displaced (*reference.before, full_x, full_y, motions_, limits_.last_depth, 0,
+            kMaxImageSide, earlier_codes_);
       std::ranges::fill (row_.earlier, std::uint8_t{0});
     }
     if (!decode_row<Code, Delta> (code, quantisers, header.columns) || code.overrun ())

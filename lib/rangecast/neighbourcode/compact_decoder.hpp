@@ -54,6 +54,7 @@ private:
   template <class Code, bool Delta>
   bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code> bool decode_motions (Code &code);
   void take_earlier (std::size_t x, const CompactQuantisers &quantisers);
   template <class Code, bool Delta>
   bool decode_full (Code &code, const Neighbours &n, bool corrected,
@@ -68,7 +69,8 @@ private:
     std::vector<std::uint8_t> earlier; /* pixels that equal those of the earlier frame set */
   };
   Row row_, upper_;
-  std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
+  std::vector<PixelCode> earlier_codes_; /* what its pixels may equal in the earlier frame set */
+  std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
   EntropyModel model_{};
   Components steps_{};
   Limits limits_{};

@@ -111,27 +111,42 @@ steps_within (int depth_threshold, int colour_threshold)
   return {step (depth, 65535), step (luma, 255), step (chroma, 255)};
 }
 
+void
+CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_reference)
+{
+  const int d = settings.depth_threshold, c = settings.colour_threshold;
+  earlier_threshold_ = Lanes{d, c, c, c};
+  /* Pixels to which later frame sets refer are made finer than need be: they can then be taken
+   * again for longer. */
+  const auto finer = [&] (int threshold) {
+    return is_reference ? (3 * threshold + 2) / 4 : threshold;
+  };
+  settings_ = settings;
+  settings_.depth_threshold = finer (d);
+  settings_.colour_threshold = finer (c);
+  const int colour = settings_.colour_threshold;
+  threshold_ = Lanes{settings_.depth_threshold, colour, colour, colour};
+  steps_ = steps_within (settings_.depth_threshold, colour).components ();
+  for (std::size_t i = 0; i < kComponents; i++)
+    reciprocals_[i] = reciprocal_of (steps_[i]);
+  const auto weight = [] (int threshold) {
+    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
+  };
+  depth_weight_ = weight (settings_.depth_threshold);
+  colour_weight_ = weight (colour);
+}
+
 CompactResult
 CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> bands,
     const CompactReference &reference, const CompactQuantisers &quantisers,
     const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to)
 {
-  settings_ = settings;
   reference_ = reference;
   quantisers_ = &quantisers;
   header_ = header;
   result_ = {};
   limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
-  steps_ = steps_within (settings.depth_threshold, settings.colour_threshold).components ();
-  for (std::size_t i = 0; i < kComponents; i++)
-    reciprocals_[i] = reciprocal_of (steps_[i]);
-  const int c = settings.colour_threshold;
-  threshold_ = Lanes{settings.depth_threshold, c, c, c};
-  const auto weight = [] (int threshold) {
-    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
-  };
-  depth_weight_ = weight (settings.depth_threshold);
-  colour_weight_ = weight (c);
+  set_thresholds (settings, reference.now != nullptr);
 
   std::size_t delta_bytes = 0, delta_pixels = 0;
   for (const RowBand &band : bands) {
@@ -157,8 +172,8 @@ CompactEncoder::pieces_of (const RowBand &band, int width) const
 {
   double side = kColumnsOfSlice * std::sqrt (settings_.max_slice_size);
   if (!band.key && delta_bytes_per_pixel_ > 0) {
-    const double columns = kFillOfDeltaSlice * settings_.max_slice_size /
-                           (delta_bytes_per_pixel_ * RefreshSchedule::kBandRows);
+    const double columns =
+        kFillOfDeltaSlice * settings_.max_slice_size / (delta_bytes_per_pixel_ * band.rows);
     side = std::clamp (columns, side, double (std::max (width, int (side) + 1)));
   }
   return std::clamp (int (std::lround (width / side)), 1, width);
@@ -235,14 +250,35 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
   }
 }
 
+/* Motion of the blocks that begin in row y, or go on there. They refer to rows of their band only,
+ * so that damage stays in it. */
+void
+CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand &band)
+{
+  const Roi &roi = header_.roi;
+  const int first_x = roi.x + header_.first_column, end_x = first_x + columns_;
+  const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
+  const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
+  BlockMotion near_by[2];
+  for (std::size_t i = 0; i < motions_.size (); i++) {
+    const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
+    const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
+    near_by[1] = motions_[i];
+    motions_[i] = search_.find (image, quantisers_->depth, quantisers_->colour, *reference_.before,
+        earlier_threshold_, {x, first_y, next - x, height, band_y, end_y}, near_by);
+    near_by[0] = motions_[i];
+  }
+}
+
 /* Finds the pixels that equal those of the earlier frame set, as far as thresholds go. */
 void
-CompactEncoder::load_earlier (int y)
+CompactEncoder::load_earlier (int y, const RowBand &band)
 {
   const auto columns = static_cast<std::size_t> (columns_);
   const Roi &roi = header_.roi;
-  reference_.before->fetch (
-      roi.x + header_.first_column, roi.y + y, std::span (earlier_codes_).first (columns));
+  const int band_y = roi.y + band.first_row;
+  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
+      limits_.last_depth, band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
   for (std::size_t x = 0; x < columns; x++) {
     row_.earlier[x] = 0;
     if (!row_.valid[x] || earlier_codes_[x] == kNoPixel)
@@ -250,7 +286,7 @@ CompactEncoder::load_earlier (int y)
     const Components c = components_of (earlier_codes_[x]);
     const auto rgb = to_rgb (c, limits_.maximum);
     earlier_colours_[x] = Lanes{c[0], rgb[0], rgb[1], rgb[2]};
-    row_.earlier[x] = are_near (own_[x], earlier_colours_[x], threshold_);
+    row_.earlier[x] = are_near (own_[x], earlier_colours_[x], earlier_threshold_);
   }
 }
 
@@ -411,11 +447,25 @@ CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t en
   }
 }
 
+template <class Code>
+void
+CompactEncoder::code_motions (Code &code)
+{
+  BlockMotion expected;
+  for (BlockMotion &m : motions_) {
+    (void)code.motion (expected, m);
+    expected = m;
+  }
+}
+
 /* @return false if the slice has become too long; the row is then to be coded again */
 template <class Code, bool Delta>
 bool
-CompactEncoder::code_row (Code &slice_code)
+CompactEncoder::code_row (Code &slice_code, bool begins_block)
 {
+  if constexpr (Delta)
+    if (begins_block)
+      code_motions (slice_code);
   code_runs (slice_code);
   const auto columns = static_cast<std::size_t> (columns_);
   const std::span<const std::uint8_t> valid (row_.valid.data (), columns);
@@ -486,22 +536,28 @@ CompactEncoder::code_piece (
     const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
   resize (header_.columns);
+  motions_.assign (
+      motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
   size_sums_ = size_counts_ = {};
   Code code = begin_slice<Code, Delta> (band.first_row);
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
     load_row (image, y);
-    if constexpr (Delta)
-      load_earlier (y);
+    const bool begins_block = (header_.roi.y + y) % kMotionBlock == 0;
+    if constexpr (Delta) {
+      if (begins_block || y == band.first_row)
+        find_motions (image, y, band);
+      load_earlier (y, band);
+    }
     const CompactResult result = result_;
     Code before = code;
     model_before_ = model_;
-    if (!code_row<Code, Delta> (code)) {
+    if (!code_row<Code, Delta> (code, begins_block || header_.rows == 0)) {
       if (header_.rows == 0)
         return false;
       result_ = result;
       close_slice (before, to);
       code = begin_slice<Code, Delta> (y);
-      if (!code_row<Code, Delta> (code))
+      if (!code_row<Code, Delta> (code, true))
         return false;
     }
     if (reference_.now) {

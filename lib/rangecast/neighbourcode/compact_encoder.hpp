@@ -42,6 +42,9 @@ Steps steps_within (int depth_threshold, int colour_threshold);
 /** Codes range images in the profiles packed and entropy. Keeps its memory. */
 class CompactEncoder {
 public:
+  /** Makes room for motion in a view of this size. */
+  void set_size (int width, int height) { search_.resize (width, height); }
+
   /** Appends the slices of one range image whose ROI is not empty.
    *  @param bands  that make up the ROI
    *  @param header  of all slices: profile, bits, ROI, times, distance of the reference */
@@ -50,12 +53,13 @@ public:
       const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
 
 private:
+  void set_thresholds (const CompactSettings &settings, bool is_reference);
   void code_band (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   [[nodiscard]] int pieces_of (const RowBand &band, int width) const;
   template <class Code, bool Delta>
   bool code_piece (
       const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
-  template <class Code, bool Delta> bool code_row (Code &slice_code);
+  template <class Code, bool Delta> bool code_row (Code &slice_code, bool begins_block);
   template <class Code> void code_runs (Code &code);
   template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Delta>
@@ -67,7 +71,9 @@ private:
   int best_choice (std::size_t x, const Neighbours &n, Components &residual);
   Components make_full (std::size_t x, const Neighbours &n);
   void load_row (const ConstRangeImage &image, int y);
-  void load_earlier (int y);
+  void load_earlier (int y, const RowBand &band);
+  void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
+  template <class Code> void code_motions (Code &code);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
 
@@ -80,7 +86,7 @@ private:
   Components steps_{};
   std::array<std::uint64_t, kComponents> reciprocals_{};
   Limits limits_{};
-  Lanes threshold_{};
+  Lanes threshold_{}, earlier_threshold_{};
   float depth_weight_ = 0, colour_weight_ = 0;
 
   /* One invalid pixel before and one behind the row, which `pixels` and `colours` count; pixels one
@@ -94,6 +100,8 @@ private:
   Row row_, upper_;
   std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
   std::vector<Lanes> earlier_colours_;
+  std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
+  MotionSearch search_;
   std::vector<Lanes> own_; /* the row as it is to be coded */
   PixelCode last_ = kNoPixel;
   int columns_ = 0;

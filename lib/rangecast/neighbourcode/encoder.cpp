@@ -81,8 +81,10 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
                           settings.profile == settings_.profile && settings.temporal;
   if (!comparable)
     references_.forget ();
-  if (!same_view)
+  if (!same_view) {
     refresh_.reset (view.height, view.id);
+    compact_.set_size (view.width, view.height);
+  }
   view_ = view;
   settings_ = settings;
   configured_ = true;

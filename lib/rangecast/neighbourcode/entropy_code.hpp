@@ -2,7 +2,7 @@
 /* Profile entropy: every decision of a pixel under a probability of its own context. */
 #pragma once
 
-#include "coded_pixel.hpp"
+#include "motion.hpp"
 #include "range_coder.hpp"
 
 namespace rangecast {
@@ -17,7 +17,9 @@ inline constexpr int kPredicted = kOther + 48;
 inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
 inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
 inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
-inline constexpr int kCount = kEarlier + 36;
+inline constexpr int kMotion = kEarlier + 36;     /* whether it is the expected one */
+inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz */
+inline constexpr int kCount = kMotionNumber + 3 * 17;
 } // namespace context
 
 using EntropyModel = std::array<Probability, context::kCount>;
@@ -48,6 +50,21 @@ public:
   bool run (bool valid, std::int32_t &later)
   {
     return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
+  }
+
+  /** Of a block, from what it is expected to be. @return false for a number that is too large */
+  bool motion (const BlockMotion &expected, BlockMotion &m)
+  {
+    if (code (context::kMotion, m == expected)) {
+      m = expected;
+      return true;
+    }
+    std::int32_t rest[] = {m.dx - expected.dx, m.dy - expected.dy, m.dz - expected.dz};
+    for (int i = 0; i < 3; i++)
+      if (const int at = context::kMotionNumber + 17 * i; !number (at, at + 1, rest[i]))
+        return false;
+    m = {expected.dx + rest[0], expected.dy + rest[1], expected.dz + rest[2]};
+    return true;
   }
 
   /** Whether a valid pixel equals the same one of the earlier frame set. */

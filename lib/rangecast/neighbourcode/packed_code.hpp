@@ -17,6 +17,8 @@ inline constexpr int kMaxGolombPrefix = 18;
 inline constexpr int kMaxGolombBits = 20;
 /** Order of the code of run ends. */
 inline constexpr int kRunOrder = 1, kEarlierRunOrder = 1;
+/** Order of the code of depth motion. */
+inline constexpr int kMotionDepthOrder = 3;
 
 /** Lengths of the codes in bits, 0 = there is none. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
@@ -70,6 +72,16 @@ public:
 
   /** By how much a run ends later than the one above. */
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
+  /** Of a block, from what it is expected to be. */
+  void motion (const BlockMotion &expected, const BlockMotion &m)
+  {
+    put (m == expected, 1);
+    if (m == expected)
+      return;
+    golomb (zigzag (m.dx - expected.dx), 0);
+    golomb (zigzag (m.dy - expected.dy), 0);
+    golomb (zigzag (m.dz - expected.dz), kMotionDepthOrder);
+  }
   /** The same for runs of pixels that equal those of the earlier frame set, or do not. */
   void earlier_run (std::int32_t later) { golomb (zigzag (later), kEarlierRunOrder); }
   template <bool> void choice (const Neighbours &n, int chosen)
@@ -140,6 +152,18 @@ public:
     const bool good = golomb (kRunOrder, value);
     later = unzigzag (value);
     return good;
+  }
+  bool motion (const BlockMotion &expected, BlockMotion &m)
+  {
+    refill ();
+    m = expected;
+    if (take (1))
+      return count_ >= 0;
+    std::uint32_t x = 0, y = 0, z = 0;
+    if (!golomb (0, x) || !golomb (0, y) || !golomb (kMotionDepthOrder, z))
+      return false;
+    m = {m.dx + unzigzag (x), m.dy + unzigzag (y), m.dz + unzigzag (z)};
+    return true;
   }
   bool earlier_run (std::int32_t &later)
   {

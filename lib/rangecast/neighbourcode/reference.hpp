@@ -32,6 +32,15 @@ public:
     return pixels_.data () +
            static_cast<std::size_t> (y) * static_cast<std::size_t> (header_.roi.width);
   }
+  /** Of the view's full image; kNone outside the ROI. */
+  [[nodiscard]] std::uint64_t at (int x, int y) const
+  {
+    const int column = x - header_.roi.x, line = y - header_.roi.y;
+    if (column < 0 || line < 0 || column >= header_.roi.width || line >= header_.roi.height)
+      return kNone;
+    return pixels_[static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width) +
+                   static_cast<std::size_t> (column)];
+  }
   /** Pixels of a row of the view's full image from column x on; kNone outside the ROI. */
   void fetch (int x, int y, std::span<std::uint64_t> to) const;
   /** Pixels of the slice become kNone: it turned out to be damaged. */

@@ -9,7 +9,9 @@ namespace rangecast {
 void
 RefreshSchedule::reset (int view_height, int view_id)
 {
-  age_ns_.assign (static_cast<std::size_t> ((view_height + kBandRows - 1) / kBandRows), 0);
+  constexpr int kLeast = 64, kBands = 4;
+  band_rows_ = std::max (kLeast, (view_height + kBands - 1) / kBands);
+  age_ns_.assign (static_cast<std::size_t> ((view_height + band_rows_ - 1) / band_rows_), 0);
   last_time_ns_ = 0;
   view_id_ = view_id;
 }
@@ -44,8 +46,8 @@ RefreshSchedule::plan (const Roi &roi, std::uint64_t time_ns, std::uint64_t peri
     } else if (refresh) {
       age = 0;
     }
-    const int top = std::max (int (i) * kBandRows, roi.y) - roi.y;
-    const int bottom = std::min ((int (i) + 1) * kBandRows, roi.y + roi.height) - roi.y;
+    const int top = std::max (int (i) * band_rows_, roi.y) - roi.y;
+    const int bottom = std::min ((int (i) + 1) * band_rows_, roi.y + roi.height) - roi.y;
     if (top < bottom)
       bands.push_back ({top, bottom - top, refresh});
   }

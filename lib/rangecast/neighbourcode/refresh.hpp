@@ -14,13 +14,14 @@ struct RowBand {
   bool key = true;             ///< without reference to an earlier frame set
 };
 
-/** Rolling intra refresh of one view. Its full image is cut into bands of kBandRows; each is coded
+/** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
  *  without reference to earlier frame sets at least once in a period, one after the other. Slices
  *  do not cross bands, so what a lost packet damaged is whole again when its band has been
  *  refreshed. */
 class RefreshSchedule {
 public:
-  static constexpr int kBandRows = 64;
+  /** Rows of a band: a quarter of the image, but not so few that slices become small. */
+  [[nodiscard]] int band_rows () const { return band_rows_; }
 
   /** @param view_id  spreads the bands of several views over time */
   void reset (int view_height, int view_id);
@@ -37,7 +38,7 @@ private:
 
   std::vector<std::uint64_t> age_ns_; /* of each band, since it was refreshed */
   std::uint64_t last_time_ns_ = 0;
-  int view_id_ = 0;
+  int view_id_ = 0, band_rows_ = 1;
 };
 
 } // namespace rangecast

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "motion.hpp"
+
+#include <algorithm>
+
+namespace rangecast {
+
+void
+fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const BlockMotion> motions,
+    std::int32_t last_depth, int first_y, int end_y, std::span<PixelCode> to)
+{
+  const int end = x + static_cast<int> (to.size ());
+  for (const BlockMotion &m : motions) {
+    const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end);
+    const auto part = to.first (static_cast<std::size_t> (next - x));
+    to = to.subspan (part.size ());
+    if (y + m.dy < first_y || y + m.dy >= end_y)
+      std::ranges::fill (part, kNoPixel);
+    else
+      plane.fetch (x + m.dx, y + m.dy, part);
+    if (m.dz != 0)
+      for (PixelCode &code : part)
+        code = displaced (code, m.dz, last_depth);
+    x = next;
+  }
+}
+
+void
+MotionSearch::resize (int width, int height)
+{
+  across_ = (width + kMotionBlock - 1) / kMotionBlock;
+  last_.assign (static_cast<std::size_t> (across_) *
+                    static_cast<std::size_t> ((height + kMotionBlock - 1) / kMotionBlock),
+      BlockMotion{});
+  samples_.reserve (kMotionBlock * kMotionBlock);
+  differences_.reserve (kMotionBlock * kMotionBlock);
+  sorted_.reserve (kMotionBlock * kMotionBlock);
+}
+
+void
+MotionSearch::forget ()
+{
+  std::ranges::fill (last_, BlockMotion{});
+}
+
+/* Every other pixel of every other row, or all of narrow blocks. */
+void
+MotionSearch::take_samples (const ConstRangeImage &image, const DepthQuantiser &depth,
+    const ColourQuantiser &colour, const Area &area)
+{
+  samples_.clear ();
+  const int step = area.width >= 8 && area.height >= 8 ? 2 : 1;
+  for (int y = area.y; y < area.y + area.height; y += step) {
+    const std::uint16_t *z = image.depth.row (y - image.roi.y) - image.roi.x;
+    const Rgbx *c = image.colour.row (y - image.roi.y) - image.roi.x;
+    for (int x = area.x; x < area.x + area.width; x += step)
+      if (depth.valid (z[x])) {
+        const Lanes own = {
+            depth.code (z[x]), colour.code (c[x].r), colour.code (c[x].g), colour.code (c[x].b)};
+        samples_.push_back ({own, x, y});
+      }
+  }
+}
+
+/* The best dz of one displacement is the middle one of the differences. */
+MotionSearch::Match
+MotionSearch::match (
+    const ReferencePlane &before, Lanes threshold, const Area &area, int dx, int dy)
+{
+  Match found = {{dx, dy, 0}, 0};
+  if (std::abs (dx) > kMaxMotion || std::abs (dy) > kMaxMotion)
+    return found;
+  differences_.clear ();
+  Lanes colours = threshold;
+  colours[0] = 1 << 20;
+  for (const Sample &s : samples_) {
+    const PixelCode code = s.y + dy >= area.first_y && s.y + dy < area.end_y
+                               ? before.at (s.x + dx, s.y + dy)
+                               : kNoPixel;
+    if (code == kNoPixel)
+      continue;
+    const Components c = components_of (code);
+    const auto rgb = to_rgb (c, 255);
+    if (are_near (s.own, Lanes{c[0], rgb[0], rgb[1], rgb[2]}, colours))
+      differences_.push_back (s.own[0] - c[0]);
+  }
+  if (differences_.empty ())
+    return found;
+  sorted_ = differences_;
+  const auto middle = sorted_.begin () + static_cast<std::ptrdiff_t> (sorted_.size () / 2);
+  std::ranges::nth_element (sorted_, middle);
+  const auto hits = [&] (int dz) {
+    return std::ranges::count_if (
+        differences_, [&] (int d) { return std::abs (d - dz) <= threshold[0]; });
+  };
+  const auto still = hits (0), moved = hits (*middle);
+  found.hits = static_cast<int> (std::max (still, moved));
+  found.motion.dz = moved > still + still / 16 ? *middle : 0;
+  return found;
+}
+
+BlockMotion
+MotionSearch::find (const ConstRangeImage &image, const DepthQuantiser &depth,
+    const ColourQuantiser &colour, const ReferencePlane &before, Lanes threshold, const Area &area,
+    std::span<const BlockMotion> near_by)
+{
+  const std::size_t index =
+      static_cast<std::size_t> (area.y / kMotionBlock) * static_cast<std::size_t> (across_) +
+      static_cast<std::size_t> (area.x / kMotionBlock);
+  take_samples (image, depth, colour, area);
+  Match best = match (before, threshold, area, 0, 0);
+  const auto all = static_cast<int> (samples_.size ());
+  const auto attempt = [&] (int dx, int dy) {
+    const Match other = match (before, threshold, area, dx, dy);
+    if (other.hits <= best.hits + all / 32) /* a motion of its own costs bits */
+      return false;
+    best = other;
+    return true;
+  };
+  if (best.hits < all - all / 32) {
+    for (const BlockMotion &m : near_by)
+      attempt (m.dx, m.dy);
+    attempt (last_[index].dx, last_[index].dy);
+    for (bool better = true; better && best.hits < all - all / 32;) {
+      const int x = best.motion.dx, y = best.motion.dy;
+      better = attempt (x - 1, y);
+      better |= attempt (x + 1, y);
+      better |= attempt (x, y - 1);
+      better |= attempt (x, y + 1);
+    }
+  }
+  last_[index] = best.motion;
+  return best.motion;
+}
+
+} // namespace rangecast
