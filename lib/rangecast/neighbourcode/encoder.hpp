@@ -26,6 +26,7 @@ struct EncoderSettings {
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
   Profile profile = Profile::kPlain;
   NeighbourChoice choice = NeighbourChoice::kFirst;
+  DepthScale depth_scale = DepthScale::kLinear;
 
   friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
 };

@@ -41,7 +41,8 @@ enum class Profile : std::uint8_t {
 
 /** What a slice says of itself. */
 struct SliceHeader {
-  bool key = true; ///< decodes without any earlier frame set
+  bool key = true;            ///< decodes without any earlier frame set
+  bool inverse_depth = false; ///< depth codes are linear in 1 / depth
   std::uint8_t view_id = 0;
   Profile profile = Profile::kPlain;
   std::uint8_t depth_bits = 0;    ///< 6 to 16
