@@ -39,6 +39,7 @@ enum {
   PROP_PROFILE,
   PROP_CHOICE,
   PROP_DEPTH_BITS,
+  PROP_DEPTH_SCALE,
   PROP_COLOUR_BITS,
   PROP_DEPTH_THRESHOLD,
   PROP_COLOUR_THRESHOLD,
@@ -113,6 +114,19 @@ gst_neighbour_code_choice_get_type (void)
             "best"},
         {}};
     return g_enum_register_static ("GstNeighbourCodeChoice", values);
+  }();
+  return type;
+}
+
+#define GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE (gst_neighbour_code_depth_scale_get_type ())
+static GType
+gst_neighbour_code_depth_scale_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (rangecast::DepthScale::kLinear), "Codes are linear in depth", "linear"},
+        {int (rangecast::DepthScale::kInverse), "Codes are linear in 1/depth", "inverse"}, {}};
+    return g_enum_register_static ("GstNeighbourCodeDepthScale", values);
   }();
   return type;
 }
@@ -385,6 +399,9 @@ gst_neighbour_code_enc_set_property (
     case PROP_DEPTH_BITS:
       settings.depth_bits = g_value_get_int (value);
       break;
+    case PROP_DEPTH_SCALE:
+      settings.depth_scale = rangecast::DepthScale (g_value_get_enum (value));
+      break;
     case PROP_COLOUR_BITS:
       settings.colour_bits = g_value_get_int (value);
       break;
@@ -430,6 +447,9 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
       break;
     case PROP_DEPTH_BITS:
       g_value_set_int (value, settings.depth_bits);
+      break;
+    case PROP_DEPTH_SCALE:
+      g_value_set_enum (value, int (settings.depth_scale));
       break;
     case PROP_COLOUR_BITS:
       g_value_set_int (value, settings.colour_bits);
@@ -492,8 +512,13 @@ install_properties (GObjectClass *object_class)
           "first (first, best, default first)",
           GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), live));
   install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
-      "Bits of a depth code; linear between the view's near and far (6 to 16, default 12)", 6, 16,
-      kDefaults.depth_bits);
+      "Bits of a depth code, of depths between the view's near and far (6 to 16, default 12)", 6,
+      16, kDefaults.depth_bits);
+  g_object_class_install_property (object_class, PROP_DEPTH_SCALE,
+      g_param_spec_enum ("depth-scale", "Depth scale",
+          "What depth codes are linear in: depth, or 1/depth, where codes stand for more depth the "
+          "further it is (linear, inverse, default linear)",
+          GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, int (kDefaults.depth_scale), live));
   install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits",
       "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits);
   install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
@@ -511,8 +536,9 @@ install_properties (GObjectClass *object_class)
       "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
       g_param_spec_double ("max-depth-error", "Maximum depth error",
-          "Metres by which quantisation alone changes a depth at most, of the present stream", 0,
-          G_MAXDOUBLE, 0, readable));
+          "Metres by which a decoded depth differs from the one that came in at most, of any view, "
+          "with the settings of the latest frame set; 0 before the first",
+          0, G_MAXDOUBLE, 0, readable));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, points, full-pixels, slices, raw-bytes, coded-bytes",
@@ -539,6 +565,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, GstPluginAPIFlags (0));
 
   transform_class->start = gst_neighbour_code_enc_start;
   transform_class->stop = gst_neighbour_code_enc_stop;

@@ -18,7 +18,7 @@ import sys
 from array import array
 from dataclasses import dataclass, field
 from math import floor, hypot
-from typing import BinaryIO, Iterable, Iterator, NamedTuple
+from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple
 
 import compact
 
@@ -32,7 +32,7 @@ RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
 MAX_RIG_PIXELS = 1 << 27
-KEY = 1
+KEY, INVERSE_DEPTH = 1, 2
 FULL_PIXEL, INVALID = 4, 5
 NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
 Pixel = tuple[int, int, int, int]  # depth in depth units, R, G, B
@@ -70,6 +70,7 @@ class Slice(NamedTuple):
     first_column: int
     columns: int
     body: bytes
+    inverse_depth: bool
 
     def lies_in(self, view: View | None) -> bool:
         """Its view is in the rig, and its ROI in the view's image."""
@@ -77,7 +78,8 @@ class Slice(NamedTuple):
 
     def agrees(self, other: Slice) -> bool:
         """What slices of one view have in common within an access unit is the same."""
-        return self[2:5] == other[2:5] and self[6:10] == other[6:10]
+        scales_agree = self.inverse_depth == other.inverse_depth
+        return self[2:5] == other[2:5] and self[6:10] == other[6:10] and scales_agree
 
     def place(self) -> tuple[int, int, int, int]:
         """Where it lies; slices of a view are taken in this order."""
@@ -284,9 +286,9 @@ def is_pose(pose: list[float]) -> bool:
 
 def parse_slice(flags: int, payload: bytes) -> Slice:
     """Reads and checks what can be checked without the rig."""
-    if flags & ~KEY or len(payload) < SLICE_FIELDS.size:
+    if flags & ~(KEY | INVERSE_DEPTH) or len(payload) < SLICE_FIELDS.size:
         raise Damaged("flags or size")
-    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :])
+    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :], bool(flags & INVERSE_DEPTH))
     if part.view > 63 or part.profile > 2 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
         raise Damaged("view, profile or bits")
     if any(part[6:14]):
@@ -330,18 +332,33 @@ def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
     return pixels
 
 
+def depth_codes(part: Slice, view: View) -> tuple[int, Callable[[int], int]]:
+    """The greatest depth code of a slice, and what gives the depth of a code, in depth units."""
+    near, far, extent = view.near, view.far, view.far - view.near
+    if extent < 1:
+        raise Damaged("near and far are less than one depth unit apart")
+    greatest = (1 << part.depth_bits) - 1
+
+    def inverse(code: int) -> int:
+        divisor = far * last - code * extent
+        return (near * far * last + divisor // 2) // divisor
+
+    if part.inverse_depth:
+        last = min((far * extent + near - 1) // near, greatest)
+        return last, inverse
+    last = min(extent, greatest)
+    return last, lambda code: near + (code * extent + last // 2) // last
+
+
 def decode_compact_slice(part: Slice, view: View) -> list[Pixel | None]:
     """The same for the profiles packed and entropy."""
-    extent = view.far - view.near
-    last = min(extent, (1 << part.depth_bits) - 1)
-    if last < 1:
-        raise Damaged("near and far are less than one depth unit apart")
+    last, depth_of = depth_codes(part, view)
     maximum = (1 << part.colour_bits) - 1
     values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
 
     def shown(codes: Pixel) -> Pixel:
         z, red, green, blue = codes
-        return (view.near + (z * extent + last // 2) // last, values[red], values[green], values[blue])
+        return (depth_of(z), values[red], values[green], values[blue])
 
     try:
         return compact.decode(part.profile, part.body, part.rows, part.columns, last, maximum, shown)
@@ -351,10 +368,7 @@ def decode_compact_slice(part: Slice, view: View) -> list[Pixel | None]:
 
 def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
     """Depth in depth units, R, G and B of a slice's full pixels, in their order."""
-    extent = view.far - view.near
-    last = min(extent, (1 << part.depth_bits) - 1)
-    if last < 1:
-        raise Damaged("near and far are less than one depth unit apart")
+    last, depth_of = depth_codes(part, view)
     maximum = (1 << part.colour_bits) - 1
     values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
     count = 8 * len(data) // part.pixel_bits()
@@ -367,7 +381,7 @@ def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
         if code > last:
             raise Damaged("depth code beyond the greatest")
         red, green, blue = (bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
-        yield (view.near + (code * extent + last // 2) // last, values[red], values[green], values[blue])
+        yield (depth_of(code), values[red], values[green], values[blue])
 
 
 def write(pictures: dict[int, Picture], views: Iterable[View], prefix: str, files: dict[str, BinaryIO]) -> None:

@@ -143,6 +143,12 @@ GST_START_TEST (test_packed_and_entropy_decode_as_ever)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_inverse_depth_decodes_as_ever)
+{
+  expect_digests ("inverse");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_exact_pictures_decode_as_ever)
 {
   expect_digests ("exact");
@@ -189,6 +195,7 @@ goldenstreams_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_default_settings_decode_as_ever);
   tcase_add_test (tc, test_packed_and_entropy_decode_as_ever);
+  tcase_add_test (tc, test_inverse_depth_decodes_as_ever);
   tcase_add_test (tc, test_exact_pictures_decode_as_ever);
   tcase_add_test (tc, test_few_bits_and_empty_views_decode_as_ever);
   tcase_add_test (tc, test_damage_costs_what_it_ever_did);

@@ -159,6 +159,26 @@ GST_START_TEST (test_padded_strides_code_to_the_same)
 }
 GST_END_TEST;
 
+/* Depth units; pixels may neither come nor go. */
+static int
+worst_depth_error (GstBuffer *sent, GstBuffer *got)
+{
+  gstrange::RangeFrameMap a (sent, GST_MAP_READ), b (got, GST_MAP_READ);
+  fail_unless_equals_int (a.views ().size (), b.views ().size ());
+  int worst = 0;
+  for (std::size_t i = 0; i < a.views ().size (); i++) {
+    const RangeImage &x = a.views ()[i], &y = b.views ()[i];
+    fail_unless (x.roi == y.roi);
+    for (int row = 0; row < x.roi.height; row++)
+      for (int column = 0; column < x.roi.width; column++) {
+        const int before = x.depth.at (column, row), after = y.depth.at (column, row);
+        fail_unless_equals_int (before == 0, after == 0);
+        worst = std::max (worst, std::abs (before - after));
+      }
+  }
+  return worst;
+}
+
 GST_START_TEST (test_bits_change_with_the_next_frame_set)
 {
   const Rig rig = ring_rig (1);
@@ -174,6 +194,47 @@ GST_START_TEST (test_bits_change_with_the_next_frame_set)
   fail_unless_equals_int (header.colour_bits, 5);
   fail_unless (fine < coarse);
   gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_depth_scale_changes_with_the_next_frame_set_and_slices_say_it)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = encoder (rig, "depth-scale=inverse");
+  for (const char *scale : {"inverse", "linear", "inverse"}) {
+    gst_util_set_object_arg (G_OBJECT (h->element), "depth-scale", scale);
+    for (const auto &unit : push_and_pull_units (h, make_frame_set (rig)))
+      fail_unless_equals_int (header_of (unit).inverse_depth, scale[0] == 'i');
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_max_depth_error_is_what_decoded_depths_come_to)
+{
+  const Rig rig = ring_rig (2);
+  for (const char *profile : {"plain", "packed", "entropy"})
+    for (const char *scale : {"linear", "inverse"}) {
+      GstHarness *h = harness_of (std::string ("neighbourcodeenc depth-bits=9 depth-threshold=2 ") +
+                                  "profile=" + profile + " depth-scale=" + scale);
+      GstHarness *decoder = harness_of ("neighbourcodedec");
+      gst_harness_set_src_caps (h, range_caps (rig));
+      gst_harness_set_src_caps (decoder, coded_caps (rig));
+      double stated = 1;
+      g_object_get (h->element, "max-depth-error", &stated, nullptr);
+      fail_unless (stated == 0, "nothing is coded yet");
+      GstBuffer *sent = make_frame_set (rig);
+      GstBuffer *got =
+          gst_harness_push_and_pull (decoder, gst_harness_push_and_pull (h, gst_buffer_ref (sent)));
+      g_object_get (h->element, "max-depth-error", &stated, nullptr);
+      const double worst = worst_depth_error (sent, got) * rig.views[0].depth_unit_m;
+      fail_unless (worst <= stated + 1e-9, "%s %s: %g m of %g", profile, scale, worst, stated);
+      fail_unless (worst >= stated / 5, "%s %s: %g m of %g", profile, scale, worst, stated);
+      gst_buffer_unref (sent);
+      gst_buffer_unref (got);
+      gst_harness_teardown (decoder);
+      gst_harness_teardown (h);
+    }
 }
 GST_END_TEST;
 
@@ -346,6 +407,8 @@ neighbourcodeenc_suite ()
   tcase_add_test (tc, test_new_caps_in_mid_stream_give_slices_of_the_new_rig);
   tcase_add_test (tc, test_padded_strides_code_to_the_same);
   tcase_add_test (tc, test_bits_change_with_the_next_frame_set);
+  tcase_add_test (tc, test_depth_scale_changes_with_the_next_frame_set_and_slices_say_it);
+  tcase_add_test (tc, test_max_depth_error_is_what_decoded_depths_come_to);
   tcase_add_test (tc, test_larger_thresholds_give_fewer_bytes_at_once);
   tcase_add_test (tc, test_no_slice_is_longer_than_max_slice_size_also_when_it_changes);
   tcase_add_test (tc, test_latency_is_that_of_upstream);

@@ -91,7 +91,7 @@ def main() -> None:
         access_unit(head, one + rig[:1]),
         # Any order, repetition, units to be passed over.
         access_unit(head, two[::-1] + two[3:5] + [unknown, head] + two[1:2]),
-        # Slices that are as if they had not come: a reserved flag, another profile, too few depth bits, too many,
+        # Slices that are as if they had not come: the depth scale that others have not, another profile, too few depth bits, too many,
         # too many colour bits, a view that the rig lacks, rows beyond the ROI; another frame number, another ROI.
         access_unit(head, [patched(one[0], 1, 3), patched(one[1], 5, 1)] + one[2:5] + [patched(one[5], 6, 5)] + one[6:]),
         access_unit(head, one[:1] + [patched(one[1], 6, 17), patched(one[2], 7, 9)] + one[3:5] + [patched(one[5], 4, 9)]),

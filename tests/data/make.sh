@@ -20,8 +20,10 @@ record coarse "num-buffers=3 empty-frames=1 range-person-only=true" \
 for profile in packed entropy; do
   record "$profile" "num-buffers=2 range-person-only=true" "profile=$profile" max-slice-size=400
 done
+record inverse "num-buffers=2 range-person-only=true" depth-scale=inverse depth-bits=9 depth-threshold=2 profile=packed \
+  max-slice-size=400
 "$here/make-damaged.py" coarse.rcnc damaged.rcnc
-for stream in default exact coarse damaged packed entropy; do
+for stream in default exact coarse damaged packed entropy inverse; do
   "$here/../bitstream/decode.py" "$stream.rcnc" "$stream" >/dev/null
 done
 sha256sum -- *-depth-?.raw *-colour-?.raw >SHA256SUMS

@@ -43,6 +43,7 @@ make_slice (std::span<const std::uint8_t> data)
   SliceHeader header;
   header.depth_bits = static_cast<std::uint8_t> (6 + at_most (0, 10));
   header.colour_bits = static_cast<std::uint8_t> (4 + at_most (1, 4));
+  header.inverse_depth = data[1] & 0x80;
   header.roi.width = 1 + at_most (2, kWidth - 1);
   header.roi.height = 1 + at_most (3, kHeight - 1);
   header.roi.x = at_most (4, kWidth - header.roi.width);

@@ -207,6 +207,16 @@ TEST_F (Hostile, slice_with_another_roi_or_frame_number_is_bad)
   EXPECT_EQ (decoded.result.bad_slices, units_of (other).size ());
 }
 
+TEST_F (Hostile, slice_of_another_depth_scale_than_the_others_is_bad)
+{
+  const auto units = units_of (small_stream ());
+  for (std::size_t k = 0; k < units.size (); k++) {
+    auto one = units;
+    one[k][1] ^= 2;
+    EXPECT_EQ (decode_exact (decoder, joined (one)).result.bad_slices, 1u) << k;
+  }
+}
+
 TEST_F (Hostile, slice_of_a_view_that_the_rig_lacks_is_bad)
 {
   std::vector<Picture> pictures;
@@ -234,9 +244,11 @@ TEST_F (Hostile, future_version_reserved_flag_and_unknown_profile_are_refused)
   auto bad = unit;
   bad[0] = static_cast<std::uint8_t> (2 << 4 | 1);
   EXPECT_EQ (read_slice_header (bad, header).code (), StatusCode::kUnsupported);
-  bad = unit;
-  bad[1] |= 0x80;
-  EXPECT_EQ (read_slice_header (bad, header).code (), StatusCode::kUnsupported);
+  for (int flag = 4; flag < 256; flag *= 2) {
+    bad = unit;
+    bad[1] = static_cast<std::uint8_t> (bad[1] | flag);
+    EXPECT_EQ (read_slice_header (bad, header).code (), StatusCode::kUnsupported) << flag;
+  }
   bad = unit;
   bad[5] = 9;
   EXPECT_EQ (read_slice_header (bad, header).code (), StatusCode::kUnsupported);

@@ -69,6 +69,9 @@ depth-bits=11 colour-bits=7 depth-threshold=4 colour-threshold=255
 depth-bits=13 depth-threshold=16
 depth-bits=14 depth-threshold=0
 depth-bits=16 colour-bits=8 depth-threshold=100
+depth-scale=inverse
+depth-scale=inverse depth-bits=6 colour-bits=4 depth-threshold=0
+depth-scale=inverse depth-bits=16 depth-threshold=0
 END
 }
 
@@ -89,6 +92,9 @@ depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=1
 depth-bits=9 colour-bits=6 depth-threshold=65535 colour-threshold=2
 depth-bits=11 colour-bits=7 depth-threshold=4 colour-threshold=255
 depth-bits=16 colour-bits=8 depth-threshold=16 max-slice-size=400
+depth-scale=inverse choice=best
+depth-scale=inverse depth-bits=7 depth-threshold=3
+depth-scale=inverse depth-bits=16 depth-threshold=0
 END
 }
 
@@ -158,7 +164,7 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged packed entropy; do
+  for stream in default exact coarse damaged packed entropy inverse; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"

@@ -7,41 +7,86 @@
 
 namespace rangecast {
 
+void
+DepthQuantiser::fill_linear (std::uint32_t last)
+{
+  const std::uint32_t range = far_ - near_;
+  for (std::uint32_t code = 0; code <= last; code++)
+    depths_[code] =
+        static_cast<std::uint16_t> (near_ + (code * std::uint64_t{range} + last / 2) / last);
+  for (std::uint32_t d = near_; d <= far_; d++)
+    codes_[d] =
+        static_cast<std::uint16_t> (((d - near_) * std::uint64_t{last} + range / 2) / range);
+}
+
+void
+DepthQuantiser::fill_inverse (std::uint32_t last)
+{
+  const std::uint64_t range = far_ - near_, top = std::uint64_t{near_} * far_ * last;
+  for (std::uint32_t code = 0; code <= last; code++) {
+    const std::uint64_t bottom = std::uint64_t{far_} * last - code * range;
+    depths_[code] = static_cast<std::uint16_t> ((top + bottom / 2) / bottom);
+  }
+  /* The nearest in depth, not in 1 / depth: a decoded depth so keeps its value if coded again. */
+  std::uint32_t code = 0;
+  for (std::uint32_t d = near_; d <= far_; d++) {
+    const auto distance = [&] (std::uint32_t c) { return std::abs (int (depths_[c]) - int (d)); };
+    std::uint32_t next = code;
+    while (next < last && depths_[next] < d)
+      next++;
+    if (distance (next) < distance (code))
+      code = next;
+    codes_[d] = static_cast<std::uint16_t> (code);
+  }
+}
+
 Status
-DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits)
+DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits, DepthScale scale)
 {
   if (near < 1 || far <= near || bits < 6 || bits > 16)
     return {StatusCode::kBadValue, "depth quantiser: expected 1 <= near < far and 6 to 16 bits"};
-  const std::uint32_t range = far - near;
-  const std::uint32_t last = std::min (range, (1u << bits) - 1); /* the greatest code */
+  const bool inverse = scale == DepthScale::kInverse;
+  const std::uint64_t range = far - near;
+  const std::uint64_t enough = inverse ? (far * range + near - 1) / near : range;
+  const auto last = static_cast<std::uint32_t> (std::min<std::uint64_t> (enough, (1u << bits) - 1));
   near_ = near;
   far_ = far;
-  step_ = double (range) / last;
+  step_ = double (range) / last * (inverse ? double (far) / near : 1);
   codes_.assign (65536, 0);
   depths_.resize (last + 1);
-  for (std::uint32_t code = 0; code <= last; code++)
-    depths_[code] =
-        static_cast<std::uint16_t> (near + (code * std::uint64_t{range} + last / 2) / last);
-  max_error_ = 0;
-  for (std::uint32_t d = near; d <= far; d++) {
-    codes_[d] = static_cast<std::uint16_t> (((d - near) * std::uint64_t{last} + range / 2) / range);
-    max_error_ = std::max (max_error_, std::abs (int (depths_[codes_[d]]) - int (d)));
-  }
+  if (inverse)
+    fill_inverse (last);
+  else
+    fill_linear (last);
   return {};
 }
 
 Status
-DepthQuantiser::set (const View &view, int bits)
+DepthQuantiser::set (const View &view, int bits, DepthScale scale)
 {
   const auto units = [&] (double metres) {
     return static_cast<std::uint16_t> (
         std::clamp (std::round (metres / view.depth_unit_m), 1.0, 65535.0));
   };
-  Status status = set (units (view.near_m), units (view.far_m), bits);
+  Status status = set (units (view.near_m), units (view.far_m), bits, scale);
   if (!status.ok ())
     return {status.code (),
         "view " + std::to_string (view.id) + ": near and far are less than one depth unit apart"};
   return status;
+}
+
+int
+DepthQuantiser::max_error (int threshold) const
+{
+  const int last = codes () - 1;
+  int most = 0;
+  for (int d = near_; d <= far_ && last > 0; d++) {
+    const int code = codes_[static_cast<std::size_t> (d)];
+    const int least = depths_[static_cast<std::size_t> (std::max (code - threshold, 0))];
+    const int greatest = depths_[static_cast<std::size_t> (std::min (code + threshold, last))];
+    most = std::max ({most, d - least, greatest - d});
+  }
+  return most;
 }
 
 ColourQuantiser::ColourQuantiser (int bits) : bits_ (std::clamp (bits, 1, 8))

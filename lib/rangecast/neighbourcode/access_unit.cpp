@@ -19,7 +19,8 @@ AccessUnitEncoder::configure (const Rig &rig, const EncoderSettings &settings)
     ViewEncoder &encoder = views_[view.id];
     if (Status s = encoder.configure (view, settings); !s.ok ())
       return s;
-    error = std::max (error, encoder.depth ().max_error () * view.depth_unit_m);
+    error =
+        std::max (error, encoder.depth ().max_error (settings.depth_threshold) * view.depth_unit_m);
   }
   rig_ = rig;
   settings_ = settings;
@@ -101,14 +102,16 @@ static auto
 sort_key (const SliceHeader &h)
 {
   return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
-      h.colour_bits, h.frame_number, h.reference, h.first_column, h.first_row, h.columns, h.rows};
+      h.inverse_depth, h.colour_bits, h.frame_number, h.reference, h.first_column, h.first_row,
+      h.columns, h.rows};
 }
 
 static bool
 agrees (const SliceHeader &a, const SliceHeader &b)
 {
-  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.colour_bits == b.colour_bits &&
-         a.frame_number == b.frame_number && a.reference == b.reference;
+  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.inverse_depth == b.inverse_depth &&
+         a.colour_bits == b.colour_bits && a.frame_number == b.frame_number &&
+         a.reference == b.reference;
 }
 
 static bool

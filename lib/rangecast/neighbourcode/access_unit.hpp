@@ -27,8 +27,8 @@ public:
   [[nodiscard]] std::size_t parts () const { return count_; }
   [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return work_[i].bytes; }
   [[nodiscard]] std::size_t size () const;
-  /** Metres by which quantisation changes a depth at most, over all views. Thresholds come on top:
-   *  depth-threshold codes of that view. */
+  /** Metres by which a decoded depth differs from the one that was coded at most, over all views:
+   *  quantisation, threshold and rounded residuals together. */
   [[nodiscard]] double max_depth_error_m () const { return max_depth_error_m_; }
 
 private:

@@ -127,11 +127,13 @@ SliceDecoder::depth_of (const SliceHeader &header)
   auto &tables = views_[header.view_id];
   if (!tables)
     tables = std::make_unique<ViewTables> ();
-  if (tables->depth_bits != header.depth_bits) {
+  if (tables->depth_bits != header.depth_bits || tables->inverse != header.inverse_depth) {
     const View *view = rig_.find (header.view_id);
-    if (!view || !tables->depth.set (*view, header.depth_bits).ok ())
+    const auto scale = header.inverse_depth ? DepthScale::kInverse : DepthScale::kLinear;
+    if (!view || !tables->depth.set (*view, header.depth_bits, scale).ok ())
       return nullptr;
     tables->depth_bits = header.depth_bits;
+    tables->inverse = header.inverse_depth;
   }
   return &tables->depth;
 }

@@ -42,6 +42,7 @@ private:
   struct ViewTables {
     DepthQuantiser depth;
     int depth_bits = 0;
+    bool inverse = false;
   };
   const DepthQuantiser *depth_of (const SliceHeader &header);
 

@@ -62,6 +62,8 @@ validate (const EncoderSettings &s)
     return bad ("encoder: maximum slice size, expected 256 to 65535 bytes");
   if (s.profile > Profile::kEntropy)
     return bad ("encoder: profile, expected plain, packed or entropy");
+  if (s.depth_scale > DepthScale::kInverse)
+    return bad ("encoder: depth scale, expected linear or inverse");
   return {};
 }
 
@@ -73,10 +75,11 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return {};
   if (Status s = validate (settings); !s.ok ())
     return s;
-  if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
+  if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
     return s;
   colour_ = ColourQuantiser (settings.colour_bits);
   const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
+                          settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits &&
                           settings.profile == settings_.profile && settings.temporal;
   if (!comparable)
@@ -268,6 +271,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   header.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
   header.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
   header.profile = settings_.profile;
+  header.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
   header.frame_number = frame_number;
   header.capture_time_ns = image.capture_time_ns;
   if (roi.empty ()) {

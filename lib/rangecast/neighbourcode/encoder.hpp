@@ -26,6 +26,7 @@ struct EncoderSettings {
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
   Profile profile = Profile::kPlain;
   NeighbourChoice choice = NeighbourChoice::kFirst;
+  DepthScale depth_scale = DepthScale::kLinear;
   /** A pixel may equal the same one of the frame set before, too. */
   bool temporal = false;
   /** Within this time every pixel is coded without reference to earlier frame sets; 0: only in key

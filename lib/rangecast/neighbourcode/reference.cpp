@@ -21,8 +21,8 @@ ReferencePlane::serves (const SliceHeader &header) const
   const bool plain = header.profile == Profile::kPlain;
   return held_ && !header.key &&
          header.frame_number - header.reference_distance == header_.frame_number &&
-         header.depth_bits == header_.depth_bits && header.colour_bits == header_.colour_bits &&
-         plain == (header_.profile == Profile::kPlain);
+         header.depth_bits == header_.depth_bits && header.inverse_depth == header_.inverse_depth &&
+         header.colour_bits == header_.colour_bits && plain == (header_.profile == Profile::kPlain);
 }
 
 void

@@ -6,8 +6,7 @@
 namespace rangecast {
 namespace {
 
-constexpr std::uint8_t kKeyFlag = 1, kReferenceFlag = 4;
-constexpr std::uint8_t kSliceFlags = kKeyFlag | kReferenceFlag;
+constexpr std::uint8_t kKeyFlag = 1, kInverseDepthFlag = 2, kReferenceFlag = 4;
 constexpr std::size_t kRigViewHeaderSize = kUnitHeaderSize + 10;
 
 template <typename T>
@@ -38,7 +37,7 @@ put_unit_header (std::uint8_t *to, UnitType type, std::uint8_t flags, std::size_
 
 Status
 expect_type (std::span<const std::uint8_t> unit, UnitType type, std::size_t minimum,
-    const char *name, std::uint8_t flags = kKeyFlag)
+    const char *name, int flags = kKeyFlag)
 {
   UnitHeader header;
   if (Status s = read_unit_header (unit, header); !s.ok ())
@@ -86,12 +85,14 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
 Status
 read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 {
-  if (Status s = expect_type (unit, UnitType::kSlice, kSliceHeaderSize, "slice", kSliceFlags);
+  if (Status s = expect_type (unit, UnitType::kSlice, kSliceHeaderSize, "slice",
+          kKeyFlag | kInverseDepthFlag | kReferenceFlag);
       !s.ok ())
     return s;
   const std::uint8_t *p = unit.data ();
   h.key = p[1] & kKeyFlag;
   h.reference = p[1] & kReferenceFlag;
+  h.inverse_depth = p[1] & kInverseDepthFlag;
   h.view_id = p[4];
   h.profile = Profile{p[5]};
   h.depth_bits = p[6];
@@ -123,9 +124,9 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 void
 write_slice_header (const SliceHeader &h, std::size_t unit_size, std::uint8_t *to)
 {
-  const auto flags =
-      static_cast<std::uint8_t> ((h.key ? kKeyFlag : 0) | (h.reference ? kReferenceFlag : 0));
-  put_unit_header (to, UnitType::kSlice, flags, unit_size);
+  const int flags = (h.key ? kKeyFlag : 0) | (h.inverse_depth ? kInverseDepthFlag : 0) |
+                    (h.reference ? kReferenceFlag : 0);
+  put_unit_header (to, UnitType::kSlice, static_cast<std::uint8_t> (flags), unit_size);
   to[4] = h.view_id;
   to[5] = static_cast<std::uint8_t> (h.profile);
   to[6] = h.depth_bits;

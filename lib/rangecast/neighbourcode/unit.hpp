@@ -41,8 +41,9 @@ enum class Profile : std::uint8_t {
 
 /** What a slice says of itself. */
 struct SliceHeader {
-  bool key = true;        ///< decodes without any earlier frame set
-  bool reference = false; ///< later frame sets may refer to the pixels of this one
+  bool key = true;            ///< decodes without any earlier frame set
+  bool inverse_depth = false; ///< depth codes are linear in 1 / depth
+  bool reference = false;     ///< later frame sets may refer to the pixels of this one
   std::uint8_t view_id = 0;
   Profile profile = Profile::kPlain;
   std::uint8_t depth_bits = 0;    ///< 6 to 16
