@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "measure.hpp"
+
+namespace bench {
+
+/** Prints rows in groups of one codec, each beside the peer at the same colour PSNR. The peer lies
+ *  between its qualities on straight lines: the logarithm of bytes, and milliseconds, over dB. */
+void print_rows (const std::vector<Row> &rows);
+
+/** Writes an array of objects, one a row. @return kNotFound if the file cannot be written */
+rangecast::Status write_json (const std::string &path, const std::vector<Row> &rows);
+
+} // namespace bench
