@@ -2,8 +2,10 @@
 #include "input.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <rangecast/roi/bounding_box.hpp>
+#include <rangecast/scene/pattern.hpp>
 
 using namespace rangecast;
 
@@ -52,8 +54,29 @@ count_points (const Input &input)
   return points;
 }
 
+/* Noise of depth as of a sensor: independent, normal (as the sum of four even numbers nearly is).
+ */
+static void
+add_depth_noise (const View &view, double sigma_mm, int frame, Picture &to)
+{
+  const double sigma = sigma_mm / 1e3 / view.depth_unit_m; /* depth units */
+  const double least = std::ceil (view.near_m / view.depth_unit_m);
+  const double most = std::floor (view.far_m / view.depth_unit_m);
+  for (std::size_t i = 0; i < to.depth.size (); i++) {
+    if (!to.depth[i])
+      continue;
+    const std::uint64_t random =
+        mix64 (i + (std::uint64_t (frame) << 32) + (std::uint64_t (view.id) << 56));
+    double sum = -2 * 65535; /* of four numbers of 16 bits: variance 4 x 65536^2 / 12 */
+    for (int k = 0; k < 64; k += 16)
+      sum += double (random >> k & 0xffff);
+    const double noisy = to.depth[i] + sigma * sum / (65536 / std::sqrt (3.0));
+    to.depth[i] = std::uint16_t (std::round (std::clamp (noisy, least, most)));
+  }
+}
+
 Status
-render_input (const SceneSettings &settings, int frames, Input &input)
+render_input (const SceneSettings &settings, int frames, double depth_noise_mm, Input &input)
 {
   std::unique_ptr<Scene> scene;
   if (Status s = Scene::create (settings, scene); !s.ok ())
@@ -68,6 +91,8 @@ render_input (const SceneSettings &settings, int frames, Input &input)
               image.colour, image.depth, {});
           !s.ok ())
         return s;
+      if (depth_noise_mm > 0)
+        add_depth_noise (view, depth_noise_mm, frame, p);
       set.push_back (make_view (view.id, std::move (p)));
       if (set.back ().roi.empty ())
         set.pop_back ();

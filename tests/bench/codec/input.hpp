@@ -66,7 +66,9 @@ rangecast::Status load_pictures (const FileSettings &settings, Input &input);
 /** Decodes a byte stream file, up to so many frame sets. Frame sets without pixels are left out. */
 rangecast::Status load_recording (const std::string &path, int frames, Input &input);
 
-/** The figure or model of avatartestsrc with exact depth, 15 frame sets a second. */
-rangecast::Status render_input (const rangecast::SceneSettings &settings, int frames, Input &input);
+/** The figure or model of avatartestsrc, 15 frame sets a second.
+ *  @param depth_noise_mm  standard deviation; without it depth is exact */
+rangecast::Status render_input (
+    const rangecast::SceneSettings &settings, int frames, double depth_noise_mm, Input &input);
 
 } // namespace bench

@@ -17,8 +17,9 @@ const char *const kUsage =
     "                   [--sequence] [--depth-unit METRES] [--near METRES] [--far METRES]\n"
     "       codec_bench --recording FILE [--frames N]\n"
     "       codec_bench [--model FILE] [--size WxH] [--frames N] [--noise LEVELS]\n"
+    "                   [--depth-noise MM]\n"
     "       with any of them: [--rounds N] [--try \"PROPERTY=VALUE ...\"] [--only TEXT]\n"
-    "                         [--json FILE]\n"
+    "                         [--depth-rms MM] [--json FILE]\n"
     "Codes frame sets with every profile of the neighbour code and with its peers, and prints\n"
     "size, quality and time of each. Frame sets are pictures, a recording, or rendered.\n"
     "  --color FILE       colour picture; what follows it belongs to the same view\n"
@@ -34,12 +35,14 @@ const char *const kUsage =
     "                     depth-bits=16 depth-threshold=0 colour-threshold=0\n"
     "  --model FILE       glTF or OBJ model to render (default: the built-in figure)\n"
     "  --size WxH         of each of its four views (default 320x240)\n"
-    "  --noise LEVELS     of its colours, grey levels (default 1.5)\n"
+    "  --noise LEVELS     of its colours, standard deviation in grey levels (default 1.5)\n"
+    "  --depth-noise MM   of its depth, standard deviation (default 0)\n"
     "  --frames N         frame sets to render (default 1), or to read of a recording (default "
     "all)\n"
     "  --rounds N         times are medians of so many (default 11)\n"
     "  --try \"P=V ...\"    also run these properties of neighbourcodeenc; may be repeated\n"
     "  --only TEXT        only codecs with TEXT in their names, and RVL + JPEG\n"
+    "  --depth-rms MM     worst depth error in the list of best settings (default 1)\n"
     "  --json FILE        also write all rows as an array of objects\n"
     "Sizes and times are of a frame set, all views, one thread, means over frame sets.\n";
 
@@ -48,6 +51,7 @@ struct Job {
   SceneSettings scene;
   std::string recording, json, only;
   std::vector<EncoderSettings> tries;
+  double depth_noise_mm = 0, depth_rms_mm = 1;
   int frames = 0, rounds = 11;
 };
 
@@ -80,6 +84,8 @@ add_options (Options &options, Job &job)
   options.text ("--model", job.scene.model);
   options.size ("--size", job.scene.width, job.scene.height, 16, 4096);
   options.number ("--noise", job.scene.noise_sigma, 0.0, 20.0);
+  options.number ("--depth-noise", job.depth_noise_mm, 0.0, 1000.0);
+  options.number ("--depth-rms", job.depth_rms_mm, 0.0, 1e5);
   options.number ("--frames", job.frames, 1, 10000);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.text ("--only", job.only);
@@ -121,7 +127,7 @@ load (const Job &job, Input &input)
     return load_pictures (job.files, input);
   if (!job.recording.empty ())
     return load_recording (job.recording, job.frames ? job.frames : 10000, input);
-  return render_input (job.scene, job.frames ? job.frames : 1, input);
+  return render_input (job.scene, job.frames ? job.frames : 1, job.depth_noise_mm, input);
 }
 
 Status
@@ -149,8 +155,9 @@ run (const Job &job)
     return s;
   const View &first = input.rig.views[0];
   const auto sets = double (input.sets.size ());
-  std::printf ("%s: %zu frame set(s), %zu view(s) of %dx%d, %.0f valid pixels each, depth %.4g to "
-               "%.4g m in units of %g mm\n",
+  std::printf (
+      "%s: frame sets: %zu, views: %zu of %dx%d, valid pixels a frame set: %.0f, depth %.4g to "
+      "%.4g m in units of %g mm\n",
       input.name.c_str (), input.sets.size (), input.rig.views.size (), first.width, first.height,
       double (count_points (input)) / sets, first.near_m, first.far_m, first.depth_unit_m * 1e3);
   Codecs codecs;
@@ -161,6 +168,7 @@ run (const Job &job)
   if (Status s = measure (input, codecs, job.rounds, rows); !s.ok ())
     return s;
   print_rows (rows);
+  print_choices (rows, job.depth_rms_mm);
   return job.json.empty () ? Status{} : write_json (job.json, rows);
 }
 

@@ -65,21 +65,24 @@ speed (const std::optional<PeerPoint> &peer, const Row &row)
          text ("%6.2fx", peer->decode_ms / row.decode_ms);
 }
 
+constexpr int kNameWidth = 66; /* columns */
+
 void
 print_heading ()
 {
-  std::printf ("%-60s %9s %6s %7s %7s %9s %9s %8s %8s   %s\n", "", "", "", "colour", "size of",
-      "depth", "error", "encode", "decode", "speed beside the peer at this PSNR, enc dec");
-  std::printf ("%-60s %9s %6s %7s %7s %9s %9s %8s %8s  %14s  %14s\n", "", "bytes", "bpvp",
-      "PSNR dB", "peer", "rms mm", "max mm", "ms", "ms", "ROI", "whole picture");
+  std::printf ("%-*s %9s %6s %7s %7s %9s %9s %8s %8s   %s\n", kNameWidth, "", "", "", "colour",
+      "size of", "depth", "error", "encode", "decode",
+      "speed beside the peer at this PSNR, enc dec");
+  std::printf ("%-*s %9s %6s %7s %7s %9s %9s %8s %8s  %14s  %14s\n", kNameWidth, "", "bytes",
+      "bpvp", "PSNR dB", "peer", "rms mm", "max mm", "ms", "ms", "ROI", "whole picture");
 }
 
 void
-print_row (const Row &row, const PeerCurve &roi, const PeerCurve &whole)
+print_row (const std::string &name, const Row &row, const PeerCurve &roi, const PeerCurve &whole)
 {
   const auto of_roi = roi.at (row.psnr_db), of_whole = whole.at (row.psnr_db);
-  std::printf ("  %-58s %9.0f %6.2f %7s %7s %9.2f %9.2f %8.3f %8.3f  %s  %s\n",
-      row.settings.c_str (), row.bytes, row.bpvp,
+  std::printf ("  %-*s %9.0f %6.2f %7s %7s %9.2f %9.2f %8.3f %8.3f  %s  %s\n", kNameWidth - 2,
+      name.c_str (), row.bytes, row.bpvp,
       std::isfinite (row.psnr_db) ? text ("%.2f", row.psnr_db).c_str () : "-",
       of_roi ? text ("%.1f %%", 100 * row.bytes / of_roi->bytes).c_str () : "-", row.depth_rms_mm,
       row.depth_max_mm, row.encode_ms, row.decode_ms, speed (of_roi, row).c_str (),
@@ -108,7 +111,32 @@ print_rows (const std::vector<Row> &rows)
   for (std::size_t i = 0; i < rows.size (); i++) {
     if (!i || rows[i].codec != rows[i - 1].codec)
       std::printf ("%s\n", rows[i].codec.c_str ());
-    print_row (rows[i], roi, whole);
+    print_row (rows[i].settings, rows[i], roi, whole);
+  }
+}
+
+void
+print_choices (const std::vector<Row> &rows, double depth_rms_mm)
+{
+  const PeerCurve roi (rows, name_of (kPeerName, false)), whole (rows, name_of (kPeerName, true));
+  for (const double psnr_db : {34.5, 36.0, 38.0}) {
+    std::vector<const Row *> best; /* one of each codec */
+    for (const Row &row : rows) {
+      if (row.psnr_db < psnr_db || row.depth_rms_mm > depth_rms_mm)
+        continue;
+      const auto same =
+          std::ranges::find_if (best, [&] (const Row *other) { return other->codec == row.codec; });
+      if (same == best.end ())
+        best.push_back (&row);
+      else if (row.bytes < (*same)->bytes)
+        *same = &row;
+    }
+    std::ranges::sort (best, {}, &Row::bytes);
+    std::printf ("smallest of each with a colour PSNR of at least %g dB and a depth error of at "
+                 "most %g mm rms\n",
+        psnr_db, depth_rms_mm);
+    for (const Row *row : best)
+      print_row (row->codec + ": " + row->settings, *row, roi, whole);
   }
 }
 
