@@ -2,17 +2,11 @@
 /* Milliseconds per frame set of the cylinder filter, beside two peers in the same run: the plain
  * rule of the method written straight down (maps, doubles, unit by unit), and a voxel grid, which
  * is what one does otherwise against overlap.
- *
- *   cylinder_bench [--rounds N] [--only NAME] [--bunny DIR] [--picture FILE.png]
- *
- * --only measures the scenes whose name begins so. --bunny takes what pipelines/bunny-to-range.py
- * wrote. --picture draws the bunny (or the bust) from above, all points in a band of heights,
- * coloured by view: before on the left, after on the right. */
+ * --help lists the options. */
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
@@ -20,9 +14,19 @@
 #include <unordered_map>
 #include <vector>
 
+#include "options.hpp"
+
 using namespace rangecast;
 
 namespace {
+
+const char *const kUsage =
+    "usage: cylinder_bench [--rounds N] [--only NAME] [--bunny DIR] [--picture FILE.png]\n"
+    "  --rounds N      times are medians of so many (default 50)\n"
+    "  --only NAME     only the scenes whose name begins so\n"
+    "  --bunny DIR     also what pipelines/bunny-to-range.py wrote there\n"
+    "  --picture FILE  draws the bunny (or the bust) from above, all points in a band of heights,\n"
+    "                  coloured by view: before on the left, after on the right\n";
 
 /** A frame set with its own pixels, which can be put back as they were. */
 struct FrameSet {
@@ -353,16 +357,13 @@ main (int argc, char **argv)
 {
   int rounds = 50;
   std::string only, bunny, picture;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    if (!std::strcmp (argv[i], "--rounds"))
-      rounds = std::max (1, std::atoi (argv[i + 1]));
-    else if (!std::strcmp (argv[i], "--only"))
-      only = argv[i + 1];
-    else if (!std::strcmp (argv[i], "--bunny"))
-      bunny = argv[i + 1];
-    else if (!std::strcmp (argv[i], "--picture"))
-      picture = argv[i + 1];
-  }
+  Options options ("cylinder_bench", kUsage);
+  options.number ("--rounds", rounds, 1, 100000);
+  options.text ("--only", only);
+  options.text ("--bunny", bunny);
+  options.text ("--picture", picture);
+  if (const auto status = options.parse (argc, argv))
+    return *status;
   FrameSet scans;
   if (!bunny.empty () && !load_bunny (bunny, scans))
     return 1;

@@ -2,13 +2,10 @@
 /* Milliseconds per picture of striprender's parts (strips made on the CPU, upload, drawing until
  * the GPU has finished) in every mode, beside a peer in the same run: a naive point cloud, one GL
  * point per valid pixel from a vertex buffer that the CPU unprojects into.
- *
- *   render_bench [--rounds N] [--model FILE] [--pictures DIR]
- *
  * Four views, cut to the figure (or to that model), seen from 25 degrees beside the first camera in
  * 640x480; coded-strips are those of frame sets that went through the neighbour code with its
- * defaults. --pictures writes what was drawn as PNG. Holes: background pixels with something drawn
- * within 5 pixels left and right and above and below them, of all that is drawn or hole. */
+ * defaults. Holes: background pixels with something drawn within 5 pixels left and right and above
+ * and below them, of all that is drawn or hole. --help lists the options. */
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
 
@@ -26,10 +23,16 @@
 #include <vector>
 
 #include "../../gst/strippainter.hpp"
+#include "options.hpp"
 
 using namespace rangecast;
 
 namespace {
+
+const char *const kUsage = "usage: render_bench [--rounds N] [--model FILE] [--pictures DIR]\n"
+                           "  --rounds N      times are medians of so many (default 30)\n"
+                           "  --model FILE    glTF or OBJ model (default: the built-in figure)\n"
+                           "  --pictures DIR  writes what was drawn there, as PNG\n";
 
 constexpr int kWidth = 640, kHeight = 480;
 
@@ -504,14 +507,12 @@ main (int argc, char **argv)
 {
   gst_init (nullptr, nullptr);
   Bench bench;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    if (!std::strcmp (argv[i], "--rounds"))
-      bench.rounds = std::max (1, std::atoi (argv[i + 1]));
-    else if (!std::strcmp (argv[i], "--model"))
-      bench.model = argv[i + 1];
-    else if (!std::strcmp (argv[i], "--pictures"))
-      bench.pictures = argv[i + 1];
-  }
+  Options options ("render_bench", kUsage);
+  options.number ("--rounds", bench.rounds, 1, 100000);
+  options.text ("--model", bench.model);
+  options.text ("--pictures", bench.pictures);
+  if (const auto status = options.parse (argc, argv))
+    return *status;
   GstGLDisplay *display = gst_gl_display_new ();
   bench.context = gst_gl_context_new (display);
   GError *error = nullptr;

@@ -1,18 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* stereodepth's way from a pair to disparities, beside OpenCV's matchers alone in the same run.
  *
- * usage: stereo_bench --left L --right R --ground-truth PNG [--scale S] --focal-length PX
- *          --baseline M [--doffs PX] --near M --far M [--rounds N]
- * Ground truth: 8 or 16 bit grey, S per pixel of disparity (default 1), 0 = unknown. Density,
- * bad-1 and bad-2 are shares of the pixels whose truth is known; bad and median are over pixels
- * that have a disparity. */
+ * Density, bad-1 and bad-2 are shares of the pixels whose truth is known; bad and median are over
+ * pixels that have a disparity. --help lists the options. */
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -20,17 +16,28 @@
 #include <string>
 #include <vector>
 
+#include "options.hpp"
+
 using namespace rangecast;
 
 namespace {
 
-std::map<std::string, std::string> options;
+const char *const kUsage =
+    "usage: stereo_bench --left FILE --right FILE --ground-truth FILE --focal-length PX\n"
+    "                    --baseline M [--scale S] [--doffs PX] [--near M] [--far M] [--rounds N]\n"
+    "  --ground-truth FILE  8 or 16 bit grey, --scale per pixel of disparity, 0 = unknown\n"
+    "  --scale S            (default 1)\n"
+    "  --focal-length PX    of both rectified pictures, pixels\n"
+    "  --baseline M         between the cameras, metres\n"
+    "  --doffs PX           by how much the right principal point lies further right (default 0)\n"
+    "  --near M, --far M    metres (default 0.3 and 3)\n"
+    "  --rounds N           times are medians of so many (default 5)\n";
 
-double
-number (const std::string &name, double fallback)
-{
-  return options.count (name) ? std::atof (options[name].c_str ()) : fallback;
-}
+struct Job {
+  std::string left, right, truth;
+  double focal = 0, baseline = 0, offset = 0, scale = 1, near_m = 0.3, far_m = 3;
+  int rounds = 5;
+};
 
 double
 median_ms (int rounds, const std::function<void ()> &work)
@@ -124,43 +131,50 @@ run_opencv (const cv::Ptr<cv::StereoMatcher> &matcher, const cv::Mat &left, cons
   report (name, disparity, truth, ms);
 }
 
-} // namespace
-
-int
-main (int argc, char **argv)
+void
+add_options (Options &options, Job &job)
 {
-  for (int i = 1; i + 1 < argc; i += 2)
-    options[argv[i]] = argv[i + 1];
-  cv::Mat left = cv::imread (options["--left"]), right = cv::imread (options["--right"]);
-  cv::Mat truth = cv::imread (options["--ground-truth"], cv::IMREAD_UNCHANGED);
-  const double focal = number ("--focal-length", 0), baseline = number ("--baseline", 0);
-  if (left.empty () || right.empty () || truth.empty () || left.size () != right.size () ||
-      left.size () != truth.size () || focal <= 0 || baseline <= 0) {
-    std::fprintf (stderr, "usage: stereo_bench --left L --right R --ground-truth PNG [--scale S] "
-                          "--focal-length PX --baseline M [--doffs PX] --near M --far M\n"
-                          "expected pictures that can be read and are of one size\n");
-    return 2;
-  }
-  if (truth.channels () > 1)
-    cv::cvtColor (truth, truth, cv::COLOR_BGR2GRAY);
-  truth.convertTo (truth, CV_32F, 1 / number ("--scale", 1));
+  options.text ("--left", job.left);
+  options.text ("--right", job.right);
+  options.text ("--ground-truth", job.truth);
+  options.number ("--scale", job.scale, 1e-6, 1e6);
+  options.number ("--focal-length", job.focal, 1.0, 1e6);
+  options.number ("--baseline", job.baseline, 1e-4, 1e3);
+  options.number ("--doffs", job.offset, -1e4, 1e4);
+  options.number ("--near", job.near_m, 1e-3, 1e5);
+  options.number ("--far", job.far_m, 1e-3, 1e5);
+  options.number ("--rounds", job.rounds, 1, 100000);
+}
+
+/* The rectified pair as a view of a rig. */
+View
+make_view (const Job &job, int width, int height)
+{
   View view;
-  view.width = left.cols;
-  view.height = left.rows;
-  view.intrinsics = {focal, focal, (left.cols - 1) / 2.0, (left.rows - 1) / 2.0};
-  view.near_m = number ("--near", 0.3);
-  view.far_m = number ("--far", 3);
+  view.width = width;
+  view.height = height;
+  view.intrinsics = {job.focal, job.focal, (width - 1) / 2.0, (height - 1) / 2.0};
+  view.near_m = job.near_m;
+  view.far_m = job.far_m;
   view.depth_unit_m = std::max (1e-4, view.far_m / 65000);
-  const double offset = number ("--doffs", 0);
   PartnerCamera partner;
   partner.intrinsics = view.intrinsics;
-  partner.intrinsics.cx += offset;
-  partner.partner_from_left.translation.x = -baseline;
+  partner.intrinsics.cx += job.offset;
+  partner.partner_from_left.translation.x = -job.baseline;
   view.right = partner;
+  return view;
+}
 
-  const int rounds = int (number ("--rounds", 5));
-  const int least = int (std::floor (focal * baseline / view.far_m - offset));
-  const int most = int (std::ceil (focal * baseline / view.near_m - offset));
+/* Runs all matchers. `truth` is as the file has it. */
+void
+measure (const Job &job, const cv::Mat &left, const cv::Mat &right, cv::Mat truth)
+{
+  if (truth.channels () > 1)
+    cv::cvtColor (truth, truth, cv::COLOR_BGR2GRAY);
+  truth.convertTo (truth, CV_32F, 1 / job.scale);
+  const View view = make_view (job, left.cols, left.rows);
+  const int least = int (std::floor (job.focal * job.baseline / view.far_m - job.offset));
+  const int most = int (std::ceil (job.focal * job.baseline / view.near_m - job.offset));
   const int count = (most - least + 1 + 15) / 16 * 16;
   cv::Mat left_rgb, right_rgb, left_grey, right_grey;
   cv::cvtColor (left, left_rgb, cv::COLOR_BGR2RGBA);
@@ -170,17 +184,41 @@ main (int argc, char **argv)
   std::printf (
       "%-28s %9s %8s %8s %8s %9s\n", "matcher", "density", "bad-1", "bad-2", "median", "ms");
   run_ours (view, left_rgb, right_rgb, truth, MatchAlgorithm::kSgbm3Way, "stereodepth sgbm-3way",
-      rounds, offset);
-  run_ours (
-      view, left_rgb, right_rgb, truth, MatchAlgorithm::kSgbm, "stereodepth sgbm", rounds, offset);
-  run_ours (
-      view, left_rgb, right_rgb, truth, MatchAlgorithm::kBm, "stereodepth bm", rounds, offset);
+      job.rounds, job.offset);
+  run_ours (view, left_rgb, right_rgb, truth, MatchAlgorithm::kSgbm, "stereodepth sgbm", job.rounds,
+      job.offset);
+  run_ours (view, left_rgb, right_rgb, truth, MatchAlgorithm::kBm, "stereodepth bm", job.rounds,
+      job.offset);
   for (int mode : {cv::StereoSGBM::MODE_SGBM_3WAY, cv::StereoSGBM::MODE_SGBM})
     run_opencv (cv::StereoSGBM::create (least, count, 5, 200, 800, 1, 31,
                     MatchSettings ().uniqueness_ratio, 60, 2, mode),
         left_grey, right_grey, truth,
-        mode == cv::StereoSGBM::MODE_SGBM ? "OpenCV SGBM" : "OpenCV SGBM 3-way", rounds, least);
-  run_opencv (
-      cv::StereoBM::create (count, 15), left_grey, right_grey, truth, "OpenCV BM", rounds, least);
+        mode == cv::StereoSGBM::MODE_SGBM ? "OpenCV SGBM" : "OpenCV SGBM 3-way", job.rounds, least);
+  run_opencv (cv::StereoBM::create (count, 15), left_grey, right_grey, truth, "OpenCV BM",
+      job.rounds, least);
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  Job job;
+  Options options ("stereo_bench", kUsage);
+  add_options (options, job);
+  if (const auto status = options.parse (argc, argv))
+    return *status;
+  if (job.left.empty () || job.right.empty () || job.truth.empty () || job.focal <= 0 ||
+      job.baseline <= 0)
+    return options.refuse (
+        "expected --left, --right, --ground-truth, --focal-length and --baseline");
+  cv::Mat left = cv::imread (job.left), right = cv::imread (job.right);
+  cv::Mat truth = cv::imread (job.truth, cv::IMREAD_UNCHANGED);
+  if (left.empty () || left.size () != right.size () || left.size () != truth.size ()) {
+    std::fprintf (stderr, "stereo_bench: %s, %s, %s: expected pictures of one size\n",
+        job.left.c_str (), job.right.c_str (), job.truth.c_str ());
+    return 1;
+  }
+  measure (job, left, right, truth);
   return 0;
 }

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Recorded files: the byte stream of docs/bitstream.md, decoded. */
+#include <fstream>
+#include <iterator>
+#include <rangecast/neighbourcode/access_unit.hpp>
+#include <rangecast/neighbourcode/byte_stream.hpp>
+
+#include "input.hpp"
+
+using namespace rangecast;
+
+namespace bench {
+namespace {
+
+/* Puts a decoded ROI back into its picture. */
+Picture
+uncrop (Picture &cut, const Roi &roi, const View &view)
+{
+  Picture whole (view.width, view.height);
+  for (int y = 0; y < roi.height; y++) {
+    const std::ptrdiff_t to = std::ptrdiff_t{roi.y + y} * view.width + roi.x;
+    const std::ptrdiff_t from = std::ptrdiff_t{y} * roi.width;
+    std::copy_n (cut.depth.begin () + from, roi.width, whole.depth.begin () + to);
+    std::copy_n (cut.colour.begin () + from, roi.width, whole.colour.begin () + to);
+  }
+  return whole;
+}
+
+class RecordingReader {
+public:
+  RecordingReader (std::string path, Input &input) : path_ (std::move (path)), input_ (input) {}
+
+  /* Takes the units of an access unit. */
+  Status take (std::span<const std::uint8_t> units)
+  {
+    number_++;
+    if (Status s = take_rig (units); !s.ok ())
+      return s;
+    if (!rigs_.generation ())
+      return {}; /* nothing can be decoded before the rig is there */
+    DecoderResult result;
+    decoder_.plan (units, result);
+    std::vector<Picture> pictures;
+    std::vector<RangeImage> images;
+    pictures.reserve (decoder_.views ().size ());
+    for (const auto &planned : decoder_.views ()) {
+      pictures.emplace_back (planned.roi.width, planned.roi.height);
+      images.push_back (pictures.back ().image (planned.view_id, planned.roi));
+    }
+    if (Status s = decoder_.decode (images, 1, result); !s.ok ())
+      return fail (s.message ());
+    if (result.bad_slices || result.missing_pixels)
+      return fail ("damaged or lossy, expected a recording with all slices");
+    FrameSet set;
+    for (std::size_t i = 0; i < images.size (); i++) {
+      const View &view = *input_.rig.find (images[i].view_id);
+      set.push_back (make_view (view.id, uncrop (pictures[i], images[i].roi, view)));
+      if (set.back ().roi.empty ())
+        set.pop_back ();
+    }
+    if (!set.empty ())
+      input_.sets.push_back (std::move (set));
+    return {};
+  }
+
+private:
+  Status fail (const std::string &what) const
+  {
+    return {StatusCode::kBadData,
+        "--recording " + path_ + ": frame set " + std::to_string (number_) + ": " + what};
+  }
+
+  Status take_rig (std::span<const std::uint8_t> units)
+  {
+    UnitReader reader (units);
+    UnitHeader header;
+    while (const auto unit = reader.next (header))
+      if (header.type == static_cast<std::uint8_t> (UnitType::kRigView))
+        if (Status s = rigs_.add (*unit); !s.ok ())
+          return fail (s.message ());
+    if (rigs_.generation () == generation_)
+      return {};
+    if (generation_)
+      return fail ("another rig, expected the same cameras throughout");
+    generation_ = rigs_.generation ();
+    input_.rig = rigs_.info ().rig;
+    return decoder_.set_rig (input_.rig);
+  }
+
+  std::string path_;
+  Input &input_;
+  RigCollector rigs_;
+  AccessUnitDecoder decoder_;
+  unsigned generation_ = 0;
+  int number_ = 0; /* of the frame set in the file, from 1 */
+};
+
+} // namespace
+
+Status
+load_recording (const std::string &path, int frames, Input &input)
+{
+  std::ifstream file (path, std::ios::binary);
+  const std::vector<std::uint8_t> bytes{
+      std::istreambuf_iterator<char> (file), std::istreambuf_iterator<char> ()};
+  if (bytes.empty ())
+    return {StatusCode::kNotFound,
+        "--recording " + path + ": cannot be read, expected a neighbour code byte stream"};
+  RecordingReader reader (path, input);
+  std::span<const std::uint8_t> rest = bytes;
+  while (!rest.empty () && input.sets.size () < std::size_t (frames)) {
+    const StreamPart part = next_part (rest, true);
+    if (part.length)
+      if (Status s =
+              reader.take (rest.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+          !s.ok ())
+        return s;
+    rest = rest.subspan (part.length ? part.length : part.rubbish);
+  }
+  if (input.sets.empty ())
+    return {StatusCode::kBadData,
+        "--recording " + path +
+            ": no frame set with pixels, expected a neighbour code byte stream"};
+  input.name = path;
+  return {};
+}
+
+} // namespace bench

@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Which codecs at which settings codec_bench runs. */
+#include "settings.hpp"
+
+#include <algorithm>
+
+using namespace rangecast;
+
+namespace bench {
+namespace {
+
+/* A family of settings; the table below has all that are run. Thresholds vary within it. */
+struct Family {
+  Profile profile;
+  NeighbourChoice choice;
+};
+constexpr Family kFamilies[] = {
+    {Profile::kPlain, NeighbourChoice::kFirst},
+    {Profile::kPacked, NeighbourChoice::kFirst},
+    {Profile::kPacked, NeighbourChoice::kBest},
+    {Profile::kEntropy, NeighbourChoice::kFirst},
+    {Profile::kEntropy, NeighbourChoice::kBest},
+};
+constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
+constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
+
+/* Thresholds in codes for 16 bits, each once: where a code is a millimetre, some are the same. */
+std::vector<int>
+depth_thresholds (double code_mm)
+{
+  std::vector<int> codes;
+  for (const double mm : kDepthThresholdsMm) {
+    const int code = int (mm / code_mm + 0.01);
+    if (std::ranges::count (codes, code) == 0)
+      codes.push_back (code);
+  }
+  return codes;
+}
+
+std::vector<EncoderSettings>
+settings_of (const Family &family, double code_mm)
+{
+  EncoderSettings defaults;
+  defaults.profile = family.profile;
+  defaults.choice = family.choice;
+  EncoderSettings exact = defaults;
+  exact.depth_bits = 16;
+  std::vector<EncoderSettings> all = {defaults};
+  for (const int depth : depth_thresholds (code_mm))
+    for (const int colour : kColourThresholds) {
+      all.push_back (exact);
+      all.back ().depth_threshold = depth;
+      all.back ().colour_threshold = colour;
+    }
+  if (family.choice != NeighbourChoice::kFirst)
+    return all;
+  exact.depth_threshold = exact.colour_threshold = 0; /* lossless */
+  all.push_back (exact);
+  all.push_back (defaults);
+  all.back ().max_slice_size = 65535; /* what slices that fit a packet cost */
+  return all;
+}
+
+} // namespace
+
+std::vector<std::string>
+add_peers (const Rig &rig, Codecs &codecs)
+{
+  std::vector<std::string> missing;
+  const auto add = [&] (std::unique_ptr<Codec> codec, const char *name) {
+    if (codec)
+      codecs.push_back (std::move (codec));
+    else if (std::ranges::count (missing, name) == 0)
+      missing.emplace_back (name);
+  };
+  constexpr auto kJpeg = ColourCode::kJpeg;
+  for (const bool whole : {false, true})
+    for (const int q : {20, 30, 40, 50, 60, 70, 75, 80, 85, 90, 95})
+      add (make_pair (DepthCode::kRvl, kJpeg, q, whole), kPeerName);
+  for (const bool whole : {false, true})
+    for (const int q : {20, 35, 50, 75, 90, 95})
+      add (make_pair (DepthCode::kRvlZstd, kJpeg, q, whole), "RVL + zstd + JPEG (libzstd)");
+  const char *png = "PNG (libpng)";
+  for (const DepthCode depth : {DepthCode::kPngFast, DepthCode::kPng})
+    for (const int q : {50, 75, 90})
+      add (make_pair (depth, kJpeg, q, false), png);
+  for (const ColourCode colour : {ColourCode::kPngFast, ColourCode::kPng})
+    add (make_pair (DepthCode::kRvl, colour, 0, false), png);
+  for (const ColourCode colour : {ColourCode::kPngFast, ColourCode::kPng})
+    add (make_pair (DepthCode::kRvl, colour, 0, true), png);
+  add (make_draco (rig), "Draco (libdraco)");
+  return missing;
+}
+
+Status
+add_profiles (const Rig &rig, Codecs &codecs)
+{
+  DepthQuantiser depth;
+  if (Status s = depth.set (rig.views[0], 16); !s.ok ())
+    return s;
+  const double code_mm = depth.step () * rig.views[0].depth_unit_m * 1e3;
+  for (const Family &family : kFamilies)
+    for (const EncoderSettings &settings : settings_of (family, code_mm)) {
+      std::unique_ptr<Codec> codec;
+      if (Status s = make_neighbour_code (rig, settings, codec); !s.ok ())
+        return s;
+      codecs.push_back (std::move (codec));
+    }
+  return {};
+}
+
+} // namespace bench

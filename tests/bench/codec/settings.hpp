@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "codec.hpp"
+
+namespace bench {
+
+/** RVL + JPEG at all qualities, which ratios need, and all other peers that are there.
+ *  @return names of peers that this build lacks */
+std::vector<std::string> add_peers (const rangecast::Rig &rig, Codecs &codecs);
+
+/** The neighbour code: every profile at several thresholds and choices. */
+rangecast::Status add_profiles (const rangecast::Rig &rig, Codecs &codecs);
+
+} // namespace bench
