@@ -66,30 +66,36 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   if (settings_.profile == Profile::kPlain) {
     const PlainSettings plain = {
         settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
-    const PlainResult done = plain_.encode (image, depth_, colour_, plain, header, to);
+    const PlainResult done = plain_.encode (image, depth_, plain, header, to);
     result.slices += done.slices;
     result.full_pixels += done.full_pixels;
+    add_points (done.points, roi, result);
   } else {
     const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
         settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
     const CompactResult done = compact_.encode (image, {depth_, colour_}, compact, header, to);
     result.slices += done.slices;
     result.full_pixels += done.full_pixels;
+    add_points (count_points (image), roi, result);
   }
-  count_points (image, result);
   return {};
 }
 
-void
-ViewEncoder::count_points (const ConstRangeImage &image, EncoderResult &result) const
+std::uint64_t
+ViewEncoder::count_points (const ConstRangeImage &image) const
 {
-  const Roi &roi = image.roi;
   std::uint64_t points = 0;
-  for (int y = 0; y < roi.height; y++) {
+  for (int y = 0; y < image.roi.height; y++) {
     const std::uint16_t *row = image.depth.row (y);
-    for (int x = 0; x < roi.width; x++)
+    for (int x = 0; x < image.roi.width; x++)
       points += depth_.valid (row[x]);
   }
+  return points;
+}
+
+void
+ViewEncoder::add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const
+{
   result.points += points;
   result.raw_bits +=
       points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +

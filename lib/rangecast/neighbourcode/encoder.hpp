@@ -60,7 +60,8 @@ public:
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
-  void count_points (const ConstRangeImage &image, EncoderResult &result) const;
+  [[nodiscard]] std::uint64_t count_points (const ConstRangeImage &image) const;
+  void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
 
   View view_;
   EncoderSettings settings_;
