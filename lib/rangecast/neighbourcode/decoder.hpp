@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
 #include "compact_decoder.hpp"
+#include "plain_decoder.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -50,8 +50,8 @@ private:
   std::array<std::unique_ptr<ViewTables>, kMaxViews> views_;
   std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
       ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
-  CompactDecoder compact_;          /* profiles packed and entropy */
-  std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
+  PlainDecoder plain_;
+  CompactDecoder compact_; /* profiles packed and entropy */
 };
 
 } // namespace rangecast

@@ -8,6 +8,7 @@
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
 #include "compact_encoder.hpp"
+#include "plain_encoder.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -72,30 +73,19 @@ private:
   void begin_temporal (SliceHeader &header);
   void encode_compact (const ConstRangeImage &image, SliceHeader header,
       std::vector<std::uint8_t> &to, EncoderResult &result);
-  void count_points (const ConstRangeImage &image, EncoderResult &result) const;
-  void load_row (const ConstRangeImage &image, int y, int first_column, int columns);
-  std::size_t code_row (bool has_upper, std::size_t symbols_at, std::size_t full_at);
-  void code_piece (const ConstRangeImage &image, int first_column, int columns, SliceHeader header,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
-  void close_slice (const SliceHeader &header, std::size_t pixels, std::size_t full,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
-  [[nodiscard]] std::size_t slice_size (std::size_t pixels, std::size_t full) const;
+  [[nodiscard]] std::uint64_t count_points (const ConstRangeImage &image) const;
+  void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
 
   View view_;
   EncoderSettings settings_;
   bool configured_ = false;
   DepthQuantiser depth_;
   ColourQuantiser colour_;
+  PlainEncoder plain_;
   CompactEncoder compact_; /* profiles packed and entropy */
   ReferencePair references_;
   RefreshSchedule refresh_;
   std::vector<RowBand> bands_;
-
-  /* Rows as four int32 a pixel (depth, R, G, B), with one invalid pixel on each side. */
-  std::vector<std::int32_t> row_, upper_;
-  std::vector<std::uint8_t> symbols_; /* of the open slice, one a byte */
-  std::vector<std::uint64_t> full_;   /* of the open slice */
-  int columns_ = 0;
 };
 
 } // namespace rangecast

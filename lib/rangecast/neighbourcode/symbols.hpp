@@ -2,6 +2,7 @@
 /* What encoder and decoder share: the symbols of a pixel, and bits in memory. */
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -26,35 +27,50 @@ symbol_bytes (std::size_t pixels)
   return (pixels * kSymbolBits + 7) / 8;
 }
 
-/** Writes numbers of up to 40 bits, least significant bit first, into memory that is large enough
- *  plus 8 bytes. */
+/** Eight bytes as one number, the first the least significant. */
+inline std::uint64_t
+load_little_endian (const std::uint8_t *from)
+{
+  std::uint64_t value;
+  std::memcpy (&value, from, sizeof value);
+  if constexpr (std::endian::native == std::endian::big)
+    value = __builtin_bswap64 (value);
+  return value;
+}
+
+inline void
+store_little_endian (std::uint64_t value, std::uint8_t *to)
+{
+  if constexpr (std::endian::native == std::endian::big)
+    value = __builtin_bswap64 (value);
+  std::memcpy (to, &value, sizeof value);
+}
+
+/** Writes numbers of up to 56 bits, least significant bit first, into memory that is large enough
+ *  plus 8 bytes. What was put is there at any time; the last byte is filled with zeros. */
 class BitWriter {
 public:
-  explicit BitWriter (std::uint8_t *to) : to_ (to) {}
+  explicit BitWriter (std::uint8_t *to) : to_ (to), begin_ (to) {}
+  /** @param value  less than 2^bits */
   void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
+    store_little_endian (held_, to_);
     count_ += bits;
-    while (count_ >= 8) {
-      *to_++ = static_cast<std::uint8_t> (held_);
-      held_ >>= 8;
-      count_ -= 8;
-    }
+    to_ += count_ >> 3;
+    held_ >>= count_ & ~7; /* 56 at most: 7 were held, and 56 came */
+    count_ &= 7;
   }
-  /** Fills the last byte with zeros. @return one past it */
-  std::uint8_t *finish ()
+  /** Bytes so far. */
+  [[nodiscard]] std::size_t size () const
   {
-    if (count_ > 0)
-      *to_++ = static_cast<std::uint8_t> (held_);
-    held_ = 0;
-    count_ = 0;
-    return to_;
+    return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
   }
 
 private:
-  std::uint8_t *to_;
-  std::uint64_t held_ = 0;
-  int count_ = 0;
+  std::uint8_t *to_, *begin_;
+  std::uint64_t held_ = 0; /* bits that fill no byte */
+  int count_ = 0;          /* of them; 0 to 7 */
 };
 
 /** Reads numbers of up to 40 bits; past the end it gives zeros and says so. */

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Functions of this file may only call functions of this file and intrinsics: an inline function
+ * of a header, compiled here, could be the copy that the linker keeps for all. */
+#include "plain_functions.hpp"
+
+#if defined __x86_64__
+#include <immintrin.h>
+
+#define AVX2 __attribute__ ((target ("avx2,bmi,bmi2,lzcnt,popcnt")))
+
+namespace rangecast {
+namespace {
+
+/* ---- quantising ---- */
+
+constexpr int kBlock = 16; /* pixels at a time */
+
+/* floor ((value * last + 127) / 255) of sixteen numbers; exact, as value * last + 127 < 65535. */
+AVX2 inline __m256i
+quantise (__m256i value, __m256i last)
+{
+  const __m256i n = _mm256_add_epi16 (_mm256_mullo_epi16 (value, last), _mm256_set1_epi16 (127));
+  const __m256i more = _mm256_add_epi16 (n, _mm256_set1_epi16 (1));
+  return _mm256_srli_epi16 (_mm256_add_epi16 (more, _mm256_srli_epi16 (n, 8)), 8);
+}
+
+/* Quantises 16 pixels. @return two bits for each pixel, set if it is valid */
+template <bool kAllColourBits>
+AVX2 inline unsigned
+make_block (const PlainQuantising &how, const std::uint16_t *depth, const std::uint16_t *codes,
+    const Rgbx *colour, PlainPixel *to)
+{
+  const __m256i d = _mm256_loadu_si256 (reinterpret_cast<const __m256i *> (depth));
+  const __m256i near = _mm256_set1_epi16 (static_cast<short> (how.near));
+  const __m256i far = _mm256_set1_epi16 (static_cast<short> (how.far));
+  const __m256i valid = _mm256_cmpeq_epi16 (_mm256_min_epu16 (_mm256_max_epu16 (d, near), far), d);
+  const auto mask = static_cast<unsigned> (_mm256_movemask_epi8 (valid));
+  const long long odd = 0x4000 + ((how.row & 1) << 13);
+  const __m256i invalid = _mm256_set_epi64x (odd + 0x1000, odd, odd + 0x1000, odd);
+  const __m256i last = _mm256_set1_epi16 (static_cast<short> ((1 << how.colour_bits) - 1));
+  const __m128i valids[] = {_mm256_castsi256_si128 (valid), _mm256_extracti128_si256 (valid, 1)};
+  for (int i = 0; i < kBlock / 4; i++) {
+    auto *const out = reinterpret_cast<__m256i *> (to + 4 * i);
+    if (mask == 0) {
+      _mm256_storeu_si256 (out, invalid);
+      continue;
+    }
+    __m256i pixels =
+        _mm256_cvtepu8_epi16 (_mm_loadu_si128 (reinterpret_cast<const __m128i *> (colour + 4 * i)));
+    if (!kAllColourBits)
+      pixels = quantise (pixels, last);
+    const __m256i code =
+        _mm256_cvtepu16_epi64 (_mm_loadl_epi64 (reinterpret_cast<const __m128i *> (codes + 4 * i)));
+    pixels = _mm256_blend_epi16 (pixels, _mm256_slli_epi64 (code, 48), 0x88);
+    const __m128i half = valids[i / 2];
+    const __m256i is_valid = _mm256_cvtepi16_epi64 (i % 2 ? _mm_srli_si128 (half, 8) : half);
+    _mm256_storeu_si256 (out, _mm256_blendv_epi8 (invalid, pixels, is_valid));
+  }
+  return mask;
+}
+
+AVX2 inline void
+widen (PlainSpan &span, int x, unsigned mask)
+{
+  if (mask == 0)
+    return;
+  if (span.valid == 0)
+    span.begin = x;
+  span.end = x + kBlock - static_cast<int> (_lzcnt_u32 (mask)) / 2;
+  span.valid += static_cast<int> (_mm_popcnt_u32 (mask)) / 2;
+}
+
+template <bool kAllColourBits>
+AVX2 PlainSpan
+make_row (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour, int columns,
+    PlainPixel *to)
+{
+  PlainSpan span;
+  int x = 0;
+  for (; x + kBlock <= columns; x += kBlock)
+    widen (span, x, make_block<kAllColourBits> (how, depth + x, how.codes + x, colour + x, to + x));
+  if (x < columns) { /* what is behind the row may not be read */
+    std::uint16_t depths[kBlock] = {}, codes[kBlock] = {};
+    Rgbx colours[kBlock];
+    const auto rest = static_cast<std::size_t> (columns - x);
+    __builtin_memcpy (depths, depth + x, rest * sizeof *depths);
+    __builtin_memcpy (codes, how.codes + x, rest * sizeof *codes);
+    __builtin_memcpy (colours, colour + x, rest * sizeof *colours);
+    widen (span, x, make_block<kAllColourBits> (how, depths, codes, colours, to + x));
+  }
+  return span;
+}
+
+AVX2 PlainSpan
+make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
+    int columns, PlainPixel *to)
+{
+  return how.colour_bits == 8 ? make_row<true> (how, depth, colour, columns, to)
+                              : make_row<false> (how, depth, colour, columns, to);
+}
+
+/* ---- coding ---- */
+
+/* Four rows at once, each kLag columns behind the one above it, so that its upper right neighbour
+ * is known: lane i of a vector is row i. A lag of 2 would do, but then each step waits for all of
+ * the one before it. */
+constexpr int kLag = 3, kColumnsBehind = kLag * (kBandRows - 1);
+static_assert (kColumnsBehind <= kPixelsBefore && kColumnsBehind + 16 + 8 <= kPixelsBehind);
+
+/* What the four rows know: the pixels on the left, and of the rows above the coming ones. */
+struct Wave {
+  __m256i left, upper_left, upper, upper_right, next;
+};
+
+AVX2 inline __m256i
+load_pixels (const PlainPixel *from)
+{
+  return _mm256_loadu_si256 (reinterpret_cast<const __m256i *> (from));
+}
+
+/* Lanes of all ones where `pixel` lies between the limits in all four numbers. */
+AVX2 inline __m256i
+is_between (__m256i pixel, __m256i least, __m256i most)
+{
+  return _mm256_cmpeq_epi64 (_mm256_min_epu16 (_mm256_max_epu16 (pixel, least), most), pixel);
+}
+
+/* Codes one pixel of each row. `above` is the row above the band, three columns on; `coded` where
+ * the last row goes. @return the symbols */
+AVX2 inline __m256i
+step (Wave &wave, __m256i own, __m256i threshold, const PlainPixel *above, PlainPixel *coded)
+{
+  const __m256i least = _mm256_subs_epu16 (own, threshold);
+  const __m256i most = _mm256_adds_epu16 (own, threshold);
+  const __m256i upper_right = is_between (wave.upper_right, least, most);
+  const __m256i upper = is_between (wave.upper, least, most);
+  const __m256i upper_left = is_between (wave.upper_left, least, most);
+  const __m256i left = is_between (wave.left, least, most);
+  /* 4 of valid pixels, 5 of others. */
+  const __m256i invalid = _mm256_and_si256 (_mm256_srli_epi64 (own, 14), _mm256_set1_epi64x (1));
+  __m256i symbol = _mm256_or_si256 (invalid, _mm256_set1_epi64x (4));
+  symbol = _mm256_blendv_epi8 (symbol, _mm256_set1_epi64x (3), upper_right);
+  symbol = _mm256_blendv_epi8 (symbol, _mm256_set1_epi64x (2), upper);
+  symbol = _mm256_blendv_epi8 (symbol, _mm256_set1_epi64x (1), upper_left);
+  symbol = _mm256_andnot_si256 (left, symbol);
+  __m256i pixel = _mm256_blendv_epi8 (own, wave.upper_right, upper_right);
+  pixel = _mm256_blendv_epi8 (pixel, wave.upper, upper);
+  pixel = _mm256_blendv_epi8 (pixel, wave.upper_left, upper_left);
+  pixel = _mm256_blendv_epi8 (pixel, wave.left, left);
+
+  _mm_storeh_pd (
+      reinterpret_cast<double *> (coded), _mm_castsi128_pd (_mm256_extracti128_si256 (pixel, 1)));
+  wave.left = pixel;
+  wave.upper_left = wave.upper;
+  wave.upper = wave.upper_right;
+  wave.upper_right = wave.next;
+  const __m256i down = _mm256_permute4x64_epi64 (pixel, 0x93); /* lanes 3, 0, 1, 2 */
+  wave.next = _mm256_blend_epi32 (down, load_pixels (above), 3);
+  return symbol;
+}
+
+/* Pixel i of each of four rows of four. */
+AVX2 inline void
+transpose (__m256i v[4])
+{
+  const __m256i a = _mm256_unpacklo_epi64 (v[0], v[1]), b = _mm256_unpackhi_epi64 (v[0], v[1]);
+  const __m256i c = _mm256_unpacklo_epi64 (v[2], v[3]), d = _mm256_unpackhi_epi64 (v[2], v[3]);
+  v[0] = _mm256_permute2x128_si256 (a, c, 0x20);
+  v[1] = _mm256_permute2x128_si256 (b, d, 0x20);
+  v[2] = _mm256_permute2x128_si256 (a, c, 0x31);
+  v[3] = _mm256_permute2x128_si256 (b, d, 0x31);
+}
+
+/* The row above in the first lane; rows further down begin outside. */
+AVX2 inline __m256i
+load_above (const PlainPixel *upper)
+{
+  return _mm256_blend_epi32 (_mm256_set1_epi64x (kOutsidePixel), load_pixels (upper), 3);
+}
+
+AVX2 void
+code_band (const PlainBand &band)
+{
+  const __m256i threshold = _mm256_set1_epi64x (static_cast<long long> (band.threshold));
+  const PlainPixel *const begin = band.upper + band.begin;
+  Wave wave = {_mm256_set1_epi64x (kOutsidePixel), load_above (begin - 1), load_above (begin),
+      load_above (begin + 1), load_above (begin + 2)};
+  std::size_t bytes = 0;
+  for (int x = band.begin; x < band.end + kColumnsBehind; x += kBlock, bytes += 6) {
+    __m256i symbols = _mm256_setzero_si256 (); /* of 16 pixels of each row, in 48 bits */
+    for (int i = 0; i < kBlock; i += 4) {
+      __m256i own[4];
+      for (int row = 0; row < kBandRows; row++)
+        own[row] = load_pixels (band.rows[row] + x + i - kLag * row);
+      transpose (own);
+      PlainPixel *const upper = band.upper + x + i;
+#pragma GCC unroll 4
+      for (int k = 0; k < 4; k++) {
+        const __m256i symbol =
+            step (wave, own[k], threshold, upper + k + 3, upper + k - kColumnsBehind);
+        symbols = _mm256_or_si256 (_mm256_srli_epi64 (symbols, 3), _mm256_slli_epi64 (symbol, 45));
+      }
+    }
+    alignas (32) std::uint64_t words[kBandRows];
+    _mm256_store_si256 (reinterpret_cast<__m256i *> (words), symbols);
+    for (int row = 0; row < kBandRows; row++)
+      __builtin_memcpy (band.symbols[row] + bytes, &words[row], 8);
+  }
+}
+
+} // namespace
+
+const PlainFunctions kPlainFunctionsAvx2 = {make_pixels, code_band, 3 * kLag};
+
+} // namespace rangecast
+#endif

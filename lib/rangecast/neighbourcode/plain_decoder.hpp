@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/quantiser.hpp"
+#include "../geometry/range_image.hpp"
+#include "unit.hpp"
+
+namespace rangecast {
+
+/** Decodes slices of profile plain. Keeps its memory. */
+class PlainDecoder {
+public:
+  /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
+   *  @param body    what is behind the slice header; not shorter than its symbols
+   *  @param header  checked, and not empty; its ROI is the image's
+   *  @param[out] points  grows by the valid pixels
+   *  @return false for damage: the pixels may then be partly written */
+  bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+      const DepthQuantiser &depth, const ColourQuantiser &colour, const RangeImage &image,
+      std::uint64_t &points);
+
+private:
+  std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
+};
+
+} // namespace rangecast

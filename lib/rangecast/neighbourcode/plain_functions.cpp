@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "plain_functions.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "../geometry/quantiser.hpp"
+#include "symbols.hpp"
+
+namespace rangecast {
+namespace {
+
+PlainSpan
+make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
+    int columns, PlainPixel *to)
+{
+  const ColourQuantiser quantiser (how.colour_bits);
+  PlainSpan span;
+  int first = columns;
+  for (int x = 0; x < columns; x++) {
+    if (depth[x] < how.near || depth[x] > how.far) {
+      to[x] = invalid_plain_pixel (x, how.row);
+      continue;
+    }
+    const Rgbx &c = colour[x];
+    to[x] = plain_pixel (
+        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[x]);
+    first = std::min (first, x);
+    span.end = x + 1;
+    span.valid++;
+  }
+  span.begin = span.valid > 0 ? first / 16 * 16 : 0;
+  return span;
+}
+
+/* Four numbers of a pixel side by side; compilers make vector code of it where there is some. */
+typedef std::int32_t Lanes __attribute__ ((vector_size (16)));
+typedef std::uint16_t Packed __attribute__ ((vector_size (8)));
+
+Lanes
+lanes_of (PlainPixel pixel)
+{
+  Packed packed;
+  std::memcpy (&packed, &pixel, sizeof packed);
+  return __builtin_convertvector(packed, Lanes);
+}
+
+bool
+are_near (Lanes a, PlainPixel b, Lanes threshold)
+{
+  typedef std::int64_t Halves __attribute__ ((vector_size (16)));
+  const Lanes difference = a - lanes_of (b);
+  const Lanes beyond = (difference > threshold) | (difference < -threshold);
+  const Halves halves = reinterpret_cast<Halves> (beyond);
+  return (halves[0] | halves[1]) == 0;
+}
+
+/* Codes one pixel. @return its symbol */
+Symbol
+code_pixel (PlainPixel &pixel, PlainPixel left, const PlainPixel *upper, Lanes threshold)
+{
+  if (pixel & kInvalidPixelBit)
+    return kInvalid;
+  const Lanes own = lanes_of (pixel);
+  const PlainPixel neighbours[] = {left, upper[-1], upper[0], upper[1]};
+  for (int i = kLeft; i <= kUpperRight; i++)
+    if (are_near (own, neighbours[i], threshold)) {
+      pixel = neighbours[i];
+      return static_cast<Symbol> (i);
+    }
+  return kFull;
+}
+
+void
+code_band (const PlainBand &band)
+{
+  const Lanes threshold = lanes_of (band.threshold);
+  PlainPixel *upper = band.upper;
+  for (int i = 0; i < kBandRows; i++) {
+    BitWriter symbols (band.symbols[i]);
+    PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];
+    for (int x = band.begin; x < band.end; x++) {
+      /* The row above is replaced as it goes, but for the last pixel. */
+      const PlainPixel above[] = {upper_left, upper[x], upper[x + 1]};
+      PlainPixel pixel = band.rows[i][x];
+      symbols.put (code_pixel (pixel, left, above + 1, threshold), kSymbolBits);
+      upper_left = above[1];
+      upper[x] = left = pixel;
+    }
+    upper[band.begin - 1] = upper[band.end] = kOutsidePixel;
+  }
+}
+
+constexpr PlainFunctions kScalar = {make_pixels, code_band, 0};
+
+} // namespace
+
+const PlainFunctions &
+plain_functions (CpuLevel level)
+{
+#if defined __x86_64__
+  if (level >= CpuLevel::kAvx2)
+    return kPlainFunctionsAvx2;
+#endif
+  (void)level;
+  return kScalar;
+}
+
+} // namespace rangecast

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The inner loops of profile plain, which exist once for each rung of cpu.hpp. All rungs give the
+ * same; the scalar functions say what that is. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../cpu.hpp"
+#include "../geometry/image_view.hpp"
+
+namespace rangecast {
+
+/** A quantised pixel: codes of R, G, B and depth, 16 bits each, R in the least significant. */
+using PlainPixel = std::uint64_t;
+
+constexpr PlainPixel
+plain_pixel (unsigned r, unsigned g, unsigned b, unsigned depth)
+{
+  return r | PlainPixel{g} << 16 | PlainPixel{b} << 32 | PlainPixel{depth} << 48;
+}
+
+/** What there is outside a slice: an R that no threshold makes equal to one of a pixel. */
+inline constexpr PlainPixel kOutsidePixel = 0xc000;
+/** An invalid pixel. Its R is also far from that of the invalid pixels beside and above it, so that
+ *  comparing is all it takes to find that it has no neighbour. */
+constexpr PlainPixel
+invalid_plain_pixel (int x, int y)
+{
+  return PlainPixel{0x4000} + 0x1000 * static_cast<unsigned> ((x & 1) | (y & 1) << 1);
+}
+inline constexpr PlainPixel kInvalidPixelBit = 0x4000; /* set in both, and in no valid pixel */
+
+/** Rows of pixels go on outside of their columns: so many before and behind can be read, and are
+ *  outside or invalid. */
+inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
+
+/** How to quantise a row. */
+struct PlainQuantising {
+  std::uint16_t near, far;    ///< of valid depths
+  const std::uint16_t *codes; ///< of the row's valid depths
+  int colour_bits;            ///< 4 to 8
+  int row;                    ///< of the piece: its last bit matters
+};
+
+/** The columns of a row that have something. */
+struct PlainSpan {
+  int begin = 0, end = 0; ///< all pixels elsewhere are invalid; begin is a multiple of 16
+  int valid = 0;          ///< valid pixels
+};
+
+/** Rows are coded in bands of up to so many. */
+inline constexpr int kBandRows = 4;
+
+struct PlainBand {
+  const PlainPixel *rows[kBandRows]; ///< what is to be coded; those that are not there are outside
+  PlainPixel *upper;    ///< the coded row above; from begin to end becomes the last of `rows`, as
+                        ///< coded, and elsewhere keeps what it is or is outside or invalid
+  int begin, end;       ///< elsewhere all pixels of the rows are invalid
+  PlainPixel threshold; ///< in all four numbers
+  std::uint8_t *symbols[kBandRows]; ///< 3 bits each, from column `begin` on, behind skip bits;
+                                    ///< room for kSymbolBytesBehind more than they need
+};
+inline constexpr int kSymbolBytesBehind = 24;
+
+struct PlainFunctions {
+  /** Quantises a row; `to` may be written up to 15 pixels behind the columns. */
+  PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
+      const Rgbx *colour, int columns, PlainPixel *to);
+  /** Codes a band as docs/bitstream.md says an encoder chooses. */
+  void (*code_band) (const PlainBand &band);
+  /** Where in its bits the symbols of row i of a band begin: at bit i * skip_bits. */
+  int skip_bits;
+};
+
+/** The functions of a rung, or of the next lower one that has its own. */
+const PlainFunctions &plain_functions (CpuLevel level);
+
+#if defined __x86_64__
+extern const PlainFunctions kPlainFunctionsAvx2;
+#endif
+
+} // namespace rangecast
