@@ -102,8 +102,8 @@ static auto
 sort_key (const SliceHeader &h)
 {
   return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
-      h.inverse_depth, h.colour_bits, h.frame_number, h.reference, h.first_column, h.first_row,
-      h.columns, h.rows};
+      h.inverse_depth, h.colour_bits, h.frame_number, h.reference, h.profile == Profile::kPlain,
+      h.first_column, h.first_row, h.columns, h.rows};
 }
 
 static bool
@@ -111,7 +111,8 @@ agrees (const SliceHeader &a, const SliceHeader &b)
 {
   return a.roi == b.roi && a.depth_bits == b.depth_bits && a.inverse_depth == b.inverse_depth &&
          a.colour_bits == b.colour_bits && a.frame_number == b.frame_number &&
-         a.reference == b.reference;
+         a.reference == b.reference &&
+         (a.profile == Profile::kPlain) == (b.profile == Profile::kPlain);
 }
 
 static bool
