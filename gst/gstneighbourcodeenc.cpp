@@ -27,6 +27,8 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
+#include "neighbourcoderate.hpp"
+
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
 using rangecast::Status;
@@ -35,8 +37,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
 
 enum {
-  PROP_0,
-  PROP_PROFILE,
+  PROP_PROFILE = NeighbourCodeRateSettings::kFirstFreeId,
   PROP_CHOICE,
   PROP_DEPTH_BITS,
   PROP_DEPTH_SCALE,
@@ -54,16 +55,20 @@ static constexpr EncoderSettings kDefaults;
 struct GstNeighbourCodeEncPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
   EncoderSettings settings;
+  NeighbourCodeRateSettings rate_settings;
   int n_threads = 0;
   double max_depth_error_m = 0;
   guint64 frames = 0, coded_bytes = 0;
   EncoderResult totals;
+  EncoderSettings latest; /* of the latest frame set */
+  double bits_per_s = 0;
 
   /* streaming thread only */
   gstrange::RangeInfo info;
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured;
   bool is_configured = false;
+  NeighbourCodeRate rate;
   std::uint32_t frame_number = 0;
   GstBufferPool *pool = nullptr;
   gsize pool_size = 0;
@@ -160,13 +165,18 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
 
 /* ---- data ---- */
 
-/* Takes over settings that changed. */
+/* Takes over settings that changed. Thresholds may with every frame set: they cost nothing. */
 static Status
 configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
 {
   if (priv->is_configured && settings == priv->configured)
     return {};
-  if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
+  EncoderSettings same = priv->configured;
+  same.depth_threshold = settings.depth_threshold;
+  same.colour_threshold = settings.colour_threshold;
+  if (priv->is_configured && settings == same)
+    priv->encoder.set_thresholds (settings.depth_threshold, settings.colour_threshold);
+  else if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
     return s;
   priv->configured = settings;
   priv->is_configured = true;
@@ -203,20 +213,42 @@ acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
   return buffer;
 }
 
+struct FrameSettings {
+  EncoderSettings encoder;
+  NeighbourCodeRateSettings rate;
+  int n_threads;
+};
+
 static Status
-encode_frame (
-    GstNeighbourCodeEncPrivate *priv, GstBuffer *input, int n_threads, EncoderResult &result)
+encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSettings &settings,
+    EncoderResult &result)
 {
   gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
-  return priv->encoder.encode (frame.views (), priv->frame_number++, n_threads, result);
+  guint64 pixels = 0;
+  for (const rangecast::RangeImage &image : frame.views ())
+    pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
+  const GstClockTime interval = priv->info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND,
+                                                           priv->info.fps_d, priv->info.fps_n)
+                                                     : GST_SECOND / 30;
+  if (Status s = configure (
+          priv, priv->rate.next (settings.encoder, settings.rate, input, pixels, interval));
+      !s.ok ())
+    return s;
+  const Status status =
+      priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
+  if (status.ok ())
+    priv->rate.coded ({priv->encoder.size (), result.points, pixels});
+  return status;
 }
 
 static void
 count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
 {
   std::lock_guard guard (priv->lock);
+  priv->latest = priv->configured;
+  priv->bits_per_s = priv->rate.bits_per_s ();
   priv->frames++;
   priv->coded_bytes += size;
   priv->totals.points += result.points;
@@ -233,17 +265,13 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
     gst_object_sync_values (
         GST_OBJECT (self), gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment,
                                GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
-  EncoderSettings settings;
-  int n_threads;
+  FrameSettings settings;
   {
     std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-    n_threads = priv->n_threads;
+    settings = {priv->settings, priv->rate_settings, priv->n_threads};
   }
   EncoderResult result;
-  Status status = configure (priv, settings);
-  if (status.ok ())
-    status = encode_frame (priv, input, n_threads, result);
+  const Status status = encode_frame (priv, input, settings, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
   count_frame (priv, result, priv->encoder.size ());
@@ -366,7 +394,9 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->frame_number = 0;
+  priv->rate.reset ();
   std::lock_guard guard (priv->lock);
+  priv->bits_per_s = 0;
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};
   return TRUE;
@@ -389,6 +419,8 @@ gst_neighbour_code_enc_set_property (
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
   std::lock_guard guard (priv->lock);
   EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.set (id, value))
+    return;
   switch (id) {
     case PROP_PROFILE:
       settings.profile = rangecast::Profile (g_value_get_enum (value));
@@ -429,7 +461,9 @@ make_stats (const GstNeighbourCodeEncPrivate *priv)
       priv->frames, "points", G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels",
       G_TYPE_UINT64, guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64,
       guint64{priv->totals.slices}, "raw-bytes", G_TYPE_UINT64, guint64{priv->totals.raw_bits / 8},
-      "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
+      "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, "bitrate", G_TYPE_UINT64,
+      guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT, priv->latest.depth_threshold,
+      "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold, nullptr);
 }
 
 static void
@@ -438,6 +472,8 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
   std::lock_guard guard (priv->lock);
   const EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.get (id, value))
+    return;
   switch (id) {
     case PROP_PROFILE:
       g_value_set_enum (value, int (settings.profile));
@@ -541,7 +577,8 @@ install_properties (GObjectClass *object_class)
           0, G_MAXDOUBLE, 0, readable));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points, full-pixels, slices, raw-bytes, coded-bytes",
+          "Counters since start: frames, points, full-pixels, slices, raw-bytes, coded-bytes; "
+          "bitrate over the last 2 s; depth-threshold, colour-threshold of the latest frame set",
           GST_TYPE_STRUCTURE, readable));
 }
 
@@ -556,6 +593,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   object_class->get_property = gst_neighbour_code_enc_get_property;
   object_class->finalize = gst_neighbour_code_enc_finalize;
   install_properties (object_class);
+  NeighbourCodeRateSettings::install (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
