@@ -2,6 +2,7 @@
 /* The neighbour code beside other codes of RGB-D pictures, on the same pixels in the same run.
  * docs/choosing-settings.md says how to read it. */
 #include <cstdio>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -177,6 +178,7 @@ run (const Job &job)
 int
 main (int argc, char **argv)
 {
+  cv::utils::logging::setLogLevel (cv::utils::logging::LOG_LEVEL_SILENT); /* we say it ourselves */
   Job job;
   job.scene.noise_sigma = 1.5;
   Options options ("codec_bench", kUsage);

@@ -13,13 +13,17 @@ namespace {
 struct Family {
   Profile profile;
   NeighbourChoice choice;
+  int max_slice_size; ///< more than a packet: only the default thresholds, to show what slices cost
 };
 constexpr Family kFamilies[] = {
-    {Profile::kPlain, NeighbourChoice::kFirst},
-    {Profile::kPacked, NeighbourChoice::kFirst},
-    {Profile::kPacked, NeighbourChoice::kBest},
-    {Profile::kEntropy, NeighbourChoice::kFirst},
-    {Profile::kEntropy, NeighbourChoice::kBest},
+    {Profile::kPlain, NeighbourChoice::kFirst, 1200},
+    {Profile::kPlain, NeighbourChoice::kFirst, 65535},
+    {Profile::kPacked, NeighbourChoice::kFirst, 1200},
+    {Profile::kPacked, NeighbourChoice::kBest, 1200},
+    {Profile::kPacked, NeighbourChoice::kFirst, 65535},
+    {Profile::kEntropy, NeighbourChoice::kFirst, 1200},
+    {Profile::kEntropy, NeighbourChoice::kBest, 1200},
+    {Profile::kEntropy, NeighbourChoice::kFirst, 65535},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
@@ -43,21 +47,21 @@ settings_of (const Family &family, double code_mm)
   EncoderSettings defaults;
   defaults.profile = family.profile;
   defaults.choice = family.choice;
+  defaults.max_slice_size = family.max_slice_size;
   EncoderSettings exact = defaults;
   exact.depth_bits = 16;
   std::vector<EncoderSettings> all = {defaults};
+  if (family.max_slice_size > EncoderSettings ().max_slice_size)
+    return all;
   for (const int depth : depth_thresholds (code_mm))
     for (const int colour : kColourThresholds) {
       all.push_back (exact);
       all.back ().depth_threshold = depth;
       all.back ().colour_threshold = colour;
     }
-  if (family.choice != NeighbourChoice::kFirst)
-    return all;
-  exact.depth_threshold = exact.colour_threshold = 0; /* lossless */
-  all.push_back (exact);
-  all.push_back (defaults);
-  all.back ().max_slice_size = 65535; /* what slices that fit a packet cost */
+  exact.depth_threshold = exact.colour_threshold = 0; /* lossless, whatever the choice */
+  if (family.choice == NeighbourChoice::kFirst)
+    all.push_back (exact);
   return all;
 }
 
