@@ -150,6 +150,9 @@ test_recording_gives_its_frame_sets () {
   check_json out.json "any(0 < $(stat -c %s three.rcnc) - 3 * r['bytes'] < 2000 for r in of('plain'))" "coded again"
   codec_bench --recording three.rcnc --frames 2 "${quick[@]}" --only plain >table.txt
   head -1 table.txt | grep -q "frame sets: 2," || fail "--frames: $(head -1 table.txt)"
+  codec_bench --recording three.rcnc --skip 2 "${quick[@]}" --only plain >table.txt
+  head -1 table.txt | grep -q "frame sets: 1," || fail "--skip: $(head -1 table.txt)"
+  refuse 1 three.rcnc --recording three.rcnc --skip 3
   head -c 1000 /dev/urandom >noise.rcnc
   refuse 1 noise.rcnc --recording noise.rcnc
   refuse 1 nowhere.rcnc --recording nowhere.rcnc
@@ -183,6 +186,7 @@ test_bad_options_are_named () {
   refuse 2 "--far" "${pair0[@]}" --near 2 --far 1
   refuse 2 "--recording" "${pair0[@]}" --recording a.rcnc
   refuse 2 "--frames" "${pair0[@]}" --frames 3
+  refuse 2 "--skip" "${pair0[@]}" --skip 3
   codec_bench --help >help.txt
   grep -q -- --mask help.txt || fail "--help: $(cat help.txt)"
 }

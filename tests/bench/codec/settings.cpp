@@ -9,21 +9,17 @@ using namespace rangecast;
 namespace bench {
 namespace {
 
-/* A family of settings; the table below has all that are run. Thresholds vary within it. */
-struct Family {
-  Profile profile;
-  NeighbourChoice choice;
-  int max_slice_size; ///< more than a packet: only the default thresholds, to show what slices cost
-};
-constexpr Family kFamilies[] = {
-    {Profile::kPlain, NeighbourChoice::kFirst, 1200},
-    {Profile::kPlain, NeighbourChoice::kFirst, 65535},
-    {Profile::kPacked, NeighbourChoice::kFirst, 1200},
-    {Profile::kPacked, NeighbourChoice::kBest, 1200},
-    {Profile::kPacked, NeighbourChoice::kFirst, 65535},
-    {Profile::kEntropy, NeighbourChoice::kFirst, 1200},
-    {Profile::kEntropy, NeighbourChoice::kBest, 1200},
-    {Profile::kEntropy, NeighbourChoice::kFirst, 65535},
+/* What is run at all thresholds below, one line each. With slices longer than a packet: only at the
+ * default thresholds, to show what slices that fit cost. */
+constexpr EncoderSettings kFamilies[] = {
+    {.profile = Profile::kPlain},
+    {.max_slice_size = 65535, .profile = Profile::kPlain},
+    {.profile = Profile::kPacked},
+    {.profile = Profile::kPacked, .choice = NeighbourChoice::kBest},
+    {.max_slice_size = 65535, .profile = Profile::kPacked},
+    {.profile = Profile::kEntropy},
+    {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest},
+    {.max_slice_size = 65535, .profile = Profile::kEntropy},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
@@ -42,17 +38,13 @@ depth_thresholds (double code_mm)
 }
 
 std::vector<EncoderSettings>
-settings_of (const Family &family, double code_mm)
+settings_of (const EncoderSettings &family, double code_mm)
 {
-  EncoderSettings defaults;
-  defaults.profile = family.profile;
-  defaults.choice = family.choice;
-  defaults.max_slice_size = family.max_slice_size;
-  EncoderSettings exact = defaults;
-  exact.depth_bits = 16;
-  std::vector<EncoderSettings> all = {defaults};
+  std::vector<EncoderSettings> all = {family};
   if (family.max_slice_size > EncoderSettings ().max_slice_size)
     return all;
+  EncoderSettings exact = family;
+  exact.depth_bits = 16;
   for (const int depth : depth_thresholds (code_mm))
     for (const int colour : kColourThresholds) {
       all.push_back (exact);
@@ -103,7 +95,7 @@ add_profiles (const Rig &rig, Codecs &codecs)
   if (Status s = depth.set (rig.views[0], 16); !s.ok ())
     return s;
   const double code_mm = depth.step () * rig.views[0].depth_unit_m * 1e3;
-  for (const Family &family : kFamilies)
+  for (const EncoderSettings &family : kFamilies)
     for (const EncoderSettings &settings : settings_of (family, code_mm)) {
       std::unique_ptr<Codec> codec;
       if (Status s = make_neighbour_code (rig, settings, codec); !s.ok ())
