@@ -9,10 +9,11 @@ A line joins the settings of a codec that no other setting of it beats in both s
 those whose depth error is small enough. Codes without any loss of colour are marks in a row of their
 own above. Needs nothing but Python."""
 import argparse
-import json
 import math
 import sys
 from xml.sax.saxutils import escape
+
+from codec_rows import front, read_rows
 
 WIDTH, HEIGHT = 980, 560
 LEFT, RIGHT, TOP, BOTTOM = 70, 280, 60, 60  # margins, pixels
@@ -23,27 +24,6 @@ COLOURS = {"plain": "#0072b2", "packed": "#009e73", "entropy": "#d55e00", "tempo
            "RVL + JPEG": "#444444", "RVL + zstd + JPEG": "#999999", "PNG16 + JPEG": "#e69f00",
            "RVL + PNG": "#8c6d31", "Draco": "#56b4e9"}
 OTHERS = ["#7b4173", "#637939", "#843c39", "#393b79"]
-KEYS = ("codec", "settings", "bpvp", "psnr_db", "depth_rms_mm")
-
-
-def read_rows(path):
-    try:
-        with open(path, encoding="utf-8") as f:
-            rows = json.load(f)
-    except (OSError, ValueError) as error:
-        sys.exit(f"plot-codecs.py: {path}: {error}, expected what codec_bench --json wrote")
-    if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) and all(k in r for k in KEYS) for r in rows):
-        sys.exit(f"plot-codecs.py: {path}: expected what codec_bench --json wrote, rows with {', '.join(KEYS)}")
-    return rows
-
-
-def front(rows):
-    """Rows that no other beats in both size and PSNR, by size."""
-    best = []
-    for row in sorted(rows, key=lambda r: (r["bpvp"], -r["psnr_db"])):
-        if not best or row["psnr_db"] > best[-1]["psnr_db"]:
-            best.append(row)
-    return best
 
 
 def by_codec(rows, max_depth_rms):
@@ -55,7 +35,7 @@ def by_codec(rows, max_depth_rms):
     found = {}
     for codec, all_of_it in codecs.items():
         exact = [r for r in all_of_it if r["psnr_db"] is None]
-        line = front([r for r in all_of_it if r["psnr_db"] is not None])
+        line = front(all_of_it)
         found[codec] = (line, min(exact, key=lambda r: r["bpvp"]) if exact else None)
     return found
 
