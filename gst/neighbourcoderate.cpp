@@ -24,12 +24,12 @@ NeighbourCodeRateSettings::install (GObjectClass *klass)
   g_object_class_install_property (klass, PROP_MAX_DEPTH_THRESHOLD,
       g_param_spec_int ("max-depth-threshold", "Maximum depth threshold",
           "With target-bitrate the depth threshold is at most so many codes, or depth-threshold if "
-          "that is more (0 to 65535, default 48)",
+          "that is more (0 to 65535, default 32)",
           0, 65535, defaults.max_depth_threshold, live));
   g_object_class_install_property (klass, PROP_MAX_COLOUR_THRESHOLD,
       g_param_spec_int ("max-colour-threshold", "Maximum colour threshold",
           "With target-bitrate the colour threshold is at most so many codes, or colour-threshold "
-          "if that is more (0 to 255, default 48)",
+          "if that is more (0 to 255, default 32)",
           0, 255, defaults.max_colour_threshold, live));
 }
 

@@ -10,7 +10,7 @@
  */
 struct NeighbourCodeRateSettings {
   guint target_bitrate = 0; ///< bits/s; 0: thresholds are as configured
-  int max_depth_threshold = 48, max_colour_threshold = 48; ///< codes
+  int max_depth_threshold = 32, max_colour_threshold = 32; ///< codes
 
   /** The first property id that is free for the element's own ones. */
   static constexpr guint kFirstFreeId = 100;

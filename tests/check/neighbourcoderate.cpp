@@ -224,7 +224,7 @@ GST_START_TEST (test_limits_change_while_playing)
         if (n == 5)
           g_object_set (encoder, "max-depth-threshold", 20, "max-colour-threshold", 16, nullptr);
       });
-  fail_unless (coded[4].thresholds == (Thresholds{48, 48}));
+  fail_unless (coded[4].thresholds == (Thresholds{32, 32}));
   fail_unless (coded[5].thresholds == (Thresholds{20, 16}));
 }
 GST_END_TEST;
