@@ -208,9 +208,81 @@ code_band (const PlainBand &band)
   }
 }
 
+/* ---- decoding ---- */
+
+AVX2 inline void
+count_group (PlainCounts &counts, std::uint64_t group)
+{
+  const std::uint64_t beyond_3 = group >> 2 & ~(group >> 1) & 0x249249249249;
+  counts.full += static_cast<std::size_t> (_mm_popcnt_u64 (beyond_3 & ~group));
+  counts.invalid += static_cast<std::size_t> (_mm_popcnt_u64 (beyond_3 & group));
+}
+
+AVX2 PlainCounts
+count_symbols (const std::uint8_t *symbols, std::size_t bytes)
+{
+  PlainCounts counts;
+  std::size_t i = 0;
+  for (; i + 8 <= bytes; i += 6) { /* sixteen symbols */
+    std::uint64_t group;
+    __builtin_memcpy (&group, symbols + i, 8);
+    count_group (counts, group);
+  }
+  std::uint64_t groups[2] = {};
+  __builtin_memcpy (groups, symbols + i, bytes - i);
+  count_group (counts, groups[0]);
+  count_group (counts, groups[0] >> 48 | groups[1] << 16);
+  return counts;
+}
+
+/* Writes 16 pixels. @return two bits for each, set if it is invalid */
+AVX2 inline unsigned
+show_block (const ShownPixel *row, std::uint16_t *depth, Rgbx *colour)
+{
+  __m256i depths[2];
+  for (int i = 0; i < 2; i++) {
+    const __m256 a = _mm256_castsi256_ps (load_pixels (row + 8 * i));
+    const __m256 b = _mm256_castsi256_ps (load_pixels (row + 8 * i + 4));
+    const __m256i colours = _mm256_castps_si256 (_mm256_shuffle_ps (a, b, 0x88));
+    _mm256_storeu_si256 (
+        reinterpret_cast<__m256i *> (colour + 8 * i), _mm256_permute4x64_epi64 (colours, 0xd8));
+    depths[i] = _mm256_castps_si256 (_mm256_shuffle_ps (a, b, 0xdd));
+  }
+  /* By twos: 0 1 4 5 . 8 9 12 13 . 2 3 6 7 . 10 11 14 15 */
+  const __m256i mixed = _mm256_packus_epi32 (depths[0], depths[1]);
+  const __m256i order = _mm256_setr_epi32 (0, 4, 1, 5, 2, 6, 3, 7);
+  const __m256i all = _mm256_permutevar8x32_epi32 (mixed, order);
+  _mm256_storeu_si256 (reinterpret_cast<__m256i *> (depth), all);
+  return static_cast<unsigned> (
+      _mm256_movemask_epi8 (_mm256_cmpeq_epi16 (all, _mm256_setzero_si256 ())));
+}
+
+AVX2 std::size_t
+show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour)
+{
+  int invalid_bits = 0, x = 0;
+  for (; x + kBlock <= columns; x += kBlock)
+    invalid_bits += _mm_popcnt_u32 (show_block (row + x, depth + x, colour + x));
+  if (x < columns && columns >= kBlock) { /* some once more */
+    const int last = columns - kBlock;
+    const unsigned invalid = show_block (row + last, depth + last, colour + last);
+    invalid_bits += _mm_popcnt_u32 (invalid >> 2 * (x - last));
+  } else if (x < columns) {
+    std::uint16_t depths[kBlock];
+    Rgbx colours[kBlock];
+    const auto rest = static_cast<std::size_t> (columns - x);
+    const unsigned invalid = show_block (row + x, depths, colours);
+    invalid_bits += _mm_popcnt_u32 (_bzhi_u32 (invalid, 2 * static_cast<unsigned> (rest)));
+    __builtin_memcpy (depth + x, depths, rest * sizeof *depths);
+    __builtin_memcpy (static_cast<void *> (colour + x), colours, rest * sizeof *colours);
+  }
+  return static_cast<std::size_t> (columns - invalid_bits / 2);
+}
+
 } // namespace
 
-const PlainFunctions kPlainFunctionsAvx2 = {make_pixels, code_band, 3 * kLag};
+const PlainFunctions kPlainFunctionsAvx2 = {
+    make_pixels, code_band, count_symbols, show_row, 3 * kLag};
 
 } // namespace rangecast
 #endif

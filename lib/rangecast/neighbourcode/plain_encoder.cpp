@@ -12,12 +12,6 @@
 namespace rangecast {
 namespace {
 
-/* Symbols are handled sixteen at a time. */
-constexpr int kGroup = 16, kGroupBits = kGroup * kSymbolBits;
-constexpr std::uint64_t kGroupMask = (std::uint64_t{1} << kGroupBits) - 1;
-constexpr std::uint64_t kLowBits = 0x249249249249; /* of each symbol of a group */
-constexpr std::uint64_t kInvalidGroup = kLowBits * kInvalid;
-
 /* Up to sixteen symbols from bit `at` on; what is behind them is 0. */
 std::uint64_t
 group_at (const std::uint8_t *symbols, std::size_t at, int count)
@@ -153,7 +147,7 @@ PlainEncoder::find_full (int row, const PlainSpan &span)
   for (int left = span.end - span.begin; left > 0;
        left -= kGroup, bit += kGroupBits, pixels += kGroup) {
     const std::uint64_t group = group_at (symbols, bit, left);
-    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kLowBits; full;
+    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
          full &= full - 1)
       *to++ = pixels[std::countr_zero (full) / kSymbolBits];
   }

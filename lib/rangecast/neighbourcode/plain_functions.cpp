@@ -2,6 +2,7 @@
 #include "plain_functions.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "../geometry/quantiser.hpp"
@@ -91,7 +92,36 @@ code_band (const PlainBand &band)
   }
 }
 
-constexpr PlainFunctions kScalar = {make_pixels, code_band, 0};
+PlainCounts
+count_symbols (const std::uint8_t *symbols, std::size_t bytes)
+{
+  PlainCounts counts;
+  for (std::size_t i = 0; i < bytes; i += 3) { /* eight symbols */
+    std::uint32_t group = symbols[i];
+    for (std::size_t k = 1; k < std::min<std::size_t> (bytes - i, 3); k++)
+      group |= std::uint32_t{symbols[i + k]} << 8 * k;
+    const std::uint32_t beyond_3 = group >> 2 & ~(group >> 1) & 0x249249;
+    counts.full += static_cast<std::size_t> (std::popcount (beyond_3 & ~group));
+    counts.invalid += static_cast<std::size_t> (std::popcount (beyond_3 & group));
+  }
+  return counts;
+}
+
+std::size_t
+show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour)
+{
+  std::size_t points = 0;
+  for (int x = 0; x < columns; x++) {
+    const ShownPixel p = row[x];
+    depth[x] = static_cast<std::uint16_t> (p >> 32);
+    colour[x] = {static_cast<std::uint8_t> (p), static_cast<std::uint8_t> (p >> 8),
+        static_cast<std::uint8_t> (p >> 16), 0};
+    points += p != 0;
+  }
+  return points;
+}
+
+constexpr PlainFunctions kScalar = {make_pixels, code_band, count_symbols, show_row, 0};
 
 } // namespace
 

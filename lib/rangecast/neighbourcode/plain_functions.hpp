@@ -63,12 +63,24 @@ struct PlainBand {
 };
 inline constexpr int kSymbolBytesBehind = 24;
 
+/** A decoded pixel as it goes into an image: R, G, B, 0, 8 bits each, R in the least significant,
+ *  above them 16 bits of depth. 0 is an invalid one. */
+using ShownPixel = std::uint64_t;
+
+struct PlainCounts {
+  std::size_t full = 0, invalid = 0;
+};
+
 struct PlainFunctions {
   /** Quantises a row; `to` may be written up to 15 pixels behind the columns. */
   PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
       const Rgbx *colour, int columns, PlainPixel *to);
   /** Codes a band as docs/bitstream.md says an encoder chooses. */
   void (*code_band) (const PlainBand &band);
+  /** Counts symbols. Bits that fill the last byte are 0. */
+  PlainCounts (*count_symbols) (const std::uint8_t *symbols, std::size_t bytes);
+  /** Writes a decoded row. @return valid pixels */
+  std::size_t (*show_row) (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
   /** Where in its bits the symbols of row i of a band begin: at bit i * skip_bits. */
   int skip_bits;
 };
