@@ -31,6 +31,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return s;
   if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
     return s;
+  plain_.set_depths (depth_);
   colour_ = ColourQuantiser (settings.colour_bits);
   view_ = view;
   settings_ = settings;
@@ -66,7 +67,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   if (settings_.profile == Profile::kPlain) {
     const PlainSettings plain = {
         settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
-    const PlainResult done = plain_.encode (image, depth_, plain, header, to);
+    const PlainResult done = plain_.encode (image, plain, header, to);
     result.slices += done.slices;
     result.full_pixels += done.full_pixels;
     add_points (done.points, roi, result);

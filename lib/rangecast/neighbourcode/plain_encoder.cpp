@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <span>
 #include <tuple>
 
 #include "symbols.hpp"
@@ -29,25 +28,6 @@ as_written (PlainPixel pixel, int depth_bits, int colour_bits)
          (pixel >> 32 & 0xff) << (depth_bits + 2 * colour_bits);
 }
 
-/* Codes of valid depths; those of others mean nothing. */
-void
-look_up (const DepthQuantiser &quantiser, std::uint16_t near, std::uint16_t far,
-    std::span<const std::uint16_t> depth, std::uint16_t *codes)
-{
-  constexpr std::size_t kBlock = 8;
-  std::size_t x = 0;
-  for (; x + kBlock <= depth.size (); x += kBlock) {
-    std::uint64_t words[2];
-    std::memcpy (words, &depth[x], sizeof words);
-    if ((words[0] | words[1]) == 0) /* background */
-      continue;
-    for (std::size_t i = x; i < x + kBlock; i++)
-      codes[i] = quantiser.code (std::clamp (depth[i], near, far));
-  }
-  for (; x < depth.size (); x++)
-    codes[x] = quantiser.code (std::clamp (depth[x], near, far));
-}
-
 void
 put_invalid (BitWriter &bits, int count)
 {
@@ -68,11 +48,13 @@ PlainEncoder::slice_size (std::size_t pixels, std::size_t full) const
 
 /* Valid depths are one interval; whichever way codes go, its ends have the first and the last. */
 void
-PlainEncoder::find_depths (const DepthQuantiser &depth)
+PlainEncoder::set_depths (const DepthQuantiser &depth)
 {
-  depth_ = &depth;
   const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
   std::tie (near_, far_) = std::minmax ({depth.depth (0), depth.depth (last)});
+  codes_.assign (65536, 0);
+  for (std::size_t d = near_; d <= far_; d++)
+    codes_[d] = depth.code (static_cast<std::uint16_t> (d));
 }
 
 /* Makes room for pieces of so many columns. */
@@ -85,7 +67,6 @@ PlainEncoder::resize (int columns)
   upper_.assign (padded, kOutsidePixel);
   outside_.assign (padded, kOutsidePixel);
   const auto size = static_cast<std::size_t> (columns);
-  codes_.resize (std::max (codes_.size (), size));
   for (auto &symbols : row_symbols_)
     symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
   row_full_.resize (std::max (row_full_.size (), size + kGroup));
@@ -97,12 +78,10 @@ PlainEncoder::resize (int columns)
 void
 PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
 {
-  const std::uint16_t *const depth = image.depth.row (y) + header_.first_column;
-  look_up (
-      *depth_, near_, far_, {depth, static_cast<std::size_t> (header_.columns)}, codes_.data ());
   const PlainQuantising how = {near_, far_, codes_.data (), header_.colour_bits, y};
-  row.span = functions_->make_pixels (how, depth, image.colour.row (y) + header_.first_column,
-      header_.columns, row.pixels.data () + kPixelsBefore);
+  row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
+      image.colour.row (y) + header_.first_column, header_.columns,
+      row.pixels.data () + kPixelsBefore);
   result_.points += static_cast<std::uint64_t> (row.span.valid);
 }
 
@@ -243,14 +222,13 @@ PlainEncoder::code_piece (
 }
 
 PlainResult
-PlainEncoder::encode (const ConstRangeImage &image, const DepthQuantiser &depth,
-    const PlainSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to)
+PlainEncoder::encode (const ConstRangeImage &image, const PlainSettings &settings,
+    SliceHeader header, std::vector<std::uint8_t> &to)
 {
   settings_ = settings;
   header_ = header;
   result_ = {};
   functions_ = &plain_functions (cpu_level ());
-  find_depths (depth);
   /* As many columns as fit in one row even if every pixel of it is written in full. */
   const int bits = kSymbolBits + bits_of_full ();
   const int most = (settings.max_slice_size - int (kSliceHeaderSize) - 2) * 8 / bits;
@@ -259,7 +237,6 @@ PlainEncoder::encode (const ConstRangeImage &image, const DepthQuantiser &depth,
     const int begin = width * i / pieces, end = width * (i + 1) / pieces;
     code_piece (image, begin, end - begin, to);
   }
-  depth_ = nullptr;
   return result_;
 }
 

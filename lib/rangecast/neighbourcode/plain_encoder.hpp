@@ -27,10 +27,13 @@ struct PlainResult {
 /** Codes range images in profile plain. Keeps its memory. */
 class PlainEncoder {
 public:
+  /** The codes of depths from now on. */
+  void set_depths (const DepthQuantiser &depth);
+
   /** Appends the slices of one range image whose ROI is not empty.
    *  @param header  of all slices: bits, ROI, times */
-  PlainResult encode (const ConstRangeImage &image, const DepthQuantiser &depth,
-      const PlainSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to);
+  PlainResult encode (const ConstRangeImage &image, const PlainSettings &settings,
+      SliceHeader header, std::vector<std::uint8_t> &to);
 
 private:
   /* A row that waits to be coded. */
@@ -44,7 +47,6 @@ private:
     std::size_t full_pixels = 0;
   };
 
-  void find_depths (const DepthQuantiser &depth);
   void resize (int columns);
   void load_row (const ConstRangeImage &image, int y, Row &row);
   PlainSpan code_band (int rows);
@@ -60,15 +62,14 @@ private:
 
   PlainSettings settings_{};
   const PlainFunctions *functions_ = nullptr;
-  const DepthQuantiser *depth_ = nullptr; /* while encode() runs */
-  std::uint16_t near_ = 1, far_ = 0;
-  SliceHeader header_; /* of the open slice */
+  std::uint16_t near_ = 1, far_ = 0; /* of valid depths */
+  std::vector<std::uint16_t> codes_; /* of all depths */
+  SliceHeader header_;               /* of the open slice */
   Slice slice_;
   PlainResult result_;
 
   std::array<Row, kBandRows> rows_;
   std::vector<PlainPixel> upper_, outside_;
-  std::vector<std::uint16_t> codes_;
   std::array<std::vector<std::uint8_t>, kBandRows> row_symbols_;
   std::vector<std::uint64_t> row_full_;
   std::vector<std::uint8_t> symbols_, full_; /* of the open slice */

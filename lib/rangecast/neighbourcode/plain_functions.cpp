@@ -25,7 +25,7 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
     }
     const Rgbx &c = colour[x];
     to[x] = plain_pixel (
-        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[x]);
+        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[depth[x]]);
     first = std::min (first, x);
     span.end = x + 1;
     span.valid++;

@@ -38,7 +38,7 @@ inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
 /** How to quantise a row. */
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
-  const std::uint16_t *codes; ///< of the row's valid depths
+  const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
   int colour_bits;            ///< 4 to 8
   int row;                    ///< of the piece: its last bit matters
 };
