@@ -7,8 +7,6 @@
 #if defined __x86_64__
 #include <immintrin.h>
 
-#include "symbols.hpp"
-
 #define AVX2 __attribute__ ((target ("avx2,bmi,bmi2,lzcnt,popcnt")))
 
 namespace rangecast {
@@ -232,20 +230,59 @@ code_band (const PlainBand &band)
   const PlainPixel *const begin = band.upper + band.begin;
   Wave wave = {_mm256_set1_epi64x (kOutsidePixel), load_above (begin - 1), load_above (begin),
       load_above (begin + 1), load_above (begin + 2)};
+  const int last = band.end + kColumnsBehind;
   std::size_t bytes = 0;
-  for (int x = band.begin; x < band.end + kColumnsBehind; x += kGroup, bytes += kGroupBits / 8) {
-    __m256i group = _mm256_setzero_si256 (); /* symbols of each row, in the upper 48 bits */
-    for (int i = 0; i < kGroup; i += 4) {
+  for (int x = band.begin; x < last; x += kGroup, bytes += kGroupBits / 8) {
+    /* Symbols of each row, 48 bits. The last ones may be missing. */
+    __m256i group = _mm256_setzero_si256 ();
+    const int steps = last - x < kGroup ? last - x : kGroup;
+    for (int i = 0; i < steps; i += 4) {
       const __m256i four = four_steps (wave, band, x + i, threshold);
-      group = _mm256_or_si256 (
-          _mm256_srli_epi64 (group, 4 * kSymbolBits), _mm256_slli_epi64 (four, 52 - kSymbolAt));
+      group = _mm256_or_si256 (group, _mm256_sll_epi64 (_mm256_srli_epi64 (four, kSymbolAt),
+                                          _mm_cvtsi32_si128 (kSymbolBits * i)));
     }
-    group = _mm256_srli_epi64 (group, 64 - kGroupBits);
     alignas (32) std::uint64_t words[kBandRows];
     _mm256_store_si256 (reinterpret_cast<__m256i *> (words), group);
     for (int row = 0; row < kBandRows; row++)
       __builtin_memcpy (band.symbols[row] + bytes, &words[row], 8);
   }
+}
+
+/* Of pixels side by side, bits of a place, moved. */
+AVX2 inline __m256i
+moved (__m256i pixels, int from, __m128i to)
+{
+  const __m256i code =
+      _mm256_and_si256 (_mm256_srli_epi64 (pixels, from), _mm256_set1_epi64x (0xff));
+  return _mm256_sll_epi64 (code, to);
+}
+
+AVX2 void
+pack_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits)
+{
+  const __m128i r = _mm_cvtsi32_si128 (depth_bits);
+  const __m128i g = _mm_cvtsi32_si128 (depth_bits + colour_bits);
+  const __m128i b = _mm_cvtsi32_si128 (depth_bits + 2 * colour_bits);
+  for (std::size_t i = 0; i < count; i += 4) {
+    const __m256i p = load_pixels (pixels + i);
+    const __m256i d_r = _mm256_or_si256 (_mm256_srli_epi64 (p, 48), moved (p, 0, r));
+    const __m256i g_b = _mm256_or_si256 (moved (p, 16, g), moved (p, 32, b));
+    _mm256_storeu_si256 (reinterpret_cast<__m256i *> (pixels + i), _mm256_or_si256 (d_r, g_b));
+  }
+}
+
+AVX2 std::size_t
+gather_full (const PlainRow &row, PlainPixel *to)
+{
+  std::size_t count = 0, bit = row.first_bit;
+  const PlainPixel *pixels = row.pixels;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits, pixels += kGroup) {
+    const std::uint64_t group = plain_group (row.symbols, bit, left);
+    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
+         full = _blsr_u64 (full))
+      to[count++] = pixels[_tzcnt_u64 (full) / kSymbolBits];
+  }
+  return count;
 }
 
 /* ---- decoding ---- */
@@ -322,7 +359,7 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
 } // namespace
 
 const PlainFunctions kPlainFunctionsAvx2 = {
-    make_pixels, code_band, count_symbols, show_row, 3 * kLag};
+    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 3 * kLag};
 
 } // namespace rangecast
 #endif

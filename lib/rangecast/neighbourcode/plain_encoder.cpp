@@ -11,24 +11,8 @@
 namespace rangecast {
 namespace {
 
-/* Up to sixteen symbols from bit `at` on; what is behind them is 0. */
-std::uint64_t
-group_at (const std::uint8_t *symbols, std::size_t at, int count)
-{
-  const std::uint64_t group = load_little_endian (symbols + at / 8) >> (at % 8) & kGroupMask;
-  return count < kGroup ? group & ((std::uint64_t{1} << count * kSymbolBits) - 1) : group;
-}
-
-/* A pixel as it is written: D bits of depth, then C each of R, G and B. */
-std::uint64_t
-as_written (PlainPixel pixel, int depth_bits, int colour_bits)
-{
-  return pixel >> 48 | (pixel & 0xff) << depth_bits |
-         (pixel >> 16 & 0xff) << (depth_bits + colour_bits) |
-         (pixel >> 32 & 0xff) << (depth_bits + 2 * colour_bits);
-}
-
-void
+/* In memory the writer would be waited for. */
+[[gnu::always_inline]] inline void
 put_invalid (BitWriter &bits, int count)
 {
   for (; count >= kGroup; count -= kGroup)
@@ -40,9 +24,15 @@ put_invalid (BitWriter &bits, int count)
 } // namespace
 
 std::size_t
-PlainEncoder::slice_size (std::size_t pixels, std::size_t full) const
+PlainEncoder::pixels_of (int rows) const
 {
-  return kSliceHeaderSize + symbol_bytes (pixels) +
+  return static_cast<std::size_t> (rows) * static_cast<std::size_t> (header_.columns);
+}
+
+std::size_t
+PlainEncoder::slice_size (int rows, std::size_t full) const
+{
+  return kSliceHeaderSize + symbol_bytes (pixels_of (rows)) +
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
@@ -114,45 +104,32 @@ PlainEncoder::code_band (int rows)
   return span;
 }
 
-/* Gathers a coded row's full pixels in row_full_. @return how many */
-std::size_t
-PlainEncoder::find_full (int row, const PlainSpan &span)
+/* The symbols of a coded row and what was coded. */
+PlainRow
+PlainEncoder::coded_row (int row, const PlainSpan &span) const
 {
   const auto at = static_cast<std::size_t> (row);
-  const PlainPixel *pixels = rows_[at].pixels.data () + kPixelsBefore + span.begin;
-  const std::uint8_t *const symbols = row_symbols_[at].data ();
-  auto bit = at * static_cast<std::size_t> (functions_->skip_bits);
-  std::uint64_t *to = row_full_.data ();
-  for (int left = span.end - span.begin; left > 0;
-       left -= kGroup, bit += kGroupBits, pixels += kGroup) {
-    const std::uint64_t group = group_at (symbols, bit, left);
-    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
-         full &= full - 1)
-      *to++ = pixels[std::countr_zero (full) / kSymbolBits];
-  }
-  return static_cast<std::size_t> (to - row_full_.data ());
+  return {row_symbols_[at].data (), at * static_cast<std::size_t> (functions_->skip_bits),
+      rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
 }
 
-/* Appends a coded row and the pixels in row_full_ to the slice. */
+/* Appends a coded row to the slice. */
 void
-PlainEncoder::add_row (int row, const PlainSpan &span, std::size_t full)
+PlainEncoder::add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full)
 {
-  const auto at = static_cast<std::size_t> (row);
-  const std::uint8_t *const symbols = row_symbols_[at].data ();
-  auto bit = at * static_cast<std::size_t> (functions_->skip_bits);
-  BitWriter out = slice_.symbols;
-  put_invalid (out, span.begin);
-  for (int left = span.end - span.begin; left > 0; left -= kGroup, bit += kGroupBits)
-    out.put (group_at (symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
-  put_invalid (out, header_.columns - span.end);
-  slice_.symbols = out;
+  BitWriter symbols (symbols_.data (), pixels_of (header_.rows) * kSymbolBits);
+  put_invalid (symbols, span.begin);
+  std::size_t bit = row.first_bit;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits)
+    symbols.put (plain_group (row.symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
+  put_invalid (symbols, header_.columns - span.end);
 
-  BitWriter pixels = slice_.full;
-  const int depth_bits = header_.depth_bits, colour_bits = header_.colour_bits;
-  for (std::size_t i = 0; i < full; i++)
-    pixels.put (as_written (row_full_[i], depth_bits, colour_bits), depth_bits + 3 * colour_bits);
-  slice_.full = pixels;
-  slice_.full_pixels += full;
+  const int bits = bits_of_full ();
+  functions_->pack_pixels (full.data (), full.size (), header_.depth_bits, header_.colour_bits);
+  BitWriter pixels (full_.data (), full_pixels_ * static_cast<std::size_t> (bits));
+  for (const std::uint64_t pixel : full)
+    pixels.put (pixel, bits);
+  full_pixels_ += full.size ();
   header_.rows++;
 }
 
@@ -161,22 +138,22 @@ PlainEncoder::begin_slice (int first_row)
 {
   header_.first_row = first_row;
   header_.rows = 0;
-  slice_ = {BitWriter (symbols_.data ()), BitWriter (full_.data ()), 0};
+  full_pixels_ = 0;
   std::ranges::fill (upper_, kOutsidePixel);
 }
 
 void
 PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
 {
-  const std::size_t symbols = slice_.symbols.size (), full = slice_.full.size ();
-  const std::size_t begin = to.size (), size = kSliceHeaderSize + symbols + full;
+  const std::size_t symbols = symbol_bytes (pixels_of (header_.rows));
+  const std::size_t begin = to.size (), size = slice_size (header_.rows, full_pixels_);
   to.resize (begin + size);
   std::uint8_t *const p = to.data () + begin;
   write_slice_header (header_, size, p);
   std::memcpy (p + kSliceHeaderSize, symbols_.data (), symbols);
-  std::memcpy (p + kSliceHeaderSize + symbols, full_.data (), full);
+  std::memcpy (p + kSliceHeaderSize + symbols, full_.data (), size - kSliceHeaderSize - symbols);
   result_.slices++;
-  result_.full_pixels += slice_.full_pixels;
+  result_.full_pixels += full_pixels_;
 }
 
 /* Codes the first rows that wait, as far as the open slice has room for them. Where it has not, the
@@ -187,15 +164,15 @@ PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
   const PlainSpan span = code_band (rows);
   const auto limit = static_cast<std::size_t> (settings_.max_slice_size);
   for (int i = 0; i < rows; i++) {
-    const std::size_t full = find_full (i, span);
-    const auto pixels =
-        static_cast<std::size_t> (header_.rows + 1) * static_cast<std::size_t> (header_.columns);
-    if (header_.rows > 0 && slice_size (pixels, slice_.full_pixels + full) > limit) {
+    const PlainRow row = coded_row (i, span);
+    const std::span<PlainPixel> full (
+        row_full_.data (), functions_->gather_full (row, row_full_.data ()));
+    if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) > limit) {
       close_slice (to);
       begin_slice (header_.first_row + header_.rows);
       return i;
     }
-    add_row (i, span, full);
+    add_row (row, span, full);
   }
   return rows;
 }

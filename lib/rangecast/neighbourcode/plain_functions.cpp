@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "../geometry/quantiser.hpp"
-#include "symbols.hpp"
 
 namespace rangecast {
 namespace {
@@ -92,6 +91,31 @@ code_band (const PlainBand &band)
   }
 }
 
+std::size_t
+gather_full (const PlainRow &row, PlainPixel *to)
+{
+  const PlainPixel *const begin = to;
+  const PlainPixel *pixels = row.pixels;
+  std::size_t bit = row.first_bit;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits, pixels += kGroup) {
+    const std::uint64_t group = plain_group (row.symbols, bit, left);
+    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
+         full &= full - 1)
+      *to++ = pixels[std::countr_zero (full) / kSymbolBits];
+  }
+  return static_cast<std::size_t> (to - begin);
+}
+
+void
+pack_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits)
+{
+  const int r = depth_bits, g = r + colour_bits, b = g + colour_bits;
+  for (std::size_t i = 0; i < count; i++) {
+    const PlainPixel p = pixels[i];
+    pixels[i] = p >> 48 | (p & 0xff) << r | (p >> 16 & 0xff) << g | (p >> 32 & 0xff) << b;
+  }
+}
+
 PlainCounts
 count_symbols (const std::uint8_t *symbols, std::size_t bytes)
 {
@@ -121,7 +145,8 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
   return points;
 }
 
-constexpr PlainFunctions kScalar = {make_pixels, code_band, count_symbols, show_row, 0};
+constexpr PlainFunctions kScalar = {
+    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 0};
 
 } // namespace
 

@@ -58,7 +58,11 @@ inline constexpr std::uint64_t kInvalidGroup = kGroupLowBits * kInvalid;
  *  plus 8 bytes. What was put is there at any time; the last byte is filled with zeros. */
 class BitWriter {
 public:
-  explicit BitWriter (std::uint8_t *to) : to_ (to), begin_ (to) {}
+  /** Goes on behind the first `bits` of `to`, which another writer put there. */
+  explicit BitWriter (std::uint8_t *to, std::size_t bits = 0)
+      : to_ (to + bits / 8), held_ (bits % 8 ? *to_ : 0), count_ (static_cast<int> (bits % 8))
+  {
+  }
   /** @param value  less than 2^bits */
   void put (std::uint64_t value, int bits)
   {
@@ -69,16 +73,11 @@ public:
     held_ >>= count_ & ~7; /* 56 at most: 7 were held, and 56 came */
     count_ &= 7;
   }
-  /** Bytes so far. */
-  [[nodiscard]] std::size_t size () const
-  {
-    return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
-  }
 
 private:
-  std::uint8_t *to_, *begin_;
-  std::uint64_t held_ = 0; /* bits that fill no byte */
-  int count_ = 0;          /* of them; 0 to 7 */
+  std::uint8_t *to_;
+  std::uint64_t held_; /* bits that fill no byte */
+  int count_;          /* of them; 0 to 7 */
 };
 
 /** Bits in memory, at any place; behind the end they are 0. */
