@@ -1,8 +1,4 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#if defined __GNUC__ && !defined __clang__
-/* Else GCC keeps pairs of a pixel's numbers in vectors, and takes an eighth more time. */
-#pragma GCC optimize("no-tree-slp-vectorize")
-#endif
 #include "compact_decoder.hpp"
 
 #include "entropy_code.hpp"
@@ -24,101 +20,101 @@ public:
   [[nodiscard]] bool at_clean_end () const { return coder ().at_end (); }
 };
 
+/* As it goes into the image: R, G, B in the lower half, depth in the upper. */
 std::uint64_t
-shown_as (const Components &c, const CompactQuantisers &quantisers)
+shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
 {
-  const auto rgb = to_rgb (c, (1 << quantisers.colour.bits ()) - 1);
-  std::uint64_t shown = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
-  for (int i = 0; i < 3; i++)
-    shown |= std::uint64_t{quantisers.colour.value (
-                 static_cast<std::uint8_t> (rgb[static_cast<std::size_t> (i)]))}
-             << (16 + 8 * i);
-  return shown;
+  const Components c = to_rgb (components_of (code), limits);
+  const auto colour = [&] (int i) {
+    return std::uint64_t{quantisers.colour.value (static_cast<std::uint8_t> (c[i]))};
+  };
+  const std::uint64_t depth = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
+  return colour (1) | colour (2) << 8 | colour (3) << 16 | depth << 32;
 }
 
-std::uint64_t
-write_row (const std::uint64_t *row, int columns, std::uint16_t *depth, Rgbx *colour)
+void
+write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, Rgbx *colour)
 {
-  std::uint64_t points = 0;
-  for (int x = 0; x < columns; x++) {
+  for (std::size_t x = 0; x < columns; x++) {
     const std::uint64_t p = row[x];
-    depth[x] = static_cast<std::uint16_t> (p);
-    colour[x] = {static_cast<std::uint8_t> (p >> 16), static_cast<std::uint8_t> (p >> 24),
-        static_cast<std::uint8_t> (p >> 32), 0};
-    points += p != 0;
+    depth[x] = static_cast<std::uint16_t> (p >> 32);
+    colour[x] = {static_cast<std::uint8_t> (p), static_cast<std::uint8_t> (p >> 8),
+        static_cast<std::uint8_t> (p >> 16), 0};
   }
-  return points;
 }
+
+constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
 
 } // namespace
 
 /* A pixel that equals no neighbour. */
 template <class Code>
 bool
-CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected,
-    const CompactQuantisers &quantisers, std::size_t x)
+CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
 {
-  Components c = predict (n, last_, limits_.last_depth);
-  Activity activity = 0;
-  if (corrected) {
-    Components residual;
-    if (!code.residual (n, n.any (), residual))
-      return false;
-    c = correct (c, residual, steps_, limits_);
-    activity = activity_of (residual);
+  const Components expected = predict (n, last_, limits_.most);
+  if (!corrected) {
+    pixel = {pack_components (expected), state_of (Origin::kPredicted)};
+    return true;
   }
-  row_.pixels[x + 1] = {
-      pack_components (c), corrected ? Origin::kCorrected : Origin::kPredicted, activity};
-  row_.shown[x + 1] = shown_as (c, quantisers);
+  Components residual;
+  if (!code.residual (n, n.any (), residual))
+    return false;
+  pixel = {pack_components (correct (expected, residual, steps_, limits_)),
+      state_of (Origin::kCorrected, activity_of (residual))};
   return true;
 }
 
-/* Decodes a run of valid pixels. What the loop needs of this object it holds in variables of its
- * own, the code too, so that it stays in registers. */
+/* Decodes a run of valid pixels, behind an invalid one. What the loop needs of this object it holds
+ * in variables of its own, the code too, so that it stays in registers. */
 template <class Code>
 bool
 CompactDecoder::decode_run (
     Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
 {
-  CodedPixel *const pixels = row_.pixels.data () + 1;
-  const CodedPixel *const upper = upper_.pixels.data () + 1;
-  std::uint64_t *const shown = row_.shown.data () + 1;
-  const std::uint64_t *const upper_shown = upper_.shown.data () + 1;
-  Neighbours n = {pixels[begin - 1], upper[begin - 1], upper[begin], upper[begin + 1]};
+  PixelCode *const codes = row_.codes ();
+  PixelState *const states = row_.states ();
+  std::uint64_t *const shown = row_.shown ();
+  const PixelCode *const upper_codes = upper_.codes ();
+  const PixelState *const upper_states = upper_.states ();
+  const std::uint64_t *const upper_shown = upper_.shown ();
+  CodedPixel left;
+  std::uint64_t left_shown = 0;
   Code code = slice_code;
   for (std::size_t x = begin; x < end; x++) {
+    const Neighbours n = {left, upper_codes + x, upper_states + x};
     const int chosen = n.any () ? code.choice (n) : kCorrect;
-    if (chosen == kTakeLeft) {
-      pixels[x] = {n.left.code, Origin::kLeft};
-      shown[x] = shown[x - 1];
-    } else if (chosen >= kTakeUpperLeft && chosen <= kTakeUpperRight) {
+    if (static_cast<unsigned> (chosen) < kPredict) [[likely]] {
       const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
-      pixels[x] = {upper[from].code, Origin::kUpper};
-      shown[x] = upper_shown[from];
+      const bool take_left = chosen == kTakeLeft;
+      left_shown = take_left ? left_shown : upper_shown[from];
+      left = {take_left ? left.code : upper_codes[from], take_left ? kLeftState : kUpperState};
     } else {
-      if (chosen < 0)
-        return false;
       Code copy = code;
-      if (!decode_full (copy, Neighbours (n), chosen == kCorrect, quantisers, x))
+      if (chosen < 0 || !decode_full (copy, Neighbours (n), chosen == kCorrect, left))
         return false;
+      left_shown = shown_as (left.code, quantisers, limits_);
       code = copy;
     }
-    if (pixels[x].code == kNoPixel) /* equals an invalid one */
+    if (left.code == kNoPixel) /* equals an invalid one */
       return false;
-    n.move (pixels[x], upper[x + 2]);
+    codes[x] = left.code;
+    states[x] = left.state;
+    shown[x] = left_shown;
   }
-  last_ = n.left.code;
+  last_ = left.code;
   slice_code = code;
   return true;
 }
 
-/* Reads which pixels of a row are valid. */
+/* Reads which pixels of a row are valid, and where its runs end. */
 template <class Code>
 bool
 CompactDecoder::decode_runs (Code &code, int columns)
 {
-  const auto size = static_cast<std::size_t> (columns);
-  const std::span<const std::uint8_t> upper (upper_.valid.data (), size);
+  const std::vector<std::uint8_t> &upper = upper_.valid ();
+  std::vector<std::uint8_t> &valid = row_.valid ();
+  runs_.clear ();
   bool now = false;
   for (int x = 0; x < columns; now = !now) {
     std::int32_t later = 0;
@@ -127,7 +123,8 @@ CompactDecoder::decode_runs (Code &code, int columns)
     const int end = run_end (upper, x, now) + later;
     if (end > columns || end < x || (end == x && (x > 0 || now)))
       return false;
-    std::fill (row_.valid.begin () + x, row_.valid.begin () + end, std::uint8_t{now});
+    std::fill (valid.begin () + x, valid.begin () + end, std::uint8_t{now});
+    runs_.push_back (end);
     x = end;
   }
   return true;
@@ -135,25 +132,24 @@ CompactDecoder::decode_runs (Code &code, int columns)
 
 template <class Code>
 bool
-CompactDecoder::decode_row (Code &code, const CompactQuantisers &quantisers, int columns)
+CompactDecoder::decode_row (
+    Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
 {
   if (!decode_runs (code, columns))
     return false;
-  const std::span<const std::uint8_t> valid (
-      row_.valid.data (), static_cast<std::size_t> (columns));
-  bool now = false;
-  for (int x = 0; x < columns; now = !now) {
-    const int end = run_end (valid, x, now);
-    const auto first = static_cast<std::size_t> (x), behind = static_cast<std::size_t> (end);
-    if (!now) {
-      std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
-      std::fill (&row_.shown[first + 1], &row_.shown[behind + 1], std::uint64_t{0});
-    } else if (!decode_run (code, quantisers, first, behind)) {
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if (!valid)
+      row_.invalidate (begin, end, 0);
+    else if (!decode_run (code, quantisers, begin, end))
       return false;
-    }
-    x = end;
+    points += valid ? end - begin : 0;
+    begin = end;
+    valid = !valid;
   }
-  return true;
+  return !code.overrun ();
 }
 
 template <class Code>
@@ -162,20 +158,19 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     const CompactQuantisers &quantisers, const RangeImage &image, std::uint64_t &points)
 {
   const auto columns = static_cast<std::size_t> (header.columns);
-  for (Row *row : {&row_, &upper_}) {
-    row->pixels.assign (columns + 3, {});
-    row->shown.assign (columns + 2, 0);
-    row->valid.assign (columns, 0);
-  }
-  limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
-  last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
+  row_.reset (columns, 0);
+  upper_.reset (columns, 0);
+  runs_.reserve (columns + 1);
+  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
+  last_ = first_expected (limits_);
   for (int y = 0; y < header.rows; y++) {
-    if (!decode_row (code, quantisers, header.columns) || code.overrun ())
+    std::uint64_t more = 0;
+    if (!decode_row (code, quantisers, header.columns, more))
       return false;
     const int image_row = header.first_row + y;
-    points += write_row (row_.shown.data () + 1, header.columns,
-        image.depth.row (image_row) + header.first_column,
+    write_row (row_.shown (), columns, image.depth.row (image_row) + header.first_column,
         image.colour.row (image_row) + header.first_column);
+    points += more;
     std::swap (row_, upper_);
   }
   return code.at_clean_end ();

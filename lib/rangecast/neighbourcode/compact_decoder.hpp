@@ -7,6 +7,7 @@
 
 #include "../geometry/range_image.hpp"
 #include "compact_encoder.hpp"
+#include "compact_row.hpp"
 #include "entropy_code.hpp"
 
 namespace rangecast {
@@ -28,25 +29,19 @@ private:
       const RangeImage &image, std::uint64_t &points);
   template <class Code> bool decode_runs (Code &code, int columns);
   template <class Code>
-  bool decode_row (Code &code, const CompactQuantisers &quantisers, int columns);
+  bool decode_row (
+      Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
   template <class Code>
   bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code>
-  bool decode_full (Code &code, const Neighbours &n, bool corrected,
-      const CompactQuantisers &quantisers, std::size_t x);
+  bool decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
-  /* One invalid pixel before and one behind the row, which `pixels` and `shown` count; pixels one
-   * more, because Neighbours look ahead. */
-  struct Row {
-    std::vector<CodedPixel> pixels;
-    std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
-    std::vector<std::uint8_t> valid;
-  };
-  Row row_, upper_;
+  CompactRow row_, upper_;
+  std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{};
   Components steps_{};
-  Limits limits_{};
+  Limits limits_;
   PixelCode last_ = kNoPixel;
 };
 

@@ -27,25 +27,13 @@ bits_of (const Components &residual)
   constexpr float kBitsOfZero[] = {0.4f, 0.4f, 0.25f, 0.25f};
   constexpr float kBitsOfSign[] = {2.5f, 2.5f, 3, 3};
   float bits = 2.5f;
-  if (residual == Components{})
+  if (is_zero (residual))
     return bits;
-  for (std::size_t i = 0; i < kComponents; i++) {
+  for (int i = 0; i < kComponents; i++) {
     const auto size = static_cast<std::uint32_t> (std::abs (residual[i]));
     bits += size == 0 ? kBitsOfZero[i] : kBitsOfSign[i] + 2 * float (std::bit_width (size) - 1);
   }
   return bits;
-}
-
-/* The first neighbour that is near enough, or kPredict; `above` is the pixel above. */
-inline int
-first_near (Lanes own, const Lanes &left, const Lanes *above, Lanes threshold)
-{
-  if (are_near (own, left, threshold))
-    return kTakeLeft;
-  for (int i = 0; i < 3; i++)
-    if (are_near (own, above[i - 1], threshold))
-      return kTakeUpperLeft + i;
-  return kPredict;
 }
 
 /* An EntropyCode that looks like a PackedWriter. */
@@ -65,28 +53,27 @@ public:
   std::size_t finish () { return coder ().finish (); }
 };
 
-/* Residuals are divided by multiplication: with this reciprocal it is exact for all there are. */
-constexpr int kReciprocalBits = 40;
+/* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
+ * lacks: sizes are below 2^17 and so float's 24 bits are enough for every step. */
+typedef float Floats __attribute__ ((vector_size (16)));
 
-std::uint64_t
-reciprocal_of (std::int32_t step)
+Components
+rounded (Components difference, Components half_steps, Floats reciprocals)
 {
-  return (std::uint64_t{1} << kReciprocalBits) / static_cast<std::uint64_t> (step) + 1;
+  const Components sign = difference >> 31;
+  const Components size = (difference ^ sign) - sign + half_steps;
+  const Floats quotient = (__builtin_convertvector (size, Floats) + 0.5f) * reciprocals;
+  return (__builtin_convertvector (quotient, Components) ^ sign) - sign;
 }
 
-std::int32_t
-rounded (std::int32_t difference, std::int32_t step, std::uint64_t reciprocal)
-{
-  const auto size = static_cast<std::uint64_t> (std::abs (difference) + step / 2);
-  const auto quotient = static_cast<std::int32_t> (size * reciprocal >> kReciprocalBits);
-  return difference < 0 ? -quotient : quotient;
-}
+/* What a copy of a neighbour, left or above, has. */
+constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
 
 /* Order of the exponential Golomb code that suits sizes of this mean. */
 std::uint8_t
-golomb_order (std::uint64_t sum, std::uint64_t count)
+golomb_order (std::int32_t sum, std::int32_t count)
 {
-  const std::uint64_t mean = count > 0 ? sum / count : 0;
+  const auto mean = static_cast<std::uint32_t> (sum / count);
   return static_cast<std::uint8_t> (std::min<int> (std::bit_width (mean + mean / 2), 15));
 }
 
@@ -113,12 +100,12 @@ CompactEncoder::encode (const ConstRangeImage &image, const CompactQuantisers &q
   quantisers_ = &quantisers;
   header_ = header;
   result_ = {};
-  limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
   steps_ = steps_within (settings.depth_threshold, settings.colour_threshold).components ();
-  for (std::size_t i = 0; i < kComponents; i++)
-    reciprocals_[i] = reciprocal_of (steps_[i]);
+  half_steps_ = steps_ / 2;
+  reciprocals_ = 1.0f / __builtin_convertvector (steps_, Floats);
+  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
   const int c = settings.colour_threshold;
-  threshold_ = Lanes{settings.depth_threshold, c, c, c};
+  bias_ = near_bias (static_cast<std::uint32_t> (settings.depth_threshold), static_cast<std::uint32_t> (c));
   const auto weight = [] (int threshold) {
     return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
   };
@@ -152,22 +139,29 @@ CompactEncoder::header_size () const
   return header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize;
 }
 
+bool
+CompactEncoder::fits (std::size_t bytes) const
+{
+  return bytes + header_size () <= static_cast<std::size_t> (settings_.max_slice_size);
+}
+
 void
 CompactEncoder::resize (int columns)
 {
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
-  for (Row *row : {&row_, &upper_}) {
-    row->pixels.assign (n + 3, {});
-    row->colours.assign (n + 2, Lanes{kNoDepthCode, 0, 0, 0});
-    row->valid.assign (n, 0);
-  }
-  own_.resize (std::max (own_.size (), n));
-  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) + kMostBytesOfPixel +
-                           kMostBytesOfRun * (n + 1);
+  row_.reset (n, kInvalidKey);
+  upper_.reset (n, kInvalidKey);
+  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  others_.resize (own_.size ());
+  runs_.reserve (n + 1);
+  /* A row is coded whole before anybody looks whether it fits. */
+  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
+                           (kMostBytesOfPixel + kMostBytesOfRun) * (n + 1);
   bytes_.resize (std::max (bytes_.size (), most));
 }
 
+/* Quantises a row. */
 void
 CompactEncoder::load_row (const ConstRangeImage &image, int y)
 {
@@ -175,53 +169,80 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
   const Rgbx *colour = image.colour.row (y) + header_.first_column;
   const DepthQuantiser &d = quantisers_->depth;
   const ColourQuantiser &c = quantisers_->colour;
-  for (int x = 0; x < columns_; x++) {
-    const auto at = static_cast<std::size_t> (x);
-    const bool valid = d.valid (depth[x]);
-    row_.valid[at] = valid;
-    own_[at] = valid ? Lanes{d.code (depth[x]), c.code (colour[x].r), c.code (colour[x].g),
-                           c.code (colour[x].b)}
-                     : Lanes{kNoDepthCode, 0, 0, 0};
+  const auto columns = static_cast<std::size_t> (columns_);
+  PixelKey *const own = own_.data ();
+  std::uint8_t *const valid = row_.valid ().data ();
+  for (std::size_t x = 0; x < columns; x++)
+    valid[x] = d.valid (depth[x]);
+  if (c.bits () == 8)
+    for (std::size_t x = 0; x < columns; x++)
+      own[x] = key_of (d.code (depth[x]), colour[x].r | colour[x].g << 8 | colour[x].b << 16);
+  else
+    for (std::size_t x = 0; x < columns; x++)
+      own[x] = key_of (d.code (depth[x]),
+          c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+}
+
+/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
+void
+CompactEncoder::find_upper (std::size_t begin, std::size_t end)
+{
+  typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
+  constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
+  const auto load = [] (const std::uint64_t *from) {
+    Keys keys;
+    std::memcpy (&keys, from, sizeof keys);
+    return keys;
+  };
+  const PixelKey *const upper = upper_.shown ();
+  for (std::size_t x = begin; x < end; x += step) {
+    const Keys own = load (own_.data () + x);
+    const auto is_near = [&] (const PixelKey *other) {
+      return near_bits (own, load (other), bias_) == kNearMask;
+    };
+    const auto all = [] (std::uint64_t choice) { return Keys{} + choice; };
+    Keys first = is_near (upper + x + 1) ? all (kTakeUpperRight) : all (kPredict);
+    first = is_near (upper + x) ? all (kTakeUpper) : first;
+    first = is_near (upper + x - 1) ? all (kTakeUpperLeft) : first;
+    std::memcpy (others_.data () + x, &first, sizeof first);
   }
 }
 
-/* Makes pixel x what the decoder will make of a prediction and a residual. @return that residual */
-Components
-CompactEncoder::make_full (std::size_t x, const Neighbours &n)
+/* What the decoder will make of a prediction and a residual. */
+CompactEncoder::FullPixel
+CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
 {
-  const Components expected = predict (n, last_, limits_.last_depth);
-  const Lanes own = own_[x];
-  const auto colour = to_luma_chroma (own[1], own[2], own[3]);
-  const Components wanted = {own[0], colour[0], colour[1], colour[2]};
-  Components residual;
-  for (std::size_t i = 0; i < kComponents; i++)
-    residual[i] = rounded (wanted[i] - expected[i], steps_[i], reciprocals_[i]);
-  const Components made = correct (expected, residual, steps_, limits_);
-  const auto rgb = to_rgb (made, limits_.maximum);
-  row_.pixels[x + 1] = {pack_components (made), Origin::kCorrected, activity_of (residual)};
-  row_.colours[x + 1] = Lanes{made[0], rgb[0], rgb[1], rgb[2]};
-  return residual;
+  const Components expected = predict (n, last_, limits_.most);
+  const Components residual =
+      rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  const Components made = cut (expected + residual * steps_, limits_.least, limits_.most);
+  return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
 }
 
 /* The neighbour with the least sum of error and price, or kPredict if the pixel in full has less.
- * @param[out] residual  of the pixel in full, which make_full() made */
+ * @param[out] full  that */
 int
-CompactEncoder::best_choice (std::size_t x, const Neighbours &n, Components &residual)
+CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full)
 {
-  const Lanes own = own_[x];
-  const auto error = [&] (Lanes other) {
-    const Lanes d = own - other;
-    return depth_weight_ * float (d[0]) * float (d[0]) +
-           colour_weight_ * float (d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
+  const PixelKey own = own_[x];
+  const auto error = [&] (PixelKey other) {
+    const auto d = [&] (int at, int mask) {
+      return static_cast<std::int32_t> (own >> at & mask) -
+             static_cast<std::int32_t> (other >> at & mask);
+    };
+    const std::int32_t z = d (0, 0xffff), r = d (32, 0xff), g = d (18, 0xff), b = d (50, 0xff);
+    return depth_weight_ * float (z) * float (z) +
+           colour_weight_ * float (r * r + g * g + b * b);
   };
-  residual = make_full (x, n);
+  full = make_full (own, n);
   int best = kPredict;
-  float least = error (row_.colours[x + 1]) + kPriceOfBit * bits_of (residual);
-  const PixelCode codes[] = {n.left.code, n.upper_left.code, n.upper.code, n.upper_right.code};
+  float least = error (full.key) + kPriceOfBit * bits_of (full.residual);
+  const PixelCode codes[] = {n.left.code, n.codes[-1], n.codes[0], n.codes[1]};
   for (std::size_t i = 0; i < 4; i++) {
-    const Lanes other = i == 0 ? row_.colours[x] : upper_.colours[x + i - 1];
+    const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
     /* Profile entropy cannot name one that equals an earlier one. */
-    if (!are_near (own, other, threshold_) || std::find (codes, codes + i, codes[i]) != codes + i)
+    if (near_bits (own, other, bias_) != kNearMask ||
+        std::find (codes, codes + i, codes[i]) != codes + i)
       continue;
     const float sum = error (other) + kPriceOfBit * kBitsOfChoice[i];
     if (sum < least) {
@@ -232,84 +253,92 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, Components &res
   return best;
 }
 
-/* Codes a pixel that no neighbour replaces. */
+/* Codes a pixel that no neighbour replaces. @return its state */
 template <class Code>
-void
-CompactEncoder::code_full (
-    Code &code, const Neighbours &n, std::size_t x, const Components &residual)
+PixelState
+CompactEncoder::code_full (Code &code, const Neighbours &n, const Components &residual)
 {
-  const bool has_neighbour = n.any (), predicted = has_neighbour && residual == Components{};
+  const bool has_neighbour = n.any (), predicted = has_neighbour && is_zero (residual);
   result_.full_pixels++;
   if (has_neighbour)
     code.choice (n, predicted ? kPredict : kCorrect);
-  if (predicted) {
-    row_.pixels[x + 1] = {row_.pixels[x + 1].code, Origin::kPredicted};
-    return;
-  }
+  if (predicted)
+    return state_of (Origin::kPredicted);
   code.residual (n, has_neighbour, residual);
-  for (std::size_t i = 0; i < kComponents; i++) {
-    size_sums_[i] += static_cast<std::uint64_t> (std::max (std::abs (residual[i]) - 1, 0));
-    size_counts_[i] += residual[i] != 0;
-  }
+  const Components size = residual < 0 ? -residual : residual;
+  size_sums_ += size + (size > 0);
+  size_counts_ -= size > 0;
+  return state_of (Origin::kCorrected, activity_of (residual));
 }
 
-/* Codes a run of valid pixels. @return false if the slice has become too long
+/* Codes a run of valid pixels, behind an invalid one.
  *
  * What the loop needs of this object it holds in variables of its own, the code too: bytes are
  * written in it, and for all that the compiler knows any byte may be one of this object's. */
-template <class Code>
-bool
+template <class Code, bool Best>
+void
 CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
 {
-  const std::size_t limit = static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
-  CodedPixel *const pixels = row_.pixels.data () + 1;
-  const CodedPixel *const upper = upper_.pixels.data () + 1;
-  Lanes *const colours = row_.colours.data () + 1;
-  const Lanes *const upper_colours = upper_.colours.data () + 1;
-  const Lanes *const own = own_.data ();
-  const Lanes threshold = threshold_;
-  const bool best = settings_.best;
-  Neighbours n = {pixels[begin - 1], upper[begin - 1], upper[begin], upper[begin + 1]};
+  PixelCode *const codes = row_.codes ();
+  PixelState *const states = row_.states ();
+  PixelKey *const keys = row_.shown ();
+  const PixelCode *const upper_codes = upper_.codes ();
+  const PixelState *const upper_states = upper_.states ();
+  const PixelKey *const upper_keys = upper_.shown (), *const own = own_.data ();
+  const std::uint64_t *const others = others_.data ();
+  const PixelKey bias = bias_;
+  CodedPixel left;
+  PixelKey left_key = kInvalidKey;
   Code code = slice_code;
-  std::size_t x = begin;
-  for (; x < end && code.bound () <= limit; x++) {
-    Components residual;
-    const int chosen = best ? best_choice (x, Neighbours (n), residual)
-                            : first_near (own[x], colours[x - 1], upper_colours + x, threshold);
-    if (chosen == kTakeLeft) {
-      code.choice (n, chosen);
-      colours[x] = colours[x - 1];
-      pixels[x] = {n.left.code, Origin::kLeft};
-    } else if (chosen != kPredict) {
-      code.choice (n, chosen);
-      const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
-      colours[x] = upper_colours[from];
-      pixels[x] = {upper[from].code, Origin::kUpper};
+  if constexpr (!Best)
+    find_upper (begin, end);
+  for (std::size_t x = begin; x < end; x++) {
+    const Neighbours n = {left, upper_codes + x, upper_states + x};
+    FullPixel full;
+    std::size_t other = 0;
+    bool take_left = false;
+    if constexpr (Best) {
+      other = static_cast<std::size_t> (best_choice (x, n, full));
+      take_left = other == kTakeLeft;
+    } else {
+      take_left = near_bits (own[x], left_key, bias) == kNearMask;
+      other = others[x];
+    }
+    if (take_left || other != kPredict) [[likely]] {
+      code.choice (n, take_left ? kTakeLeft : static_cast<int> (other));
+      const std::size_t from = x + other - kTakeUpper;
+      left_key = take_left ? left_key : upper_keys[from];
+      left = {take_left ? left.code : upper_codes[from], take_left ? kLeftState : kUpperState};
     } else {
       Code copy = code;
       const Neighbours near = n;
-      code_full (copy, near, x, best ? Components (residual) : make_full (x, near));
+      if constexpr (!Best)
+        full = make_full (own[x], near);
+      left.state = code_full (copy, near, full.residual);
+      left.code = full.code;
+      left_key = full.key;
       code = copy;
     }
-    n.move (pixels[x], upper[x + 2]);
+    codes[x] = left.code;
+    states[x] = left.state;
+    keys[x] = left_key;
   }
-  last_ = n.left.code;
+  last_ = left.code;
   slice_code = code;
-  return code.bound () <= limit;
 }
 
-/* Codes which pixels of the row are valid. */
+/* Codes which pixels of the row are valid, and finds where its runs end. */
 template <class Code>
 void
 CompactEncoder::code_runs (Code &code)
 {
-  const auto columns = static_cast<std::size_t> (columns_);
-  const std::span<const std::uint8_t> valid (row_.valid.data (), columns),
-      upper (upper_.valid.data (), columns);
+  const std::vector<std::uint8_t> &valid = row_.valid (), &upper = upper_.valid ();
+  runs_.clear ();
   bool now = false;
   for (int x = 0; x < columns_; now = !now) {
     const int end = run_end (valid, x, now);
     code.run (now, end - run_end (upper, x, now));
+    runs_.push_back (end);
     x = end;
   }
 }
@@ -320,38 +349,34 @@ bool
 CompactEncoder::code_row (Code &slice_code)
 {
   code_runs (slice_code);
-  const auto columns = static_cast<std::size_t> (columns_);
-  const std::span<const std::uint8_t> valid (row_.valid.data (), columns);
-  bool now = false;
-  for (int x = 0; x < columns_; now = !now) {
-    const int end = run_end (valid, x, now);
-    const auto first = static_cast<std::size_t> (x), behind = static_cast<std::size_t> (end);
-    if (!now) {
-      std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
-      std::fill (&row_.colours[first + 1], &row_.colours[behind + 1], Lanes{kNoDepthCode, 0, 0, 0});
-    } else if (!code_run (slice_code, first, behind)) {
-      return false;
-    }
-    x = end;
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if (!valid)
+      row_.invalidate (begin, end, kInvalidKey);
+    else if (settings_.best)
+      code_run<Code, true> (slice_code, begin, end);
+    else
+      code_run<Code, false> (slice_code, begin, end);
+    begin = end;
+    valid = !valid;
   }
-  return slice_code.bound () <=
-         static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
+  return fits (slice_code.bound ());
 }
 
 template <class Code>
 Code
 CompactEncoder::begin_slice (int first_row)
 {
-  for (std::size_t i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
+  for (int i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
     if (size_counts_[i] > 0)
-      orders_[i] = golomb_order (size_sums_[i], size_counts_[i]);
-  size_sums_ = size_counts_ = {};
+      orders_[static_cast<std::size_t> (i)] = golomb_order (size_sums_[i], size_counts_[i]);
+  size_sums_ = size_counts_ = Components{};
   header_.first_row = first_row;
   header_.rows = 0;
-  last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
-  std::ranges::fill (upper_.pixels, CodedPixel{});
-  std::ranges::fill (upper_.colours, Lanes{kNoDepthCode, 0, 0, 0});
-  std::ranges::fill (upper_.valid, std::uint8_t{0});
+  last_ = first_expected (limits_);
+  upper_.reset (static_cast<std::size_t> (columns_), kInvalidKey);
   return Code (bytes_.data (), model_, orders_);
 }
 
@@ -385,17 +410,20 @@ CompactEncoder::code_piece (
   header_.first_column = first_column;
   header_.columns = columns;
   resize (columns);
-  size_sums_ = size_counts_ = {};
+  size_sums_ = size_counts_ = Components{};
   Code code = begin_slice<Code> (0);
   for (int y = 0; y < image.roi.height; y++) {
     load_row (image, y);
     const CompactResult result = result_;
+    const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
     model_before_ = model_;
     if (!code_row (code)) {
       if (header_.rows == 0)
         return false;
       result_ = result;
+      size_sums_ = sums;
+      size_counts_ = counts;
       close_slice (before, to);
       code = begin_slice<Code> (y);
       if (!code_row (code))

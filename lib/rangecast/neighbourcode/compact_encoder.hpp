@@ -6,8 +6,9 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "compact_row.hpp"
 #include "entropy_code.hpp"
-#include "pixel_lanes.hpp"
+#include "pixel_key.hpp"
 
 namespace rangecast {
 
@@ -40,46 +41,52 @@ public:
       const CompactSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to);
 
 private:
+  typedef float Reciprocals __attribute__ ((vector_size (16)));
+  /* What a pixel becomes that no neighbour replaces. */
+  struct FullPixel {
+    Components residual;
+    PixelCode code;
+    PixelKey key;
+  };
+
   template <class Code>
   bool code_piece (
       const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to);
   template <class Code> bool code_row (Code &slice_code);
   template <class Code> void code_runs (Code &code);
-  template <class Code> bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best>
+  void code_run (Code &slice_code, std::size_t begin, std::size_t end);
   template <class Code>
-  void code_full (Code &code, const Neighbours &n, std::size_t x, const Components &residual);
+  PixelState code_full (Code &code, const Neighbours &n, const Components &residual);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int best_choice (std::size_t x, const Neighbours &n, Components &residual);
-  Components make_full (std::size_t x, const Neighbours &n);
+  int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
+  [[nodiscard]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   void load_row (const ConstRangeImage &image, int y);
+  void find_upper (std::size_t begin, std::size_t end);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
+  [[nodiscard]] bool fits (std::size_t bytes) const;
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
   SliceHeader header_;
   CompactResult result_;
-  Components steps_{};
-  std::array<std::uint64_t, kComponents> reciprocals_{};
-  Limits limits_{};
-  Lanes threshold_{};
+  Components steps_{}, half_steps_{};
+  Reciprocals reciprocals_{};
+  Limits limits_;
+  PixelKey bias_ = 0; /* of the thresholds */
   float depth_weight_ = 0, colour_weight_ = 0;
 
-  /* One invalid pixel before and one behind the row, which `pixels` and `colours` count; pixels one
-   * more, because Neighbours look ahead. */
-  struct Row {
-    std::vector<CodedPixel> pixels;
-    std::vector<Lanes> colours; /* depth, R, G, B as decoded */
-    std::vector<std::uint8_t> valid;
-  };
-  Row row_, upper_;
-  std::vector<Lanes> own_; /* the row as it is to be coded */
+  CompactRow row_, upper_;
+  std::vector<PixelKey> own_;         /* the row as it is to be coded */
+  std::vector<std::uint64_t> others_; /* for each pixel, the first of those above that is near */
   PixelCode last_ = kNoPixel;
   int columns_ = 0;
+  std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{}, model_before_{};
   std::vector<std::uint8_t> bytes_; /* of the open slice, behind its header */
-  std::array<std::uint64_t, kComponents> size_sums_{}, size_counts_{}; /* of its residuals */
+  Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};
 };
 

@@ -51,23 +51,21 @@ public:
   int choice (const Neighbours &n, int chosen)
   {
     if (n.left.valid ()) {
-      const int at =
-          context::kLeft + n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ();
-      if (code (at, chosen == kTakeLeft))
+      if (code (context::kLeft + static_cast<int> (n.kinds ()), chosen == kTakeLeft))
         return kTakeLeft;
     }
     const int other = other_choice (n, chosen);
     if (other != kPredict)
       return other;
-    const int at = context::kPredicted + n.left.origin () + 5 * n.upper.origin ();
+    const int at = context::kPredicted + n.left.origin () + 5 * n.upper ().origin ();
     return code (at, chosen == kPredict) ? kPredict : kCorrect;
   }
 
   /** @return false for a residual that is too large */
   bool residual (const Neighbours &n, bool has_neighbour, Components &r)
   {
-    const Activity sums = n.left.activity () + n.upper.activity () + n.upper_right.activity ();
-    const bool alone = !n.left.valid () || !n.upper.valid ();
+    const Activity sums = n.activities ();
+    const bool alone = !n.left.valid () || !n.upper ().valid ();
     bool previous = false;
     for (int i = 0; i < kComponents; i++) {
       const int surroundings = !has_neighbour ? 5
@@ -75,9 +73,11 @@ public:
                                               : kActivityClass[sums >> 8 * i & 0xff];
       const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
       const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
-      if (!number (zero, size, r[i]))
+      std::int32_t value = r[i];
+      if (!number (zero, size, value))
         return false;
-      previous = r[i] != 0;
+      r[i] = value;
+      previous = value != 0;
     }
     return true;
   }
@@ -89,12 +89,11 @@ private:
    * are passed over. */
   int other_choice (const Neighbours &n, int chosen)
   {
-    const PixelCode l = n.left.code, ul = n.upper_left.code, u = n.upper.code,
-                    ur = n.upper_right.code;
-    const bool differs[] = {ul != l, u != l && u != ul, ur != l && ur != ul && ur != u};
-    const bool candidate[] = {n.upper_left.valid () && differs[0], n.upper.valid () && differs[1],
-        n.upper_right.valid () && differs[2]};
-    const int full = 2 * (n.left.kind () == 3) + (n.upper.kind () == 3);
+    const PixelCode l = n.left.code, ul = n.codes[-1], u = n.codes[0], ur = n.codes[1];
+    const bool candidate[] = {static_cast<bool> (n.upper_left ().valid () & (ul != l)),
+        static_cast<bool> (n.upper ().valid () & (u != l) & (u != ul)),
+        static_cast<bool> (n.upper_right ().valid () & (ur != l) & (ur != ul) & (ur != u))};
+    const int full = 2 * (n.left.kind () == 3) + (n.upper ().kind () == 3);
     for (int i = 0; i < 3; i++) {
       if (!candidate[i])
         continue;

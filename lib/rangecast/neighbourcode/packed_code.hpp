@@ -40,13 +40,6 @@ struct PackedTables {
 };
 const PackedTables &packed_tables ();
 
-constexpr std::size_t
-packed_context (const Neighbours &n)
-{
-  return static_cast<std::size_t> (
-      n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ());
-}
-
 constexpr std::uint32_t
 zigzag (std::int32_t v)
 {
@@ -71,53 +64,57 @@ public:
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
   void choice (const Neighbours &n, int chosen)
   {
-    put (tables_->choice[packed_context (n)][static_cast<std::size_t> (chosen)]);
+    put (tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)]);
   }
   void residual (const Neighbours &, bool has_neighbour, const Components &r)
   {
     const unsigned pattern = (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3;
     put (tables_->pattern[!has_neighbour][pattern]);
-    for (std::size_t i = 0; i < kComponents; i++)
-      if (r[i]) {
-        put (r[i] < 0, 1);
-        golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[i]);
-      }
+    for (unsigned rest = pattern; rest != 0; rest &= rest - 1) {
+      const int i = std::countr_zero (rest);
+      put (r[i] < 0, 1);
+      golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
+    }
   }
-  [[nodiscard]] std::size_t bound () const { return static_cast<std::size_t> (to_ - begin_) + 8; }
+  /** The bytes that finish() comes to. */
+  [[nodiscard]] std::size_t bound () const
+  {
+    return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
+  }
   std::size_t finish ()
   {
-    for (; count_ > 0; count_ -= 8, held_ >>= 8)
-      *to_++ = static_cast<std::uint8_t> (held_);
-    return static_cast<std::size_t> (to_ - begin_);
+    put (0, 0); /* again, because a copy may have gone on */
+    return bound ();
   }
 
 private:
-  /* Up to 32 bits. */
+  /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full. */
   void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
     count_ += bits;
-    if (count_ >= 32) {
-      for (int i = 0; i < 4; i++)
-        to_[i] = static_cast<std::uint8_t> (held_ >> 8 * i);
-      to_ += 4;
-      held_ >>= 32;
-      count_ -= 32;
-    }
+    std::uint64_t word = held_;
+    if constexpr (std::endian::native == std::endian::big)
+      word = __builtin_bswap64 (word);
+    std::memcpy (to_, &word, sizeof word);
+    to_ += count_ >> 3;
+    held_ >>= count_ & ~7;
+    count_ &= 7;
   }
   void put (const PrefixCode &code) { put (code.bits, code.length); }
   void golomb (std::uint32_t value, int order)
   {
-    const std::uint32_t upper = (value >> order) + 1;
+    const std::uint64_t upper = (value >> order) + 1;
     const int width = std::bit_width (upper) - 1;
-    put (1u << width, width + 1);
-    put (upper & ((1u << width) - 1), width);
-    put (value & ((1u << order) - 1), order);
+    const std::uint64_t top = std::uint64_t{1} << width;
+    put (top | (upper ^ top) << (width + 1) |
+             (value & ((std::uint64_t{1} << order) - 1)) << (2 * width + 1),
+        2 * width + 1 + order);
   }
 
   std::uint8_t *begin_, *to_;
   std::uint64_t held_ = 0;
-  int count_ = 0;
+  int count_ = 0; /* below 8 between calls */
   GolombOrders orders_;
   const PackedTables *tables_;
 };
@@ -140,7 +137,7 @@ public:
   /** A PixelChoice, or -1 for damage. */
   int choice (const Neighbours &n)
   {
-    return get (tables_->choice_of[packed_context (n)], kMaxChoiceBits);
+    return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
   }
   bool residual (const Neighbours &, bool has_neighbour, Components &r)
   {
