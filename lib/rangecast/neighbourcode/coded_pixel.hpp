@@ -104,6 +104,14 @@ state_of (Origin origin, Activity activity = 0)
          PixelState{activity} << 32;
 }
 
+/** One of two numbers, without a jump: whether it would be taken nobody could foretell. */
+[[gnu::always_inline]] inline std::uint64_t
+either (bool first, std::uint64_t a, std::uint64_t b)
+{
+  asm ("" : "+r"(b)); /* else compilers load b behind a jump, if they need it only there */
+  return __builtin_expect_with_probability (first, 1, 0.5) ? a : b;
+}
+
 /** Two plain numbers: it is copied for every pixel, and whole. */
 struct CodedPixel {
   PixelCode code = kNoPixel;

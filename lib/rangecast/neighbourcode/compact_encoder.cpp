@@ -45,9 +45,11 @@ public:
     model = kInitialModel;
   }
   void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
-  void residual (const Neighbours &n, bool has_neighbour, Components r)
+  void full (const Neighbours &n, bool has_neighbour, Components r)
   {
-    (void)EntropyCode::residual (n, has_neighbour, r);
+    if (has_neighbour && choice (n, is_zero (r) ? kPredict : kCorrect) == kPredict)
+      return;
+    (void)residual (n, has_neighbour, r);
   }
   [[nodiscard]] std::size_t bound () const { return coder ().bound (); }
   std::size_t finish () { return coder ().finish (); }
@@ -194,22 +196,24 @@ CompactEncoder::find_upper (std::size_t begin, std::size_t end)
     std::memcpy (&keys, from, sizeof keys);
     return keys;
   };
-  const PixelKey *const upper = upper_.shown ();
+  const PixelKey *const upper = upper_.shown (), *const pixels = own_.data ();
+  std::uint64_t *const others = others_.data ();
+  const PixelKey bias = bias_;
   for (std::size_t x = begin; x < end; x += step) {
-    const Keys own = load (own_.data () + x);
+    const Keys own = load (pixels + x);
     const auto is_near = [&] (const PixelKey *other) {
-      return near_bits (own, load (other), bias_) == kNearMask;
+      return near_bits (own, load (other), bias) == kNearMask;
     };
     const auto all = [] (std::uint64_t choice) { return Keys{} + choice; };
     Keys first = is_near (upper + x + 1) ? all (kTakeUpperRight) : all (kPredict);
     first = is_near (upper + x) ? all (kTakeUpper) : first;
     first = is_near (upper + x - 1) ? all (kTakeUpperLeft) : first;
-    std::memcpy (others_.data () + x, &first, sizeof first);
+    std::memcpy (others + x, &first, sizeof first);
   }
 }
 
 /* What the decoder will make of a prediction and a residual. */
-CompactEncoder::FullPixel
+inline CompactEncoder::FullPixel
 CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
 {
   const Components expected = predict (n, last_, limits_.most);
@@ -255,20 +259,17 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
 
 /* Codes a pixel that no neighbour replaces. @return its state */
 template <class Code>
-PixelState
-CompactEncoder::code_full (Code &code, const Neighbours &n, const Components &residual)
+inline PixelState
+CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
 {
-  const bool has_neighbour = n.any (), predicted = has_neighbour && is_zero (residual);
+  const bool has_neighbour = n.any (), predicted = has_neighbour & is_zero (residual);
   result_.full_pixels++;
-  if (has_neighbour)
-    code.choice (n, predicted ? kPredict : kCorrect);
-  if (predicted)
-    return state_of (Origin::kPredicted);
-  code.residual (n, has_neighbour, residual);
+  code.full (n, has_neighbour, residual);
   const Components size = residual < 0 ? -residual : residual;
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
-  return state_of (Origin::kCorrected, activity_of (residual));
+  return either (predicted, state_of (Origin::kPredicted),
+      state_of (Origin::kCorrected, activity_of (residual)));
 }
 
 /* Codes a run of valid pixels, behind an invalid one.
@@ -307,17 +308,15 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     if (take_left || other != kPredict) [[likely]] {
       code.choice (n, take_left ? kTakeLeft : static_cast<int> (other));
       const std::size_t from = x + other - kTakeUpper;
-      left_key = take_left ? left_key : upper_keys[from];
-      left = {take_left ? left.code : upper_codes[from], take_left ? kLeftState : kUpperState};
+      left_key = either (take_left, left_key, upper_keys[from]);
+      left = {either (take_left, left.code, upper_codes[from]),
+          take_left ? kLeftState : kUpperState};
     } else {
-      Code copy = code;
-      const Neighbours near = n;
       if constexpr (!Best)
-        full = make_full (own[x], near);
-      left.state = code_full (copy, near, full.residual);
+        full = make_full (own[x], n);
+      left.state = code_full (code, n, full.residual);
       left.code = full.code;
       left_key = full.key;
-      code = copy;
     }
     codes[x] = left.code;
     states[x] = left.state;

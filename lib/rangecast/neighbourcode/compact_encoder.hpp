@@ -57,11 +57,11 @@ private:
   template <class Code, bool Best>
   void code_run (Code &slice_code, std::size_t begin, std::size_t end);
   template <class Code>
-  PixelState code_full (Code &code, const Neighbours &n, const Components &residual);
+  [[gnu::always_inline]] PixelState code_full (Code &code, const Neighbours &n, Components residual);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
   int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
-  [[nodiscard]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
+  [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   void load_row (const ConstRangeImage &image, int y);
   void find_upper (std::size_t begin, std::size_t end);
   void resize (int columns);

@@ -28,8 +28,36 @@ struct PrefixCode {
   std::uint8_t length = 0;
 };
 
+/** The exponential Golomb code of a number below 2^kMaxGolombBits. */
+struct GolombCode {
+  std::uint64_t bits;
+  int length;
+
+  constexpr GolombCode (std::uint32_t value, int order)
+  {
+    const std::uint64_t upper = (value >> order) + 1;
+    const int width = std::bit_width (upper) - 1;
+    const std::uint64_t top = std::uint64_t{1} << width;
+    const std::uint64_t low = value & ((std::uint64_t{1} << order) - 1);
+    bits = top | (upper ^ top) << (width + 1) | low << (2 * width + 1);
+    length = 2 * width + 1 + order;
+  }
+};
+
+/** Small residuals and their signs have tables of their own. */
+inline constexpr int kMaxQuickSize = 31, kQuickBits = 9;
+
 /** Codes and the tables that read them, built once from the lengths. */
 struct PackedTables {
+  /** Sign and size of a residual; no bits for 0. */
+  struct QuickCode {
+    std::uint32_t bits : 24, length : 8;
+  };
+  /** A residual that is known from the next kQuickBits bits; length 0: it is not. */
+  struct QuickEntry {
+    std::int16_t residual = 0;
+    std::uint16_t length = 0;
+  };
   struct Entry {
     std::uint8_t symbol = 0, length = 0; /* length 0: no such code */
   };
@@ -37,6 +65,9 @@ struct PackedTables {
   std::array<std::array<PrefixCode, 16>, 2> pattern;
   std::array<std::array<Entry, 1 << kMaxChoiceBits>, kPackedContexts> choice_of;
   std::array<std::array<Entry, 1 << kMaxPatternBits>, 2> pattern_of;
+  /* For each order. */
+  std::array<std::array<QuickCode, 2 * kMaxQuickSize + 1>, 16> quick;
+  std::array<std::array<QuickEntry, 1 << kQuickBits>, 16> quick_of;
 };
 const PackedTables &packed_tables ();
 
@@ -62,19 +93,46 @@ public:
 
   /** By how much a run ends later than the one above. */
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
-  void choice (const Neighbours &n, int chosen)
+  [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
     put (tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)]);
   }
-  void residual (const Neighbours &, bool has_neighbour, const Components &r)
+  /** A pixel that equals no neighbour; its residual may be 0 if there is a neighbour. */
+  [[gnu::always_inline]] void full (const Neighbours &n, bool has_neighbour, Components r)
   {
-    const unsigned pattern = (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3;
-    put (tables_->pattern[!has_neighbour][pattern]);
-    for (unsigned rest = pattern; rest != 0; rest &= rest - 1) {
-      const int i = std::countr_zero (rest);
-      put (r[i] < 0, 1);
-      golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
+    const Components sizes = r < 0 ? -r : r;
+    const auto pattern =
+        static_cast<std::size_t> ((r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
+    std::uint64_t bits = 0;
+    int length = 0;
+    const auto add = [&] (std::uint64_t more, int count) {
+      bits |= more << length;
+      length += count;
+    };
+    if (has_neighbour) [[likely]] {
+      const PrefixCode choice = tables_->choice[n.kinds ()][pattern == 0 ? kPredict : kCorrect];
+      add (choice.bits, choice.length);
     }
+    const PrefixCode code = tables_->pattern[!has_neighbour][pattern]; /* none for 0 */
+    add (code.bits, code.length);
+    if (!is_zero (sizes > kMaxQuickSize)) [[unlikely]] {
+      put (bits, length);
+      long_residual (r, static_cast<unsigned> (pattern));
+      return;
+    }
+    const auto quick = [&] (int i) {
+      const auto code = tables_->quick[orders_[static_cast<std::size_t> (i)]]
+                                      [static_cast<std::size_t> (r[i] + kMaxQuickSize)];
+      add (code.bits, code.length);
+    };
+    quick (0);
+    quick (1);
+    put (bits, length);
+    bits = 0;
+    length = 0;
+    quick (2);
+    quick (3);
+    put (bits, length);
   }
   /** The bytes that finish() comes to. */
   [[nodiscard]] std::size_t bound () const
@@ -89,7 +147,7 @@ public:
 
 private:
   /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full. */
-  void put (std::uint64_t value, int bits)
+  [[gnu::always_inline]] void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
     count_ += bits;
@@ -102,14 +160,18 @@ private:
     count_ &= 7;
   }
   void put (const PrefixCode &code) { put (code.bits, code.length); }
+  void long_residual (Components r, unsigned pattern)
+  {
+    for (; pattern != 0; pattern &= pattern - 1) {
+      const int i = std::countr_zero (pattern);
+      put (r[i] < 0, 1);
+      golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
+    }
+  }
   void golomb (std::uint32_t value, int order)
   {
-    const std::uint64_t upper = (value >> order) + 1;
-    const int width = std::bit_width (upper) - 1;
-    const std::uint64_t top = std::uint64_t{1} << width;
-    put (top | (upper ^ top) << (width + 1) |
-             (value & ((std::uint64_t{1} << order) - 1)) << (2 * width + 1),
-        2 * width + 1 + order);
+    const GolombCode code (value, order);
+    put (code.bits, code.length);
   }
 
   std::uint8_t *begin_, *to_;
@@ -144,20 +206,20 @@ public:
     const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
     if (pattern < 0)
       return false;
-    for (std::size_t i = 0; i < kComponents; i++) {
-      r[i] = 0;
-      if (!(pattern >> i & 1))
-        continue;
+    bool good = true;
+    const auto number = [&] (int i) {
       refill ();
-      const bool negative = held_ & 1;
-      consume (1);
-      std::uint32_t size = 0;
-      if (!golomb (orders_[i], size) || size >= kMaxResidual)
-        return false;
-      r[i] = static_cast<std::int32_t> (size) + 1;
-      r[i] = negative ? -r[i] : r[i];
-    }
-    return true;
+      const auto order = orders_[static_cast<std::size_t> (i)];
+      const auto quick = tables_->quick_of[order][held_ & ((1u << kQuickBits) - 1)];
+      const bool there = pattern >> i & 1;
+      if (there && quick.length == 0) [[unlikely]]
+        return long_residual (order, good);
+      consume (there ? quick.length : 0);
+      return there ? std::int32_t{quick.residual} : 0;
+    };
+    const std::int32_t z = number (0), y = number (1), co = number (2), cg = number (3);
+    r = Components{z, y, co, cg};
+    return good && count_ >= 0;
   }
   /** More was taken than there is. */
   [[nodiscard]] bool overrun () const { return count_ < 0; }
@@ -174,6 +236,16 @@ private:
     const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
     consume (e.length);
     return e.length > 0 && count_ >= 0 ? e.symbol : -1;
+  }
+  std::int32_t long_residual (int order, bool &good)
+  {
+    refill ();
+    const bool negative = held_ & 1;
+    consume (1);
+    std::uint32_t size = 0;
+    good &= golomb (order, size) && size < kMaxResidual;
+    const auto r = static_cast<std::int32_t> (size) + 1;
+    return negative ? -r : r;
   }
   bool golomb (int order, std::uint32_t &value)
   {
