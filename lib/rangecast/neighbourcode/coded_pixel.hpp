@@ -104,12 +104,21 @@ state_of (Origin origin, Activity activity = 0)
          PixelState{activity} << 32;
 }
 
-/** One of two numbers, without a jump: whether it would be taken nobody could foretell. */
+/** All bits set if `v`, which is below 2^63, is 0; else none. */
 [[gnu::always_inline]] inline std::uint64_t
-either (bool first, std::uint64_t a, std::uint64_t b)
+mask_of_zero (std::uint64_t v)
 {
-  asm ("" : "+r"(b)); /* else compilers load b behind a jump, if they need it only there */
-  return __builtin_expect_with_probability (first, 1, 0.5) ? a : b;
+  auto mask = static_cast<std::uint64_t> (static_cast<std::int64_t> (v - 1) >> 63);
+  asm ("" : "+r"(mask)); /* else compilers may find a condition in it, and jump */
+  return mask;
+}
+
+/** `a` where the mask is set, else `b`. Without a jump: whether it would be taken nobody could
+ *  foretell. */
+constexpr std::uint64_t
+either (std::uint64_t mask, std::uint64_t a, std::uint64_t b)
+{
+  return b ^ ((a ^ b) & mask);
 }
 
 /** Two plain numbers: it is copied for every pixel, and whole. */

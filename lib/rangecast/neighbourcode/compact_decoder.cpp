@@ -15,7 +15,7 @@ public:
   {
     model = kInitialModel;
   }
-  int choice (const Neighbours &n) { return EntropyCode::choice (n, -1); }
+  int choice (const Neighbours &n) { return EntropyCode::choice (n, kNoSymbol); }
   [[nodiscard]] bool overrun () const { return coder ().overrun (); }
   [[nodiscard]] bool at_clean_end () const { return coder ().at_end (); }
 };
@@ -25,21 +25,27 @@ std::uint64_t
 shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
 {
   const Components c = to_rgb (components_of (code), limits);
-  const auto colour = [&] (int i) {
-    return std::uint64_t{quantisers.colour.value (static_cast<std::uint8_t> (c[i]))};
-  };
   const std::uint64_t depth = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
-  return colour (1) | colour (2) << 8 | colour (3) << 16 | depth << 32;
+  std::uint32_t rgb = static_cast<std::uint32_t> (c[1] | c[2] << 8 | c[3] << 16);
+  if (quantisers.colour.bits () < 8) {
+    const auto value = [&] (int i) {
+      return std::uint32_t{quantisers.colour.value (static_cast<std::uint8_t> (c[i]))};
+    };
+    rgb = value (1) | value (2) << 8 | value (3) << 16;
+  }
+  return rgb | depth << 32;
 }
 
 void
 write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, Rgbx *colour)
 {
+  for (std::size_t x = 0; x < columns; x++)
+    depth[x] = static_cast<std::uint16_t> (row[x] >> 32);
   for (std::size_t x = 0; x < columns; x++) {
-    const std::uint64_t p = row[x];
-    depth[x] = static_cast<std::uint16_t> (p >> 32);
-    colour[x] = {static_cast<std::uint8_t> (p), static_cast<std::uint8_t> (p >> 8),
-        static_cast<std::uint8_t> (p >> 16), 0};
+    auto rgbx = static_cast<std::uint32_t> (row[x]);
+    if constexpr (std::endian::native == std::endian::big)
+      rgbx = __builtin_bswap32 (rgbx);
+    std::memcpy (&colour[x].r, &rgbx, sizeof rgbx);
   }
 }
 
@@ -49,7 +55,7 @@ constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_
 
 /* A pixel that equals no neighbour. */
 template <class Code>
-bool
+inline bool
 CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
 {
   const Components expected = predict (n, last_, limits_.most);
@@ -83,18 +89,18 @@ CompactDecoder::decode_run (
   Code code = slice_code;
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
-    const int chosen = n.any () ? code.choice (n) : kCorrect;
-    if (static_cast<unsigned> (chosen) < kPredict) [[likely]] {
-      const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
-      const bool take_left = chosen == kTakeLeft;
-      left_shown = take_left ? left_shown : upper_shown[from];
-      left = {take_left ? left.code : upper_codes[from], take_left ? kLeftState : kUpperState};
+    const auto chosen =
+        static_cast<unsigned> (x > begin || n.any () ? code.choice (n) : int{kCorrect});
+    if (chosen < kPredict) [[likely]] {
+      const std::size_t from = x + chosen - kTakeUpper;
+      const std::uint64_t take_left = mask_of_zero (chosen);
+      left_shown = either (take_left, left_shown, upper_shown[from]);
+      left = {either (take_left, left.code, upper_codes[from]),
+          either (take_left, kLeftState, kUpperState)};
     } else {
-      Code copy = code;
-      if (chosen < 0 || !decode_full (copy, Neighbours (n), chosen == kCorrect, left))
+      if (chosen > kCorrect || !decode_full (code, n, chosen == kCorrect, left))
         return false;
       left_shown = shown_as (left.code, quantisers, limits_);
-      code = copy;
     }
     if (left.code == kNoPixel) /* equals an invalid one */
       return false;
@@ -196,7 +202,9 @@ CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &h
   const auto order = [&] (std::size_t i) {
     return static_cast<std::uint8_t> (body[kStepsSize + i / 2] >> 4 * (i % 2) & 15);
   };
-  PackedReader code (data.data (), data.size (), {order (0), order (1), order (2), order (3)});
+  bytes_.assign (data.begin (), data.end ());
+  bytes_.resize (data.size () + PackedReader::kPadding);
+  PackedReader code (bytes_.data (), data.size (), {order (0), order (1), order (2), order (3)});
   return decode_rows (code, header, quantisers, image, points);
 }
 

@@ -35,10 +35,11 @@ private:
   bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code>
-  bool decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
+  [[gnu::always_inline]] bool decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   CompactRow row_, upper_;
   std::vector<int> runs_; /* ends of the row's runs */
+  std::vector<std::uint8_t> bytes_; /* of the slice, and padding */
   EntropyModel model_{};
   Components steps_{};
   Limits limits_;

@@ -176,13 +176,19 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
   std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++)
     valid[x] = d.valid (depth[x]);
-  if (c.bits () == 8)
+  for (std::size_t x = 0; x < columns; x++)
+    own[x] = d.code (depth[x]);
+  if (c.bits () < 8)
     for (std::size_t x = 0; x < columns; x++)
-      own[x] = key_of (d.code (depth[x]), colour[x].r | colour[x].g << 8 | colour[x].b << 16);
+      own[x] |= key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
   else
-    for (std::size_t x = 0; x < columns; x++)
-      own[x] = key_of (d.code (depth[x]),
-          c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+    for (std::size_t x = 0; x < columns; x++) {
+      std::uint32_t rgbx = 0;
+      std::memcpy (&rgbx, colour + x, sizeof rgbx);
+      if constexpr (std::endian::native == std::endian::big)
+        rgbx = __builtin_bswap32 (rgbx);
+      own[x] |= key_of (0, rgbx);
+    }
 }
 
 /* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
@@ -268,7 +274,7 @@ CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
   const Components size = residual < 0 ? -residual : residual;
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
-  return either (predicted, state_of (Origin::kPredicted),
+  return either (mask_of_zero (!predicted), state_of (Origin::kPredicted),
       state_of (Origin::kCorrected, activity_of (residual)));
 }
 
@@ -296,21 +302,21 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
     FullPixel full;
-    std::size_t other = 0;
-    bool take_left = false;
+    std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
     if constexpr (Best) {
-      other = static_cast<std::size_t> (best_choice (x, n, full));
-      take_left = other == kTakeLeft;
+      other = static_cast<std::uint64_t> (best_choice (x, n, full));
+      take_left = mask_of_zero (other);
     } else {
-      take_left = near_bits (own[x], left_key, bias) == kNearMask;
+      take_left = mask_of_zero (near_bits (own[x], left_key, bias) ^ kNearMask);
       other = others[x];
     }
-    if (take_left || other != kPredict) [[likely]] {
-      code.choice (n, take_left ? kTakeLeft : static_cast<int> (other));
+    const std::uint64_t chosen = either (take_left, kTakeLeft, other);
+    if (chosen != kPredict) [[likely]] {
+      code.choice (n, static_cast<int> (chosen));
       const std::size_t from = x + other - kTakeUpper;
       left_key = either (take_left, left_key, upper_keys[from]);
       left = {either (take_left, left.code, upper_codes[from]),
-          take_left ? kLeftState : kUpperState};
+          either (take_left, kLeftState, kUpperState)};
     } else {
       if constexpr (!Best)
         full = make_full (own[x], n);

@@ -28,7 +28,7 @@ template <std::size_t N, std::size_t Size>
 void
 invert (const std::array<PrefixCode, N> &codes, std::array<PackedTables::Entry, Size> &table)
 {
-  table = {};
+  table.fill ({});
   for (std::size_t symbol = 0; symbol < N; symbol++)
     if (codes[symbol].length > 0)
       for (std::size_t i = codes[symbol].bits; i < Size;

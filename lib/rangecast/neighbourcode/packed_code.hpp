@@ -44,6 +44,9 @@ struct GolombCode {
   }
 };
 
+/** What bits say that are no code. */
+inline constexpr int kNoSymbol = 16;
+
 /** Small residuals and their signs have tables of their own. */
 inline constexpr int kMaxQuickSize = 31, kQuickBits = 9;
 
@@ -59,7 +62,7 @@ struct PackedTables {
     std::uint16_t length = 0;
   };
   struct Entry {
-    std::uint8_t symbol = 0, length = 0; /* length 0: no such code */
+    std::uint8_t symbol = kNoSymbol, length = 1;
   };
   std::array<std::array<PrefixCode, kChoices>, kPackedContexts> choice;
   std::array<std::array<PrefixCode, 16>, 2> pattern;
@@ -181,11 +184,16 @@ private:
   const PackedTables *tables_;
 };
 
-/** Reads what a PackedWriter wrote. Behind the end it reads zeros, which soon are no code. */
+/** Reads what a PackedWriter wrote. Behind the end it reads zeros: who goes on for long has to look
+ *  at overrun() now and then. */
 class PackedReader {
 public:
+  /** Zero bytes that have to be there behind the data. */
+  static constexpr std::size_t kPadding = 16;
+
   PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
-      : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
+      : from_ (from), end_ (from + bytes), orders_ (orders),
+        tables_ (&packed_tables ())
   {
   }
 
@@ -194,48 +202,51 @@ public:
     std::uint32_t value = 0;
     const bool good = golomb (kRunOrder, value);
     later = unzigzag (value);
-    return good;
+    return good && !overrun ();
   }
-  /** A PixelChoice, or -1 for damage. */
-  int choice (const Neighbours &n)
+  /** A PixelChoice, or kNoSymbol for damage. */
+  [[gnu::always_inline]] int choice (const Neighbours &n)
   {
     return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
   }
-  bool residual (const Neighbours &, bool has_neighbour, Components &r)
+  [[gnu::always_inline]] bool residual (const Neighbours &, bool has_neighbour, Components &r)
   {
     const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
-    if (pattern < 0)
-      return false;
-    bool good = true;
+    bool good = pattern != kNoSymbol;
     const auto number = [&] (int i) {
-      refill ();
       const auto order = orders_[static_cast<std::size_t> (i)];
+      const std::uint32_t there = -(static_cast<std::uint32_t> (pattern) >> i & 1);
       const auto quick = tables_->quick_of[order][held_ & ((1u << kQuickBits) - 1)];
-      const bool there = pattern >> i & 1;
-      if (there && quick.length == 0) [[unlikely]]
+      if (there & !quick.length) [[unlikely]]
         return long_residual (order, good);
-      consume (there ? quick.length : 0);
-      return there ? std::int32_t{quick.residual} : 0;
+      consume (static_cast<int> (there & quick.length));
+      return static_cast<std::int32_t> (there) & quick.residual;
     };
-    const std::int32_t z = number (0), y = number (1), co = number (2), cg = number (3);
+    refill ();
+    const std::int32_t z = number (0), y = number (1), co = number (2);
+    refill ();
+    const std::int32_t cg = number (3);
     r = Components{z, y, co, cg};
-    return good && count_ >= 0;
+    return good;
   }
   /** More was taken than there is. */
-  [[nodiscard]] bool overrun () const { return count_ < 0; }
+  [[nodiscard]] bool overrun () const { return left () < 0; }
   /** Nothing is left but the zero bits that fill the last byte, and no more was read. */
   [[nodiscard]] bool at_clean_end () const
   {
-    return from_ == end_ && count_ >= 0 && count_ < 8 && held_ == 0;
+    const std::ptrdiff_t bits = left ();
+    return bits == 0 || (bits > 0 && bits < 8 && end_[-1] >> (8 - bits) == 0);
   }
 
 private:
-  template <std::size_t N> int get (const std::array<PackedTables::Entry, N> &table, int most)
+  template <std::size_t N>
+  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int most)
   {
-    refill ();
+    if (count_ < most)
+      refill ();
     const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
     consume (e.length);
-    return e.length > 0 && count_ >= 0 ? e.symbol : -1;
+    return e.symbol;
   }
   std::int32_t long_residual (int order, bool &good)
   {
@@ -244,6 +255,7 @@ private:
     consume (1);
     std::uint32_t size = 0;
     good &= golomb (order, size) && size < kMaxResidual;
+    refill ();
     const auto r = static_cast<std::int32_t> (size) + 1;
     return negative ? -r : r;
   }
@@ -259,7 +271,7 @@ private:
       return false;
     refill ();
     value = upper << order | take (order);
-    return count_ >= 0;
+    return true;
   }
   std::uint32_t take (int bits)
   {
@@ -267,32 +279,28 @@ private:
     consume (bits);
     return value;
   }
-  /* At least 56 bits are there afterwards, or all that are left. */
-  void refill ()
+  /* At least 56 bits are there afterwards. */
+  [[gnu::always_inline]] void refill ()
   {
-    if (end_ - from_ >= 8 && count_ >= 0) {
-      std::uint64_t word = 0;
-      for (int i = 0; i < 8; i++)
-        word |= std::uint64_t{from_[i]} << 8 * i;
-      held_ |= word << count_;
-      from_ += (63 - count_) >> 3;
-      count_ |= 56;
-      return;
-    }
-    while (count_ >= 0 && count_ <= 56 && from_ != end_) {
-      held_ |= std::uint64_t{*from_++} << count_;
-      count_ += 8;
-    }
+    std::uint64_t word = 0;
+    std::memcpy (&word, from_, sizeof word);
+    if constexpr (std::endian::native == std::endian::big)
+      word = __builtin_bswap64 (word);
+    held_ |= word << count_;
+    from_ = std::min (from_ + ((63 - count_) >> 3), end_ + 8);
+    count_ |= 56;
   }
   void consume (int bits)
   {
     held_ >>= bits;
     count_ -= bits;
   }
+  /* Bits that have not been taken; below 0, how many too many. */
+  [[nodiscard]] std::ptrdiff_t left () const { return 8 * (end_ - from_) + count_; }
 
   const std::uint8_t *from_, *end_;
   std::uint64_t held_ = 0; /* bits from count_ upwards are those of the next bytes, or zeros */
-  int count_ = 0;          /* below 0: more was taken than there is */
+  int count_ = 0;
   GolombOrders orders_;
   const PackedTables *tables_;
 };
