@@ -43,32 +43,32 @@ using PixelCode = std::uint64_t;
 typedef std::int32_t Components __attribute__ ((vector_size (16)));
 inline constexpr int kComponents = 4;
 
-typedef std::int16_t ComponentHalves __attribute__ ((vector_size (8)));
-
-/* As a PixelCode has them: the first component in the least significant bits. */
-inline ComponentHalves
-in_order (ComponentHalves halves)
-{
-  if constexpr (std::endian::native == std::endian::little)
-    return halves;
-  return __builtin_shufflevector (halves, halves, 3, 2, 1, 0);
-}
+typedef std::int16_t ComponentHalves __attribute__ ((vector_size (16)));
+typedef std::uint64_t ComponentPairs __attribute__ ((vector_size (16)));
 
 inline Components
 components_of (PixelCode code)
 {
-  ComponentHalves halves;
-  std::memcpy (&halves, &code, sizeof halves);
-  return __builtin_convertvector (in_order (halves), Components) & Components{0xffff, -1, -1, -1};
+  if constexpr (std::endian::native == std::endian::big)
+    return Components{static_cast<std::uint16_t> (code), static_cast<std::int16_t> (code >> 16),
+        static_cast<std::int16_t> (code >> 32), static_cast<std::int16_t> (code >> 48)};
+  const auto halves = reinterpret_cast<ComponentHalves> (ComponentPairs{code, 0});
+  const auto doubled = __builtin_shufflevector (halves, halves, 0, 0, 1, 1, 2, 2, 3, 3);
+  return reinterpret_cast<Components> (doubled) >> 16 & Components{0xffff, -1, -1, -1};
 }
 
 inline PixelCode
 pack_components (Components c)
 {
-  const ComponentHalves halves = in_order (__builtin_convertvector (c, ComponentHalves));
-  PixelCode code;
-  std::memcpy (&code, &halves, sizeof code);
-  return code;
+  if constexpr (std::endian::native == std::endian::big) {
+    PixelCode code = 0;
+    for (int i = 0; i < kComponents; i++)
+      code |= PixelCode{static_cast<std::uint16_t> (c[i])} << 16 * i;
+    return code;
+  }
+  const auto halves = reinterpret_cast<ComponentHalves> (c);
+  const auto packed = __builtin_shufflevector (halves, halves, 0, 2, 4, 6, 0, 2, 4, 6);
+  return reinterpret_cast<ComponentPairs> (packed)[0];
 }
 
 inline Components
@@ -230,12 +230,11 @@ inline constexpr std::uint32_t kMaxResidual = 1u << 18;
 inline Activity
 activity_of (Components residual)
 {
-  typedef std::uint8_t Bytes __attribute__ ((vector_size (4)));
   const Components size = residual < 0 ? -residual : residual;
-  const Bytes bytes = __builtin_convertvector (size > 9 ? Components{9, 9, 9, 9} : size, Bytes);
-  Activity activity;
-  std::memcpy (&activity, &bytes, sizeof activity);
-  return std::endian::native == std::endian::little ? activity : __builtin_bswap32 (activity);
+  const Components most = {9, 9, 9, 9}, least = size > most ? most : size;
+  const auto pairs = reinterpret_cast<ComponentPairs> (least << Components{0, 8, 0, 8});
+  const auto low = pairs[0] | pairs[0] >> 32, high = pairs[1] | pairs[1] >> 32;
+  return static_cast<Activity> ((low & 0xffff) | (high & 0xffff) << 16);
 }
 
 /** Where the run that begins at `begin` ends, in a row of one byte a pixel, 0 = invalid. */

@@ -21,7 +21,7 @@ public:
 };
 
 /* As it goes into the image: R, G, B in the lower half, depth in the upper. */
-std::uint64_t
+inline std::uint64_t
 shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
 {
   const Components c = to_rgb (components_of (code), limits);
@@ -74,7 +74,7 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, Co
 /* Decodes a run of valid pixels, behind an invalid one. What the loop needs of this object it holds
  * in variables of its own, the code too, so that it stays in registers. */
 template <class Code>
-bool
+inline bool
 CompactDecoder::decode_run (
     Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
 {
@@ -113,6 +113,22 @@ CompactDecoder::decode_run (
   return true;
 }
 
+template <class Code>
+bool
+CompactDecoder::decode_run_every (
+    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  return decode_run (code, quantisers, begin, end);
+}
+
+template <class Code>
+bool
+CompactDecoder::decode_run_v3 (
+    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  return decode_run (code, quantisers, begin, end);
+}
+
 /* Reads which pixels of a row are valid, and where its runs end. */
 template <class Code>
 bool
@@ -149,7 +165,8 @@ CompactDecoder::decode_row (
     const auto end = static_cast<std::size_t> (run);
     if (!valid)
       row_.invalidate (begin, end, 0);
-    else if (!decode_run (code, quantisers, begin, end))
+    else if (!(has_v3_ ? decode_run_v3 (code, quantisers, begin, end)
+                       : decode_run_every (code, quantisers, begin, end)))
       return false;
     points += valid ? end - begin : 0;
     begin = end;

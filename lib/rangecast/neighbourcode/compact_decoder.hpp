@@ -32,11 +32,18 @@ private:
   bool decode_row (
       Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
   template <class Code>
-  bool decode_run (
+  [[gnu::always_inline]] bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code>
+  [[RANGECAST_EVERY_CPU]] bool decode_run_every (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code>
+  [[RANGECAST_X86_64_V3]] bool decode_run_v3 (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code>
   [[gnu::always_inline]] bool decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
+  const bool has_v3_ = has_x86_64_v3 ();
   CompactRow row_, upper_;
   std::vector<int> runs_; /* ends of the row's runs */
   std::vector<std::uint8_t> bytes_; /* of the slice, and padding */

@@ -164,7 +164,7 @@ CompactEncoder::resize (int columns)
 }
 
 /* Quantises a row. */
-void
+inline void
 CompactEncoder::load_row (const ConstRangeImage &image, int y)
 {
   const std::uint16_t *depth = image.depth.row (y) + header_.first_column;
@@ -191,11 +191,25 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
     }
 }
 
-/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
 void
+CompactEncoder::load_row_every (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
+}
+
+void
+CompactEncoder::load_row_v3 (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
+}
+
+/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
+inline void
 CompactEncoder::find_upper (std::size_t begin, std::size_t end)
 {
+  /* Two keys, compared as four halves: every processor can do that. */
   typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
+  typedef std::int32_t Halves __attribute__ ((vector_size (16)));
   constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
   const auto load = [] (const std::uint64_t *from) {
     Keys keys;
@@ -207,14 +221,17 @@ CompactEncoder::find_upper (std::size_t begin, std::size_t end)
   const PixelKey bias = bias_;
   for (std::size_t x = begin; x < end; x += step) {
     const Keys own = load (pixels + x);
-    const auto is_near = [&] (const PixelKey *other) {
-      return near_bits (own, load (other), bias) == kNearMask;
+    const auto first = [&] (const PixelKey *other, std::uint64_t choice, Keys next) {
+      const auto halves =
+          reinterpret_cast<Halves> (near_bits (own, load (other), bias) ^ kNearMask) == 0;
+      const auto both = halves & __builtin_shufflevector (halves, halves, 1, 0, 3, 2);
+      const auto mask = reinterpret_cast<Keys> (both);
+      return (mask & choice) | (~mask & next);
     };
-    const auto all = [] (std::uint64_t choice) { return Keys{} + choice; };
-    Keys first = is_near (upper + x + 1) ? all (kTakeUpperRight) : all (kPredict);
-    first = is_near (upper + x) ? all (kTakeUpper) : first;
-    first = is_near (upper + x - 1) ? all (kTakeUpperLeft) : first;
-    std::memcpy (others + x, &first, sizeof first);
+    const Keys right = first (upper + x + 1, kTakeUpperRight, Keys{} + std::uint64_t{kPredict});
+    const Keys choice =
+        first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
+    std::memcpy (others + x, &choice, sizeof choice);
   }
 }
 
@@ -283,7 +300,7 @@ CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
  * What the loop needs of this object it holds in variables of its own, the code too: bytes are
  * written in it, and for all that the compiler knows any byte may be one of this object's. */
 template <class Code, bool Best>
-void
+inline void
 CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
 {
   PixelCode *const codes = row_.codes ();
@@ -332,6 +349,30 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   slice_code = code;
 }
 
+template <class Code, bool Best>
+void
+CompactEncoder::code_run_every (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best> (code, begin, end);
+}
+
+template <class Code, bool Best>
+void
+CompactEncoder::code_run_v3 (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best> (code, begin, end);
+}
+
+template <class Code, bool Best>
+void
+CompactEncoder::code_run_here (Code &code, std::size_t begin, std::size_t end)
+{
+  if (has_v3_)
+    code_run_v3<Code, Best> (code, begin, end);
+  else
+    code_run_every<Code, Best> (code, begin, end);
+}
+
 /* Codes which pixels of the row are valid, and finds where its runs end. */
 template <class Code>
 void
@@ -361,9 +402,9 @@ CompactEncoder::code_row (Code &slice_code)
     if (!valid)
       row_.invalidate (begin, end, kInvalidKey);
     else if (settings_.best)
-      code_run<Code, true> (slice_code, begin, end);
+      code_run_here<Code, true> (slice_code, begin, end);
     else
-      code_run<Code, false> (slice_code, begin, end);
+      code_run_here<Code, false> (slice_code, begin, end);
     begin = end;
     valid = !valid;
   }
@@ -418,7 +459,10 @@ CompactEncoder::code_piece (
   size_sums_ = size_counts_ = Components{};
   Code code = begin_slice<Code> (0);
   for (int y = 0; y < image.roi.height; y++) {
-    load_row (image, y);
+    if (has_v3_)
+      load_row_v3 (image, y);
+    else
+      load_row_every (image, y);
     const CompactResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
     Code before = code;

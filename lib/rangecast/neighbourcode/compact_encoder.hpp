@@ -8,6 +8,7 @@
 #include "../geometry/range_image.hpp"
 #include "compact_row.hpp"
 #include "entropy_code.hpp"
+#include "isa.hpp"
 #include "pixel_key.hpp"
 
 namespace rangecast {
@@ -55,19 +56,28 @@ private:
   template <class Code> bool code_row (Code &slice_code);
   template <class Code> void code_runs (Code &code);
   template <class Code, bool Best>
-  void code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best>
+  [[RANGECAST_EVERY_CPU]] void code_run_every (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best>
+  [[RANGECAST_X86_64_V3]] void code_run_v3 (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best>
+  void code_run_here (Code &code, std::size_t begin, std::size_t end);
   template <class Code>
   [[gnu::always_inline]] PixelState code_full (Code &code, const Neighbours &n, Components residual);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
   int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
-  void load_row (const ConstRangeImage &image, int y);
-  void find_upper (std::size_t begin, std::size_t end);
+  [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
+  [[RANGECAST_EVERY_CPU]] void load_row_every (const ConstRangeImage &image, int y);
+  [[RANGECAST_X86_64_V3]] void load_row_v3 (const ConstRangeImage &image, int y);
+  [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
   [[nodiscard]] bool fits (std::size_t bytes) const;
 
+  const bool has_v3_ = has_x86_64_v3 ();
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
   SliceHeader header_;
