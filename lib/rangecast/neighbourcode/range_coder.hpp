@@ -149,16 +149,21 @@ public:
     for (int i = 0; i < 3; i++)
       refill ();
   }
-  bool get (Probability &p)
+  [[gnu::always_inline]] bool get (Probability &p)
   {
     const std::uint32_t part = yes_part (range_, p);
     const std::uint64_t split = std::uint64_t{part} << 32;
-    const bool yes = window_ < split;
-    window_ -= yes ? 0 : split;
-    range_ = yes ? part : range_ - part;
-    learn (p, yes);
+    if (window_ < split) {
+      range_ = part;
+      learn (p, true);
+      normalise ();
+      return true;
+    }
+    window_ -= split;
+    range_ -= part;
+    learn (p, false);
     normalise ();
-    return yes;
+    return false;
   }
   std::uint32_t get_bits (int count)
   {
