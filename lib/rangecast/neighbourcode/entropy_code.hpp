@@ -62,7 +62,7 @@ public:
   }
 
   /** @return false for a residual that is too large */
-  bool residual (const Neighbours &n, bool has_neighbour, Components &r)
+  [[gnu::always_inline]] bool residual (const Neighbours &n, bool has_neighbour, Components &r)
   {
     const Activity sums = n.activities ();
     const bool alone = !n.left.valid () || !n.upper ().valid ();
