@@ -384,6 +384,7 @@ CompactEncoder::code_runs (Code &code)
   for (int x = 0; x < columns_; now = !now) {
     const int end = run_end (valid, x, now);
     code.run (now, end - run_end (upper, x, now));
+    result_.points += now ? static_cast<std::uint64_t> (end - x) : 0;
     runs_.push_back (end);
     x = end;
   }

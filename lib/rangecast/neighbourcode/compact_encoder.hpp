@@ -21,6 +21,7 @@ struct CompactSettings {
 
 struct CompactResult {
   std::uint64_t slices = 0;
+  std::uint64_t points = 0;      ///< valid pixels
   std::uint64_t full_pixels = 0; ///< those without a neighbour that is near enough
 };
 

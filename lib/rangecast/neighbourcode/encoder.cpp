@@ -239,7 +239,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     const CompactResult done = compact_.encode (image, {depth_, colour_}, compact, header, to);
     result.slices += done.slices;
     result.full_pixels += done.full_pixels;
-    count_points (image, result);
+    add_points (done.points, roi, result);
     return {};
   }
   /* As many columns as fit in one row even if every pixel of it is written in full. */
@@ -264,6 +264,12 @@ ViewEncoder::count_points (const ConstRangeImage &image, EncoderResult &result) 
     for (int x = 0; x < roi.width; x++)
       points += depth_.valid (row[x]);
   }
+  add_points (points, roi, result);
+}
+
+void
+ViewEncoder::add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const
+{
   result.points += points;
   result.raw_bits +=
       points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +

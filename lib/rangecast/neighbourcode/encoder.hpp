@@ -60,6 +60,7 @@ public:
 
 private:
   void count_points (const ConstRangeImage &image, EncoderResult &result) const;
+  void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
   void load_row (const ConstRangeImage &image, int y, int first_column, int columns);
   std::size_t code_row (bool has_upper, std::size_t symbols_at, std::size_t full_at);
   void code_piece (const ConstRangeImage &image, int first_column, int columns, SliceHeader header,
