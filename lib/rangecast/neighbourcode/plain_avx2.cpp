@@ -73,7 +73,7 @@ widen (PlainSpan &span, int x, unsigned mask)
   if (mask == 0)
     return;
   if (span.valid == 0)
-    span.begin = x;
+    span.begin = x + static_cast<int> (_tzcnt_u32 (mask)) / 2;
   span.end = x + kBlock - static_cast<int> (_lzcnt_u32 (mask)) / 2;
   span.valid += static_cast<int> (_mm_popcnt_u32 (mask)) / 2;
 }

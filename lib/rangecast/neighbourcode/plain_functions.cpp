@@ -29,7 +29,7 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
     span.end = x + 1;
     span.valid++;
   }
-  span.begin = span.valid > 0 ? first / 16 * 16 : 0;
+  span.begin = span.valid > 0 ? first : 0;
   return span;
 }
 
