@@ -237,20 +237,13 @@ CompactDecoder::keep_row (std::uint64_t *kept, int columns) const
 
 /* Fills the pixels of a row that are unknown. */
 void
-CompactDecoder::show_older (
-    const ConstRangeImage &older, const SliceHeader &header, int row, const RangeImage &image) const
+CompactDecoder::show_older_row (const DecoderReference &reference, const SliceHeader &header,
+    int row, const RangeImage &image) const
 {
-  const int from_y = image.roi.y + row - older.roi.y;
-  if (from_y < 0 || from_y >= older.roi.height)
-    return;
   for (int x = 0; x < header.columns; x++) {
     const auto at = static_cast<std::size_t> (x);
-    const int to = header.first_column + x, from = image.roi.x + to - older.roi.x;
-    if (!row_.valid[at] || row_.pixels[at + 1].code != kNoPixel || from < 0 ||
-        from >= older.roi.width)
-      continue;
-    image.depth.row (row)[to] = older.depth.row (from_y)[from];
-    image.colour.row (row)[to] = older.colour.row (from_y)[from];
+    if (row_.valid[at] && row_.pixels[at + 1].code == kNoPixel)
+      show_older (reference, image, header.first_column + x, row);
   }
 }
 
@@ -294,8 +287,8 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
       const auto valid = std::ranges::count (row_.valid, std::uint8_t{1});
       const std::uint64_t unknown = static_cast<std::uint64_t> (valid) - points;
       decoded.unknown += unknown;
-      if (unknown > 0 && reference.older)
-        show_older (*reference.older, header, image_row, image);
+      if (unknown > 0)
+        show_older_row (reference, header, image_row, image);
     }
     if (reference.now)
       keep_row (reference.now->row (image_row) + header.first_column, header.columns);

@@ -11,20 +11,6 @@
 
 namespace rangecast {
 
-/** What came of a slice. */
-struct DecodedPixels {
-  std::uint64_t points = 0;  ///< valid ones
-  std::uint64_t unknown = 0; ///< valid, but they refer to pixels that were not received
-};
-
-/** Where a slice's pixels refer to, and where they are kept. */
-struct DecoderReference {
-  const ReferencePlane *before = nullptr; ///< none: nothing is there to refer to
-  ReferencePlane *now = nullptr;          ///< takes the decoded pixels, if there is one
-  /** What is shown of pixels that refer to something that was not received; may be empty. */
-  const ConstRangeImage *older = nullptr;
-};
-
 /** Decodes slices of the profiles packed and entropy. Keeps its memory. */
 class CompactDecoder {
 public:
@@ -45,7 +31,7 @@ private:
   bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
   void keep_row (std::uint64_t *kept, int columns) const;
-  void show_older (const ConstRangeImage &older, const SliceHeader &header, int row,
+  void show_older_row (const DecoderReference &reference, const SliceHeader &header, int row,
       const RangeImage &image) const;
   template <class Code> bool decode_runs (Code &code, int columns);
   template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);

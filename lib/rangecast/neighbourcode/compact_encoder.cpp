@@ -138,7 +138,7 @@ CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_referen
 
 CompactResult
 CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> bands,
-    const CompactReference &reference, const CompactQuantisers &quantisers,
+    const CodingReference &reference, const CompactQuantisers &quantisers,
     const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to)
 {
   reference_ = reference;

@@ -24,12 +24,6 @@ struct CompactResult {
   std::uint64_t full_pixels = 0;  ///< those without a neighbour that is near enough
 };
 
-/** What slices may refer to. */
-struct CompactReference {
-  const ReferencePlane *before = nullptr; ///< for slices that are not key ones
-  ReferencePlane *now = nullptr;          ///< takes the coded pixels, if there is one
-};
-
 struct CompactQuantisers {
   const DepthQuantiser &depth;
   const ColourQuantiser &colour;
@@ -49,7 +43,7 @@ public:
    *  @param bands  that make up the ROI
    *  @param header  of all slices: profile, bits, ROI, times, distance of the reference */
   CompactResult encode (const ConstRangeImage &image, std::span<const RowBand> bands,
-      const CompactReference &reference, const CompactQuantisers &quantisers,
+      const CodingReference &reference, const CompactQuantisers &quantisers,
       const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
 
 private:
@@ -78,7 +72,7 @@ private:
   [[nodiscard]] std::size_t header_size () const;
 
   CompactSettings settings_{};
-  CompactReference reference_;
+  CodingReference reference_;
   double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
   SliceHeader header_;

@@ -65,32 +65,26 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   if (!(image.roi == header.roi) || image.depth.width != header.roi.width ||
       image.depth.height != header.roi.height)
     return {StatusCode::kBadSize, "slice: its ROI is not that of the other slices of the view"};
-  const auto pixels =
-      static_cast<std::size_t> (header.rows) * static_cast<std::size_t> (header.columns);
   UnitHeader unit_header;
   if (Status s = read_unit_header (unit, unit_header); !s.ok ())
     return s;
-  const std::size_t size = unit_header.size, symbols_size = symbol_bytes (pixels);
-  if (header.profile != Profile::kPlain && pixels > 0 && size >= header_size_of (header)) {
-    const DepthQuantiser *quantiser = depth_of (header);
-    const bool serves = reference.before && reference.before->serves (header);
-    const bool good =
-        quantiser && compact_.decode (unit.first (size).subspan (header_size_of (header)), header,
-                         {*quantiser, colours_[header.colour_bits - 4]},
-                         {serves ? reference.before : nullptr, reference.now}, image, decoded);
-    return good ? Status{} : damaged ();
-  }
-  if (size < kSliceHeaderSize || symbols_size > size - kSliceHeaderSize)
+  if (unit_header.size < smallest_size (header))
     return {StatusCode::kTruncated, "slice: shorter than its symbols"};
-  if (!header.key)
-    return {StatusCode::kUnsupported, "slice: profile plain without key"};
-  if (pixels == 0)
-    return size == kSliceHeaderSize ? Status{} : damaged ();
+  const auto body = unit.first (unit_header.size).subspan (header_size_of (header));
+  if (header.rows == 0)
+    return body.empty () ? Status{} : damaged ();
   const DepthQuantiser *depth = depth_of (header);
-  if (!depth)
-    return damaged ();
-  const bool good = plain_.decode (unit.first (size).subspan (kSliceHeaderSize), header, *depth,
-      colours_[header.colour_bits - 4], image, decoded.points);
+  const ColourQuantiser &colour = colours_[header.colour_bits - 4];
+  DecoderReference usable = reference;
+  if (!reference.before || !reference.before->serves (header))
+    usable.before = nullptr;
+  bool good = depth;
+  if (depth && header.profile != Profile::kPlain)
+    good = compact_.decode (body, header, {*depth, colour}, usable, image, decoded);
+  else if (depth && (header.reference || !header.key))
+    good = plain_temporal_.decode (body, header, *depth, colour, usable, image, decoded);
+  else if (depth)
+    good = plain_.decode (body, header, *depth, colour, image, decoded.points);
   return good ? Status{} : damaged ();
 }
 
@@ -107,7 +101,8 @@ SliceDecoder::smallest_size (const SliceHeader &header)
     case Profile::kEntropy:
       return kEntropyHeaderSize + !header.key; /* zeros at the end are left out */
     default:
-      return kSliceHeaderSize + symbol_bytes (rows * static_cast<std::size_t> (header.columns));
+      return header_size_of (header) +
+             symbol_bytes (rows * static_cast<std::size_t> (header.columns));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "../geometry/range_image.hpp"
 #include "compact_decoder.hpp"
 #include "plain_decoder.hpp"
+#include "plain_temporal.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -51,6 +52,7 @@ private:
   std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
       ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
   PlainDecoder plain_;
+  PlainTemporalDecoder plain_temporal_;
   CompactDecoder compact_; /* profiles packed and entropy */
 };
 

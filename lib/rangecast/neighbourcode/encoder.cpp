@@ -50,10 +50,15 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   return {};
 }
 
-/* Begins to keep the coded pixels, and plans what may refer to those of the frame set before. */
-void
-ViewEncoder::begin_temporal (SliceHeader &header)
+/* Begins to keep the coded pixels, if later frame sets are to refer to them, and plans which rows
+ * refer to the frame set before. */
+CodingReference
+ViewEncoder::plan_references (SliceHeader &header)
 {
+  if (!settings_.temporal) {
+    bands_.assign (1, {0, header.roi.height, true});
+    return {};
+  }
   header.reference = true;
   references_.begin (header);
   const ReferencePlane &before = references_.before ();
@@ -61,19 +66,14 @@ ViewEncoder::begin_temporal (SliceHeader &header)
   const bool key = !before.held () || distance == 0 || distance > 255;
   header.reference_distance = key ? std::uint8_t{0} : static_cast<std::uint8_t> (distance);
   refresh_.plan (header.roi, header.capture_time_ns, settings_.refresh_period_ns, key, bands_);
+  return {&before, &references_.now ()};
 }
 
 void
 ViewEncoder::encode_compact (const ConstRangeImage &image, SliceHeader header,
     std::vector<std::uint8_t> &to, EncoderResult &result)
 {
-  CompactReference reference;
-  if (settings_.temporal) {
-    begin_temporal (header);
-    reference = {&references_.before (), &references_.now ()};
-  } else {
-    bands_.assign (1, {0, header.roi.height, true});
-  }
+  const CodingReference reference = plan_references (header);
   const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
       settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
   const CompactResult done =
@@ -112,8 +112,12 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   if (settings_.profile == Profile::kPlain) {
     const PlainSettings plain = {
         settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
-    const PlainResult done = plain_.encode (image, depth_, plain, header, to);
+    const CodingReference reference = plan_references (header);
+    const PlainResult done = reference.now ? plain_temporal_.encode (image, bands_, reference,
+                                                 depth_, colour_, plain, header, to)
+                                           : plain_.encode (image, depth_, plain, header, to);
     result.slices += done.slices;
+    result.delta_slices += done.delta_slices;
     result.full_pixels += done.full_pixels;
     add_points (done.points, roi, result);
   } else {

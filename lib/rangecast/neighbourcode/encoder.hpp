@@ -9,6 +9,7 @@
 #include "../geometry/range_image.hpp"
 #include "compact_encoder.hpp"
 #include "plain_encoder.hpp"
+#include "plain_temporal.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -70,7 +71,7 @@ public:
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
-  void begin_temporal (SliceHeader &header);
+  CodingReference plan_references (SliceHeader &header);
   void encode_compact (const ConstRangeImage &image, SliceHeader header,
       std::vector<std::uint8_t> &to, EncoderResult &result);
   [[nodiscard]] std::uint64_t count_points (const ConstRangeImage &image) const;
@@ -82,6 +83,7 @@ private:
   DepthQuantiser depth_;
   ColourQuantiser colour_;
   PlainEncoder plain_;
+  PlainTemporalEncoder plain_temporal_;
   CompactEncoder compact_; /* profiles packed and entropy */
   ReferencePair references_;
   RefreshSchedule refresh_;

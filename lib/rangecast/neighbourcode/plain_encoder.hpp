@@ -20,6 +20,7 @@ struct PlainSettings {
 
 struct PlainResult {
   std::uint64_t slices = 0;
+  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
   std::uint64_t full_pixels = 0;
   std::uint64_t points = 0; ///< valid pixels
 };

@@ -68,4 +68,27 @@ private:
   int now_ = 0;
 };
 
+/** What slices may refer to, and where their pixels are kept; nullptr = nothing, nowhere. */
+struct CodingReference {
+  const ReferencePlane *before = nullptr;
+  ReferencePlane *now = nullptr;
+};
+
+/** The same for a decoder. */
+struct DecoderReference {
+  const ReferencePlane *before = nullptr;
+  ReferencePlane *now = nullptr;
+  /** What is shown of unknown pixels; may be nullptr or have another ROI. */
+  const ConstRangeImage *older = nullptr;
+};
+
+/** What came of a slice. */
+struct DecodedPixels {
+  std::uint64_t points = 0;  ///< valid ones
+  std::uint64_t unknown = 0; ///< valid, but they refer to pixels that were not received
+};
+
+/** Fills a pixel of an image (column and row of its ROI) from `older`, if that has it. */
+void show_older (const DecoderReference &reference, const RangeImage &image, int x, int y);
+
 } // namespace rangecast

@@ -9,7 +9,7 @@
 
 namespace rangecast {
 
-/** One symbol a pixel; 3 bits in profile plain. 6 and 7 are reserved. */
+/** One symbol a pixel; 3 bits in profile plain. 7 is reserved. */
 enum Symbol : std::uint8_t {
   kLeft = 0, ///< equals the pixel to the left
   kUpperLeft = 1,
@@ -17,6 +17,7 @@ enum Symbol : std::uint8_t {
   kUpperRight = 3,
   kFull = 4,    ///< written in full
   kInvalid = 5, ///< has no depth
+  kEarlier = 6, ///< equals the same pixel of an earlier frame set
 };
 inline constexpr int kSymbolBits = 3;
 
