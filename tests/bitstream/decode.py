@@ -23,7 +23,7 @@ from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 import compact
 
 VERSION = 1
-PLAIN = 0
+PLAIN, PACKED, ENTROPY = 0, 1, 2
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
 UNIT_HEADER = struct.Struct("<BBH")
@@ -104,8 +104,11 @@ class Slice(NamedTuple):
         return self.first_column, self.first_row, self.columns, self.rows
 
     def too_short(self) -> bool:
-        """It does not hold its symbols."""
-        return 8 * len(self.body) < 3 * self.rows * self.columns
+        """It is shorter than any that gives its pixels."""
+        if not self.rows:
+            return False
+        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 32}[self.profile]
+        return 8 * len(self.body) < bits
 
     def pixel_bits(self) -> int:
         return self.depth_bits + 3 * self.colour_bits
@@ -151,9 +154,10 @@ class Reader:
 
     data: bytes
     views: dict[int, View] = field(default_factory=dict)
-    parts: dict[int, View] = field(default_factory=dict)
+    parts: dict[int, tuple[View, bytes]] = field(default_factory=dict)
     rig_key: tuple[int, int, int] | None = None
-    earlier: dict[int, Picture] = field(default_factory=dict)  # by view-id: the latest that slices may refer to
+    earlier: dict[int, list[Picture]] = field(default_factory=dict)  # by view-id: the latest two to refer to
+    rig: dict[int, bytes] = field(default_factory=dict)  # the payloads of its units
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
 
     def access_units(self) -> Iterator[dict[int, Picture]]:
@@ -253,15 +257,16 @@ class Reader:
                 picture.put(part, pixels)
         self.counts["unknown pixels"] += picture.pixels.count(UNKNOWN)
         if frequent.reference:
-            self.earlier[frequent.view] = picture
+            others = [one for one in self.earlier.get(picture.view.id, []) if one.like.frame != frequent.frame]
+            self.earlier[picture.view.id] = [picture] + others[:1]
         return picture
 
     def known(self, part: Slice) -> Callable[[int, int], Numbers | None]:
         """What is known, at each place of the view's image, of the frame set that a slice refers to."""
-        earlier = self.earlier.get(part.view)
+        others = [one for one in self.earlier.get(part.view, []) if one.like.frame != part.frame]
         number = (part.frame - part.distance) % (1 << 32)
-        if earlier and earlier.like.frame == number and earlier.like.format() == part.format():
-            return earlier.known
+        if others and others[0].like.frame == number and others[0].like.format() == part.format():
+            return others[0].known
         return lambda x, y: None
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
@@ -275,11 +280,14 @@ class Reader:
         if self.rig_key != (total, numerator, denominator):
             self.rig_key = (total, numerator, denominator)
             self.parts = {}
-        self.parts[number] = view
-        by_id = {view.id: view for view in self.parts.values()}
+        self.parts[number] = view, payload
+        by_id = {view.id: view for view, _ in self.parts.values()}
         widest, tallest = (max(side) for side in zip(*((view.width, view.height) for view in by_id.values())))
         if len(by_id) == total and total * widest * tallest <= MAX_RIG_PIXELS:
             self.views = by_id
+            rig = {number: payload for number, (_, payload) in self.parts.items()}
+            if self.rig != rig:
+                self.rig, self.earlier = rig, {}
 
 
 def units(data: bytes) -> Iterator[tuple[int, int, bytes]]:
@@ -343,7 +351,7 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[size:], scale, reference, distance)
     if part.view > 63 or part.profile > 2 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
         raise Damaged("view, profile or bits")
-    if any(part[6:14]):
+    if any(part[6:14]) or not key:
         if not part.rows or not part.columns:
             raise Damaged("no pixels")
         if part.first_row + part.rows > part.height or part.first_column + part.columns > part.width:
