@@ -6,6 +6,10 @@
  * Decodes range images from the neighbour code. Slices that are lost or damaged leave invalid
  * pixels (or, by #GstNeighbourCodeDec:conceal, the last ones), never an error.
  *
+ * Frame sets may refer to earlier ones (neighbourcodeenc temporal=true). What refers to something
+ * that was lost is left out as if it were lost itself, and the decoder asks upstream for a key
+ * frame set (GstForceKeyUnit; RTP: PLI), unless #GstNeighbourCodeDec:request-key-units is off.
+ *
  * Where buffers are slices (alignment=slice), a frame set ends with a buffer that has the MARKER
  * flag, before one of another capture time, or where the stream ends.
  *
@@ -20,6 +24,7 @@
 #include "gstneighbourcodedec.h"
 
 #include <gst/base/base.h>
+#include <gst/video/video.h>
 
 #include <atomic>
 #include <gstrange/gstrange.h>
@@ -35,7 +40,10 @@ using rangecast::Status;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
 
-enum { PROP_0, PROP_CONCEAL, PROP_N_THREADS, PROP_STATS };
+enum { PROP_0, PROP_CONCEAL, PROP_REQUEST_KEY_UNITS, PROP_N_THREADS, PROP_STATS };
+
+/* Upstream is asked for a key frame set no more often. */
+static constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
 
 /* Pixels from before a jump in time are not shown after it. */
 static constexpr GstClockTime kMaxConcealAge = GST_SECOND;
@@ -45,6 +53,7 @@ enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 struct GstNeighbourCodeDecPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
   GstNeighbourCodeConceal conceal = CONCEAL_INVALID;
+  bool request_key_units = true;
   int n_threads = 0;
   guint64 frames = 0, coded_bytes = 0;
   DecoderResult totals;
@@ -52,8 +61,10 @@ struct GstNeighbourCodeDecPrivate {
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
-  GstBuffer *last = nullptr;          /* what conceal=last takes pixels from */
-  std::atomic<bool> by_slices{false}; /* alignment of the input */
+  GstBuffer *last = nullptr;            /* what conceal=last takes pixels from */
+  std::atomic<bool> by_slices{false};   /* alignment of the input */
+  std::atomic<bool> is_temporal{false}; /* the latest frame set is a reference of later ones */
+  GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that made us ask */
   std::vector<guint8> slices;
   GstBuffer *first = nullptr; /* of slices: gives times and flags */
   bool complete = false;      /* nothing more comes to slices */
@@ -109,6 +120,9 @@ forget_stream (GstNeighbourCodeDecPrivate *priv)
 {
   forget_slices (priv);
   gst_clear_buffer (&priv->last);
+  priv->decoder.forget_references ();
+  priv->is_temporal = false;
+  priv->last_request = GST_CLOCK_TIME_NONE;
 }
 
 static void
@@ -138,12 +152,13 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* With alignment=slice the base class does not learn of late frames: it would drop single slices.
- */
+/* The base class does not learn of late frames where it would drop single slices (alignment=slice),
+ * or what later frame sets refer to. */
 static gboolean
 gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS && GST_NEIGHBOUR_CODE_DEC (base)->priv->by_slices)
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS && (priv->by_slices || priv->is_temporal))
     return gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (base), event);
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->src_event (base, event);
 }
@@ -186,10 +201,35 @@ count_frame (GstNeighbourCodeDecPrivate *priv, const DecoderResult &result, gsiz
   totals.missing_pixels += result.missing_pixels;
   totals.points += result.points;
   totals.raw_bits += result.raw_bits;
+  totals.unknown_pixels += result.unknown_pixels;
+}
+
+/* Losses linger where frame sets refer to one another, so upstream is asked for a new beginning. */
+static void
+request_key_unit (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResult &result)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  const GstClockTime now = GST_BUFFER_PTS (input), then = priv->last_request;
+  const bool is_lossy = result.unknown_pixels + result.missing_pixels + result.bad_slices > 0;
+  if (!priv->is_temporal || !is_lossy)
+    return;
+  if (GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (then) && now >= then &&
+      now - then < kRequestInterval)
+    return;
+  {
+    std::lock_guard guard (priv->lock);
+    if (!priv->request_key_units)
+      return;
+  }
+  priv->last_request = now;
+  GST_DEBUG_OBJECT (self, "asking for a key frame set");
+  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, FALSE, 0));
 }
 
 static GstFlowReturn
-decode_bytes (GstNeighbourCodeDec *self, std::span<const guint8> bytes, GstBuffer **output)
+decode_bytes (
+    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   bool conceal;
@@ -209,6 +249,9 @@ decode_bytes (GstNeighbourCodeDec *self, std::span<const guint8> bytes, GstBuffe
   if (status.ok ())
     status = decode_into (priv, buffer, conceal, n_threads, result);
   count_frame (priv, result, bytes.size ());
+  if (!priv->decoder.views ().empty ())
+    priv->is_temporal = priv->decoder.views ()[0].reference.reference;
+  request_key_unit (self, input, result);
   if (result.bad_slices)
     GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
   if (!status.ok ()) {
@@ -251,7 +294,7 @@ decode_frame_set (
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   forget_what_is_too_old (priv, input);
-  const GstFlowReturn flow = decode_bytes (self, bytes, output);
+  const GstFlowReturn flow = decode_bytes (self, input, bytes, output);
   if (flow != GST_FLOW_OK)
     return flow;
   GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, *output);
@@ -410,6 +453,9 @@ gst_neighbour_code_dec_set_property (
     case PROP_CONCEAL:
       priv->conceal = GstNeighbourCodeConceal (g_value_get_enum (value));
       break;
+    case PROP_REQUEST_KEY_UNITS:
+      priv->request_key_units = g_value_get_boolean (value);
+      break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
       break;
@@ -425,7 +471,8 @@ make_stats (const GstNeighbourCodeDecPrivate *priv)
   return gst_structure_new ("application/x-neighbourcodedec-stats", "frames", G_TYPE_UINT64,
       priv->frames, "points", G_TYPE_UINT64, guint64{totals.points}, "slices", G_TYPE_UINT64,
       guint64{totals.slices}, "bad-slices", G_TYPE_UINT64, guint64{totals.bad_slices},
-      "missing-pixels", G_TYPE_UINT64, guint64{totals.missing_pixels}, "raw-bytes", G_TYPE_UINT64,
+      "missing-pixels", G_TYPE_UINT64, guint64{totals.missing_pixels}, "unknown-pixels",
+      G_TYPE_UINT64, guint64{totals.unknown_pixels}, "raw-bytes", G_TYPE_UINT64,
       guint64{totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
 }
 
@@ -437,6 +484,9 @@ gst_neighbour_code_dec_get_property (GObject *object, guint id, GValue *value, G
   switch (id) {
     case PROP_CONCEAL:
       g_value_set_enum (value, priv->conceal);
+      break;
+    case PROP_REQUEST_KEY_UNITS:
+      g_value_set_boolean (value, priv->request_key_units);
       break;
     case PROP_N_THREADS:
       g_value_set_int (value, priv->n_threads);
@@ -483,13 +533,19 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
       g_param_spec_enum ("conceal", "Conceal",
           "What becomes of pixels whose slices are lost or damaged (default: invalid)",
           GST_TYPE_NEIGHBOUR_CODE_CONCEAL, CONCEAL_INVALID, playing));
+  g_object_class_install_property (object_class, PROP_REQUEST_KEY_UNITS,
+      g_param_spec_boolean ("request-key-units", "Request key units",
+          "Asks upstream for a key frame set (GstForceKeyUnit) when something was lost that later "
+          "frame sets refer to (default true)",
+          TRUE, playing));
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
           "Views decoded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64,
           0, playing));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points, slices, bad-slices, missing-pixels, raw-bytes, "
+          "Counters since start: frames, points, slices, bad-slices, missing-pixels, "
+          "unknown-pixels, raw-bytes, "
           "coded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 

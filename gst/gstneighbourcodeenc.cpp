@@ -6,6 +6,12 @@
  * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
  * decode without one another. The format is specified in docs/bitstream.md.
  *
+ * With temporal=true pixels may also equal those of the frame set before; this takes half the bytes
+ * or less where a person moves before a still camera. Key frame sets, which need no earlier one,
+ * come first, at least every key-interval, and when somebody asks (GstForceKeyUnit, from up- or
+ * downstream; RTP: PLI, FIR); all others have the DELTA_UNIT flag. What a loss damaged is whole
+ * again after refresh-period at the latest, also without key frame sets.
+ *
  * A buffer is a frame set, or a slice of one where downstream asks for alignment=slice: then the
  * last of a frame set has the MARKER flag.
  *
@@ -27,6 +33,9 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
+#include "keyunitrequests.hpp"
+#include "neighbourcoderate.hpp"
+
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
 using rangecast::Status;
@@ -35,8 +44,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
 
 enum {
-  PROP_0,
-  PROP_PROFILE,
+  PROP_PROFILE = NeighbourCodeRateSettings::kFirstFreeId,
   PROP_CHOICE,
   PROP_DEPTH_BITS,
   PROP_DEPTH_SCALE,
@@ -44,6 +52,9 @@ enum {
   PROP_DEPTH_THRESHOLD,
   PROP_COLOUR_THRESHOLD,
   PROP_MAX_SLICE_SIZE,
+  PROP_TEMPORAL,
+  PROP_REFRESH_PERIOD,
+  PROP_KEY_INTERVAL,
   PROP_N_THREADS,
   PROP_MAX_DEPTH_ERROR,
   PROP_STATS
@@ -54,17 +65,26 @@ static constexpr EncoderSettings kDefaults;
 struct GstNeighbourCodeEncPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
   EncoderSettings settings;
+  NeighbourCodeRateSettings rate_settings;
   int n_threads = 0;
+  guint key_interval_ms = 0;
   double max_depth_error_m = 0;
   guint64 frames = 0, coded_bytes = 0;
   EncoderResult totals;
+  EncoderSettings latest; /* of the latest frame set */
+  double bits_per_s = 0;
+
+  KeyUnitRequests key_requests;
 
   /* streaming thread only */
   gstrange::RangeInfo info;
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured;
   bool is_configured = false;
+  NeighbourCodeRate rate;
   std::uint32_t frame_number = 0;
+  bool is_key = true;                          /* the frame set in encoder */
+  GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
   GstBufferPool *pool = nullptr;
   gsize pool_size = 0;
   bool by_slices = false;     /* alignment of the output */
@@ -153,6 +173,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   const GstStructure *structure = gst_caps_get_structure (out, 0);
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
+  priv->encoder.request_key (); /* decoders begin anew with new caps */
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   forget_input (priv);
   return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
@@ -160,13 +181,18 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
 
 /* ---- data ---- */
 
-/* Takes over settings that changed. */
+/* Takes over settings that changed. Thresholds may with every frame set: they cost nothing. */
 static Status
 configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
 {
   if (priv->is_configured && settings == priv->configured)
     return {};
-  if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
+  EncoderSettings same = priv->configured;
+  same.depth_threshold = settings.depth_threshold;
+  same.colour_threshold = settings.colour_threshold;
+  if (priv->is_configured && settings == same)
+    priv->encoder.set_thresholds (settings.depth_threshold, settings.colour_threshold);
+  else if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
     return s;
   priv->configured = settings;
   priv->is_configured = true;
@@ -203,26 +229,86 @@ acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
   return buffer;
 }
 
+struct FrameSettings {
+  EncoderSettings encoder;
+  NeighbourCodeRateSettings rate;
+  int n_threads;
+  guint key_interval_ms;
+};
+
+static GstClockTime
+frame_interval (const gstrange::RangeInfo &info)
+{
+  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
+                        : GST_SECOND / 30;
+}
+
 static Status
-encode_frame (
-    GstNeighbourCodeEncPrivate *priv, GstBuffer *input, int n_threads, EncoderResult &result)
+encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSettings &settings,
+    EncoderResult &result)
 {
   gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
-  return priv->encoder.encode (frame.views (), priv->frame_number++, n_threads, result);
+  guint64 pixels = 0;
+  for (const rangecast::RangeImage &image : frame.views ())
+    pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
+  const GstClockTime interval = frame_interval (priv->info);
+  if (Status s = configure (
+          priv, priv->rate.next (settings.encoder, settings.rate, input, pixels, interval));
+      !s.ok ())
+    return s;
+  const Status status =
+      priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
+  if (status.ok ())
+    priv->rate.coded ({priv->encoder.size (), result.points, pixels});
+  return status;
 }
 
 static void
 count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
 {
   std::lock_guard guard (priv->lock);
+  priv->latest = priv->configured;
+  priv->bits_per_s = priv->rate.bits_per_s ();
   priv->frames++;
   priv->coded_bytes += size;
   priv->totals.points += result.points;
   priv->totals.full_pixels += result.full_pixels;
   priv->totals.slices += result.slices;
+  priv->totals.delta_slices += result.delta_slices;
   priv->totals.raw_bits += result.raw_bits;
+}
+
+/* Asks the encoder for a key frame set where one is due. */
+static void
+prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, guint interval_ms)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstSegment *segment = &GST_BASE_TRANSFORM (self)->segment;
+  const GstClockTime pts = GST_BUFFER_PTS (input);
+  const GstClockTime now = gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
+  /* The next frame set would come too late. */
+  const GstClockTime until = now + frame_interval (priv->info);
+  const bool is_old = interval_ms > 0 && GST_CLOCK_TIME_IS_VALID (now) &&
+                      GST_CLOCK_TIME_IS_VALID (priv->last_key) &&
+                      (now < priv->last_key || until - priv->last_key > interval_ms * GST_MSECOND);
+  GstEvent *announcement = priv->key_requests.answer (
+      pts, gst_segment_to_stream_time (segment, GST_FORMAT_TIME, pts), now);
+  if (announcement || is_old)
+    priv->encoder.request_key ();
+  if (announcement)
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
+}
+
+static void
+note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &result)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  priv->is_key = result.delta_slices == 0;
+  if (priv->is_key)
+    priv->last_key = gst_segment_to_running_time (
+        &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
 }
 
 static GstFlowReturn
@@ -233,19 +319,17 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
     gst_object_sync_values (
         GST_OBJECT (self), gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment,
                                GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
-  EncoderSettings settings;
-  int n_threads;
+  FrameSettings settings;
   {
     std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-    n_threads = priv->n_threads;
+    settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_interval_ms};
   }
+  prepare_key (self, input, settings.key_interval_ms);
   EncoderResult result;
-  Status status = configure (priv, settings);
-  if (status.ok ())
-    status = encode_frame (priv, input, n_threads, result);
+  const Status status = encode_frame (priv, input, settings, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
+  note_key (self, input, result);
   count_frame (priv, result, priv->encoder.size ());
   return GST_FLOW_OK;
 }
@@ -266,7 +350,10 @@ make_output (GstNeighbourCodeEnc *self, gsize size)
   const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (buffer, capture);
-  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  if (priv->is_key)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  else
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
   return buffer;
 }
 
@@ -359,6 +446,33 @@ gst_neighbour_code_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta 
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
+/* ---- events ---- */
+
+static gboolean
+gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event)) { /* goes on with the frame set that answers it */
+    gst_event_unref (event);
+    return TRUE;
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
+    priv->encoder.request_key ();
+    priv->key_requests.forget ();
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
+{
+  if (GST_NEIGHBOUR_CODE_ENC (base)->priv->key_requests.note (event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->src_event (base, event);
+}
+
 /* ---- life ---- */
 
 static gboolean
@@ -366,7 +480,12 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->frame_number = 0;
+  priv->rate.reset ();
+  priv->last_key = GST_CLOCK_TIME_NONE;
+  priv->encoder.request_key ();
+  priv->key_requests.forget ();
   std::lock_guard guard (priv->lock);
+  priv->bits_per_s = 0;
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};
   return TRUE;
@@ -389,6 +508,8 @@ gst_neighbour_code_enc_set_property (
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
   std::lock_guard guard (priv->lock);
   EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.set (id, value))
+    return;
   switch (id) {
     case PROP_PROFILE:
       settings.profile = rangecast::Profile (g_value_get_enum (value));
@@ -414,6 +535,15 @@ gst_neighbour_code_enc_set_property (
     case PROP_MAX_SLICE_SIZE:
       settings.max_slice_size = g_value_get_int (value);
       break;
+    case PROP_TEMPORAL:
+      settings.temporal = g_value_get_boolean (value);
+      break;
+    case PROP_REFRESH_PERIOD:
+      settings.refresh_period_ns = g_value_get_uint (value) * GST_MSECOND;
+      break;
+    case PROP_KEY_INTERVAL:
+      priv->key_interval_ms = g_value_get_uint (value);
+      break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
       break;
@@ -428,8 +558,12 @@ make_stats (const GstNeighbourCodeEncPrivate *priv)
   return gst_structure_new ("application/x-neighbourcodeenc-stats", "frames", G_TYPE_UINT64,
       priv->frames, "points", G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels",
       G_TYPE_UINT64, guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64,
-      guint64{priv->totals.slices}, "raw-bytes", G_TYPE_UINT64, guint64{priv->totals.raw_bits / 8},
-      "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
+      guint64{priv->totals.slices}, "delta-slices", G_TYPE_UINT64,
+      guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
+      guint64{priv->totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes,
+      "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
+      priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
+      nullptr);
 }
 
 static void
@@ -438,6 +572,8 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
   std::lock_guard guard (priv->lock);
   const EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.get (id, value))
+    return;
   switch (id) {
     case PROP_PROFILE:
       g_value_set_enum (value, int (settings.profile));
@@ -462,6 +598,15 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
       break;
     case PROP_MAX_SLICE_SIZE:
       g_value_set_int (value, settings.max_slice_size);
+      break;
+    case PROP_TEMPORAL:
+      g_value_set_boolean (value, settings.temporal);
+      break;
+    case PROP_REFRESH_PERIOD:
+      g_value_set_uint (value, guint (settings.refresh_period_ns / GST_MSECOND));
+      break;
+    case PROP_KEY_INTERVAL:
+      g_value_set_uint (value, priv->key_interval_ms);
       break;
     case PROP_N_THREADS:
       g_value_set_int (value, priv->n_threads);
@@ -532,6 +677,24 @@ install_properties (GObjectClass *object_class)
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
       "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
       int (rangecast::kMaxUnitSize), kDefaults.max_slice_size);
+  g_object_class_install_property (object_class, PROP_TEMPORAL,
+      g_param_spec_boolean ("temporal", "Temporal",
+          "Pixels may equal those of the frame set before, too (default false: every frame set "
+          "decodes alone)",
+          kDefaults.temporal, live));
+  const auto install_ms = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                              guint fallback) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, live));
+  };
+  install_ms (PROP_REFRESH_PERIOD, "refresh-period", "Refresh period",
+      "With temporal: every pixel is coded without reference to earlier frame sets at least so "
+      "often, milliseconds (0 to 3600000, default 1000; 0: only in key frame sets)",
+      guint (kDefaults.refresh_period_ns / GST_MSECOND));
+  install_ms (PROP_KEY_INTERVAL, "key-interval", "Key interval",
+      "With temporal: a key frame set comes at least so often, milliseconds; files can be sought "
+      "to those (0 to 3600000, default 0: only first and on request)",
+      0);
   install_int (PROP_N_THREADS, "n-threads", "Threads",
       "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
@@ -541,7 +704,9 @@ install_properties (GObjectClass *object_class)
           0, G_MAXDOUBLE, 0, readable));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points, full-pixels, slices, raw-bytes, coded-bytes",
+          "Counters since start: frames, points, full-pixels, slices, delta-slices, raw-bytes, "
+          "coded-bytes; "
+          "bitrate over the last 2 s; depth-threshold, colour-threshold of the latest frame set",
           GST_TYPE_STRUCTURE, readable));
 }
 
@@ -556,6 +721,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   object_class->get_property = gst_neighbour_code_enc_get_property;
   object_class->finalize = gst_neighbour_code_enc_finalize;
   install_properties (object_class);
+  NeighbourCodeRateSettings::install (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
@@ -567,6 +733,8 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, GstPluginAPIFlags (0));
 
+  transform_class->sink_event = gst_neighbour_code_enc_sink_event;
+  transform_class->src_event = gst_neighbour_code_enc_src_event;
   transform_class->start = gst_neighbour_code_enc_start;
   transform_class->stop = gst_neighbour_code_enc_stop;
   transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;

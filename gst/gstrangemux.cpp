@@ -298,6 +298,8 @@ append (GstBuffer *frame_set, GstBuffer *buffer, bool coded)
   if (!coded)
     return gst_range_buffer_append (frame_set, buffer);
   gst_buffer_copy_into (frame_set, buffer, GST_BUFFER_COPY_MEMORY, 0, -1);
+  if (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
+    GST_BUFFER_FLAG_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
   gst_buffer_add_parent_buffer_meta (frame_set, buffer); /* its pool gets it back after us */
   return true;
 }

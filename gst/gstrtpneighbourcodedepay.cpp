@@ -53,6 +53,7 @@ struct GstRtpNeighbourCodeDepayPrivate {
   unsigned used_generation = 0;
   bool have_caps = false;
   std::vector<guint8> access_unit; /* slices that arrived so far */
+  bool is_delta = false;           /* one of them refers to an earlier frame set */
   guint32 timestamp = 0;           /* RTP time of them */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
@@ -79,6 +80,7 @@ static void
 forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
 {
   priv->access_unit.clear ();
+  priv->is_delta = false;
   priv->pts = priv->capture_time = GST_CLOCK_TIME_NONE;
 }
 
@@ -152,6 +154,8 @@ take_access_unit (GstRtpNeighbourCodeDepay *self)
     if (priv->have_caps) {
       buffer = gst_buffer_new_memdup (priv->access_unit.data (), priv->access_unit.size ());
       GST_BUFFER_PTS (buffer) = priv->pts;
+      if (priv->is_delta)
+        GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
       priv->counters.access_units++;
     } else {
       priv->counters.without_rig++;
@@ -163,13 +167,15 @@ take_access_unit (GstRtpNeighbourCodeDepay *self)
   return buffer;
 }
 
-/* Earliest of its slices: views of one frame set may differ by parts of a frame. */
+/* The earliest capture time of its slices, because views of one frame set may differ by parts of a
+ * frame; and whether one of them refers to an earlier frame set. */
 static void
-note_capture_time (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
+note_slice (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
 {
   rangecast::SliceHeader slice;
   if (!rangecast::read_slice_header (unit, slice).ok ())
     return;
+  priv->is_delta = priv->is_delta || !slice.key;
   if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
     priv->capture_time = slice.capture_time_ns;
 }
@@ -202,7 +208,7 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
     } else {
       good++;
       if (header.type == static_cast<guint8> (UnitType::kSlice))
-        note_capture_time (priv, *unit);
+        note_slice (priv, *unit);
       priv->access_unit.insert (priv->access_unit.end (), unit->begin (), unit->end ());
     }
   }

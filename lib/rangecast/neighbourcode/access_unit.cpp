@@ -14,18 +14,41 @@ namespace rangecast {
 Status
 AccessUnitEncoder::configure (const Rig &rig, const EncoderSettings &settings)
 {
-  double error = 0;
-  for (const View &view : rig.views) {
-    ViewEncoder &encoder = views_[view.id];
-    if (Status s = encoder.configure (view, settings); !s.ok ())
+  for (const View &view : rig.views)
+    if (Status s = views_[view.id].configure (view, settings); !s.ok ())
       return s;
-    error =
-        std::max (error, encoder.depth ().max_error (settings.depth_threshold) * view.depth_unit_m);
-  }
   rig_ = rig;
   settings_ = settings;
-  max_depth_error_m_ = error;
+  find_max_depth_error ();
   return {};
+}
+
+void
+AccessUnitEncoder::set_thresholds (int depth, int colour)
+{
+  const bool same_depth = depth == settings_.depth_threshold;
+  settings_.depth_threshold = depth;
+  settings_.colour_threshold = colour;
+  for (const View &view : rig_.views)
+    views_[view.id].set_thresholds (depth, colour);
+  if (!same_depth)
+    find_max_depth_error ();
+}
+
+/* Mostly all views have the same near and far, and one is enough. */
+void
+AccessUnitEncoder::find_max_depth_error ()
+{
+  max_depth_error_m_ = 0;
+  const View *last = nullptr;
+  for (const View &view : rig_.views) {
+    if (last && view.near_m == last->near_m && view.far_m == last->far_m &&
+        view.depth_unit_m == last->depth_unit_m)
+      continue;
+    const int error = views_[view.id].depth ().max_error (settings_.depth_threshold);
+    max_depth_error_m_ = std::max (max_depth_error_m_, error * view.depth_unit_m);
+    last = &view;
+  }
 }
 
 Status

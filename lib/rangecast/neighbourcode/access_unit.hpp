@@ -14,6 +14,9 @@ namespace rangecast {
 class AccessUnitEncoder {
 public:
   Status configure (const Rig &rig, const EncoderSettings &settings);
+  /** Changes nothing but the thresholds, without new tables or memory. They must be within their
+   *  ranges; configure() sets those of its settings again. */
+  void set_thresholds (int depth, int colour);
 
   /** Codes a frame set. Its bytes are those of parts() in order, valid until the next call.
    *  @param threads  views at a time; 0 = number of cores
@@ -32,6 +35,8 @@ public:
   [[nodiscard]] double max_depth_error_m () const { return max_depth_error_m_; }
 
 private:
+  void find_max_depth_error ();
+
   struct Work { /* of one image of the frame set */
     std::vector<std::uint8_t> bytes;
     EncoderResult result;

@@ -33,6 +33,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return s;
   if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
     return s;
+  plain_.set_depths (depth_);
   colour_ = ColourQuantiser (settings.colour_bits);
   const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
                           settings.depth_scale == settings_.depth_scale &&
@@ -115,7 +116,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     const CodingReference reference = plan_references (header);
     const PlainResult done = reference.now ? plain_temporal_.encode (image, bands_, reference,
                                                  depth_, colour_, plain, header, to)
-                                           : plain_.encode (image, depth_, plain, header, to);
+                                           : plain_.encode (image, plain, header, to);
     result.slices += done.slices;
     result.delta_slices += done.delta_slices;
     result.full_pixels += done.full_pixels;

@@ -54,6 +54,12 @@ class ViewEncoder {
 public:
   /** Sets up for a view. Builds tables only if something changed. */
   Status configure (const View &view, const EncoderSettings &settings);
+  /** Changes nothing but the thresholds: at no cost. They must be within their ranges. */
+  void set_thresholds (int depth, int colour)
+  {
+    settings_.depth_threshold = depth;
+    settings_.colour_threshold = colour;
+  }
 
   /** Appends the slices of one range image.
    *

@@ -7,6 +7,8 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "plain_functions.hpp"
+#include "symbols.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -24,7 +26,12 @@ public:
       std::uint64_t &points);
 
 private:
-  std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
+  void decode_rows (const LittleEndianBits &symbols, const SliceHeader &header,
+      const RangeImage &image, std::size_t &points);
+
+  const PlainFunctions *functions_ = nullptr;
+  std::vector<ShownPixel> rows_; /* the present row and the one above it, padded */
+  std::vector<ShownPixel> full_; /* pixels of the slice, and one more that nothing asks for */
 };
 
 } // namespace rangecast

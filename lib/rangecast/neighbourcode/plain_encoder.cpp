@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <span>
 #include <tuple>
 
 #include "symbols.hpp"
@@ -12,49 +11,8 @@
 namespace rangecast {
 namespace {
 
-/* Symbols are handled sixteen at a time. */
-constexpr int kGroup = 16, kGroupBits = kGroup * kSymbolBits;
-constexpr std::uint64_t kGroupMask = (std::uint64_t{1} << kGroupBits) - 1;
-constexpr std::uint64_t kLowBits = 0x249249249249; /* of each symbol of a group */
-constexpr std::uint64_t kInvalidGroup = kLowBits * kInvalid;
-
-/* Up to sixteen symbols from bit `at` on; what is behind them is 0. */
-std::uint64_t
-group_at (const std::uint8_t *symbols, std::size_t at, int count)
-{
-  const std::uint64_t group = load_little_endian (symbols + at / 8) >> (at % 8) & kGroupMask;
-  return count < kGroup ? group & ((std::uint64_t{1} << count * kSymbolBits) - 1) : group;
-}
-
-/* A pixel as it is written: D bits of depth, then C each of R, G and B. */
-std::uint64_t
-as_written (PlainPixel pixel, int depth_bits, int colour_bits)
-{
-  return pixel >> 48 | (pixel & 0xff) << depth_bits |
-         (pixel >> 16 & 0xff) << (depth_bits + colour_bits) |
-         (pixel >> 32 & 0xff) << (depth_bits + 2 * colour_bits);
-}
-
-/* Codes of valid depths; those of others mean nothing. */
-void
-look_up (const DepthQuantiser &quantiser, std::uint16_t near, std::uint16_t far,
-    std::span<const std::uint16_t> depth, std::uint16_t *codes)
-{
-  constexpr std::size_t kBlock = 8;
-  std::size_t x = 0;
-  for (; x + kBlock <= depth.size (); x += kBlock) {
-    std::uint64_t words[2];
-    std::memcpy (words, &depth[x], sizeof words);
-    if ((words[0] | words[1]) == 0) /* background */
-      continue;
-    for (std::size_t i = x; i < x + kBlock; i++)
-      codes[i] = quantiser.code (std::clamp (depth[i], near, far));
-  }
-  for (; x < depth.size (); x++)
-    codes[x] = quantiser.code (std::clamp (depth[x], near, far));
-}
-
-void
+/* In memory the writer would be waited for. */
+[[gnu::always_inline]] inline void
 put_invalid (BitWriter &bits, int count)
 {
   for (; count >= kGroup; count -= kGroup)
@@ -66,19 +24,27 @@ put_invalid (BitWriter &bits, int count)
 } // namespace
 
 std::size_t
-PlainEncoder::slice_size (std::size_t pixels, std::size_t full) const
+PlainEncoder::pixels_of (int rows) const
 {
-  return kSliceHeaderSize + symbol_bytes (pixels) +
+  return static_cast<std::size_t> (rows) * static_cast<std::size_t> (header_.columns);
+}
+
+std::size_t
+PlainEncoder::slice_size (int rows, std::size_t full) const
+{
+  return kSliceHeaderSize + symbol_bytes (pixels_of (rows)) +
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
 /* Valid depths are one interval; whichever way codes go, its ends have the first and the last. */
 void
-PlainEncoder::find_depths (const DepthQuantiser &depth)
+PlainEncoder::set_depths (const DepthQuantiser &depth)
 {
-  depth_ = &depth;
   const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
   std::tie (near_, far_) = std::minmax ({depth.depth (0), depth.depth (last)});
+  codes_.assign (65536, 0);
+  for (std::size_t d = near_; d <= far_; d++)
+    codes_[d] = depth.code (static_cast<std::uint16_t> (d));
 }
 
 /* Makes room for pieces of so many columns. */
@@ -91,7 +57,6 @@ PlainEncoder::resize (int columns)
   upper_.assign (padded, kOutsidePixel);
   outside_.assign (padded, kOutsidePixel);
   const auto size = static_cast<std::size_t> (columns);
-  codes_.resize (std::max (codes_.size (), size));
   for (auto &symbols : row_symbols_)
     symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
   row_full_.resize (std::max (row_full_.size (), size + kGroup));
@@ -103,12 +68,10 @@ PlainEncoder::resize (int columns)
 void
 PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
 {
-  const std::uint16_t *const depth = image.depth.row (y) + header_.first_column;
-  look_up (
-      *depth_, near_, far_, {depth, static_cast<std::size_t> (header_.columns)}, codes_.data ());
   const PlainQuantising how = {near_, far_, codes_.data (), header_.colour_bits, y};
-  row.span = functions_->make_pixels (how, depth, image.colour.row (y) + header_.first_column,
-      header_.columns, row.pixels.data () + kPixelsBefore);
+  row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
+      image.colour.row (y) + header_.first_column, header_.columns,
+      row.pixels.data () + kPixelsBefore);
   result_.points += static_cast<std::uint64_t> (row.span.valid);
 }
 
@@ -141,45 +104,32 @@ PlainEncoder::code_band (int rows)
   return span;
 }
 
-/* Gathers a coded row's full pixels in row_full_. @return how many */
-std::size_t
-PlainEncoder::find_full (int row, const PlainSpan &span)
+/* The symbols of a coded row and what was coded. */
+PlainRow
+PlainEncoder::coded_row (int row, const PlainSpan &span) const
 {
   const auto at = static_cast<std::size_t> (row);
-  const PlainPixel *pixels = rows_[at].pixels.data () + kPixelsBefore + span.begin;
-  const std::uint8_t *const symbols = row_symbols_[at].data ();
-  auto bit = at * static_cast<std::size_t> (functions_->skip_bits);
-  std::uint64_t *to = row_full_.data ();
-  for (int left = span.end - span.begin; left > 0;
-       left -= kGroup, bit += kGroupBits, pixels += kGroup) {
-    const std::uint64_t group = group_at (symbols, bit, left);
-    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kLowBits; full;
-         full &= full - 1)
-      *to++ = pixels[std::countr_zero (full) / kSymbolBits];
-  }
-  return static_cast<std::size_t> (to - row_full_.data ());
+  return {row_symbols_[at].data (), at * static_cast<std::size_t> (functions_->skip_bits),
+      rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
 }
 
-/* Appends a coded row and the pixels in row_full_ to the slice. */
+/* Appends a coded row to the slice. */
 void
-PlainEncoder::add_row (int row, const PlainSpan &span, std::size_t full)
+PlainEncoder::add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full)
 {
-  const auto at = static_cast<std::size_t> (row);
-  const std::uint8_t *const symbols = row_symbols_[at].data ();
-  auto bit = at * static_cast<std::size_t> (functions_->skip_bits);
-  BitWriter out = slice_.symbols;
-  put_invalid (out, span.begin);
-  for (int left = span.end - span.begin; left > 0; left -= kGroup, bit += kGroupBits)
-    out.put (group_at (symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
-  put_invalid (out, header_.columns - span.end);
-  slice_.symbols = out;
+  BitWriter symbols (symbols_.data (), pixels_of (header_.rows) * kSymbolBits);
+  put_invalid (symbols, span.begin);
+  std::size_t bit = row.first_bit;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits)
+    symbols.put (plain_group (row.symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
+  put_invalid (symbols, header_.columns - span.end);
 
-  BitWriter pixels = slice_.full;
-  const int depth_bits = header_.depth_bits, colour_bits = header_.colour_bits;
-  for (std::size_t i = 0; i < full; i++)
-    pixels.put (as_written (row_full_[i], depth_bits, colour_bits), depth_bits + 3 * colour_bits);
-  slice_.full = pixels;
-  slice_.full_pixels += full;
+  const int bits = bits_of_full ();
+  functions_->pack_pixels (full.data (), full.size (), header_.depth_bits, header_.colour_bits);
+  BitWriter pixels (full_.data (), full_pixels_ * static_cast<std::size_t> (bits));
+  for (const std::uint64_t pixel : full)
+    pixels.put (pixel, bits);
+  full_pixels_ += full.size ();
   header_.rows++;
 }
 
@@ -188,22 +138,22 @@ PlainEncoder::begin_slice (int first_row)
 {
   header_.first_row = first_row;
   header_.rows = 0;
-  slice_ = {BitWriter (symbols_.data ()), BitWriter (full_.data ()), 0};
+  full_pixels_ = 0;
   std::ranges::fill (upper_, kOutsidePixel);
 }
 
 void
 PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
 {
-  const std::size_t symbols = slice_.symbols.size (), full = slice_.full.size ();
-  const std::size_t begin = to.size (), size = kSliceHeaderSize + symbols + full;
+  const std::size_t symbols = symbol_bytes (pixels_of (header_.rows));
+  const std::size_t begin = to.size (), size = slice_size (header_.rows, full_pixels_);
   to.resize (begin + size);
   std::uint8_t *const p = to.data () + begin;
   write_slice_header (header_, size, p);
   std::memcpy (p + kSliceHeaderSize, symbols_.data (), symbols);
-  std::memcpy (p + kSliceHeaderSize + symbols, full_.data (), full);
+  std::memcpy (p + kSliceHeaderSize + symbols, full_.data (), size - kSliceHeaderSize - symbols);
   result_.slices++;
-  result_.full_pixels += slice_.full_pixels;
+  result_.full_pixels += full_pixels_;
 }
 
 /* Codes the first rows that wait, as far as the open slice has room for them. Where it has not, the
@@ -214,15 +164,15 @@ PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
   const PlainSpan span = code_band (rows);
   const auto limit = static_cast<std::size_t> (settings_.max_slice_size);
   for (int i = 0; i < rows; i++) {
-    const std::size_t full = find_full (i, span);
-    const auto pixels =
-        static_cast<std::size_t> (header_.rows + 1) * static_cast<std::size_t> (header_.columns);
-    if (header_.rows > 0 && slice_size (pixels, slice_.full_pixels + full) > limit) {
+    const PlainRow row = coded_row (i, span);
+    const std::span<PlainPixel> full (
+        row_full_.data (), functions_->gather_full (row, row_full_.data ()));
+    if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) > limit) {
       close_slice (to);
       begin_slice (header_.first_row + header_.rows);
       return i;
     }
-    add_row (i, span, full);
+    add_row (row, span, full);
   }
   return rows;
 }
@@ -249,14 +199,13 @@ PlainEncoder::code_piece (
 }
 
 PlainResult
-PlainEncoder::encode (const ConstRangeImage &image, const DepthQuantiser &depth,
-    const PlainSettings &settings, SliceHeader header, std::vector<std::uint8_t> &to)
+PlainEncoder::encode (const ConstRangeImage &image, const PlainSettings &settings,
+    SliceHeader header, std::vector<std::uint8_t> &to)
 {
   settings_ = settings;
   header_ = header;
   result_ = {};
   functions_ = &plain_functions (cpu_level ());
-  find_depths (depth);
   /* As many columns as fit in one row even if every pixel of it is written in full. */
   const int bits = kSymbolBits + bits_of_full ();
   const int most = (settings.max_slice_size - int (kSliceHeaderSize) - 2) * 8 / bits;
@@ -265,7 +214,6 @@ PlainEncoder::encode (const ConstRangeImage &image, const DepthQuantiser &depth,
     const int begin = width * i / pieces, end = width * (i + 1) / pieces;
     code_piece (image, begin, end - begin, to);
   }
-  depth_ = nullptr;
   return result_;
 }
 

@@ -2,10 +2,10 @@
 #include "plain_functions.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "../geometry/quantiser.hpp"
-#include "symbols.hpp"
 
 namespace rangecast {
 namespace {
@@ -24,7 +24,7 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
     }
     const Rgbx &c = colour[x];
     to[x] = plain_pixel (
-        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[x]);
+        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[depth[x]]);
     first = std::min (first, x);
     span.end = x + 1;
     span.valid++;
@@ -91,7 +91,62 @@ code_band (const PlainBand &band)
   }
 }
 
-constexpr PlainFunctions kScalar = {make_pixels, code_band, 0};
+std::size_t
+gather_full (const PlainRow &row, PlainPixel *to)
+{
+  const PlainPixel *const begin = to;
+  const PlainPixel *pixels = row.pixels;
+  std::size_t bit = row.first_bit;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits, pixels += kGroup) {
+    const std::uint64_t group = plain_group (row.symbols, bit, left);
+    for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
+         full &= full - 1)
+      *to++ = pixels[std::countr_zero (full) / kSymbolBits];
+  }
+  return static_cast<std::size_t> (to - begin);
+}
+
+void
+pack_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits)
+{
+  const int r = depth_bits, g = r + colour_bits, b = g + colour_bits;
+  for (std::size_t i = 0; i < count; i++) {
+    const PlainPixel p = pixels[i];
+    pixels[i] = p >> 48 | (p & 0xff) << r | (p >> 16 & 0xff) << g | (p >> 32 & 0xff) << b;
+  }
+}
+
+PlainCounts
+count_symbols (const std::uint8_t *symbols, std::size_t bytes)
+{
+  PlainCounts counts;
+  for (std::size_t i = 0; i < bytes; i += 3) { /* eight symbols */
+    std::uint32_t group = symbols[i];
+    for (std::size_t k = 1; k < std::min<std::size_t> (bytes - i, 3); k++)
+      group |= std::uint32_t{symbols[i + k]} << 8 * k;
+    const std::uint32_t beyond_3 = group >> 2 & ~(group >> 1) & 0x249249;
+    counts.full += static_cast<std::size_t> (std::popcount (beyond_3 & ~group));
+    counts.invalid += static_cast<std::size_t> (std::popcount (beyond_3 & group));
+  }
+  return counts;
+}
+
+std::size_t
+show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour)
+{
+  std::size_t points = 0;
+  for (int x = 0; x < columns; x++) {
+    const ShownPixel p = row[x];
+    depth[x] = static_cast<std::uint16_t> (p >> 32);
+    colour[x] = {static_cast<std::uint8_t> (p), static_cast<std::uint8_t> (p >> 8),
+        static_cast<std::uint8_t> (p >> 16), 0};
+    points += p != 0;
+  }
+  return points;
+}
+
+constexpr PlainFunctions kScalar = {
+    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 0};
 
 } // namespace
 

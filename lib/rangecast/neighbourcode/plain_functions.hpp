@@ -8,6 +8,7 @@
 
 #include "../cpu.hpp"
 #include "../geometry/image_view.hpp"
+#include "symbols.hpp"
 
 namespace rangecast {
 
@@ -38,7 +39,7 @@ inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
 /** How to quantise a row. */
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
-  const std::uint16_t *codes; ///< of the row's valid depths
+  const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
   int colour_bits;            ///< 4 to 8
   int row;                    ///< of the piece: its last bit matters
 };
@@ -63,12 +64,45 @@ struct PlainBand {
 };
 inline constexpr int kSymbolBytesBehind = 24;
 
+/** A coded row. */
+struct PlainRow {
+  const std::uint8_t *symbols; ///< as code_band() gives them
+  std::size_t first_bit;       ///< of them
+  const PlainPixel *pixels;    ///< what was coded; kPixelsBehind more can be read
+  int columns;
+};
+
+/** Up to sixteen symbols from a bit on; above them 0. */
+inline std::uint64_t
+plain_group (const std::uint8_t *symbols, std::size_t bit, int count)
+{
+  const std::uint64_t group = load_little_endian (symbols + bit / 8) >> (bit % 8) & kGroupMask;
+  return count < kGroup ? group & ((std::uint64_t{1} << count * kSymbolBits) - 1) : group;
+}
+
+/** A decoded pixel as it goes into an image: R, G, B, 0, 8 bits each, R in the least significant,
+ *  above them 16 bits of depth. 0 is an invalid one. */
+using ShownPixel = std::uint64_t;
+
+struct PlainCounts {
+  std::size_t full = 0, invalid = 0;
+};
+
 struct PlainFunctions {
   /** Quantises a row; `to` may be written up to 15 pixels behind the columns. */
   PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
       const Rgbx *colour, int columns, PlainPixel *to);
   /** Codes a band as docs/bitstream.md says an encoder chooses. */
   void (*code_band) (const PlainBand &band);
+  /** Gathers the full pixels of a row. @return how many */
+  std::size_t (*gather_full) (const PlainRow &row, PlainPixel *to);
+  /** Makes pixels what is written: D bits of depth, then C each of R, G, B. Up to 3 behind them
+   *  may change. */
+  void (*pack_pixels) (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits);
+  /** Counts symbols. Bits that fill the last byte are 0. */
+  PlainCounts (*count_symbols) (const std::uint8_t *symbols, std::size_t bytes);
+  /** Writes a decoded row. @return valid pixels */
+  std::size_t (*show_row) (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
   /** Where in its bits the symbols of row i of a band begin: at bit i * skip_bits. */
   int skip_bits;
 };

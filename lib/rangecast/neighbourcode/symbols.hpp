@@ -2,10 +2,12 @@
 /* What encoder and decoder share: the symbols of a pixel, and bits in memory. */
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 namespace rangecast {
 
@@ -47,11 +49,21 @@ store_little_endian (std::uint64_t value, std::uint8_t *to)
   std::memcpy (to, &value, sizeof value);
 }
 
+/** Symbols of profile plain are handled sixteen at a time. */
+inline constexpr int kGroup = 16, kGroupBits = kGroup * kSymbolBits;
+inline constexpr std::uint64_t kGroupMask = (std::uint64_t{1} << kGroupBits) - 1;
+inline constexpr std::uint64_t kGroupLowBits = 0x249249249249; /* the lowest of each symbol */
+inline constexpr std::uint64_t kInvalidGroup = kGroupLowBits * kInvalid;
+
 /** Writes numbers of up to 56 bits, least significant bit first, into memory that is large enough
  *  plus 8 bytes. What was put is there at any time; the last byte is filled with zeros. */
 class BitWriter {
 public:
-  explicit BitWriter (std::uint8_t *to) : to_ (to), begin_ (to) {}
+  /** Goes on behind the first `bits` of `to`, which another writer put there. */
+  explicit BitWriter (std::uint8_t *to, std::size_t bits = 0)
+      : to_ (to + bits / 8), held_ (bits % 8 ? *to_ : 0), count_ (static_cast<int> (bits % 8))
+  {
+  }
   /** @param value  less than 2^bits */
   void put (std::uint64_t value, int bits)
   {
@@ -62,16 +74,35 @@ public:
     held_ >>= count_ & ~7; /* 56 at most: 7 were held, and 56 came */
     count_ &= 7;
   }
-  /** Bytes so far. */
-  [[nodiscard]] std::size_t size () const
+
+private:
+  std::uint8_t *to_;
+  std::uint64_t held_; /* bits that fill no byte */
+  int count_;          /* of them; 0 to 7 */
+};
+
+/** Bits in memory, at any place; behind the end they are 0. */
+class LittleEndianBits {
+public:
+  explicit LittleEndianBits (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
+  /** At least 57 bits from bit `at` on, which lies inside or right behind the end. */
+  [[nodiscard]] std::uint64_t from (std::size_t at) const
   {
-    return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
+    const std::size_t byte = at / 8, rest = bytes_.size () - byte;
+    if (rest >= 8) [[likely]]
+      return load_little_endian (bytes_.data () + byte) >> at % 8;
+    std::uint8_t last[8] = {};
+    std::copy_n (bytes_.data () + byte, rest, last);
+    return load_little_endian (last) >> at % 8;
+  }
+  /** Nothing is behind the first `bits` but zeros that fill the last byte. */
+  [[nodiscard]] bool end_behind (std::size_t bits) const
+  {
+    return bytes_.size () == (bits + 7) / 8 && (bits % 8 == 0 || bytes_.back () >> bits % 8 == 0);
   }
 
 private:
-  std::uint8_t *to_, *begin_;
-  std::uint64_t held_ = 0; /* bits that fill no byte */
-  int count_ = 0;          /* of them; 0 to 7 */
+  std::span<const std::uint8_t> bytes_;
 };
 
 /** Reads numbers of up to 40 bits; past the end it gives zeros and says so. */

@@ -63,8 +63,10 @@ struct FileSettings {
 /** @return an error that names the file, for what cannot be read or does not fit together */
 rangecast::Status load_pictures (const FileSettings &settings, Input &input);
 
-/** Decodes a byte stream file, up to so many frame sets. Frame sets without pixels are left out. */
-rangecast::Status load_recording (const std::string &path, int frames, Input &input);
+/** Decodes a byte stream file. Frame sets without pixels are left out.
+ *  @param skip  frame sets of the file that do not count; @param frames  at most so many after them
+ */
+rangecast::Status load_recording (const std::string &path, int skip, int frames, Input &input);
 
 /** The figure or model of avatartestsrc, 15 frame sets a second.
  *  @param depth_noise_mm  standard deviation; without it depth is exact */

@@ -55,48 +55,59 @@ struct Limits {
   double near, far;
 };
 
+/* One pair as it is in the files; the mask is empty if there is none. */
+struct Pair {
+  cv::Mat colour, depth, mask;
+};
+
+Status
+read_pair (const PictureFiles &files, Pair &to)
+{
+  if (Status s = read_picture ("--color", files.colour, cv::IMREAD_COLOR, to.colour); !s.ok ())
+    return s;
+  if (Status s = read_picture ("--depth", files.depth, cv::IMREAD_UNCHANGED, to.depth); !s.ok ())
+    return s;
+  if (to.depth.type () != CV_16UC1)
+    return {StatusCode::kBadData,
+        "--depth " + files.depth + ": expected a picture of 16 bits and one channel"};
+  if (Status s = expect_size ("--depth", files.depth, to.depth, to.colour); !s.ok ())
+    return s;
+  if (files.mask.empty ())
+    return {};
+  if (Status s = read_picture ("--mask", files.mask, cv::IMREAD_UNCHANGED, to.mask); !s.ok ())
+    return s;
+  if (to.mask.depth () != CV_8U)
+    return {StatusCode::kBadData, "--mask " + files.mask + ": expected a picture of 8 bits"};
+  return expect_size ("--mask", files.mask, to.mask, to.colour);
+}
+
 Status
 load_pair (const PictureFiles &files, const Limits &limits, Picture &to)
 {
-  cv::Mat colour, depth, mask;
-  if (Status s = read_picture ("--color", files.colour, cv::IMREAD_COLOR, colour); !s.ok ())
+  Pair pair;
+  if (Status s = read_pair (files, pair); !s.ok ())
     return s;
-  if (Status s = read_picture ("--depth", files.depth, cv::IMREAD_UNCHANGED, depth); !s.ok ())
-    return s;
-  if (depth.type () != CV_16UC1)
-    return {StatusCode::kBadData,
-        "--depth " + files.depth + ": expected a picture of 16 bits and one channel"};
-  if (Status s = expect_size ("--depth", files.depth, depth, colour); !s.ok ())
-    return s;
-  if (!files.mask.empty ()) {
-    if (Status s = read_picture ("--mask", files.mask, cv::IMREAD_UNCHANGED, mask); !s.ok ())
-      return s;
-    if (mask.depth () != CV_8U)
-      return {StatusCode::kBadData, "--mask " + files.mask + ": expected a picture of 8 bits"};
-    if (Status s = expect_size ("--mask", files.mask, mask, colour); !s.ok ())
-      return s;
-  }
-  to = Picture (depth.cols, depth.rows);
-  std::size_t i = 0, masked = 0, points = 0;
-  for (int y = 0; y < depth.rows; y++)
-    for (int x = 0; x < depth.cols; x++, i++) {
-      const std::uint16_t d = depth.at<std::uint16_t> (y, x);
-      if (!mask.empty () && !keeps (mask, y, x))
+  to = Picture (pair.depth.cols, pair.depth.rows);
+  std::size_t i = 0, kept = 0, points = 0;
+  for (int y = 0; y < to.height; y++)
+    for (int x = 0; x < to.width; x++, i++) {
+      const std::uint16_t d = pair.depth.at<std::uint16_t> (y, x);
+      if (!pair.mask.empty () && !keeps (pair.mask, y, x))
         continue;
-      masked++;
+      kept++;
       if (!d || d < limits.near || d > limits.far)
         continue;
-      const auto &c = colour.at<cv::Vec3b> (y, x);
+      const auto &c = pair.colour.at<cv::Vec3b> (y, x);
       to.depth[i] = d;
       to.colour[i] = {c[2], c[1], c[0], 0};
       points++;
     }
-  if (!masked)
+  if (!kept)
     return {StatusCode::kBadData, "--mask " + files.mask + ": all zero, expected pixels to keep"};
   if (!points)
     return {StatusCode::kBadData,
         "--depth " + files.depth + ": no pixel left, expected depths within --near and --far" +
-            (mask.empty () ? "" : " where --mask " + files.mask + " is not zero")};
+            (files.mask.empty () ? "" : " where --mask " + files.mask + " is not zero")};
   return {};
 }
 

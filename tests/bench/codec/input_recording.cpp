@@ -28,7 +28,10 @@ uncrop (Picture &cut, const Roi &roi, const View &view)
 
 class RecordingReader {
 public:
-  RecordingReader (std::string path, Input &input) : path_ (std::move (path)), input_ (input) {}
+  RecordingReader (std::string path, int skip, Input &input)
+      : path_ (std::move (path)), skip_ (skip), input_ (input)
+  {
+  }
 
   /* Takes the units of an access unit. */
   Status take (std::span<const std::uint8_t> units)
@@ -36,7 +39,7 @@ public:
     number_++;
     if (Status s = take_rig (units); !s.ok ())
       return s;
-    if (!rigs_.generation ())
+    if (!rigs_.generation () || number_ <= skip_)
       return {}; /* nothing can be decoded before the rig is there */
     DecoderResult result;
     decoder_.plan (units, result);
@@ -88,6 +91,7 @@ private:
   }
 
   std::string path_;
+  int skip_;
   Input &input_;
   RigCollector rigs_;
   AccessUnitDecoder decoder_;
@@ -98,7 +102,7 @@ private:
 } // namespace
 
 Status
-load_recording (const std::string &path, int frames, Input &input)
+load_recording (const std::string &path, int skip, int frames, Input &input)
 {
   std::ifstream file (path, std::ios::binary);
   const std::vector<std::uint8_t> bytes{
@@ -106,7 +110,7 @@ load_recording (const std::string &path, int frames, Input &input)
   if (bytes.empty ())
     return {StatusCode::kNotFound,
         "--recording " + path + ": cannot be read, expected a neighbour code byte stream"};
-  RecordingReader reader (path, input);
+  RecordingReader reader (path, skip, input);
   std::span<const std::uint8_t> rest = bytes;
   while (!rest.empty () && input.sets.size () < std::size_t (frames)) {
     const StreamPart part = next_part (rest, true);

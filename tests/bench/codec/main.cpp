@@ -2,6 +2,7 @@
 /* The neighbour code beside other codes of RGB-D pictures, on the same pixels in the same run.
  * docs/choosing-settings.md says how to read it. */
 #include <cstdio>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -15,7 +16,7 @@ namespace {
 const char *const kUsage =
     "usage: codec_bench --color FILE --depth FILE [--mask FILE] [--color FILE --depth FILE ...]\n"
     "                   [--sequence] [--depth-unit METRES] [--near METRES] [--far METRES]\n"
-    "       codec_bench --recording FILE [--frames N]\n"
+    "       codec_bench --recording FILE [--skip N] [--frames N]\n"
     "       codec_bench [--model FILE] [--size WxH] [--frames N] [--noise LEVELS]\n"
     "                   [--depth-noise MM]\n"
     "       with any of them: [--rounds N] [--try \"PROPERTY=VALUE ...\"] [--only TEXT]\n"
@@ -33,6 +34,7 @@ const char *const kUsage =
     "  --recording FILE   byte stream of neighbourcodeparse, recorded without loss for "
     "preference:\n"
     "                     depth-bits=16 depth-threshold=0 colour-threshold=0\n"
+    "  --skip N           frame sets at its beginning to leave out (default 0)\n"
     "  --model FILE       glTF or OBJ model to render (default: the built-in figure)\n"
     "  --size WxH         of each of its four views (default 320x240)\n"
     "  --noise LEVELS     of its colours, standard deviation in grey levels (default 1.5)\n"
@@ -52,7 +54,7 @@ struct Job {
   std::string recording, json, only;
   std::vector<EncoderSettings> tries;
   double depth_noise_mm = 0, depth_rms_mm = 1;
-  int frames = 0, rounds = 11;
+  int skip = 0, frames = 0, rounds = 11;
 };
 
 /* A name of a file for the pair it belongs to: the first of its kind after another begins a new one
@@ -86,6 +88,7 @@ add_options (Options &options, Job &job)
   options.number ("--noise", job.scene.noise_sigma, 0.0, 20.0);
   options.number ("--depth-noise", job.depth_noise_mm, 0.0, 1000.0);
   options.number ("--depth-rms", job.depth_rms_mm, 0.0, 1e5);
+  options.number ("--skip", job.skip, 0, 1000000);
   options.number ("--frames", job.frames, 1, 10000);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.text ("--only", job.only);
@@ -113,6 +116,8 @@ find_contradiction (const Job &job)
     return "--sequence, --near and --far: expected together with --color and --depth";
   if (!files.pairs.empty () && job.frames)
     return "--frames: expected with --recording, --model or nothing; pictures come one by one";
+  if (job.skip && job.recording.empty ())
+    return "--skip: expected with --recording";
   if (files.near_m > 0 && files.far_m > 0 && files.near_m + files.depth_unit_m > files.far_m)
     return "--near and --far: expected --far to be greater, by a --depth-unit or more";
   if (files.far_m > 65535 * files.depth_unit_m)
@@ -126,7 +131,7 @@ load (const Job &job, Input &input)
   if (!job.files.pairs.empty ())
     return load_pictures (job.files, input);
   if (!job.recording.empty ())
-    return load_recording (job.recording, job.frames ? job.frames : 10000, input);
+    return load_recording (job.recording, job.skip, job.frames ? job.frames : 10000, input);
   return render_input (job.scene, job.frames ? job.frames : 1, job.depth_noise_mm, input);
 }
 
@@ -177,6 +182,7 @@ run (const Job &job)
 int
 main (int argc, char **argv)
 {
+  cv::utils::logging::setLogLevel (cv::utils::logging::LOG_LEVEL_SILENT); /* we say it ourselves */
   Job job;
   job.scene.noise_sigma = 1.5;
   Options options ("codec_bench", kUsage);

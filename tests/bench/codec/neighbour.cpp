@@ -13,10 +13,19 @@ namespace {
 
 const char *const kProfileNames[] = {"plain", "packed", "entropy"};
 
+/* Slices that no packet holds are a codec of their own: nobody should choose them for a network. */
+std::string
+name_of_profile (const EncoderSettings &settings)
+{
+  const bool is_long = settings.max_slice_size > EncoderSettings ().max_slice_size;
+  return std::string (kProfileNames[static_cast<int> (settings.profile)]) +
+         (is_long ? ", long slices" : "");
+}
+
 class NeighbourCode final : public Codec {
 public:
   explicit NeighbourCode (const EncoderSettings &settings)
-      : Codec (kProfileNames[static_cast<int> (settings.profile)], settings_text (settings), false)
+      : Codec (name_of_profile (settings), settings_text (settings), false)
   {
   }
 

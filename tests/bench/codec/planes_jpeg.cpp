@@ -28,7 +28,7 @@ public:
     unsigned char *at = to.need (most);
     unsigned long size = most;
     if (tjCompress2 (packer_, &from.colour[0].r, from.width, 0, from.height, TJPF_RGBX, &at, &size,
-            TJSAMP_420, quality_, TJFLAG_FASTDCT | TJFLAG_NOREALLOC))
+            TJSAMP_420, quality_, TJFLAG_ACCURATEDCT | TJFLAG_NOREALLOC))
       return {StatusCode::kBadData, tjGetErrorStr2 (packer_)};
     to.size = size;
     return {};
@@ -37,7 +37,7 @@ public:
   Status decode (std::span<const std::uint8_t> from, Picture &to) override
   {
     if (tjDecompress2 (unpacker_, from.data (), from.size (), &to.colour[0].r, to.width, 0,
-            to.height, TJPF_RGBX, TJFLAG_FASTDCT))
+            to.height, TJPF_RGBX, TJFLAG_ACCURATEDCT))
       return {StatusCode::kBadData, tjGetErrorStr2 (unpacker_)};
     return {};
   }

@@ -9,17 +9,17 @@ using namespace rangecast;
 namespace bench {
 namespace {
 
-/* A family of settings; the table below has all that are run. Thresholds vary within it. */
-struct Family {
-  Profile profile;
-  NeighbourChoice choice;
-};
-constexpr Family kFamilies[] = {
-    {Profile::kPlain, NeighbourChoice::kFirst},
-    {Profile::kPacked, NeighbourChoice::kFirst},
-    {Profile::kPacked, NeighbourChoice::kBest},
-    {Profile::kEntropy, NeighbourChoice::kFirst},
-    {Profile::kEntropy, NeighbourChoice::kBest},
+/* What is run at all thresholds below, one line each. With slices longer than a packet: only at the
+ * default thresholds, to show what slices that fit cost. */
+constexpr EncoderSettings kFamilies[] = {
+    {.profile = Profile::kPlain},
+    {.max_slice_size = 65535, .profile = Profile::kPlain},
+    {.profile = Profile::kPacked},
+    {.profile = Profile::kPacked, .choice = NeighbourChoice::kBest},
+    {.max_slice_size = 65535, .profile = Profile::kPacked},
+    {.profile = Profile::kEntropy},
+    {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest},
+    {.max_slice_size = 65535, .profile = Profile::kEntropy},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
@@ -38,26 +38,22 @@ depth_thresholds (double code_mm)
 }
 
 std::vector<EncoderSettings>
-settings_of (const Family &family, double code_mm)
+settings_of (const EncoderSettings &family, double code_mm)
 {
-  EncoderSettings defaults;
-  defaults.profile = family.profile;
-  defaults.choice = family.choice;
-  EncoderSettings exact = defaults;
+  std::vector<EncoderSettings> all = {family};
+  if (family.max_slice_size > EncoderSettings ().max_slice_size)
+    return all;
+  EncoderSettings exact = family;
   exact.depth_bits = 16;
-  std::vector<EncoderSettings> all = {defaults};
   for (const int depth : depth_thresholds (code_mm))
     for (const int colour : kColourThresholds) {
       all.push_back (exact);
       all.back ().depth_threshold = depth;
       all.back ().colour_threshold = colour;
     }
-  if (family.choice != NeighbourChoice::kFirst)
-    return all;
-  exact.depth_threshold = exact.colour_threshold = 0; /* lossless */
-  all.push_back (exact);
-  all.push_back (defaults);
-  all.back ().max_slice_size = 65535; /* what slices that fit a packet cost */
+  exact.depth_threshold = exact.colour_threshold = 0; /* lossless, whatever the choice */
+  if (family.choice == NeighbourChoice::kFirst)
+    all.push_back (exact);
   return all;
 }
 
@@ -99,7 +95,7 @@ add_profiles (const Rig &rig, Codecs &codecs)
   if (Status s = depth.set (rig.views[0], 16); !s.ok ())
     return s;
   const double code_mm = depth.step () * rig.views[0].depth_unit_m * 1e3;
-  for (const Family &family : kFamilies)
+  for (const EncoderSettings &family : kFamilies)
     for (const EncoderSettings &settings : settings_of (family, code_mm)) {
       std::unique_ptr<Codec> codec;
       if (Status s = make_neighbour_code (rig, settings, codec); !s.ok ())

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace rangecast {
+
+/** Thresholds of an encoder, in codes. */
+struct Thresholds {
+  int depth = 0;  ///< 0 to 65535
+  int colour = 0; ///< 0 to 255
+
+  friend bool operator== (const Thresholds &, const Thresholds &) = default;
+};
+
+struct RateSettings {
+  double bits_per_s = 0;        ///< the target; > 0
+  Thresholds best;              ///< never below
+  Thresholds worst;             ///< never above, where `best` is not
+  double bits_per_point = 8;    ///< a guess for the first frame set, at `best`
+  double interval_s = 1.0 / 30; ///< a guess, of frame sets
+
+  friend bool operator== (const RateSettings &, const RateSettings &) = default;
+};
+
+/** What one frame set came to. */
+struct CodedFrame {
+  std::uint64_t bytes = 0;
+  std::uint64_t points = 0; ///< valid pixels; 0: nobody is there
+  std::uint64_t pixels = 0; ///< of all ROIs
+  bool refresh = false;     ///< a key frame set among others that are smaller
+};
+
+/** Chooses thresholds so that coded frame sets come to a bit rate.
+ *
+ *  Quality is one number, *coarseness* x >= 0: with it the logarithms of both thresholds (+ 1/2)
+ *  rise evenly from the best to the worst. A model says what a frame set comes to,
+ *      bits = points * exp (a - b * x)
+ *  of which a follows every frame set and b each change of x. An account holds what was sent beyond
+ *  the target; it is paid back over about a second, what key frame sets cost more over two. From
+ * one frame set to the next thresholds move little, and by hysteresis seldom: usually by one code
+ * in one of the two.
+ *
+ *  Time is that of the frame sets. Nothing is allocated. Not thread-safe. */
+class RateControl {
+public:
+  /** Forgets everything. */
+  void reset () { *this = RateControl (); }
+
+  /** May be called before every frame set. A new target begins a new account; thresholds go on from
+   *  what they are, within the new limits. */
+  void configure (const RateSettings &settings);
+
+  /** The thresholds for the next frame set, once for each.
+   *  @param time_ns  of its capture; differences count, and what goes backwards or jumps ahead by
+   *  more than some seconds is a new beginning
+   *  @param pixels  of all its ROIs: more pixels are expected to need more bytes */
+  Thresholds next (std::uint64_t time_ns, std::uint64_t pixels);
+
+  /** What the frame set of the latest next() came to. */
+  void coded (const CodedFrame &frame);
+
+  [[nodiscard]] Thresholds thresholds () const { return thresholds_; }
+  [[nodiscard]] double coarseness () const { return x_; }
+
+private:
+  [[nodiscard]] double threshold_at (int best, int worst, double x) const;
+  [[nodiscard]] double coarseness_of (const Thresholds &thresholds) const;
+  [[nodiscard]] double bytes_per_s () const { return settings_.bits_per_s / 8; }
+  void take_time (std::uint64_t time_ns);
+  double plan_bytes ();
+  void learn (double bits_per_point);
+  void limit_account ();
+
+  RateSettings settings_;
+  bool configured_ = false;
+  double depth_span_ = 0, colour_span_ = 0; /* logarithms of worst / best */
+  double x_ = 0, most_x_ = 0;
+  Thresholds thresholds_;
+  double learnt_x_ = 0, learnt_bits_ = 0; /* of the latest frame set with points */
+  int frames_ = 0;                        /* learnt from, up to a few */
+  int outliers_ = 0;                      /* in a row */
+  double a_ = 0, b_ = 0;
+  double fill_ = 0; /* points of a pixel */
+  bool has_time_ = false;
+  std::uint64_t time_ns_ = 0;
+  double interval_s_ = 0, elapsed_s_ = 0;
+  double account_ = 0; /* bytes sent beyond the target */
+  double spread_ = 0;  /* bytes of refreshes that are still to enter the account */
+};
+
+/** Bits per second over the last two seconds of frame sets. */
+class RateMeter {
+public:
+  void reset () { *this = RateMeter (); }
+  void add (std::uint64_t time_ns, std::uint64_t bytes);
+  /** 0 before the second frame set. */
+  [[nodiscard]] double bits_per_s () const;
+
+private:
+  static constexpr std::uint64_t kWindowNs = 2'000'000'000;
+  struct Entry {
+    std::uint64_t time_ns, bytes;
+  };
+  [[nodiscard]] const Entry &at (std::size_t i) const
+  {
+    return entries_[(first_ + i) % entries_.size ()];
+  }
+  std::array<Entry, 256> entries_{}; /* a ring; of faster streams the window is shorter */
+  std::size_t first_ = 0, count_ = 0;
+  std::uint64_t sum_ = 0;
+};
+
+} // namespace rangecast
