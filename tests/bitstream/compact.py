@@ -13,6 +13,9 @@ from typing import Callable, NamedTuple, Optional, Union
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "bitstream.md"
 PACKED, ENTROPY = 1, 2
 MAX_OVERRUN = 16
+BLOCK = 16  # rows and columns that share motion
+Numbers = tuple[int, ...]  # Z, Y, Co, Cg
+Motion = tuple[int, ...]  # dx, dy, dz
 
 
 class Damage(Exception):
@@ -39,20 +42,40 @@ def prefix_code(lengths: list[int]) -> dict[tuple[int, int], int]:
 
 
 INITIAL = [int(word, 16) for word in table("initial probabilities")]
+INITIAL_WITHOUT_KEY = [int(word, 16) for word in table("initial probabilities without key")]
 CHOICES = [prefix_code([int(digit) for digit in word]) for word in table("choice lengths")]
 PATTERN_LENGTHS = [int(word) for word in table("pattern lengths")]
 PATTERNS = [prefix_code(PATTERN_LENGTHS[:16]), prefix_code(PATTERN_LENGTHS[16:])]
 
 
 class Pixel(NamedTuple):
-    """A valid pixel: Z, Y, Co, Cg, where it came from, and the size of its residual."""
+    """A valid pixel: its numbers (if not known, some others), where they came from, and the size of its residual."""
 
-    numbers: tuple[int, ...]
+    numbers: Numbers
     origin: int
+    known: bool
+    choice: Optional[int] = None
     activity: tuple[int, ...] = (0, 0, 0, 0)
+    is_earlier: bool = False
 
 
 Place = Optional[Pixel]
+
+
+class Earlier(NamedTuple):
+    """The earlier frame set that a slice without key refers to."""
+
+    x: int  # place of the slice's first pixel in the view's full image
+    y: int
+    pixel: Callable[[int, int], Optional[Numbers]]  # of a place in the full image; None: not known
+
+
+def is_earlier(pixel: Place) -> bool:
+    return pixel is not None and pixel.is_earlier
+
+
+def is_choice(pixel: Place, choice: int) -> bool:
+    return pixel is not None and pixel.choice == choice
 
 
 def origin(pixel: Place) -> int:
@@ -111,9 +134,17 @@ class PackedData:
                 return code[length, bits]
         raise Damage("no such code")
 
-    def later(self, _valid: bool) -> int:
-        value = self.golomb(1)
+    def signed_golomb(self, order: int) -> int:
+        value = self.golomb(order)
         return -(value + 1) // 2 if value % 2 else value // 2
+
+    def later(self, _valid: bool) -> int:
+        return self.signed_golomb(1)
+
+    def motion(self, expected: Motion) -> Motion:
+        if self.take(1):
+            return expected
+        return tuple(v + self.signed_golomb(order) for v, order in zip(expected, (0, 0, 3)))
 
     def choice(self, near: Neighbours) -> int:
         return self.symbol(CHOICES[near.kinds()])
@@ -138,8 +169,9 @@ class PackedData:
 class EntropyData:
     """Decisions, and what entropy makes of them."""
 
-    def __init__(self, data: bytes) -> None:
-        self.p = list(INITIAL)
+    def __init__(self, data: bytes, key: bool) -> None:
+        self.key = key
+        self.p = list(INITIAL if key else INITIAL_WITHOUT_KEY)
         self.data = data
         self.position = 0
         self.range = (1 << 32) - 1
@@ -201,15 +233,38 @@ class EntropyData:
     def later(self, valid: bool) -> int:
         return self.number(int(valid), 2 + 16 * valid)
 
-    def choice(self, near: Neighbours) -> int:
-        if near.left and self.decide(34 + near.kinds()):
-            return 0
-        seen = {near.left.numbers} if near.left else set()
+    def motion(self, expected: Motion) -> Motion:
+        if self.decide(383):
+            return expected
+        return tuple(v + self.number(384 + 17 * i, 385 + 17 * i) for i, v in enumerate(expected))
+
+    def earlier(self, near: Neighbours) -> bool:
+        """Whether a valid pixel of a slice without key is earlier."""
+        left, upper = (2 if is_earlier(pixel) else int(pixel is not None) for pixel in (near.left, near.upper))
+        others = 9 * is_earlier(near.upper_right) + 18 * is_earlier(near.upper_left)
+        return self.decide(347 + left + 3 * upper + others)
+
+    def candidates(self, near: Neighbours) -> list[bool]:
+        """Which of the upper-left, the upper and the upper-right neighbour a choice may name."""
+        left, upper_left, upper, upper_right = near
+        if not self.key:
+            return [
+                upper_left is not None and not is_choice(left, 2),
+                upper is not None and not is_choice(upper, 0) and not is_choice(left, 3),
+                upper_right is not None and not is_choice(upper_right, 0),
+            ]
+        seen = {left.numbers} if left else set()
         candidates = []
         for pixel in near[1:]:
             candidates.append(pixel is not None and pixel.numbers not in seen)
             if pixel:
                 seen.add(pixel.numbers)
+        return candidates
+
+    def choice(self, near: Neighbours) -> int:
+        if near.left and self.decide(34 + near.kinds()):
+            return 0
+        candidates = self.candidates(near)
         full = 2 * (kind(near.left) == 3) + (kind(near.upper) == 3)
         others = (candidates[1] + 2 * candidates[2], int(candidates[2]), 0)
         for i in range(3):
@@ -243,54 +298,87 @@ def cut(value: int, least: int, most: int) -> int:
     return min(max(value, least), most)
 
 
+def read_runs(begin: int, end: int, above: list[bool], later: Callable[[bool], int]) -> list[bool]:
+    """Runs of two kinds by turns, the first one of False, from `begin` to `end`: the kind of each column."""
+    kinds: list[bool] = []
+    now = False
+    while begin + len(kinds) < end:
+        start = expected = begin + len(kinds)
+        while expected < end and above[expected] == now:
+            expected += 1
+        behind = expected + later(now)
+        if behind > end or behind < start or behind == start and (now or start > begin):
+            raise Damage("run")
+        kinds += [now] * (behind - start)
+        now = not now
+    return kinds
+
+
 class CompactSlice:
     """Reads the pixels of a slice. last and maximum are the greatest codes of depth and colour."""
 
-    def __init__(self, profile: int, body: bytes, columns: int, last: int, maximum: int) -> None:
+    def __init__(
+        self, profile: int, body: bytes, columns: int, last: int, maximum: int, earlier: Optional[Earlier]
+    ) -> None:
         if len(body) < 4:
             raise Damage("no steps")
         depth = int.from_bytes(body[:2], "little")
         self.steps = (depth, body[2], body[3], body[3])
         if 0 in self.steps:
             raise Damage("a step of 0")
-        self.data: Data = PackedData(body[4:]) if profile == PACKED else EntropyData(body[4:])
+        key = earlier is None
+        self.data: Data = PackedData(body[4:]) if profile == PACKED else EntropyData(body[4:], key)
         self.columns = columns
         self.limits = ((0, last), (0, maximum), (-maximum, maximum), (-maximum, maximum))
-        self.latest: tuple[int, ...] = (last // 2, maximum // 2, 0, 0)
+        self.latest = Pixel((last // 2, maximum // 2, 0, 0), 0, True)
+        self.earlier = earlier
+        self.motions: dict[int, Motion] = {}  # by number of the block in its row
 
-    def runs(self, above: list[Place]) -> list[bool]:
-        """Which pixels of a row are valid."""
-        valid: list[bool] = []
-        now = False
-        first = True
-        while len(valid) < self.columns:
-            begin = len(valid)
-            end = begin
-            while end < self.columns and (above[end] is not None) == now:
-                end += 1
-            end += self.data.later(now)
-            if end > self.columns or end < begin or end == begin and not first:
-                raise Damage("run")
-            valid += [now] * (end - begin)
-            now = not now
-            first = False
-        return valid
-
-    def row(self, above: list[Place]) -> list[Place]:
-        """The pixels of the next row."""
+    def row(self, number: int, above: list[Place]) -> list[Place]:
+        """The pixels of the next row, the one of that number."""
+        if self.earlier and (number == 0 or (self.earlier.y + number) % BLOCK == 0):
+            self.read_motions(self.earlier.x)
         row: list[Place] = [None] * self.columns
-        for x, valid in enumerate(self.runs(above)):
-            if valid:
-                near = Neighbours(
-                    row[x - 1] if x > 0 else None,
-                    above[x - 1] if x > 0 else None,
-                    above[x],
-                    above[x + 1] if x + 1 < self.columns else None,
-                )
+        valid = read_runs(0, self.columns, [pixel is not None for pixel in above], self.data.later)
+        copied = [False] * self.columns  # packed only
+        for x in range(self.columns):
+            if not valid[x]:
+                continue
+            if self.earlier and isinstance(self.data, PackedData) and (x == 0 or not valid[x - 1]):
+                end = (valid + [False]).index(False, x)
+                copied[x:end] = read_runs(x, end, [is_earlier(pixel) for pixel in above], self.data.later)
+            near = Neighbours(
+                row[x - 1] if x > 0 else None,
+                above[x - 1] if x > 0 else None,
+                above[x],
+                above[x + 1] if x + 1 < self.columns else None,
+            )
+            if self.earlier and (copied[x] if isinstance(self.data, PackedData) else self.data.earlier(near)):
+                pixel = self.earlier_pixel(self.earlier, x, number)
+            else:
                 pixel = self.pixel(near)
-                self.latest = pixel.numbers
-                row[x] = pixel
+            self.latest = row[x] = pixel
         return row
+
+    def read_motions(self, first_column: int) -> None:
+        """Those of the next row of blocks."""
+        expected: Motion = (0, 0, 0)
+        self.motions = {}
+        for block in range(first_column // BLOCK, (first_column + self.columns - 1) // BLOCK + 1):
+            expected = self.data.motion(expected)
+            dx, dy, dz = expected
+            if abs(dx) > 31 or abs(dy) > 31 or abs(dz) > 65535:
+                raise Damage("motion")
+            self.motions[block] = expected
+
+    def earlier_pixel(self, earlier: Earlier, column: int, row: int) -> Pixel:
+        """One that equals a pixel of the earlier frame set but for its depth."""
+        x, y = earlier.x + column, earlier.y + row
+        dx, dy, dz = self.motions[x // BLOCK]
+        numbers = earlier.pixel(x + dx, y + dy)
+        if numbers is None:
+            return Pixel((0, 0, 0, 0), 1, False, is_earlier=True)
+        return Pixel((cut(numbers[0] + dz, *self.limits[0]), *numbers[1:]), 1, True, is_earlier=True)
 
     def pixel(self, near: Neighbours) -> Pixel:
         choice = self.data.choice(near) if any(near) else 5
@@ -298,51 +386,44 @@ class CompactSlice:
             same = near[choice]
             if not same:
                 raise Damage("equals an invalid pixel")
-            return Pixel(same.numbers, 1 if choice == 0 else 2)
-        numbers = self.predicted(near)
+            return Pixel(same.numbers, 1 if choice == 0 else 2, same.known, choice)
+        numbers, known = self.predicted(near)
         if choice == 4:
-            return Pixel(numbers, 3)
+            return Pixel(numbers, 3, known, choice)
         r = self.data.residual(near)
         made = (cut(n + d * s, *limit) for n, d, s, limit in zip(numbers, r, self.steps, self.limits))
-        return Pixel(tuple(made), 4, tuple(min(abs(d), 9) for d in r))
+        return Pixel(tuple(made), 4, known, choice, tuple(min(abs(d), 9) for d in r))
 
-    def predicted(self, near: Neighbours) -> tuple[int, ...]:
+    def predicted(self, near: Neighbours) -> tuple[Numbers, bool]:
+        """The numbers, and whether they are known."""
         left, upper_left, upper, upper_right = near
-        if not left and not upper:
-            other = upper_left or upper_right
-            return other.numbers if other else self.latest
         if not left or not upper:
-            return (left or upper).numbers  # type: ignore[union-attr]
+            one = left or upper or upper_left or upper_right or self.latest
+            return one.numbers, one.known
         beyond = upper_right or upper
         p = [(2 * a + b + c + 2) // 4 for a, b, c in zip(left.numbers, upper.numbers, beyond.numbers)]
         z = left.numbers[0] + upper.numbers[0]
         p[0] = cut(z - upper_left.numbers[0], *self.limits[0]) if upper_left else (z + 1) // 2
-        return tuple(p)
+        return tuple(p), all(pixel.known for pixel in near if pixel)
 
-    def codes(self, numbers: tuple[int, ...]) -> tuple[int, int, int, int]:
-        """Codes of depth, R, G and B."""
-        z, y, co, cg = numbers
-        t = y - cg // 2
-        b = t - co // 2
-        maximum = self.limits[1][1]
-        return z, cut(b + co, 0, maximum), cut(cg + t, 0, maximum), cut(b, 0, maximum)
+
+def codes(numbers: Numbers, maximum: int) -> tuple[int, int, int, int]:
+    """Codes of depth, R, G and B."""
+    z, y, co, cg = numbers
+    t = y - cg // 2
+    b = t - co // 2
+    return z, cut(b + co, 0, maximum), cut(cg + t, 0, maximum), cut(b, 0, maximum)
 
 
 def decode(
-    profile: int,
-    body: bytes,
-    rows: int,
-    columns: int,
-    last: int,
-    maximum: int,
-    shown: Callable[[tuple[int, int, int, int]], tuple[int, int, int, int]],
-) -> list[Optional[tuple[int, int, int, int]]]:
-    """The pixels of a slice as `shown` makes them of their codes, row by row; None: invalid."""
-    part = CompactSlice(profile, body, columns, last, maximum)
+    profile: int, body: bytes, rows: int, columns: int, last: int, maximum: int, earlier: Optional[Earlier]
+) -> list[Place]:
+    """The pixels of a slice, row by row; None: invalid."""
+    part = CompactSlice(profile, body, columns, last, maximum, earlier)
     above: list[Place] = [None] * columns
-    pixels: list[Optional[tuple[int, int, int, int]]] = []
-    for _ in range(rows):
-        above = part.row(above)
-        pixels += [shown(part.codes(pixel.numbers)) if pixel else None for pixel in above]
+    pixels: list[Place] = []
+    for number in range(rows):
+        above = part.row(number, above)
+        pixels += above
     part.data.finish()
     return pixels

@@ -8,7 +8,7 @@ usage: decode.py FILE OUT_PREFIX
 Writes for each view N of the rig, one picture of its full size for each frame set, one behind the other:
   OUT_PREFIX-depth-N.raw   16 bits little-endian, depth units, 0 where invalid
   OUT_PREFIX-colour-N.raw  8 bits each of R, G and B, 0 where invalid
-and prints what it read. Pixels that did not arrive are invalid; so is all of a view that has no slice.
+and prints what it read. Pixels that did not arrive are invalid, and those that depend on such; so is all of a view that has no slice.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ import sys
 from array import array
 from dataclasses import dataclass, field
 from math import floor, hypot
-from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple
+from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 
 import compact
 
 VERSION = 1
+PLAIN, PACKED, ENTROPY = 0, 1, 2
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
 UNIT_HEADER = struct.Struct("<BBH")
@@ -32,14 +33,23 @@ RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
 MAX_RIG_PIXELS = 1 << 27
-KEY, INVERSE_DEPTH = 1, 2
-FULL_PIXEL, INVALID = 4, 5
+KEY, INVERSE_DEPTH, REFERENCE = 1, 2, 4
+FULL_PIXEL, INVALID, SAME_AS_EARLIER = 4, 5, 6
 NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
-Pixel = tuple[int, int, int, int]  # depth in depth units, R, G, B
+COUNTED = "access units", "slices", "damaged slices", "damaged rig views", "unknown pixels"
+Numbers = tuple[int, ...]  # plain: codes of depth, R, G, B; packed and entropy: Z, Y, Co, Cg
 
 
 class Damaged(Exception):
     """A unit that a reader must not use. Costs that unit and nothing else."""
+
+
+class Unknown:
+    """Stands for the numbers of a valid pixel that depends on one that did not arrive."""
+
+
+UNKNOWN = Unknown()
+Pixel = Union[Numbers, Unknown, None]  # None: invalid
 
 
 class View(NamedTuple):
@@ -71,6 +81,8 @@ class Slice(NamedTuple):
     columns: int
     body: bytes
     inverse_depth: bool
+    reference: bool  # a later frame set may refer to this one
+    distance: int  # in frame numbers, to the earlier frame set; 0: key
 
     def lies_in(self, view: View | None) -> bool:
         """Its view is in the rig, and its ROI in the view's image."""
@@ -78,16 +90,25 @@ class Slice(NamedTuple):
 
     def agrees(self, other: Slice) -> bool:
         """What slices of one view have in common within an access unit is the same."""
-        scales_agree = self.inverse_depth == other.inverse_depth
-        return self[2:5] == other[2:5] and self[6:10] == other[6:10] and scales_agree
+        return self.common() == other.common()
+
+    def common(self) -> tuple:
+        return *self[6:10], self.frame, self.reference, *self.format()
+
+    def format(self) -> tuple[int, int, bool, bool]:
+        """What the numbers of its pixels mean."""
+        return self.depth_bits, self.colour_bits, self.inverse_depth, self.profile == PLAIN
 
     def place(self) -> tuple[int, int, int, int]:
         """Where it lies; slices of a view are taken in this order."""
         return self.first_column, self.first_row, self.columns, self.rows
 
     def too_short(self) -> bool:
-        """It does not hold its symbols."""
-        return 8 * len(self.body) < 3 * self.rows * self.columns
+        """It is shorter than any that gives its pixels."""
+        if not self.rows:
+            return False
+        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 32}[self.profile]
+        return 8 * len(self.body) < bits
 
     def pixel_bits(self) -> int:
         return self.depth_bits + 3 * self.colour_bits
@@ -96,18 +117,35 @@ class Slice(NamedTuple):
 class Picture:
     """A view of an access unit in its full size, invalid until slices arrive."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: View, like: Slice) -> None:
         self.view = view
-        self.depth = array("H", bytes(2 * view.width * view.height))
-        self.colour = bytearray(3 * view.width * view.height)
+        self.like = like
+        self.pixels: list[Pixel] = [None] * (view.width * view.height)
 
-    def put(self, part: Slice, pixels: list[Pixel | None]) -> None:
-        """Takes the pixels of a slice; None is an invalid one."""
-        for i, pixel in enumerate(pixels):
-            row, column = divmod(i, part.columns)
-            at = (part.y + part.first_row + row) * self.view.width + part.x + part.first_column + column
-            self.depth[at] = pixel[0] if pixel else 0
-            self.colour[3 * at : 3 * at + 3] = bytes(pixel[1:]) if pixel else bytes(3)
+    def put(self, part: Slice, pixels: list[Pixel]) -> None:
+        """Takes the pixels of a slice."""
+        for row in range(part.rows):
+            at = (part.y + part.first_row + row) * self.view.width + part.x + part.first_column
+            self.pixels[at : at + part.columns] = pixels[row * part.columns : (row + 1) * part.columns]
+
+    def known(self, x: int, y: int) -> Numbers | None:
+        """The numbers of the pixel at a place, if a later frame set can refer to it."""
+        if not (0 <= x < self.view.width and 0 <= y < self.view.height):
+            return None
+        pixel = self.pixels[y * self.view.width + x]
+        return None if isinstance(pixel, Unknown) else pixel
+
+    def shown(self) -> tuple[array[int], bytearray]:
+        """Depths in depth units, and colours."""
+        depths, colours = array("H", bytes(2 * len(self.pixels))), bytearray(3 * len(self.pixels))
+        maximum = (1 << self.like.colour_bits) - 1
+        values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
+        for at, pixel in enumerate(self.pixels):
+            if pixel is not None and not isinstance(pixel, Unknown):
+                depth, *colour = pixel if self.like.profile == PLAIN else compact.codes(pixel, maximum)
+                depths[at] = depth_codes(self.like, self.view)[1](depth)
+                colours[3 * at : 3 * at + 3] = bytes(values[code] for code in colour)
+        return depths, colours
 
 
 @dataclass
@@ -116,11 +154,11 @@ class Reader:
 
     data: bytes
     views: dict[int, View] = field(default_factory=dict)
-    parts: dict[int, View] = field(default_factory=dict)
+    parts: dict[int, tuple[View, bytes]] = field(default_factory=dict)
     rig_key: tuple[int, int, int] | None = None
-    counts: dict[str, int] = field(
-        default_factory=lambda: dict.fromkeys(("access units", "slices", "damaged slices", "damaged rig views"), 0)
-    )
+    earlier: dict[int, list[Picture]] = field(default_factory=dict)  # by view-id: the latest two to refer to
+    rig: dict[int, bytes] = field(default_factory=dict)  # the payloads of its units
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
 
     def access_units(self) -> Iterator[dict[int, Picture]]:
         """The pictures of each access unit that is a frame set, by view-id."""
@@ -196,27 +234,40 @@ class Reader:
                 self.counts["damaged slices"] += 1
         pictures = {}
         for view_id in {part.view for part in sound}:
-            pictures[view_id] = Picture(self.views[view_id])
-            self.draw([part for part in sound if part.view == view_id], pictures[view_id])
+            pictures[view_id] = self.draw([part for part in sound if part.view == view_id])
         return pictures
 
-    def draw(self, parts: list[Slice], picture: Picture) -> None:
+    def draw(self, parts: list[Slice]) -> Picture:
         """Draws the slices of one view, without those that are at odds with most of them."""
         frequent = max(parts, key=lambda part: sum(map(part.agrees, parts)))
         agreeing = [part for part in parts if part.agrees(frequent)]
         self.counts["damaged slices"] += len(parts) - len(agreeing)
+        picture = Picture(self.views[frequent.view], frequent)
         drawn = set()
         for part in sorted(agreeing, key=Slice.place):
             if part.place() in drawn:
                 continue
-            pixels: list[Pixel | None] = [None] * (part.rows * part.columns)
+            pixels: list[Pixel] = [None] * (part.rows * part.columns)
             try:
-                pixels = decode_slice(part, picture.view)
+                pixels = decode_slice(part, picture.view, self.known(part))
                 drawn.add(part.place())
             except Damaged:
                 self.counts["damaged slices"] += 1
             if part.place() in drawn or not part.too_short():
                 picture.put(part, pixels)
+        self.counts["unknown pixels"] += picture.pixels.count(UNKNOWN)
+        if frequent.reference:
+            others = [one for one in self.earlier.get(picture.view.id, []) if one.like.frame != frequent.frame]
+            self.earlier[picture.view.id] = [picture] + others[:1]
+        return picture
+
+    def known(self, part: Slice) -> Callable[[int, int], Numbers | None]:
+        """What is known, at each place of the view's image, of the frame set that a slice refers to."""
+        others = [one for one in self.earlier.get(part.view, []) if one.like.frame != part.frame]
+        number = (part.frame - part.distance) % (1 << 32)
+        if others and others[0].like.frame == number and others[0].like.format() == part.format():
+            return others[0].known
+        return lambda x, y: None
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
         """Collects the views of the rig and makes it the present one when all are there."""
@@ -229,11 +280,14 @@ class Reader:
         if self.rig_key != (total, numerator, denominator):
             self.rig_key = (total, numerator, denominator)
             self.parts = {}
-        self.parts[number] = view
-        by_id = {view.id: view for view in self.parts.values()}
+        self.parts[number] = view, payload
+        by_id = {view.id: view for view, _ in self.parts.values()}
         widest, tallest = (max(side) for side in zip(*((view.width, view.height) for view in by_id.values())))
         if len(by_id) == total and total * widest * tallest <= MAX_RIG_PIXELS:
             self.views = by_id
+            rig = {number: payload for number, (_, payload) in self.parts.items()}
+            if self.rig != rig:
+                self.rig, self.earlier = rig, {}
 
 
 def units(data: bytes) -> Iterator[tuple[int, int, bytes]]:
@@ -286,12 +340,18 @@ def is_pose(pose: list[float]) -> bool:
 
 def parse_slice(flags: int, payload: bytes) -> Slice:
     """Reads and checks what can be checked without the rig."""
-    if flags & ~(KEY | INVERSE_DEPTH) or len(payload) < SLICE_FIELDS.size:
+    key = flags & KEY
+    size = SLICE_FIELDS.size + (0 if key else 1)
+    if flags & ~(KEY | INVERSE_DEPTH | REFERENCE) or len(payload) < size:
         raise Damaged("flags or size")
-    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[SLICE_FIELDS.size :], bool(flags & INVERSE_DEPTH))
+    distance = 0 if key else payload[size - 1]
+    if not key and not distance:
+        raise Damaged("distance")
+    scale, reference = bool(flags & INVERSE_DEPTH), bool(flags & REFERENCE)
+    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[size:], scale, reference, distance)
     if part.view > 63 or part.profile > 2 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
         raise Damaged("view, profile or bits")
-    if any(part[6:14]):
+    if any(part[6:14]) or not key:
         if not part.rows or not part.columns:
             raise Damaged("no pixels")
         if part.first_row + part.rows > part.height or part.first_column + part.columns > part.width:
@@ -299,10 +359,13 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     return part
 
 
-def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
-    """The pixels of a slice, row by row; None: invalid."""
-    if part.profile and part.rows:
-        return decode_compact_slice(part, view)
+def decode_slice(part: Slice, view: View, known: Callable[[int, int], Numbers | None]) -> list[Pixel]:
+    """The pixels of a slice, row by row."""
+    if part.rows and view.far == view.near:
+        raise Damaged("near and far are less than one depth unit apart")
+    x, y = part.x + part.first_column, part.y + part.first_row
+    if part.profile != PLAIN and part.rows:
+        return decode_compact_slice(part, view, None if not part.distance else compact.Earlier(x, y, known))
     count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
     if part.too_short():
@@ -315,16 +378,18 @@ def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
     if len(full_bytes) != (symbols.count(FULL_PIXEL) * part.pixel_bits() + 7) // 8:
         raise Damaged("too many or too few full pixels")
     full = full_pixels(full_bytes, part, view)
-    pixels: list[Pixel | None] = []
+    pixels: list[Pixel] = []
     for i, symbol in enumerate(symbols):
+        row, column = divmod(i, columns)
         if symbol == INVALID:
             pixels.append(None)
         elif symbol == FULL_PIXEL:
             pixels.append(next(full))
+        elif symbol == SAME_AS_EARLIER and part.distance:
+            pixels.append(known(x + column, y + row) or UNKNOWN)
         elif symbol > INVALID:
             raise Damaged("reserved symbol")
         else:
-            row, column = divmod(i, columns)
             dx, dy = NEIGHBOURS[symbol]
             if not 0 <= column + dx < columns or row + dy < 0 or not (pixel := pixels[i + dy * columns + dx]):
                 raise Damaged("names a pixel that does not exist or is invalid")
@@ -335,8 +400,6 @@ def decode_slice(part: Slice, view: View) -> list[Pixel | None]:
 def depth_codes(part: Slice, view: View) -> tuple[int, Callable[[int], int]]:
     """The greatest depth code of a slice, and what gives the depth of a code, in depth units."""
     near, far, extent = view.near, view.far, view.far - view.near
-    if extent < 1:
-        raise Damaged("near and far are less than one depth unit apart")
     greatest = (1 << part.depth_bits) - 1
 
     def inverse(code: int) -> int:
@@ -350,27 +413,19 @@ def depth_codes(part: Slice, view: View) -> tuple[int, Callable[[int], int]]:
     return last, lambda code: near + (code * extent + last // 2) // last
 
 
-def decode_compact_slice(part: Slice, view: View) -> list[Pixel | None]:
+def decode_compact_slice(part: Slice, view: View, earlier: compact.Earlier | None) -> list[Pixel]:
     """The same for the profiles packed and entropy."""
-    last, depth_of = depth_codes(part, view)
-    maximum = (1 << part.colour_bits) - 1
-    values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
-
-    def shown(codes: Pixel) -> Pixel:
-        z, red, green, blue = codes
-        return (depth_of(z), values[red], values[green], values[blue])
-
+    last, maximum = depth_codes(part, view)[0], (1 << part.colour_bits) - 1
     try:
-        return compact.decode(part.profile, part.body, part.rows, part.columns, last, maximum, shown)
+        places = compact.decode(part.profile, part.body, part.rows, part.columns, last, maximum, earlier)
     except compact.Damage as damage:
         raise Damaged(str(damage)) from None
+    return [pixel and (pixel.numbers if pixel.known else UNKNOWN) for pixel in places]
 
 
-def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
-    """Depth in depth units, R, G and B of a slice's full pixels, in their order."""
-    last, depth_of = depth_codes(part, view)
-    maximum = (1 << part.colour_bits) - 1
-    values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
+def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Numbers]:
+    """Codes of depth, R, G and B of a slice's full pixels, in their order."""
+    last, maximum = depth_codes(part, view)[0], (1 << part.colour_bits) - 1
     count = 8 * len(data) // part.pixel_bits()
     if int.from_bytes(data, "little") >> count * part.pixel_bits():
         raise Damaged("bits set behind the full pixels")
@@ -380,18 +435,19 @@ def full_pixels(data: bytes, part: Slice, view: View) -> Iterator[Pixel]:
         code = bits & (1 << part.depth_bits) - 1
         if code > last:
             raise Damaged("depth code beyond the greatest")
-        red, green, blue = (bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
-        yield (depth_of(code), values[red], values[green], values[blue])
+        yield code, *(bits >> part.depth_bits + i * part.colour_bits & maximum for i in range(3))
 
 
 def write(pictures: dict[int, Picture], views: Iterable[View], prefix: str, files: dict[str, BinaryIO]) -> None:
     """Appends one picture of each view to its files; all invalid where a view has none."""
     for view in views:
-        picture = pictures.get(view.id) or Picture(view)
-        depth = array("H", picture.depth)
+        pixels = view.width * view.height
+        depth, colour = array("H", bytes(2 * pixels)), bytearray(3 * pixels)
+        if view.id in pictures:
+            depth, colour = pictures[view.id].shown()
         if sys.byteorder == "big":
             depth.byteswap()
-        for kind, content in (("depth", depth.tobytes()), ("colour", bytes(picture.colour))):
+        for kind, content in (("depth", depth.tobytes()), ("colour", bytes(colour))):
             name = f"{prefix}-{kind}-{view.id}.raw"
             if name not in files:
                 files[name] = open(name, "wb")

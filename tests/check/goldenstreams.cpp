@@ -93,7 +93,7 @@ struct Pictures {
 };
 
 static void
-expect_digests (const std::string &name)
+expect_digests (const std::string &name, int views = 2)
 {
   GstHarness *h = play ("neighbourcodeparse ! neighbourcodedec", read_data (name + ".rcnc"));
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
@@ -119,7 +119,7 @@ expect_digests (const std::string &name)
   gst_harness_teardown (h);
 
   const auto expected = expected_digests ();
-  fail_unless_equals_int (pictures.size (), 2);
+  fail_unless_equals_int (pictures.size (), views);
   for (const auto &[id, picture] : pictures)
     for (const auto &[kind, checksum] :
         {std::pair{"depth", picture.depth}, {"colour", picture.colour}}) {
@@ -146,6 +146,20 @@ GST_END_TEST;
 GST_START_TEST (test_inverse_depth_decodes_as_ever)
 {
   expect_digests ("inverse");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slices_without_key_decode_as_ever)
+{
+  expect_digests ("temporal-plain", 1);
+  expect_digests ("temporal-packed", 1);
+  expect_digests ("temporal-entropy", 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pixels_that_depend_on_lost_ones_are_invalid_as_ever)
+{
+  expect_digests ("temporal-lossy", 1);
 }
 GST_END_TEST;
 
@@ -196,6 +210,8 @@ goldenstreams_suite ()
   tcase_add_test (tc, test_default_settings_decode_as_ever);
   tcase_add_test (tc, test_packed_and_entropy_decode_as_ever);
   tcase_add_test (tc, test_inverse_depth_decodes_as_ever);
+  tcase_add_test (tc, test_slices_without_key_decode_as_ever);
+  tcase_add_test (tc, test_pixels_that_depend_on_lost_ones_are_invalid_as_ever);
   tcase_add_test (tc, test_exact_pictures_decode_as_ever);
   tcase_add_test (tc, test_few_bits_and_empty_views_decode_as_ever);
   tcase_add_test (tc, test_damage_costs_what_it_ever_did);

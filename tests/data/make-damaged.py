@@ -7,6 +7,10 @@ usage: make-damaged.py coarse.rcnc damaged.rcnc
 
 import struct
 import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "bitstream"))
+import compact  # its tables of prefix codes
 
 START_CODE = b"\x00RCU"
 SLICE, RIG_VIEW, ACCESS_UNIT = 0x11, 0x12, 0x13
@@ -40,13 +44,55 @@ def longer(unit: bytes, tail: bytes) -> bytes:
     return unit[:2] + struct.pack("<H", len(unit) + len(tail)) + unit[4:] + tail
 
 
-def small_slice(like: bytes, row: int, rows: int, symbols: str, codes: list[int], tail: int = 0, more: bytes = b"") -> bytes:
+def small_slice(
+    like: bytes, row: int, rows: int, symbols: str, codes: list[int], tail: int = 0, more: bytes = b"", distance: int | None = None
+) -> bytes:
     """A slice of 14 and 5 bits at the left of a ROI, its symbols as octal digits, with bits behind its full pixels."""
     size = (3 * len(symbols) + 7) // 8
     full = sum((code | code * 77 % 32768 << 14) << 29 * i for i, code in enumerate(codes)) | tail << 29 * len(codes)
     body = int(symbols[::-1], 8).to_bytes(size, "little") + full.to_bytes((29 * len(codes) + 7) // 8, "little") + more
-    header = like[4:6] + bytes((14, 5)) + like[8:28] + struct.pack("<4H", row, rows, 0, len(symbols) // rows)
-    return like[:2] + struct.pack("<H", 36 + len(body)) + header + body
+    return slice_of(like, 0, row, rows, len(symbols) // rows, body, distance)
+
+
+def slice_of(like: bytes, profile: int, row: int, rows: int, columns: int, body: bytes, distance: int | None) -> bytes:
+    """A slice of 14 and 5 bits at the left of a ROI; without key if it has a distance."""
+    flags = 1 if distance is None else 0
+    body = body if distance is None else bytes((distance,)) + body
+    header = like[4:5] + bytes((profile, 14, 5)) + like[8:28] + struct.pack("<4H", row, rows, 0, columns)
+    return like[:1] + bytes((flags,)) + struct.pack("<H", 36 + len(body)) + header + body
+
+
+def frame_set(slices: list[bytes], number: int, flags: int = 0) -> list[bytes]:
+    """The same slices, with more flags and another frame number."""
+    return [patched(patched(unit, 1, unit[1] | flags), 8, number) for unit in slices]
+
+
+def golomb(order: int, v: int) -> str:
+    """The code of v, or if that is negative of -2 v - 1, as it says of numbers with a sign; bits in their order."""
+    v = 2 * v if v >= 0 else -2 * v - 1
+    n = ((v >> order) + 1).bit_length() - 1
+    rest = f"{(v >> order) + 1 - (1 << n):0{n}b}"[::-1] if n else ""
+    return "0" * n + "1" + rest + (f"{v % (1 << order):0{order}b}"[::-1] if order else "")
+
+
+def prefix(code: dict[tuple[int, int], int], symbol: int) -> str:
+    return next(f"{bits:0{length}b}" for (length, bits), is_symbol in code.items() if is_symbol == symbol)
+
+
+def motion(dx: int, dy: int, dz: int) -> str:
+    """Of the first block of a row."""
+    return "0" + golomb(0, dx) + golomb(0, dy) + golomb(3, dz)
+
+
+def packed(like: bytes, row: int, columns: int, bits: str, distance: int | None = None) -> bytes:
+    """A slice of one row in profile packed, steps 1 and orders 0."""
+    data = int("0" + bits[::-1], 2).to_bytes((len(bits) + 7) // 8, "little")
+    return slice_of(like, 1, row, 1, columns, bytes((1, 0, 1, 1, 0, 0)) + data, distance)
+
+
+def entropy(like: bytes, row: int, columns: int, data: bytes, distance: int | None = None) -> bytes:
+    """A slice of one row in profile entropy, steps 1."""
+    return slice_of(like, 2, row, 1, columns, bytes((1, 0, 1, 1)) + data, distance)
 
 
 # Rows, symbols, depth codes of full pixels, bits and bytes behind them. The greatest depth code is 8500.
@@ -74,6 +120,72 @@ SMALL_SLICES: list[tuple] = [
     (2, "455", [21]),  # bits left over behind the symbols
     (1, "4", [22]),
 ]
+
+# The same without key: symbols, full pixels, distance. They refer to EARLIER_SYMBOLS.
+EARLIER_SYMBOLS = "44554"
+LATER_SLICES: list[tuple] = [
+    (1, "66544", [23, 24], 1),
+    (1, "66666", [], 1),  # two that are invalid in the earlier one
+    (2, "6666644420", [25, 26, 27], 1),  # and neighbours that equal such
+    (1, "66504", [28], 1),  # an invalid pixel to the left
+    (1, "67544", [29, 30], 1),  # a reserved symbol
+    (1, "64544", [31, 32], 0),  # refers to itself
+    (1, "64544", [33, 34], 2),  # to one that is not there
+    (1, "66544", [35, 36], None),  # with key
+    (1, "44544", [37, 38, 39, 40], None),
+]
+
+VALID = 6  # pixels of the rows below
+ALL_VALID = golomb(1, -VALID) + golomb(1, VALID)  # runs: no invalid pixel, then all valid; also of pixels that are earlier
+LIKE_LEFT = "".join(prefix(compact.CHOICES[kind], 0) for kind in (3, 1, 1, 1, 1))
+KEY_ROW = ALL_VALID + prefix(compact.PATTERNS[1], 3) + "0" + golomb(0, -50) + "1" + golomb(0, 3) + LIKE_LEFT
+NONE_EARLIER = golomb(1, 0)
+MOTIONS = [(0, 0, 0), (1, 0, 0), (31, 0, 0), (-31, 0, 0), (32, 0, 0), (-32, 0, 0), (0, 0, 9)]
+MOTIONS += [(0, -31, 1), (0, -32, 1), (0, 0, 65535), (0, 0, -65535), (0, 0, 65536), (0, 0, -65536)]
+# Bits of rows without key.
+PACKED_ROWS = [motion(*v) + ALL_VALID + ALL_VALID for v in MOTIONS] + [
+    "1" + ALL_VALID + ALL_VALID,  # motion as expected
+    "1" + ALL_VALID + NONE_EARLIER + KEY_ROW[len(ALL_VALID) :],
+    "1" + ALL_VALID + golomb(1, 1),  # beyond the valid ones
+    "1" + ALL_VALID + golomb(1, -6) + golomb(1, 0) + "1" * 20,  # an empty run that is not the first
+    "1" + ALL_VALID + golomb(1, -3) + golomb(1, 3) + prefix(compact.PATTERNS[1], 0) + LIKE_LEFT[:3],
+    motion(1, 0, 0) + ALL_VALID + ALL_VALID + "1",  # a bit left over
+    motion(1, 0, 0) + ALL_VALID,  # it ends too soon
+]
+ENTROPY_ROWS = [b"", b"\xff", b"\0" * 3, b"\x80\x11\x22\x33", b"\x40\x99\x12", b"\xc0\x05\x77\x88", b"\0" * 40, b"\xff" * 40]
+
+
+def without_key(one: list[bytes]) -> list[list[bytes]]:
+    """Frame sets for what the document says of slices without key, from a slice of each view."""
+    first, other = one[0], one[-1]
+    earlier = [small_slice(first, 2 * i, 1, EARLIER_SYMBOLS, [90 + 3 * i, 800 - i, 77]) for i in range(15)]
+    earlier += [small_slice(other, 0, 1, EARLIER_SYMBOLS, [1, 2, 3])]
+    later = [small_slice(first, 2 * i, *parts[:3], distance=parts[3]) for i, parts in enumerate(LATER_SLICES)]
+    no_distance = longer(patched(small_slice(first, 28, 1, "4", [3]), 1, 0)[:36], b"")
+    keys = [packed(first, i, VALID, KEY_ROW) for i in range(31)] + [entropy(other, 0, 4, ENTROPY_ROWS[4])]
+    rows = [packed(first, i, VALID, bits, 1) for i, bits in enumerate(PACKED_ROWS)]
+    noise = [entropy(other, i, 12, data, 1) for i, data in enumerate(ENTROPY_ROWS)]
+    return [
+        frame_set(earlier, 10, 4),
+        # No reference itself, as the next ones.
+        frame_set([*later, no_distance, packed(first, 30, VALID, KEY_ROW)], 11),
+        # Of other bits, of another profile, of two views one without pixels and without key.
+        [patched(unit, 6, 13) for unit in frame_set(later, 11)],
+        frame_set(rows + [patched(slice_of(other, 0, 0, 0, 0, b"", 1), 20, *bytes(16))], 11),
+        # Repeated, as a reference: refers to the same one both times.
+        frame_set(later[:5], 11, 4),
+        frame_set(later[:3] + later[4:6], 11, 4),
+        frame_set(later[:4], 12, 4),
+        # Slices that lack the flag of the others.
+        frame_set(later[:4], 13, 4)[:3] + frame_set(later[3:4], 13),
+        # Packed and entropy.
+        frame_set(keys, 20, 4),
+        frame_set(rows + noise, 21, 4),
+        frame_set(rows[::-1] + noise, 22, 4),
+        frame_set(rows, 24),
+    ]
+
+
 def main() -> None:
     with open(sys.argv[1], "rb") as stream:
         coarse = units_of(stream.read())
@@ -101,8 +213,11 @@ def main() -> None:
         access_unit(head, [small_slice(one[i // 15 * 6], i % 15 * 2, *parts) for i, parts in enumerate(SMALL_SLICES)]),
         # A first slice that is damaged still sets the ROI.
         access_unit(head, [patched(two[0], 36, 6), *two[1:5], longer(two[5], b"\0"), *two[6:]]),
-        # Without the key flag, as it should not be; a rig view with it; a rig of which one view comes.
-        access_unit(head, [patched(rig[0], 1, 1), patched(rig[1], 5, 5)] + [patched(unit, 1, 0) for unit in one]),
+        # With a reserved flag; a rig view with the key flag; a rig of which one view comes.
+        access_unit(head, [patched(rig[0], 1, 1), patched(rig[1], 5, 5)] + [patched(unit, 1, 9) for unit in one]),
+        # Without the key flag, which makes the first byte of symbols a distance.
+        access_unit(head, [patched(unit, 1, 0) for unit in one]),
+        *(access_unit(patched(head, 1, 0), units) for units in without_key(one)),
         # What follows a unit of another version, or one that is too short, cannot be read.
         access_unit(head, two[:3] + [patched(unknown, 0, 0x29)] + two[3:]),
         access_unit(head, two[:5] + [patched(unknown, 2, 3)] + two[5:]),

@@ -5,11 +5,12 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 cd "$1"
 
+views=2 size=48x36
 record () { # stream 'properties of avatartestsrc' [property of neighbourcodeenc...]
   local stream=$1 source=$2
   shift 2
   # shellcheck disable=SC2086
-  gst-launch-1.0 -q avatartestsrc views=2 $source ! video/x-range,width=48,height=36,framerate=15/1 ! neighbourcodeenc "$@" \
+  gst-launch-1.0 -q avatartestsrc "views=$views" $source ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc "$@" \
     ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$stream.rcnc"
 }
 
@@ -22,8 +23,15 @@ for profile in packed entropy; do
 done
 record inverse "num-buffers=2 range-person-only=true" depth-scale=inverse depth-bits=9 depth-threshold=2 profile=packed \
   max-slice-size=400
+# High enough for bands of 64 rows, each of which is refreshed in turn.
+views=1 size=64x144
+for profile in plain packed entropy; do
+  record "temporal-$profile" "num-buffers=8 range-person-only=true motion=2" "profile=$profile" temporal=true \
+    refresh-period=300 max-slice-size=300
+done
+"$here/make-lossy.py" temporal-entropy.rcnc temporal-lossy.rcnc
 "$here/make-damaged.py" coarse.rcnc damaged.rcnc
-for stream in default exact coarse damaged packed entropy inverse; do
+for stream in default exact coarse damaged packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
   "$here/../bitstream/decode.py" "$stream.rcnc" "$stream" >/dev/null
 done
 sha256sum -- *-depth-?.raw *-colour-?.raw >SHA256SUMS

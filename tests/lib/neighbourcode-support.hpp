@@ -33,6 +33,16 @@ struct Picture {
             clip (120 + 50 * v + n (random)), clip (100 + 40 * u * v + n (random)), 0};
       }
   }
+  /** One to decode into. */
+  static Picture blank (int id, Roi r, std::uint16_t depth)
+  {
+    Picture picture (id, {0, 0, 0, 0});
+    picture.depth = Image<std::uint16_t> (r.width, r.height);
+    picture.colour = Image<Rgbx> (r.width, r.height);
+    picture.roi = r;
+    picture.fill (depth);
+    return picture;
+  }
   void fill (std::uint16_t value)
   {
     for (int y = 0; y < roi.height; y++)
@@ -71,7 +81,7 @@ decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
   Decoded decoded;
   decoder.plan (bytes, decoded.result, whole_rois);
   for (const auto &view : decoder.views ())
-    decoded.pictures.emplace_back (view.view_id, view.roi).fill (0x5a5a);
+    decoded.pictures.push_back (Picture::blank (view.view_id, view.roi, 0x5a5a));
   std::vector<RangeImage> images;
   for (Picture &picture : decoded.pictures)
     images.push_back (picture.image ());

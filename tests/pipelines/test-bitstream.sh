@@ -164,7 +164,7 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged packed entropy inverse; do
+  for stream in default exact coarse damaged packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"
@@ -194,4 +194,18 @@ open("bad.rcnc", "wb").write(data)
 END
     expect_decoders_agree bad.rcnc 2 "$profile, damage with seed $seed"
   done
+}
+
+# What is lost of a frame set is unknown in those that refer to it, and both decoders find the same of
+# it unknown.
+test_damaged_slices_without_key_decode_the_same () {
+  local seed profile profiles=(plain packed entropy) streams=$source_dir/tests/data
+  for seed in {1..24}; do
+    profile=${profiles[seed % 3]}
+    python3 "$source_dir/tests/bitstream/mangle.py" "$streams/temporal-$profile.rcnc" \
+      "$streams/temporal-${profiles[seed % 2 + 1]}.rcnc" mangled.rcnc "$seed"
+    expect_decoders_agree mangled.rcnc 1 "$profile, mangled with seed $seed"
+    grep -q ' 0 unknown pixels' counts.txt || echo "$seed" >>with-unknown.txt
+  done
+  [ "$(wc -l <with-unknown.txt)" -ge 12 ] || fail "hardly any stream had unknown pixels"
 }

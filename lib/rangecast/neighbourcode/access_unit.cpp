@@ -324,10 +324,11 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
     const int id = slice.header.view_id;
     ReferencePair &pair = references_[id];
     ReferencePlane *now = slice.header.reference ? &pair.now () : nullptr;
+    const ReferencePlane &before = pair.before (slice.header.frame_number);
     DecodedPixels decoded;
     if (!slice.too_short &&
         decoders_[id]
-            .decode (slice.unit, slice.header, {&pair.before (), now, &older}, image, decoded)
+            .decode (slice.unit, slice.header, {&before, now, &older}, image, decoded)
             .ok ()) {
       result.slices++;
       result.points += decoded.points;

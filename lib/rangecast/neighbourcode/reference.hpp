@@ -60,6 +60,12 @@ public:
   void forget ();
 
   [[nodiscard]] const ReferencePlane &before () const { return planes_[1 - now_]; }
+  /** What a frame set of that number may refer to, whether it was begun or not: the latest one that
+   * is of another. */
+  [[nodiscard]] const ReferencePlane &before (std::uint32_t frame_number) const
+  {
+    return now ().held () && now ().frame_number () != frame_number ? now () : before ();
+  }
   ReferencePlane &now () { return planes_[now_]; }
   [[nodiscard]] const ReferencePlane &now () const { return planes_[now_]; }
 
