@@ -261,7 +261,8 @@ encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSet
   const Status status =
       priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
   if (status.ok ())
-    priv->rate.coded ({priv->encoder.size (), result.points, pixels});
+    priv->rate.coded ({priv->encoder.size (), result.points, pixels,
+        settings.encoder.temporal && result.delta_slices == 0});
   return status;
 }
 
