@@ -34,6 +34,8 @@ public:
   /** Codes whole pictures, not only the ROI. */
   [[nodiscard]] bool whole () const { return whole_; }
 
+  /** The next frame set to encode is the first one again: nothing may refer to earlier ones. */
+  virtual void begin () {}
   /** Codes a frame set and keeps the bytes. Measured. */
   virtual rangecast::Status encode (FrameSet &set) = 0;
   /** Hands out the bytes of the last frame set. Not measured. */

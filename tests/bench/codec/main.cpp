@@ -136,11 +136,12 @@ load (const Job &job, Input &input)
 }
 
 Status
-make_codecs (const Job &job, const Rig &rig, Codecs &codecs)
+make_codecs (const Job &job, const Input &input, Codecs &codecs)
 {
+  const Rig &rig = input.rig;
   for (const std::string &name : add_peers (rig, codecs))
     std::printf ("left out, not in this build: %s\n", name.c_str ());
-  if (Status s = add_profiles (rig, codecs); !s.ok ())
+  if (Status s = add_profiles (rig, input.sets.size () > 1, codecs); !s.ok ())
     return s;
   std::erase_if (codecs, [&] (const std::unique_ptr<Codec> &codec) {
     return codec->name ().find (job.only) == std::string::npos &&
@@ -166,7 +167,7 @@ run (const Job &job)
       input.name.c_str (), input.sets.size (), input.rig.views.size (), first.width, first.height,
       double (count_points (input)) / sets, first.near_m, first.far_m, first.depth_unit_m * 1e3);
   Codecs codecs;
-  if (Status s = make_codecs (job, input.rig, codecs); !s.ok ())
+  if (Status s = make_codecs (job, input, codecs); !s.ok ())
     return s;
   std::fflush (stdout);
   std::vector<Row> rows;

@@ -102,6 +102,7 @@ private:
   Status encode (bool warm_up)
   {
     double total = 0;
+    codec_.begin ();
     for (std::size_t i = 0; i < coded_.size (); i++) {
       FrameSet &set = input_.sets[i];
       if (warm_up)

@@ -19,7 +19,7 @@ name_of_profile (const EncoderSettings &settings)
 {
   const bool is_long = settings.max_slice_size > EncoderSettings ().max_slice_size;
   return std::string (kProfileNames[static_cast<int> (settings.profile)]) +
-         (is_long ? ", long slices" : "");
+         (settings.temporal ? ", temporal" : "") + (is_long ? ", long slices" : "");
 }
 
 class NeighbourCode final : public Codec {
@@ -35,6 +35,8 @@ public:
       return s;
     return decoder_.set_rig (rig);
   }
+
+  void begin () override { encoder_.request_key (); }
 
   Status encode (FrameSet &set) override
   {
@@ -66,7 +68,7 @@ public:
     }
     if (Status s = decoder_.decode (images_, 1, result); !s.ok ())
       return s;
-    if (result.bad_slices || result.missing_pixels)
+    if (result.bad_slices || result.missing_pixels || result.unknown_pixels)
       return {StatusCode::kBadData, "damaged slices"};
     return {};
   }
@@ -95,6 +97,18 @@ set_property (const std::string &name, const std::string &value, EncoderSettings
   }
   if (name == "choice")
     return "choice=first or best";
+  if (name == "temporal" && (value == "true" || value == "false")) {
+    settings.temporal = value == "true";
+    return {};
+  }
+  if (name == "temporal")
+    return "temporal=true or false";
+  if (name == "depth-scale" && (value == "linear" || value == "inverse")) {
+    settings.depth_scale = value == "inverse" ? DepthScale::kInverse : DepthScale::kLinear;
+    return {};
+  }
+  if (name == "depth-scale")
+    return "depth-scale=linear or inverse";
   const std::pair<const char *, int *> numbers[] = {{"depth-bits", &settings.depth_bits},
       {"colour-bits", &settings.colour_bits}, {"depth-threshold", &settings.depth_threshold},
       {"colour-threshold", &settings.colour_threshold},
@@ -134,6 +148,10 @@ settings_text (const EncoderSettings &s)
     text << " colour-bits=" << s.colour_bits;
   if (s.choice != defaults.choice)
     text << " choice=best";
+  if (s.depth_scale != defaults.depth_scale)
+    text << " depth-scale=inverse";
+  if (s.temporal)
+    text << " temporal=true";
   if (s.max_slice_size != defaults.max_slice_size)
     text << " max-slice-size=" << s.max_slice_size;
   return text.str ();

@@ -20,6 +20,10 @@ constexpr EncoderSettings kFamilies[] = {
     {.profile = Profile::kEntropy},
     {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest},
     {.max_slice_size = 65535, .profile = Profile::kEntropy},
+    {.profile = Profile::kPlain, .temporal = true},
+    {.profile = Profile::kPacked, .temporal = true},
+    {.profile = Profile::kEntropy, .temporal = true},
+    {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest, .temporal = true},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
@@ -89,19 +93,22 @@ add_peers (const Rig &rig, Codecs &codecs)
 }
 
 Status
-add_profiles (const Rig &rig, Codecs &codecs)
+add_profiles (const Rig &rig, bool sequence, Codecs &codecs)
 {
   DepthQuantiser depth;
   if (Status s = depth.set (rig.views[0], 16); !s.ok ())
     return s;
   const double code_mm = depth.step () * rig.views[0].depth_unit_m * 1e3;
-  for (const EncoderSettings &family : kFamilies)
+  for (const EncoderSettings &family : kFamilies) {
+    if (family.temporal && !sequence)
+      continue;
     for (const EncoderSettings &settings : settings_of (family, code_mm)) {
       std::unique_ptr<Codec> codec;
       if (Status s = make_neighbour_code (rig, settings, codec); !s.ok ())
         return s;
       codecs.push_back (std::move (codec));
     }
+  }
   return {};
 }
 

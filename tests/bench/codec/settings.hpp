@@ -9,7 +9,8 @@ namespace bench {
  *  @return names of peers that this build lacks */
 std::vector<std::string> add_peers (const rangecast::Rig &rig, Codecs &codecs);
 
-/** The neighbour code: every profile at several thresholds and choices. */
-rangecast::Status add_profiles (const rangecast::Rig &rig, Codecs &codecs);
+/** The neighbour code: every profile at several thresholds and choices.
+ *  @param sequence  there are several frame sets, so that temporal ones make sense */
+rangecast::Status add_profiles (const rangecast::Rig &rig, bool sequence, Codecs &codecs);
 
 } // namespace bench
