@@ -31,8 +31,8 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return s;
   if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
     return s;
-  plain_.set_depths (depth_);
   colour_ = ColourQuantiser (settings.colour_bits);
+  plain_.set_codes (depth_, colour_);
   view_ = view;
   settings_ = settings;
   configured_ = true;
