@@ -33,8 +33,8 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return s;
   if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
     return s;
-  plain_.set_depths (depth_);
   colour_ = ColourQuantiser (settings.colour_bits);
+  plain_.set_codes (depth_, colour_);
   const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
                           settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits &&

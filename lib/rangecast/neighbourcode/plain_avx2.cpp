@@ -33,7 +33,7 @@ make_two (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *co
 {
   __m128i pixels = _mm_cvtepu8_epi16 (_mm_loadl_epi64 (reinterpret_cast<const __m128i *> (colour)));
   if (!kAllColourBits)
-    pixels = quantise (pixels, how.colour_bits);
+    pixels = quantise (pixels, how.colour.bits ());
   pixels = _mm_insert_epi16 (pixels, how.codes[depth[0]], 3);
   return _mm_insert_epi16 (pixels, how.codes[depth[1]], 7);
 }
@@ -102,8 +102,8 @@ AVX2 PlainSpan
 make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
     int columns, PlainPixel *to)
 {
-  return how.colour_bits == 8 ? make_row<true> (how, depth, colour, columns, to)
-                              : make_row<false> (how, depth, colour, columns, to);
+  return how.colour.bits () == 8 ? make_row<true> (how, depth, colour, columns, to)
+                                 : make_row<false> (how, depth, colour, columns, to);
 }
 
 /* ---- coding ---- */
@@ -359,7 +359,7 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
 } // namespace
 
 const PlainFunctions kPlainFunctionsAvx2 = {
-    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 3 * kLag};
+    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, kBandRows, 3 * kLag};
 
 } // namespace rangecast
 #endif

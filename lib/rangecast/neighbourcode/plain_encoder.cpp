@@ -39,8 +39,9 @@ PlainEncoder::slice_size (int rows, std::size_t full) const
 /* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
  * nearly so. */
 void
-PlainEncoder::set_depths (const DepthQuantiser &depth)
+PlainEncoder::set_codes (const DepthQuantiser &depth, const ColourQuantiser &colour)
 {
+  colour_ = colour;
   const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
   std::tie (near_, far_) = std::minmax ({depth.depth (0), depth.depth (last)});
   while (near_ > 1 && depth.valid (static_cast<std::uint16_t> (near_ - 1)))
@@ -73,7 +74,7 @@ PlainEncoder::resize (int columns)
 void
 PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
 {
-  const PlainQuantising how = {near_, far_, codes_.data (), header_.colour_bits, y};
+  const PlainQuantising how = {near_, far_, codes_.data (), colour_, y};
   row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
       image.colour.row (y) + header_.first_column, header_.columns,
       row.pixels.data () + kPixelsBefore);
@@ -193,7 +194,7 @@ PlainEncoder::code_piece (
   begin_slice (0);
   int waiting = 0;
   for (int done = 0; done < image.roi.height;) {
-    for (; waiting < kBandRows && done + waiting < image.roi.height; waiting++)
+    for (; waiting < functions_->band_rows && done + waiting < image.roi.height; waiting++)
       load_row (image, done + waiting, rows_[static_cast<std::size_t> (waiting)]);
     const int more = add_band (waiting, to);
     std::rotate (rows_.begin (), rows_.begin () + more, rows_.end ());

@@ -29,8 +29,8 @@ struct PlainResult {
 /** Codes range images in profile plain. Keeps its memory. */
 class PlainEncoder {
 public:
-  /** The codes of depths from now on. */
-  void set_depths (const DepthQuantiser &depth);
+  /** The codes of depths and colours from now on. */
+  void set_codes (const DepthQuantiser &depth, const ColourQuantiser &colour);
 
   /** Appends the slices of one range image whose ROI is not empty.
    *  @param header  of all slices: bits, ROI, times */
@@ -61,8 +61,9 @@ private:
   const PlainFunctions *functions_ = nullptr;
   std::uint16_t near_ = 1, far_ = 0; /* of valid depths */
   std::vector<std::uint16_t> codes_; /* of all depths */
-  SliceHeader header_;               /* of the open slice */
-  std::size_t full_pixels_ = 0;      /* of the open slice */
+  ColourQuantiser colour_;
+  SliceHeader header_;          /* of the open slice */
+  std::size_t full_pixels_ = 0; /* of the open slice */
   PlainResult result_;
 
   std::array<Row, kBandRows> rows_;

@@ -5,8 +5,6 @@
 #include <bit>
 #include <cstring>
 
-#include "../geometry/quantiser.hpp"
-
 namespace rangecast {
 namespace {
 
@@ -14,7 +12,6 @@ PlainSpan
 make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
     int columns, PlainPixel *to)
 {
-  const ColourQuantiser quantiser (how.colour_bits);
   PlainSpan span;
   int first = columns;
   for (int x = 0; x < columns; x++) {
@@ -24,7 +21,7 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
     }
     const Rgbx &c = colour[x];
     to[x] = plain_pixel (
-        quantiser.code (c.r), quantiser.code (c.g), quantiser.code (c.b), how.codes[depth[x]]);
+        how.colour.code (c.r), how.colour.code (c.g), how.colour.code (c.b), how.codes[depth[x]]);
     first = std::min (first, x);
     span.end = x + 1;
     span.valid++;
@@ -106,20 +103,18 @@ code_group (const PlainPixel *row, PlainPixel *upper, int count, PlainPixel &lef
   return symbols;
 }
 
+/* A band of one row. */
 void
 code_band (const PlainBand &band)
 {
   const Lanes threshold = lanes_of (band.threshold);
-  PlainPixel *upper = band.upper;
-  for (int i = 0; i < kBandRows; i++) {
-    BitWriter symbols (band.symbols[i]);
-    PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];
-    for (int x = band.begin; x < band.end; x += kGroup) {
-      const int count = std::min (kGroup, band.end - x);
-      symbols.put (code_group (band.rows[i] + x, upper + x, count, left, upper_left, threshold),
-          count * kSymbolBits);
-    }
-    upper[band.begin - 1] = upper[band.end] = kOutsidePixel;
+  PlainPixel *const upper = band.upper;
+  BitWriter symbols (band.symbols[0]);
+  PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];
+  for (int x = band.begin; x < band.end; x += kGroup) {
+    const int count = std::min (kGroup, band.end - x);
+    symbols.put (code_group (band.rows[0] + x, upper + x, count, left, upper_left, threshold),
+        count * kSymbolBits);
   }
 }
 
@@ -178,7 +173,7 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
 }
 
 constexpr PlainFunctions kScalar = {
-    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 0};
+    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 1, 0};
 
 } // namespace
 

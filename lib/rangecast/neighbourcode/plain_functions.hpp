@@ -8,6 +8,7 @@
 
 #include "../cpu.hpp"
 #include "../geometry/image_view.hpp"
+#include "../geometry/quantiser.hpp"
 #include "symbols.hpp"
 
 namespace rangecast {
@@ -40,8 +41,8 @@ inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
   const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
-  int colour_bits;            ///< 4 to 8
-  int row;                    ///< of the piece: its last bit matters
+  const ColourQuantiser &colour;
+  int row; ///< of the piece: its last bit matters
 };
 
 /** The columns of a row that have something. */
@@ -50,7 +51,7 @@ struct PlainSpan {
   int valid = 0;          ///< valid pixels
 };
 
-/** Rows are coded in bands of up to so many. */
+/** Rows are coded in bands of PlainFunctions::band_rows, which is at most this. */
 inline constexpr int kBandRows = 4;
 
 struct PlainBand {
@@ -103,6 +104,7 @@ struct PlainFunctions {
   PlainCounts (*count_symbols) (const std::uint8_t *symbols, std::size_t bytes);
   /** Writes a decoded row. @return valid pixels */
   std::size_t (*show_row) (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
+  int band_rows;
   /** Where in its bits the symbols of row i of a band begin: at bit i * skip_bits. */
   int skip_bits;
 };
