@@ -76,7 +76,7 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, Co
     return false;
   const Components made = correct (expected, residual, steps_, limits_);
   pixel = {known ? pack_components (made) : kNoPixel,
-      state_of (Origin::kCorrected, activity_of (residual))};
+      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0)};
   return true;
 }
 

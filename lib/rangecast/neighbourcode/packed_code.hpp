@@ -91,6 +91,7 @@ unzigzag (std::uint32_t v)
 /** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
 class PackedWriter {
 public:
+  static constexpr bool kUsesActivity = false;
   static constexpr bool kEarlierInRuns = true;
 
   PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const GolombOrders &orders)
@@ -207,6 +208,7 @@ private:
  *  at overrun() now and then. */
 class PackedReader {
 public:
+  static constexpr bool kUsesActivity = false;
   static constexpr bool kEarlierInRuns = true;
 
   /** Zero bytes that have to be there behind the data. */
