@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <memory>
+#include <rangecast/neighbourcode/isa.hpp>
 #include <rangecast/neighbourcode/packed_code.hpp>
 
 using namespace rangecast;
@@ -342,6 +343,56 @@ TEST_P (Profiles, huge_steps_and_residuals_stay_in_range)
     for (std::size_t k = kSliceHeaderSize; k < unit.size (); k++)
       unit[k] = static_cast<std::uint8_t> (k < kSliceHeaderSize + 4 ? 0xff : random ());
     EXPECT_LE (decode_exact (decoder, unit).result.slices, 1u);
+  }
+}
+
+TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
+{
+  if (!has_x86_64_v3 ())
+    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  std::mt19937 random (7);
+  for (int i = 0; i < 40; i++) {
+    const auto below = [&] (unsigned n) { return static_cast<int> (random () % n); };
+    std::vector<Picture> pictures;
+    const Roi roi = {below (20), below (20), 1 + below (290), 1 + below (200)};
+    pictures.emplace_back (0, roi, random (), below (60));
+    EncoderSettings s =
+        settings (6 + below (11), 4 + below (5), below (3) ? below (300) : below (65536),
+            below (3) ? below (20) : below (256), 256 + below (2000));
+    s.choice = i % 4 ? NeighbourChoice::kFirst : NeighbourChoice::kBest;
+    const auto bytes = encode (rig (), pictures, s);
+    Decoded here = decode_exact (decoder, bytes);
+    every_cpu_only = true;
+    AccessUnitDecoder other;
+    ASSERT_TRUE (other.set_rig (rig ()).ok ());
+    const auto other_bytes = encode (rig (), pictures, s);
+    Decoded there = decode_exact (other, bytes);
+    every_cpu_only = false;
+    ASSERT_EQ (bytes, other_bytes) << i;
+    ASSERT_EQ (here.result.bad_slices + there.result.bad_slices, 0u) << i;
+    expect_same (here.pictures[0], there.pictures[0]);
+  }
+}
+
+TEST_P (Profiles, code_for_every_cpu_and_for_this_one_agree_on_damage)
+{
+  if (!has_x86_64_v3 ())
+    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  std::mt19937 random (8);
+  const auto stream = small_stream ();
+  for (int i = 0; i < 2000; i++) {
+    auto bad = stream;
+    for (int k = 0; k < 3; k++)
+      bad[random () % bad.size ()] = static_cast<std::uint8_t> (random ());
+    const Decoded here = decode_exact (decoder, bad);
+    every_cpu_only = true;
+    AccessUnitDecoder other;
+    ASSERT_TRUE (other.set_rig (rig ()).ok ());
+    const Decoded there = decode_exact (other, bad);
+    every_cpu_only = false;
+    ASSERT_EQ (here.result.slices, there.result.slices) << i;
+    ASSERT_EQ (here.result.bad_slices, there.result.bad_slices) << i;
+    ASSERT_EQ (here.result.points, there.result.points) << i;
   }
 }
 

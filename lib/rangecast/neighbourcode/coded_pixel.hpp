@@ -92,8 +92,8 @@ inline constexpr PixelCode kNoPixel = ~PixelCode{0};
 /** Sizes of a residual, at most 9 each, one a byte from the least significant; 0 for copies. */
 using Activity = std::uint32_t;
 
-/** What contexts are made of: a pixel's origin, from bit 8 its kind, from bit 32 its activity. 0 for
- *  invalid pixels only. Several of them are added up at once. */
+/** What contexts are made of: a pixel's origin, from bit 8 its kind, from bit 32 its activity. 0
+ * for invalid pixels only. Several of them are added up at once. */
 using PixelState = std::uint64_t;
 
 constexpr PixelState
@@ -109,7 +109,7 @@ state_of (Origin origin, Activity activity = 0)
 mask_of_zero (std::uint64_t v)
 {
   auto mask = static_cast<std::uint64_t> (static_cast<std::int64_t> (v - 1) >> 63);
-  asm ("" : "+r"(mask)); /* else compilers may find a condition in it, and jump */
+  asm("" : "+r"(mask)); /* else compilers may find a condition in it, and jump */
   return mask;
 }
 
@@ -134,9 +134,9 @@ struct CodedPixel {
 
 /** Limits of the components, and of depth, R, G, B. */
 struct Limits {
-  Components least{}, most{};   ///< of depth, Y, Co, Cg
-  Components brightest{};       ///< most of depth, R, G, B; the least are 0
-  Components most_steps{};      ///< of a residual: as many as change a component as far as it goes
+  Components least{}, most{}; ///< of depth, Y, Co, Cg
+  Components brightest{};     ///< most of depth, R, G, B; the least are 0
+  Components most_steps{};    ///< of a residual: as many as change a component as far as it goes
 
   Limits () = default;
   /** @param last_depth, maximum  greatest codes of depth and colour */
@@ -154,15 +154,19 @@ first_expected (const Limits &limits)
   return pack_components (Components{limits.most[0] / 2, limits.most[1] / 2, 0, 0});
 }
 
-/** Depth, R, G, B of depth and YCoCg-R; cut to the limits, because residuals may have been rounded. */
+/** Depth, R, G, B of depth and YCoCg-R; cut to the limits, because residuals may have been rounded.
+ */
 inline Components
 to_rgb (Components c, const Limits &limits)
 {
-  const Components half = c >> 1; /* t = Y - half of Cg; G = t + Cg; B = t - half of Co; R = B + Co */
-  const Components base = __builtin_shufflevector (c, c, 0, 1, 1, 1) -
-                          (__builtin_shufflevector (half, half, 3, 3, 3, 3) & Components{0, -1, -1, -1});
+  const Components half =
+      c >> 1; /* t = Y - half of Cg; G = t + Cg; B = t - half of Co; R = B + Co */
+  const Components base =
+      __builtin_shufflevector (c, c, 0, 1, 1, 1) -
+      (__builtin_shufflevector (half, half, 3, 3, 3, 3) & Components{0, -1, -1, -1});
   const Components plus = __builtin_shufflevector (c, c, 2, 2, 3, 3) & Components{0, -1, -1, 0};
-  const Components minus = __builtin_shufflevector (half, half, 2, 2, 2, 2) & Components{0, -1, 0, -1};
+  const Components minus =
+      __builtin_shufflevector (half, half, 2, 2, 2, 2) & Components{0, -1, 0, -1};
   return cut (base + plus - minus, Components{}, limits.brightest);
 }
 
@@ -201,8 +205,8 @@ predict (const Neighbours &n, PixelCode last, Components most)
     return left;
   const Components upper = components_of (n.codes[0]), right = components_of (n.codes[ur]);
   const Components mean = (2 * left + upper + right + 2) >> 2;
-  const Components plane = n.states[-1] != 0 ? left + upper - components_of (n.codes[-1])
-                                             : (left + upper + 1) >> 1;
+  const Components plane =
+      n.states[-1] != 0 ? left + upper - components_of (n.codes[-1]) : (left + upper + 1) >> 1;
   const Components depth_only = {-1, 0, 0, 0};
   return (mean & ~depth_only) | (cut (plane, Components{}, most) & depth_only);
 }

@@ -41,11 +41,12 @@ private:
   [[RANGECAST_X86_64_V3]] bool decode_run_v3 (
       Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code>
-  [[gnu::always_inline]] bool decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
+  [[gnu::always_inline]] bool decode_full (
+      Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   const bool has_v3_ = has_x86_64_v3 ();
   CompactRow row_, upper_;
-  std::vector<int> runs_; /* ends of the row's runs */
+  std::vector<int> runs_;           /* ends of the row's runs */
   std::vector<std::uint8_t> bytes_; /* of the slice, and padding */
   EntropyModel model_{};
   Components steps_{};

@@ -64,8 +64,8 @@ rounded (Components difference, Components half_steps, Floats reciprocals)
 {
   const Components sign = difference >> 31;
   const Components size = (difference ^ sign) - sign + half_steps;
-  const Floats quotient = (__builtin_convertvector (size, Floats) + 0.5f) * reciprocals;
-  return (__builtin_convertvector (quotient, Components) ^ sign) - sign;
+  const Floats quotient = (__builtin_convertvector(size, Floats) + 0.5f) * reciprocals;
+  return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
 }
 
 /* What a copy of a neighbour, left or above, has. */
@@ -104,10 +104,11 @@ CompactEncoder::encode (const ConstRangeImage &image, const CompactQuantisers &q
   result_ = {};
   steps_ = steps_within (settings.depth_threshold, settings.colour_threshold).components ();
   half_steps_ = steps_ / 2;
-  reciprocals_ = 1.0f / __builtin_convertvector (steps_, Floats);
+  reciprocals_ = 1.0f / __builtin_convertvector(steps_, Floats);
   limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
   const int c = settings.colour_threshold;
-  bias_ = near_bias (static_cast<std::uint32_t> (settings.depth_threshold), static_cast<std::uint32_t> (c));
+  bias_ = near_bias (
+      static_cast<std::uint32_t> (settings.depth_threshold), static_cast<std::uint32_t> (c));
   const auto weight = [] (int threshold) {
     return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
   };
@@ -180,7 +181,8 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
     own[x] = d.code (depth[x]);
   if (c.bits () < 8)
     for (std::size_t x = 0; x < columns; x++)
-      own[x] |= key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+      own[x] |=
+          key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
   else
     for (std::size_t x = 0; x < columns; x++) {
       std::uint32_t rgbx = 0;
@@ -229,8 +231,7 @@ CompactEncoder::find_upper (std::size_t begin, std::size_t end)
       return (mask & choice) | (~mask & next);
     };
     const Keys right = first (upper + x + 1, kTakeUpperRight, Keys{} + std::uint64_t{kPredict});
-    const Keys choice =
-        first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
+    const Keys choice = first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
     std::memcpy (others + x, &choice, sizeof choice);
   }
 }
@@ -258,8 +259,7 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
              static_cast<std::int32_t> (other >> at & mask);
     };
     const std::int32_t z = d (0, 0xffff), r = d (32, 0xff), g = d (18, 0xff), b = d (50, 0xff);
-    return depth_weight_ * float (z) * float (z) +
-           colour_weight_ * float (r * r + g * g + b * b);
+    return depth_weight_ * float (z) * float (z) + colour_weight_ * float (r * r + g * g + b * b);
   };
   full = make_full (own, n);
   int best = kPredict;

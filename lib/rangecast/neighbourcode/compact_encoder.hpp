@@ -65,7 +65,8 @@ private:
   template <class Code, bool Best>
   void code_run_here (Code &code, std::size_t begin, std::size_t end);
   template <class Code>
-  [[gnu::always_inline]] PixelState code_full (Code &code, const Neighbours &n, Components residual);
+  [[gnu::always_inline]] PixelState code_full (
+      Code &code, const Neighbours &n, Components residual);
   template <class Code> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
   int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
@@ -96,7 +97,7 @@ private:
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{}, model_before_{};
-  std::vector<std::uint8_t> bytes_; /* of the open slice, behind its header */
+  std::vector<std::uint8_t> bytes_;        /* of the open slice, behind its header */
   Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};
 };

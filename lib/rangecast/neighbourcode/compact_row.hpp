@@ -34,7 +34,8 @@ public:
   /** Of the first column; the pixel before it is at -1. */
   [[nodiscard]] PixelCode *codes () { return codes_.data () + 1; }
   [[nodiscard]] PixelState *states () { return states_.data () + 1; }
-  /** What is shown instead of YCoCg: encoders keep a PixelKey, decoders what goes into the image. */
+  /** What is shown instead of YCoCg: encoders keep a PixelKey, decoders what goes into the image.
+   */
   [[nodiscard]] std::uint64_t *shown () { return shown_.data () + 1; }
   /** One byte a pixel, 0 = invalid. */
   [[nodiscard]] std::vector<std::uint8_t> &valid () { return valid_; }

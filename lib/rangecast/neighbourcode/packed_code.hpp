@@ -104,8 +104,8 @@ public:
   [[gnu::always_inline]] void full (const Neighbours &n, bool has_neighbour, Components r)
   {
     const Components sizes = r < 0 ? -r : r;
-    const auto pattern =
-        static_cast<std::size_t> ((r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
+    const auto pattern = static_cast<std::size_t> (
+        (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
     std::uint64_t bits = 0;
     int length = 0;
     const auto add = [&] (std::uint64_t more, int count) {
@@ -149,7 +149,8 @@ public:
   }
 
 private:
-  /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full. */
+  /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full.
+   */
   [[gnu::always_inline]] void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
@@ -168,7 +169,8 @@ private:
     for (; pattern != 0; pattern &= pattern - 1) {
       const int i = std::countr_zero (pattern);
       put (r[i] < 0, 1);
-      golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
+      golomb (
+          static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
     }
   }
   void golomb (std::uint32_t value, int order)
@@ -192,8 +194,7 @@ public:
   static constexpr std::size_t kPadding = 16;
 
   PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
-      : from_ (from), end_ (from + bytes), orders_ (orders),
-        tables_ (&packed_tables ())
+      : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
   {
   }
 

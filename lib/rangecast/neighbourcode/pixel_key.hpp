@@ -8,8 +8,8 @@
 
 namespace rangecast {
 
-/** From bit 0 depth, 18 G, 32 R, 50 B, 60 whether it is invalid: each with room for what near_bias()
- *  adds. */
+/** From bit 0 depth, 18 G, 32 R, 50 B, 60 whether it is invalid: each with room for what
+ * near_bias() adds. */
 using PixelKey = std::uint64_t;
 
 inline constexpr PixelKey kInvalidKey = PixelKey{1} << 60;
@@ -44,8 +44,8 @@ components_of_key (PixelKey key)
 }
 
 /** The top bit of each number's room. */
-inline constexpr PixelKey kNearMask =
-    PixelKey{1} << 17 | PixelKey{1} << 27 | PixelKey{1} << 41 | PixelKey{1} << 59 | PixelKey{1} << 61;
+inline constexpr PixelKey kNearMask = PixelKey{1} << 17 | PixelKey{1} << 27 | PixelKey{1} << 41 |
+                                      PixelKey{1} << 59 | PixelKey{1} << 61;
 
 /** What keeps those bits set as long as no number is below another by more than its threshold. */
 constexpr PixelKey

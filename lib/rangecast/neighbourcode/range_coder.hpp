@@ -132,7 +132,8 @@ private:
   }
 
   std::uint8_t *begin_, *to_;
-  std::uint64_t low_ = 0; /* 32 bits, above them count_ more that have left the range, and a carry */
+  std::uint64_t low_ =
+      0; /* 32 bits, above them count_ more that have left the range, and a carry */
   std::uint32_t range_ = 0xffffffff;
   int count_ = 0;           /* 0 or 8 between decisions */
   std::size_t pending_ = 0; /* pairs of bytes 0xff behind the held one */
