@@ -144,23 +144,21 @@ private:
 /** Reads decisions; behind the end it reads zeros. */
 class RangeDecoder {
 public:
-  RangeDecoder (const std::uint8_t *from, std::size_t bytes) : data_ (from), size_ (bytes)
+  RangeDecoder (const std::uint8_t *from, std::size_t bytes) : from_ (from), end_ (from + bytes)
   {
-    ahead_ = -32;
-    for (int i = 0; i < 3; i++)
-      refill ();
+    for (int i = 0; i < 4; i++)
+      code_ = code_ << 8 | next_byte ();
   }
   [[gnu::always_inline]] bool get (Probability &p)
   {
     const std::uint32_t part = yes_part (range_, p);
-    const std::uint64_t split = std::uint64_t{part} << 32;
-    if (window_ < split) {
+    if (code_ < part) {
       range_ = part;
       learn (p, true);
       normalise ();
       return true;
     }
-    window_ -= split;
+    code_ -= part;
     range_ -= part;
     learn (p, false);
     normalise ();
@@ -171,48 +169,37 @@ public:
     std::uint32_t value = 0;
     while (count-- > 0) {
       range_ >>= 1;
-      const std::uint64_t split = std::uint64_t{range_} << 32;
-      const bool one = window_ < split;
-      window_ -= one ? 0 : split;
+      const bool one = code_ < range_;
+      code_ -= one ? 0 : range_;
       value = value << 1 | one;
       normalise ();
     }
     return value;
   }
   /** Every byte has been read. */
-  [[nodiscard]] bool at_end () const { return read () >= size_; }
+  [[nodiscard]] bool at_end () const { return from_ == end_; }
   /** More has been read than an encoder leaves out. */
-  [[nodiscard]] bool overrun () const { return read () > size_ + kMaxOverrun; }
+  [[nodiscard]] bool overrun () const { return overrun_ > kMaxOverrun; }
 
 private:
-  /* Bytes that have come into the range, those behind the end too. */
-  [[nodiscard]] std::size_t read () const { return next_ - static_cast<std::size_t> (ahead_) / 8; }
+  std::uint32_t next_byte ()
+  {
+    if (from_ != end_)
+      return *from_++;
+    overrun_++;
+    return 0;
+  }
   void normalise ()
   {
-    const int bits = bits_to_grow (range_);
-    range_ <<= bits;
-    window_ <<= bits;
-    ahead_ -= bits;
-    if (ahead_ < 16)
-      refill ();
-  }
-  void refill ()
-  {
-    std::uint64_t two = 0;
-    if (next_ + 2 <= size_)
-      two = static_cast<std::uint64_t> (data_[next_] << 8 | data_[next_ + 1]);
-    else if (next_ < size_)
-      two = static_cast<std::uint64_t> (data_[next_] << 8);
-    next_ += 2;
-    window_ |= two << (16 - ahead_);
-    ahead_ += 16;
+    while (range_ < kMinRange) {
+      range_ <<= 8;
+      code_ = code_ << 8 | next_byte ();
+    }
   }
 
-  const std::uint8_t *data_;
-  std::size_t size_, next_ = 0;
-  std::uint64_t window_ = 0; /* what is compared with the range, then ahead_ bits that come next */
-  std::uint32_t range_ = 0xffffffff;
-  int ahead_ = 0; /* 16 to 31 between decisions */
+  const std::uint8_t *from_, *end_;
+  std::uint32_t range_ = 0xffffffff, code_ = 0;
+  std::size_t overrun_ = 0;
 };
 
 } // namespace rangecast
