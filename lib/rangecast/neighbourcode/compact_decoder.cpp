@@ -67,7 +67,7 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, Co
   if (!code.residual (n, n.any (), residual))
     return false;
   pixel = {pack_components (correct (expected, residual, steps_, limits_)),
-      state_of (Origin::kCorrected, activity_of (residual))};
+      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0)};
   return true;
 }
 

@@ -292,7 +292,7 @@ CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
   return either (mask_of_zero (!predicted), state_of (Origin::kPredicted),
-      state_of (Origin::kCorrected, activity_of (residual)));
+      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0));
 }
 
 /* Codes a run of valid pixels, behind an invalid one.

@@ -35,6 +35,9 @@ inline constexpr int kMaxPrefix = 17;
  *  that a loop can keep a copy in registers; the probabilities are the caller's. */
 template <class Coder> class EntropyCode {
 public:
+  /** Whether contexts need the activity of pixels. */
+  static constexpr bool kUsesActivity = true;
+
   EntropyCode (Coder coder, EntropyModel &model) : coder_ (coder), model_ (model.data ()) {}
 
   [[nodiscard]] Coder &coder () { return coder_; }

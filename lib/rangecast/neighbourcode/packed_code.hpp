@@ -89,6 +89,8 @@ unzigzag (std::uint32_t v)
 /** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
 class PackedWriter {
 public:
+  static constexpr bool kUsesActivity = false;
+
   PackedWriter (std::uint8_t *to, EntropyModel &, const GolombOrders &orders)
       : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
   {
@@ -190,6 +192,7 @@ private:
  *  at overrun() now and then. */
 class PackedReader {
 public:
+  static constexpr bool kUsesActivity = false;
   /** Zero bytes that have to be there behind the data. */
   static constexpr std::size_t kPadding = 16;
 
