@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <iterator>
 
 namespace rangecast {
 
@@ -20,8 +21,7 @@ cpu_supports ()
 #if defined __x86_64__
   __builtin_cpu_init ();
   if (__builtin_cpu_supports ("avx2") && __builtin_cpu_supports ("bmi") &&
-      __builtin_cpu_supports ("bmi2") && __builtin_cpu_supports ("lzcnt") &&
-      __builtin_cpu_supports ("popcnt"))
+      __builtin_cpu_supports ("bmi2") && __builtin_cpu_supports ("popcnt"))
     return CpuLevel::kAvx2;
 #endif
   return CpuLevel::kScalar;

@@ -6,7 +6,7 @@ namespace rangecast {
 /** What code may take for granted, in rungs: each holds all before it. */
 enum class CpuLevel : int {
   kScalar, ///< what the compiler was told to build for
-  kAvx2,   ///< x86-64 with AVX2, BMI1, BMI2, LZCNT and POPCNT
+  kAvx2,   ///< x86-64 with AVX2, BMI1, BMI2 and POPCNT
 };
 inline constexpr CpuLevel kCpuLevels[] = {CpuLevel::kScalar, CpuLevel::kAvx2};
 

@@ -118,14 +118,13 @@ expect_windows_on_target (const std::vector<Coded> &coded, std::size_t first, do
 
 GST_START_TEST (test_any_two_seconds_are_within_a_tenth_of_the_target)
 {
-  for (const char *profile : kProfiles)
-    for (const double share : {0.9, 0.65}) {
-      const std::string properties = std::string ("profile=") + profile;
-      const double wanted = share * usual_rate ("", properties);
-      const auto coded = play ("num-buffers=75", properties + target (wanted));
-      fail_unless_equals_int (coded.size (), 75);
-      expect_windows_on_target (coded, 0, wanted);
-    }
+  for (const char *profile : kProfiles) {
+    const std::string properties = std::string ("profile=") + profile;
+    const double wanted = 0.7 * usual_rate ("", properties);
+    const auto coded = play ("num-buffers=60", properties + target (wanted));
+    fail_unless_equals_int (coded.size (), 60);
+    expect_windows_on_target (coded, 0, wanted);
+  }
 }
 GST_END_TEST;
 
@@ -146,7 +145,7 @@ GST_START_TEST (test_thresholds_move_by_one_code_at_most_and_seldom)
   for (const char *profile : kProfiles) {
     const std::string properties = std::string ("profile=") + profile;
     const auto coded =
-        play ("num-buffers=75", properties + target (0.7 * usual_rate ("", properties)));
+        play ("num-buffers=60", properties + target (0.7 * usual_rate ("", properties)));
     int changes = 0;
     for (std::size_t i = kFps; i < coded.size (); i++) {
       const Thresholds a = coded[i - 1].thresholds, b = coded[i].thresholds;
@@ -154,7 +153,7 @@ GST_START_TEST (test_thresholds_move_by_one_code_at_most_and_seldom)
           "%s: from %d, %d to %d, %d", profile, a.depth, a.colour, b.depth, b.colour);
       changes += !(a == b);
     }
-    fail_unless (changes < 25, "%s: %d changes in 60 frame sets", profile, changes);
+    fail_unless (changes < 20, "%s: %d changes in 45 frame sets", profile, changes);
   }
 }
 GST_END_TEST;
@@ -259,7 +258,7 @@ GST_START_TEST (test_max_depth_error_follows_the_thresholds)
     g_object_set (encoder, "target-bitrate", n < 5 ? 1u : 0u, nullptr);
   });
   fail_unless_equals_int (errors.size (), 10);
-  fail_unless (errors[4] > 4 * errors[9], "%g and %g m", errors[4], errors[9]);
+  fail_unless (errors[4] > 3 * errors[9], "%g and %g m", errors[4], errors[9]);
 }
 GST_END_TEST;
 

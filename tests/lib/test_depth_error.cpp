@@ -186,3 +186,27 @@ TEST (DepthError, slices_of_both_scales_in_turn_decode)
           q.depth (q.code (pictures[0].depth.view ().at (x, 3))));
   }
 }
+
+TEST (DepthError, thresholds_set_alone_give_the_bytes_and_the_error_of_a_new_encoder)
+{
+  const Rig rig = two_views (0.3, 1.5);
+  for (Profile profile : kProfiles) {
+    EncoderSettings settings = {10, 7, 3, 9, 600, profile};
+    auto pictures = pictures_of_steps (rig, settings, 9);
+    const std::vector<RangeImage> images = {pictures[0].image (), pictures[1].image ()};
+    AccessUnitEncoder encoder;
+    ASSERT_TRUE (encoder.configure (rig, settings).ok ());
+    for (int threshold : {20, 0, 5}) {
+      settings.depth_threshold = threshold;
+      settings.colour_threshold = threshold + 2;
+      encoder.set_thresholds (threshold, threshold + 2);
+      EncoderResult result;
+      ASSERT_TRUE (encoder.encode (images, 5, 1, result).ok ());
+      std::vector<std::uint8_t> bytes;
+      for (std::size_t i = 0; i < encoder.parts (); i++)
+        bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+      EXPECT_EQ (bytes, encode (rig, pictures, settings));
+      EXPECT_DOUBLE_EQ (encoder.max_depth_error_m (), stated_error (rig, settings));
+    }
+  }
+}

@@ -346,8 +346,9 @@ private:
     Pixels decoded (header.roi.width, header.roi.height, 1);
     std::ranges::fill (decoded.depths, std::uint16_t{0xabcd});
     std::ranges::fill (decoded.colours, std::uint8_t{0xef});
-    std::uint64_t points = 0, valid = 0;
-    const bool good = decoder.decode (unit, header, decoded.image (), points).ok ();
+    DecodedPixels counted;
+    std::uint64_t valid = 0;
+    const bool good = decoder.decode (unit, header, {}, decoded.image (), counted).ok ();
     ASSERT_EQ (good, expected.has_value ());
     for (int y = 0; y < header.roi.height; y++)
       for (int x = 0; x < header.roi.width; x++) {
@@ -365,7 +366,7 @@ private:
         }
       }
     if (good) {
-      ASSERT_EQ (points, valid);
+      ASSERT_EQ (counted.points, valid);
     }
   }
 };

@@ -7,6 +7,7 @@
 
 #include "../geometry/range_image.hpp"
 #include "compact_encoder.hpp"
+#include "compact_row.hpp"
 #include "entropy_code.hpp"
 
 namespace rangecast {
@@ -17,49 +18,52 @@ public:
   /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
    *  @param body    what is behind the slice header
    *  @param header  checked, and not empty; its ROI is the image's
-   *  @param[out] pixels  grows
+   *  @param[out] decoded  grows
    *  @return false for damage: the pixels may then be partly written */
   bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
       const CompactQuantisers &quantisers, const DecoderReference &reference,
-      const RangeImage &image, DecodedPixels &pixels);
+      const RangeImage &image, DecodedPixels &decoded);
 
 private:
+  template <class Code>
+  bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
   template <class Code, bool Delta>
   bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
   template <class Code>
-  bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
-  void keep_row (std::uint64_t *kept, int columns) const;
-  void show_older_row (const DecoderReference &reference, const SliceHeader &header, int row,
-      const RangeImage &image) const;
-  template <class Code> bool decode_runs (Code &code, int columns);
-  template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
-  template <class Code, bool Delta>
-  bool decode_row (Code &code, const CompactQuantisers &quantisers, int columns);
-  template <class Code, bool Delta>
-  bool decode_run (
-      Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  bool load_earlier (
+      Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
   template <class Code> bool decode_motions (Code &code);
-  void take_earlier (std::size_t x, const CompactQuantisers &quantisers);
+  template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code> bool decode_runs (Code &code, int columns);
   template <class Code, bool Delta>
-  bool decode_full (Code &code, const Neighbours &n, bool corrected,
-      const CompactQuantisers &quantisers, std::size_t x);
+  bool decode_row (
+      Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] bool decode_run (
+      Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[RANGECAST_EVERY_CPU]] bool decode_run_every (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[RANGECAST_X86_64_V3]] bool decode_run_v3 (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] bool decode_full (
+      Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
+  std::uint64_t show_older_row (const DecoderReference &reference, const SliceHeader &header,
+      int row, const RangeImage &image);
 
-  /* One invalid pixel before and one behind the row, which `pixels` and `shown` count; pixels one
-   * more, because Neighbours look ahead. */
-  struct Row {
-    std::vector<CodedPixel> pixels;
-    std::vector<std::uint64_t> shown; /* depth, then R, G, B, as they go into the image */
-    std::vector<std::uint8_t> valid;
-    std::vector<std::uint8_t> earlier; /* pixels that equal those of the earlier frame set */
-  };
-  Row row_, upper_;
+  const bool has_v3_ = has_x86_64_v3 ();
+  CompactRow row_, upper_;
+  std::vector<int> runs_;                /* ends of the row's runs */
   std::vector<PixelCode> earlier_codes_; /* what its pixels may equal in the earlier frame set */
   std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
+  std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
   EntropyModel model_{};
   Components steps_{};
-  Limits limits_{};
+  Limits limits_;
   PixelCode last_ = kNoPixel;
 };
 

@@ -30,25 +30,13 @@ bits_of (const Components &residual)
   constexpr float kBitsOfZero[] = {0.4f, 0.4f, 0.25f, 0.25f};
   constexpr float kBitsOfSign[] = {2.5f, 2.5f, 3, 3};
   float bits = 2.5f;
-  if (residual == Components{})
+  if (is_zero (residual))
     return bits;
-  for (std::size_t i = 0; i < kComponents; i++) {
+  for (int i = 0; i < kComponents; i++) {
     const auto size = static_cast<std::uint32_t> (std::abs (residual[i]));
     bits += size == 0 ? kBitsOfZero[i] : kBitsOfSign[i] + 2 * float (std::bit_width (size) - 1);
   }
   return bits;
-}
-
-/* The first neighbour that is near enough, or kPredict; `above` is the pixel above. */
-inline int
-first_near (Lanes own, const Lanes &left, const Lanes *above, Lanes threshold)
-{
-  if (are_near (own, left, threshold))
-    return kTakeLeft;
-  for (int i = 0; i < 3; i++)
-    if (are_near (own, above[i - 1], threshold))
-      return kTakeUpperLeft + i;
-  return kPredict;
 }
 
 /* An EntropyCode that looks like a PackedWriter. */
@@ -63,36 +51,37 @@ public:
     model = initial;
   }
   void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
-  void residual (const Neighbours &n, bool has_neighbour, Components r)
+  template <bool Delta> void full (const Neighbours &n, bool has_neighbour, Components r)
   {
-    (void)EntropyCode::residual (n, has_neighbour, r);
+    if (has_neighbour && choice<Delta> (n, is_zero (r) ? kPredict : kCorrect) == kPredict)
+      return;
+    (void)residual (n, has_neighbour, r);
   }
   [[nodiscard]] std::size_t bound () const { return coder ().bound (); }
   std::size_t finish () { return coder ().finish (); }
 };
 
-/* Residuals are divided by multiplication: with this reciprocal it is exact for all there are. */
-constexpr int kReciprocalBits = 40;
+/* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
+ * lacks: sizes are below 2^17 and so float's 24 bits are enough for every step. */
+typedef float Floats __attribute__ ((vector_size (16)));
 
-std::uint64_t
-reciprocal_of (std::int32_t step)
+Components
+rounded (Components difference, Components half_steps, Floats reciprocals)
 {
-  return (std::uint64_t{1} << kReciprocalBits) / static_cast<std::uint64_t> (step) + 1;
+  const Components sign = difference >> 31;
+  const Components size = (difference ^ sign) - sign + half_steps;
+  const Floats quotient = (__builtin_convertvector(size, Floats) + 0.5f) * reciprocals;
+  return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
 }
 
-std::int32_t
-rounded (std::int32_t difference, std::int32_t step, std::uint64_t reciprocal)
-{
-  const auto size = static_cast<std::uint64_t> (std::abs (difference) + step / 2);
-  const auto quotient = static_cast<std::int32_t> (size * reciprocal >> kReciprocalBits);
-  return difference < 0 ? -quotient : quotient;
-}
+/* What a copy of a neighbour, left or above, has. */
+constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
 
 /* Order of the exponential Golomb code that suits sizes of this mean. */
 std::uint8_t
-golomb_order (std::uint64_t sum, std::uint64_t count)
+golomb_order (std::int32_t sum, std::int32_t count)
 {
-  const std::uint64_t mean = count > 0 ? sum / count : 0;
+  const auto mean = static_cast<std::uint32_t> (sum / count);
   return static_cast<std::uint8_t> (std::min<int> (std::bit_width (mean + mean / 2), 15));
 }
 
@@ -114,26 +103,29 @@ steps_within (int depth_threshold, int colour_threshold)
 void
 CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_reference)
 {
-  const int d = settings.depth_threshold, c = settings.colour_threshold;
-  earlier_threshold_ = Lanes{d, c, c, c};
+  const auto bias = [] (int depth, int colour) {
+    return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
+  };
   /* Pixels to which later frame sets refer are made finer than need be: they can then be taken
    * again for longer. */
   const auto finer = [&] (int threshold) {
     return is_reference ? (3 * threshold + 2) / 4 : threshold;
   };
   settings_ = settings;
-  settings_.depth_threshold = finer (d);
-  settings_.colour_threshold = finer (c);
-  const int colour = settings_.colour_threshold;
-  threshold_ = Lanes{settings_.depth_threshold, colour, colour, colour};
-  steps_ = steps_within (settings_.depth_threshold, colour).components ();
-  for (std::size_t i = 0; i < kComponents; i++)
-    reciprocals_[i] = reciprocal_of (steps_[i]);
+  const int d = settings_.depth_threshold = finer (settings.depth_threshold);
+  const int c = settings_.colour_threshold = finer (settings.colour_threshold);
+  earlier_bias_ = bias (settings.depth_threshold, settings.colour_threshold);
+  earlier_threshold_ = Components{settings.depth_threshold, settings.colour_threshold,
+      settings.colour_threshold, settings.colour_threshold};
+  bias_ = bias (d, c);
+  steps_ = steps_within (d, c).components ();
+  half_steps_ = steps_ / 2;
+  reciprocals_ = 1.0f / __builtin_convertvector(steps_, Floats);
   const auto weight = [] (int threshold) {
     return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
   };
-  depth_weight_ = weight (settings_.depth_threshold);
-  colour_weight_ = weight (colour);
+  depth_weight_ = weight (d);
+  colour_weight_ = weight (c);
 }
 
 CompactResult
@@ -145,8 +137,8 @@ CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> b
   quantisers_ = &quantisers;
   header_ = header;
   result_ = {};
-  limits_ = {quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1};
   set_thresholds (settings, reference.now != nullptr);
+  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
 
   std::size_t delta_bytes = 0, delta_pixels = 0;
   for (const RowBand &band : bands) {
@@ -214,40 +206,69 @@ CompactEncoder::header_size () const
          !header_.key;
 }
 
+bool
+CompactEncoder::fits (std::size_t bytes) const
+{
+  return bytes + header_size () <= static_cast<std::size_t> (settings_.max_slice_size);
+}
+
 void
 CompactEncoder::resize (int columns)
 {
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
-  for (Row *row : {&row_, &upper_}) {
-    row->pixels.assign (n + 3, {});
-    row->colours.assign (n + 2, Lanes{kNoDepthCode, 0, 0, 0});
-    row->valid.assign (n, 0);
-    row->earlier.assign (n, 0);
-  }
-  own_.resize (std::max (own_.size (), n));
-  earlier_codes_.resize (std::max (earlier_codes_.size (), n));
-  earlier_colours_.resize (std::max (earlier_colours_.size (), n));
-  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) + kMostBytesOfPixel +
-                           kMostBytesOfRun * (n + 1);
+  row_.reset (n, kInvalidKey);
+  upper_.reset (n, kInvalidKey);
+  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  others_.resize (own_.size ());
+  earlier_codes_.resize (own_.size ());
+  earlier_keys_.resize (own_.size ());
+  runs_.reserve (n + 1);
+  /* A row is coded whole before anybody looks whether it fits. */
+  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
+                           (kMostBytesOfPixel + kMostBytesOfRun) * (n + 1);
   bytes_.resize (std::max (bytes_.size (), most));
 }
 
-void
+/* Quantises a row. */
+inline void
 CompactEncoder::load_row (const ConstRangeImage &image, int y)
 {
   const std::uint16_t *depth = image.depth.row (y) + header_.first_column;
   const Rgbx *colour = image.colour.row (y) + header_.first_column;
   const DepthQuantiser &d = quantisers_->depth;
   const ColourQuantiser &c = quantisers_->colour;
-  for (int x = 0; x < columns_; x++) {
-    const auto at = static_cast<std::size_t> (x);
-    const bool valid = d.valid (depth[x]);
-    row_.valid[at] = valid;
-    own_[at] = valid ? Lanes{d.code (depth[x]), c.code (colour[x].r), c.code (colour[x].g),
-                           c.code (colour[x].b)}
-                     : Lanes{kNoDepthCode, 0, 0, 0};
-  }
+  const auto columns = static_cast<std::size_t> (columns_);
+  PixelKey *const own = own_.data ();
+  std::uint8_t *const valid = row_.valid ().data ();
+  for (std::size_t x = 0; x < columns; x++)
+    valid[x] = d.valid (depth[x]);
+  for (std::size_t x = 0; x < columns; x++)
+    own[x] = d.code (depth[x]);
+  if (c.bits () < 8)
+    for (std::size_t x = 0; x < columns; x++)
+      own[x] |=
+          key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+  else
+    for (std::size_t x = 0; x < columns; x++) {
+      std::uint32_t rgbx = 0;
+      std::memcpy (&rgbx, colour + x, sizeof rgbx);
+      if constexpr (std::endian::native == std::endian::big)
+        rgbx = __builtin_bswap32 (rgbx);
+      own[x] |= key_of (0, rgbx);
+    }
+}
+
+void
+CompactEncoder::load_row_every (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
+}
+
+void
+CompactEncoder::load_row_v3 (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
 }
 
 /* Motion of the blocks that begin in row y, or go on there. They refer to rows of their band only,
@@ -259,13 +280,15 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   const int first_x = roi.x + header_.first_column, end_x = first_x + columns_;
   const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
   const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
+  const MotionSearch::Pictures pictures = {
+      image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
   BlockMotion near_by[2];
   for (std::size_t i = 0; i < motions_.size (); i++) {
     const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
     near_by[1] = motions_[i];
-    motions_[i] = search_.find (image, quantisers_->depth, quantisers_->colour, *reference_.before,
-        earlier_threshold_, {x, first_y, next - x, height, band_y, end_y}, near_by);
+    motions_[i] = search_.find (
+        pictures, earlier_threshold_, {x, first_y, next - x, height, band_y, end_y}, near_by);
     near_by[0] = motions_[i];
   }
 }
@@ -278,55 +301,83 @@ CompactEncoder::load_earlier (int y, const RowBand &band)
   const Roi &roi = header_.roi;
   const int band_y = roi.y + band.first_row;
   fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
-      limits_.last_depth, band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+      limits_.most[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+  std::uint8_t *const earlier = row_.earlier ().data ();
+  const std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++) {
-    row_.earlier[x] = 0;
-    if (!row_.valid[x] || earlier_codes_[x] == kNoPixel)
+    earlier[x] = 0;
+    if (!valid[x] || earlier_codes_[x] == kNoPixel)
       continue;
-    const Components c = components_of (earlier_codes_[x]);
-    const auto rgb = to_rgb (c, limits_.maximum);
-    earlier_colours_[x] = Lanes{c[0], rgb[0], rgb[1], rgb[2]};
-    row_.earlier[x] = are_near (own_[x], earlier_colours_[x], earlier_threshold_);
+    earlier_keys_[x] = key_of (to_rgb (components_of (earlier_codes_[x]), limits_));
+    earlier[x] = near_bits (own_[x], earlier_keys_[x], earlier_bias_) == kNearMask;
   }
 }
 
-/* Makes pixel x what the decoder will make of a prediction and a residual. @return that residual */
-Components
-CompactEncoder::make_full (std::size_t x, const Neighbours &n)
+/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
+inline void
+CompactEncoder::find_upper (std::size_t begin, std::size_t end)
 {
-  const Components expected = predict (n, last_, limits_.last_depth);
-  const Lanes own = own_[x];
-  const auto colour = to_luma_chroma (own[1], own[2], own[3]);
-  const Components wanted = {own[0], colour[0], colour[1], colour[2]};
-  Components residual;
-  for (std::size_t i = 0; i < kComponents; i++)
-    residual[i] = rounded (wanted[i] - expected[i], steps_[i], reciprocals_[i]);
-  const Components made = correct (expected, residual, steps_, limits_);
-  const auto rgb = to_rgb (made, limits_.maximum);
-  row_.pixels[x + 1] = {pack_components (made), Origin::kCorrected, activity_of (residual)};
-  row_.colours[x + 1] = Lanes{made[0], rgb[0], rgb[1], rgb[2]};
-  return residual;
+  /* Two keys, compared as four halves: every processor can do that. */
+  typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
+  typedef std::int32_t Halves __attribute__ ((vector_size (16)));
+  constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
+  const auto load = [] (const std::uint64_t *from) {
+    Keys keys;
+    std::memcpy (&keys, from, sizeof keys);
+    return keys;
+  };
+  const PixelKey *const upper = upper_.shown (), *const pixels = own_.data ();
+  std::uint64_t *const others = others_.data ();
+  const PixelKey bias = bias_;
+  for (std::size_t x = begin; x < end; x += step) {
+    const Keys own = load (pixels + x);
+    const auto first = [&] (const PixelKey *other, std::uint64_t choice, Keys next) {
+      const auto halves =
+          reinterpret_cast<Halves> (near_bits (own, load (other), bias) ^ kNearMask) == 0;
+      const auto both = halves & __builtin_shufflevector (halves, halves, 1, 0, 3, 2);
+      const auto mask = reinterpret_cast<Keys> (both);
+      return (mask & choice) | (~mask & next);
+    };
+    const Keys right = first (upper + x + 1, kTakeUpperRight, Keys{} + std::uint64_t{kPredict});
+    const Keys choice = first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
+    std::memcpy (others + x, &choice, sizeof choice);
+  }
+}
+
+/* What the decoder will make of a prediction and a residual. */
+inline CompactEncoder::FullPixel
+CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
+{
+  const Components expected = predict (n, last_, limits_.most);
+  const Components residual =
+      rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  const Components made = cut (expected + residual * steps_, limits_.least, limits_.most);
+  return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
 }
 
 /* The neighbour with the least sum of error and price, or kPredict if the pixel in full has less.
- * @param[out] residual  of the pixel in full, which make_full() made */
+ * @param[out] full  that */
 int
-CompactEncoder::best_choice (std::size_t x, const Neighbours &n, Components &residual)
+CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full)
 {
-  const Lanes own = own_[x];
-  const auto error = [&] (Lanes other) {
-    const Lanes d = own - other;
-    return depth_weight_ * float (d[0]) * float (d[0]) +
-           colour_weight_ * float (d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
+  const PixelKey own = own_[x];
+  const auto error = [&] (PixelKey other) {
+    const auto d = [&] (int at, int mask) {
+      return static_cast<std::int32_t> (own >> at & mask) -
+             static_cast<std::int32_t> (other >> at & mask);
+    };
+    const std::int32_t z = d (0, 0xffff), r = d (32, 0xff), g = d (18, 0xff), b = d (50, 0xff);
+    return depth_weight_ * float (z) * float (z) + colour_weight_ * float (r * r + g * g + b * b);
   };
-  residual = make_full (x, n);
+  full = make_full (own, n);
   int best = kPredict;
-  float least = error (row_.colours[x + 1]) + kPriceOfBit * bits_of (residual);
-  const PixelCode codes[] = {n.left.code, n.upper_left.code, n.upper.code, n.upper_right.code};
+  float least = error (full.key) + kPriceOfBit * bits_of (full.residual);
+  const PixelCode codes[] = {n.left.code, n.codes[-1], n.codes[0], n.codes[1]};
   for (std::size_t i = 0; i < 4; i++) {
-    const Lanes other = i == 0 ? row_.colours[x] : upper_.colours[x + i - 1];
+    const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
     /* Profile entropy cannot name one that equals an earlier one. */
-    if (!are_near (own, other, threshold_) || std::find (codes, codes + i, codes[i]) != codes + i)
+    if (near_bits (own, other, bias_) != kNearMask ||
+        std::find (codes, codes + i, codes[i]) != codes + i)
       continue;
     const float sum = error (other) + kPriceOfBit * kBitsOfChoice[i];
     if (sum < least) {
@@ -337,113 +388,124 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, Components &res
   return best;
 }
 
-/* Codes a pixel that no neighbour replaces. */
+/* Codes a pixel that no neighbour replaces. @return its state */
 template <class Code, bool Delta>
-void
-CompactEncoder::code_full (
-    Code &code, const Neighbours &n, std::size_t x, const Components &residual)
+inline PixelState
+CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
 {
-  const bool has_neighbour = n.any (), predicted = has_neighbour && residual == Components{};
+  const bool has_neighbour = n.any (), predicted = has_neighbour & is_zero (residual);
   result_.full_pixels++;
-  if (has_neighbour)
-    code.template choice<Delta> (n, predicted ? kPredict : kCorrect);
-  if (predicted) {
-    row_.pixels[x + 1] = {row_.pixels[x + 1].code, Origin::kPredicted};
-    return;
-  }
-  code.residual (n, has_neighbour, residual);
-  for (std::size_t i = 0; i < kComponents; i++) {
-    size_sums_[i] += static_cast<std::uint64_t> (std::max (std::abs (residual[i]) - 1, 0));
-    size_counts_[i] += residual[i] != 0;
-  }
+  code.template full<Delta> (n, has_neighbour, residual);
+  const Components size = residual < 0 ? -residual : residual;
+  size_sums_ += size + (size > 0);
+  size_counts_ -= size > 0;
+  return either (mask_of_zero (!predicted), state_of (Origin::kPredicted),
+      state_of (Origin::kCorrected, activity_of (residual)));
 }
 
-/* Codes a run of valid pixels. @return false if the slice has become too long
+/* Codes a run of valid pixels, behind an invalid one.
  *
  * What the loop needs of this object it holds in variables of its own, the code too: bytes are
  * written in it, and for all that the compiler knows any byte may be one of this object's. */
-template <class Code, bool Delta>
-bool
+template <class Code, bool Best, bool Delta>
+inline void
 CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
 {
-  const std::size_t limit = static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
-  CodedPixel *const pixels = row_.pixels.data () + 1;
-  const CodedPixel *const upper = upper_.pixels.data () + 1;
-  Lanes *const colours = row_.colours.data () + 1;
-  const Lanes *const upper_colours = upper_.colours.data () + 1;
-  const Lanes *const own = own_.data ();
-  const Lanes threshold = threshold_;
-  const bool best = settings_.best;
-  Neighbours n = {pixels[begin - 1], upper[begin - 1], upper[begin], upper[begin + 1]};
+  PixelCode *const codes = row_.codes ();
+  PixelState *const states = row_.states ();
+  PixelKey *const keys = row_.shown ();
+  const PixelCode *const upper_codes = upper_.codes ();
+  const PixelState *const upper_states = upper_.states ();
+  const PixelKey *const upper_keys = upper_.shown (), *const own = own_.data ();
+  const std::uint64_t *const others = others_.data ();
+  [[maybe_unused]] const std::uint8_t *const earlier = row_.earlier ().data ();
+  const PixelKey bias = bias_;
+  CodedPixel left;
+  PixelKey left_key = kInvalidKey;
   Code code = slice_code;
-  std::size_t x = begin;
-  for (; x < end && code.bound () <= limit; x++) {
+  if constexpr (!Best)
+    find_upper (begin, end);
+  for (std::size_t x = begin; x < end; x++) {
+    const Neighbours n = {left, upper_codes + x, upper_states + x};
     if constexpr (Delta) {
-      const bool earlier = row_.earlier[x];
       if constexpr (!Code::kEarlierInRuns)
-        (void)code.earlier (n, earlier);
-      if (earlier) {
-        colours[x] = earlier_colours_[x];
-        pixels[x] = CodedPixel::copy (earlier_codes_[x], kTakeEarlier);
-        n.move (pixels[x], upper[x + 2]);
+        (void)code.earlier (n, earlier[x]);
+      if (earlier[x]) {
+        codes[x] = left.code = earlier_codes_[x];
+        states[x] = left.state = copy_state (kTakeEarlier);
+        keys[x] = left_key = earlier_keys_[x];
         continue;
       }
     }
-    Components residual;
-    const int chosen = best ? best_choice (x, Neighbours (n), residual)
-                            : first_near (own[x], colours[x - 1], upper_colours + x, threshold);
-    if (chosen == kTakeLeft) {
-      code.template choice<Delta> (n, chosen);
-      colours[x] = colours[x - 1];
-      pixels[x] =
-          Delta ? CodedPixel::copy (n.left.code, chosen) : CodedPixel (n.left.code, Origin::kLeft);
-    } else if (chosen != kPredict) {
-      code.template choice<Delta> (n, chosen);
-      const std::size_t from = x + static_cast<std::size_t> (chosen) - kTakeUpper;
-      colours[x] = upper_colours[from];
-      pixels[x] = Delta ? CodedPixel::copy (upper[from].code, chosen)
-                        : CodedPixel (upper[from].code, Origin::kUpper);
+    FullPixel full;
+    std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
+    if constexpr (Best) {
+      other = static_cast<std::uint64_t> (best_choice (x, n, full));
+      take_left = mask_of_zero (other);
     } else {
-      Code copy = code;
-      const Neighbours near = n;
-      code_full<Code, Delta> (copy, near, x, best ? Components (residual) : make_full (x, near));
-      code = copy;
+      take_left = mask_of_zero (near_bits (own[x], left_key, bias) ^ kNearMask);
+      other = others[x];
     }
-    n.move (pixels[x], upper[x + 2]);
+    const std::uint64_t chosen = either (take_left, kTakeLeft, other);
+    if (chosen != kPredict) [[likely]] {
+      code.template choice<Delta> (n, static_cast<int> (chosen));
+      const std::size_t from = x + other - kTakeUpper;
+      left_key = either (take_left, left_key, upper_keys[from]);
+      left = {either (take_left, left.code, upper_codes[from]),
+          Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
+    } else {
+      if constexpr (!Best)
+        full = make_full (own[x], n);
+      left.state = code_full<Code, Delta> (code, n, full.residual);
+      left.code = full.code;
+      left_key = full.key;
+    }
+    codes[x] = left.code;
+    states[x] = left.state;
+    keys[x] = left_key;
   }
-  last_ = n.left.code;
+  last_ = left.code;
   slice_code = code;
-  return code.bound () <= limit;
 }
 
-/* Codes which pixels of the row are valid. */
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_every (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best, Delta> (code, begin, end);
+}
+
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_v3 (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best, Delta> (code, begin, end);
+}
+
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_here (Code &code, std::size_t begin, std::size_t end)
+{
+  if (has_v3_)
+    code_run_v3<Code, Best, Delta> (code, begin, end);
+  else
+    code_run_every<Code, Best, Delta> (code, begin, end);
+}
+
+/* Codes which pixels of the row are valid, and finds where its runs end. */
 template <class Code>
 void
 CompactEncoder::code_runs (Code &code)
 {
-  const auto columns = static_cast<std::size_t> (columns_);
-  const std::span<const std::uint8_t> valid (row_.valid.data (), columns),
-      upper (upper_.valid.data (), columns);
+  const std::vector<std::uint8_t> &valid = row_.valid (), &upper = upper_.valid ();
+  runs_.clear ();
   bool now = false;
   for (int x = 0; x < columns_; now = !now) {
     const int end = run_end (valid, x, now);
     code.run (now, end - run_end (upper, x, now));
+    result_.points += now ? static_cast<std::uint64_t> (end - x) : 0;
+    runs_.push_back (end);
     x = end;
-  }
-}
-
-/* Codes which pixels of a run of valid ones equal those of the earlier frame set. */
-template <class Code>
-void
-CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t end)
-{
-  const std::span<const std::uint8_t> own (row_.earlier.data (), end),
-      upper (upper_.earlier.data (), end);
-  bool now = false;
-  for (auto x = static_cast<int> (begin); x < static_cast<int> (end); now = !now) {
-    const int to = run_end (own, x, now);
-    code.earlier_run (to - run_end (upper, x, now));
-    x = to;
   }
 }
 
@@ -458,51 +520,61 @@ CompactEncoder::code_motions (Code &code)
   }
 }
 
+/* Codes which pixels of a run of valid ones equal those of the earlier frame set. */
+template <class Code>
+void
+CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t end)
+{
+  const std::span<const std::uint8_t> own (row_.earlier ().data (), end),
+      upper (upper_.earlier ().data (), end);
+  bool now = false;
+  for (auto x = static_cast<int> (begin); x < static_cast<int> (end); now = !now) {
+    const int to = run_end (own, x, now);
+    code.earlier_run (to - run_end (upper, x, now));
+    x = to;
+  }
+}
+
 /* @return false if the slice has become too long; the row is then to be coded again */
 template <class Code, bool Delta>
 bool
-CompactEncoder::code_row (Code &slice_code, bool begins_block)
+CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
 {
   if constexpr (Delta)
     if (begins_block)
       code_motions (slice_code);
   code_runs (slice_code);
-  const auto columns = static_cast<std::size_t> (columns_);
-  const std::span<const std::uint8_t> valid (row_.valid.data (), columns);
-  bool now = false;
-  for (int x = 0; x < columns_; now = !now) {
-    const int end = run_end (valid, x, now);
-    const auto first = static_cast<std::size_t> (x), behind = static_cast<std::size_t> (end);
-    if (!now) {
-      std::fill (&row_.pixels[first + 1], &row_.pixels[behind + 1], CodedPixel{});
-      std::fill (&row_.colours[first + 1], &row_.colours[behind + 1], Lanes{kNoDepthCode, 0, 0, 0});
-    } else {
-      if constexpr (Delta && Code::kEarlierInRuns)
-        code_earlier_runs (slice_code, first, behind);
-      if (!code_run<Code, Delta> (slice_code, first, behind))
-        return false;
-    }
-    x = end;
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if constexpr (Delta && Code::kEarlierInRuns)
+      if (valid)
+        code_earlier_runs (slice_code, begin, end);
+    if (!valid)
+      row_.invalidate (begin, end, kInvalidKey);
+    else if (settings_.best)
+      code_run_here<Code, true, Delta> (slice_code, begin, end);
+    else
+      code_run_here<Code, false, Delta> (slice_code, begin, end);
+    begin = end;
+    valid = !valid;
   }
-  return slice_code.bound () <=
-         static_cast<std::size_t> (settings_.max_slice_size) - header_size ();
+  return fits (slice_code.bound ());
 }
 
 template <class Code, bool Delta>
 Code
 CompactEncoder::begin_slice (int first_row)
 {
-  for (std::size_t i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
+  for (int i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
     if (size_counts_[i] > 0)
-      orders_[i] = golomb_order (size_sums_[i], size_counts_[i]);
-  size_sums_ = size_counts_ = {};
+      orders_[static_cast<std::size_t> (i)] = golomb_order (size_sums_[i], size_counts_[i]);
+  size_sums_ = size_counts_ = Components{};
   header_.first_row = first_row;
   header_.rows = 0;
-  last_ = pack_components ({limits_.last_depth / 2, limits_.maximum / 2, 0, 0});
-  std::ranges::fill (upper_.pixels, CodedPixel{});
-  std::ranges::fill (upper_.colours, Lanes{kNoDepthCode, 0, 0, 0});
-  std::ranges::fill (upper_.valid, std::uint8_t{0});
-  std::ranges::fill (upper_.earlier, std::uint8_t{0});
+  last_ = first_expected (limits_);
+  upper_.reset (static_cast<std::size_t> (columns_), kInvalidKey);
   return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel, orders_);
 }
 
@@ -528,6 +600,30 @@ CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
   result_.delta_slices += !header_.key;
 }
 
+/* Makes a row ready to be coded. */
+template <bool Delta>
+void
+CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
+{
+  if (has_v3_)
+    load_row_v3 (image, y);
+  else
+    load_row_every (image, y);
+  if constexpr (Delta) {
+    if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
+      find_motions (image, y, band);
+    load_earlier (y, band);
+  }
+}
+
+/* Keeps a coded row for later frame sets to refer to. */
+void
+CompactEncoder::keep_row (int y)
+{
+  if (reference_.now)
+    std::copy_n (row_.codes (), columns_, reference_.now->row (y) + header_.first_column);
+}
+
 /* Codes all rows of a band in the columns that the header says.
  * @return false if one row alone is longer than a slice may be */
 template <class Code, bool Delta>
@@ -538,33 +634,27 @@ CompactEncoder::code_piece (
   resize (header_.columns);
   motions_.assign (
       motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
-  size_sums_ = size_counts_ = {};
+  size_sums_ = size_counts_ = Components{};
   Code code = begin_slice<Code, Delta> (band.first_row);
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
-    load_row (image, y);
-    const bool begins_block = (header_.roi.y + y) % kMotionBlock == 0;
-    if constexpr (Delta) {
-      if (begins_block || y == band.first_row)
-        find_motions (image, y, band);
-      load_earlier (y, band);
-    }
+    load<Delta> (image, y, band);
     const CompactResult result = result_;
+    const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
     model_before_ = model_;
-    if (!code_row<Code, Delta> (code, begins_block || header_.rows == 0)) {
+    const bool begins_block = header_.rows == 0 || (header_.roi.y + y) % kMotionBlock == 0;
+    if (!code_row<Code, Delta> (code, begins_block)) {
       if (header_.rows == 0)
         return false;
       result_ = result;
+      size_sums_ = sums;
+      size_counts_ = counts;
       close_slice (before, to);
       code = begin_slice<Code, Delta> (y);
       if (!code_row<Code, Delta> (code, true))
         return false;
     }
-    if (reference_.now) {
-      std::uint64_t *kept = reference_.now->row (y) + header_.first_column;
-      for (int x = 0; x < columns_; x++)
-        kept[x] = row_.pixels[static_cast<std::size_t> (x) + 1].code;
-    }
+    keep_row (y);
     header_.rows++;
     std::swap (row_, upper_);
   }

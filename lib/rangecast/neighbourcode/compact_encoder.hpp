@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "compact_row.hpp"
 #include "entropy_code.hpp"
-#include "pixel_lanes.hpp"
+#include "isa.hpp"
+#include "pixel_key.hpp"
 #include "refresh.hpp"
 
 namespace rangecast {
@@ -21,6 +24,7 @@ struct CompactSettings {
 struct CompactResult {
   std::uint64_t slices = 0;
   std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
+  std::uint64_t points = 0;       ///< valid pixels
   std::uint64_t full_pixels = 0;  ///< those without a neighbour that is near enough
 };
 
@@ -47,61 +51,78 @@ public:
       const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
 
 private:
+  typedef float Reciprocals __attribute__ ((vector_size (16)));
+  /* What a pixel becomes that no neighbour replaces. */
+  struct FullPixel {
+    Components residual;
+    PixelCode code;
+    PixelKey key;
+  };
+
   void set_thresholds (const CompactSettings &settings, bool is_reference);
   void code_band (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   [[nodiscard]] int pieces_of (const RowBand &band, int width) const;
   template <class Code, bool Delta>
   bool code_piece (
       const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  template <bool Delta> void load (const ConstRangeImage &image, int y, const RowBand &band);
   template <class Code, bool Delta> bool code_row (Code &slice_code, bool begins_block);
   template <class Code> void code_runs (Code &code);
+  template <class Code> void code_motions (Code &code);
   template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[RANGECAST_EVERY_CPU]] void code_run_every (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[RANGECAST_X86_64_V3]] void code_run_v3 (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  void code_run_here (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Delta>
-  bool code_run (Code &slice_code, std::size_t begin, std::size_t end);
-  template <class Code, bool Delta>
-  void code_full (Code &code, const Neighbours &n, std::size_t x, const Components &residual);
+  [[gnu::always_inline]] PixelState code_full (
+      Code &code, const Neighbours &n, Components residual);
   template <class Code, bool Delta> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int best_choice (std::size_t x, const Neighbours &n, Components &residual);
-  Components make_full (std::size_t x, const Neighbours &n);
-  void load_row (const ConstRangeImage &image, int y);
+  int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
+  [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
+  [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
+  [[RANGECAST_EVERY_CPU]] void load_row_every (const ConstRangeImage &image, int y);
+  [[RANGECAST_X86_64_V3]] void load_row_v3 (const ConstRangeImage &image, int y);
+  [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
   void load_earlier (int y, const RowBand &band);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
-  template <class Code> void code_motions (Code &code);
+  void keep_row (int y);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
+  [[nodiscard]] bool fits (std::size_t bytes) const;
 
+  const bool has_v3_ = has_x86_64_v3 ();
   CompactSettings settings_{};
-  CodingReference reference_;
-  double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
   const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
   SliceHeader header_;
   CompactResult result_;
-  Components steps_{};
-  std::array<std::uint64_t, kComponents> reciprocals_{};
-  Limits limits_{};
-  Lanes threshold_{}, earlier_threshold_{};
+  Components steps_{}, half_steps_{};
+  Reciprocals reciprocals_{};
+  Limits limits_;
+  PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
+  Components earlier_threshold_{};
+  CodingReference reference_;
+  double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
   float depth_weight_ = 0, colour_weight_ = 0;
 
-  /* One invalid pixel before and one behind the row, which `pixels` and `colours` count; pixels one
-   * more, because Neighbours look ahead. */
-  struct Row {
-    std::vector<CodedPixel> pixels;
-    std::vector<Lanes> colours; /* depth, R, G, B as decoded */
-    std::vector<std::uint8_t> valid;
-    std::vector<std::uint8_t> earlier; /* pixels that equal those of the earlier frame set */
-  };
-  Row row_, upper_;
+  CompactRow row_, upper_;
+  std::vector<PixelKey> own_;            /* the row as it is to be coded */
+  std::vector<std::uint64_t> others_;    /* for each pixel, the first of those above that is near */
   std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
-  std::vector<Lanes> earlier_colours_;
+  std::vector<PixelKey> earlier_keys_;
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
   MotionSearch search_;
-  std::vector<Lanes> own_; /* the row as it is to be coded */
   PixelCode last_ = kNoPixel;
   int columns_ = 0;
+  std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{}, model_before_{};
-  std::vector<std::uint8_t> bytes_; /* of the open slice, behind its header */
-  std::array<std::uint64_t, kComponents> size_sums_{}, size_counts_{}; /* of its residuals */
+  std::vector<std::uint8_t> bytes_;        /* of the open slice, behind its header */
+  Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};
 };
 

@@ -82,6 +82,7 @@ ViewEncoder::encode_compact (const ConstRangeImage &image, SliceHeader header,
   result.slices += done.slices;
   result.delta_slices += done.delta_slices;
   result.full_pixels += done.full_pixels;
+  add_points (done.points, image.roi, result);
 }
 
 Status
@@ -123,21 +124,8 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
     add_points (done.points, roi, result);
   } else {
     encode_compact (image, header, to, result);
-    add_points (count_points (image), roi, result);
   }
   return {};
-}
-
-std::uint64_t
-ViewEncoder::count_points (const ConstRangeImage &image) const
-{
-  std::uint64_t points = 0;
-  for (int y = 0; y < image.roi.height; y++) {
-    const std::uint16_t *row = image.depth.row (y);
-    for (int x = 0; x < image.roi.width; x++)
-      points += depth_.valid (row[x]);
-  }
-  return points;
 }
 
 void

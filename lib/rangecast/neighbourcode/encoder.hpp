@@ -80,7 +80,6 @@ private:
   CodingReference plan_references (SliceHeader &header);
   void encode_compact (const ConstRangeImage &image, SliceHeader header,
       std::vector<std::uint8_t> &to, EncoderResult &result);
-  [[nodiscard]] std::uint64_t count_points (const ConstRangeImage &image) const;
   void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
 
   View view_;

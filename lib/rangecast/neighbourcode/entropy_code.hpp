@@ -67,12 +67,12 @@ public:
     return true;
   }
 
-  /** Whether a valid pixel equals the same one of the earlier frame set. */
+  /** Whether a valid pixel equals one of the earlier frame set. */
   bool earlier (const Neighbours &n, bool yes)
   {
-    const auto of = [] (const CodedPixel &p) { return p.valid () + p.took (kTakeEarlier); };
-    const int at = of (n.left) + 3 * of (n.upper) + 9 * n.upper_right.took (kTakeEarlier) +
-                   18 * n.upper_left.took (kTakeEarlier);
+    const auto of = [] (PixelState s) { return (s != 0) + took (s, kTakeEarlier); };
+    const int at = of (n.left.state) + 3 * of (n.states[0]) + 9 * took (n.states[1], kTakeEarlier) +
+                   18 * took (n.states[-1], kTakeEarlier);
     return code (context::kEarlier + at, yes);
   }
 
@@ -82,23 +82,21 @@ public:
   template <bool Delta> int choice (const Neighbours &n, int chosen)
   {
     if (n.left.valid ()) {
-      const int at =
-          context::kLeft + n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ();
-      if (code (at, chosen == kTakeLeft))
+      if (code (context::kLeft + static_cast<int> (n.kinds ()), chosen == kTakeLeft))
         return kTakeLeft;
     }
-    const int other = other_choice (n, chosen, Delta ? known_equals (n) : equals (n));
+    const int other = other_choice (n, chosen, Delta ? known_candidates (n) : candidates (n));
     if (other != kPredict)
       return other;
-    const int at = context::kPredicted + n.left.origin () + 5 * n.upper.origin ();
+    const int at = context::kPredicted + n.left.origin () + 5 * n.upper ().origin ();
     return code (at, chosen == kPredict) ? kPredict : kCorrect;
   }
 
   /** @return false for a residual that is too large */
-  bool residual (const Neighbours &n, bool has_neighbour, Components &r)
+  [[gnu::always_inline]] bool residual (const Neighbours &n, bool has_neighbour, Components &r)
   {
-    const Activity sums = n.left.activity () + n.upper.activity () + n.upper_right.activity ();
-    const bool alone = !n.left.valid () || !n.upper.valid ();
+    const Activity sums = n.activities ();
+    const bool alone = !n.left.valid () || !n.upper ().valid ();
     bool previous = false;
     for (int i = 0; i < kComponents; i++) {
       const int surroundings = !has_neighbour ? 5
@@ -106,9 +104,11 @@ public:
                                               : kActivityClass[sums >> 8 * i & 0xff];
       const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
       const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
-      if (!number (zero, size, r[i]))
+      std::int32_t value = r[i];
+      if (!number (zero, size, value))
         return false;
-      previous = r[i] != 0;
+      r[i] = value;
+      previous = value != 0;
     }
     return true;
   }
@@ -116,29 +116,32 @@ public:
 private:
   bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
 
-  /* Which of the three above equal a neighbour before them: nobody needs to choose them. */
-  struct Equals {
-    bool upper_left, upper, upper_right;
+  /* Which of the three above are valid and do not equal a neighbour before them, which would have
+   * been chosen. */
+  struct Candidates {
+    bool is[3];
   };
-  static Equals equals (const Neighbours &n)
+  static Candidates candidates (const Neighbours &n)
   {
-    const PixelCode l = n.left.code, ul = n.upper_left.code, u = n.upper.code,
-                    ur = n.upper_right.code;
-    return {ul == l, u == l || u == ul, ur == l || ur == ul || ur == u};
+    const PixelCode l = n.left.code, ul = n.codes[-1], u = n.codes[0], ur = n.codes[1];
+    return {{static_cast<bool> (n.upper_left ().valid () & (ul != l)),
+        static_cast<bool> (n.upper ().valid () & (u != l) & (u != ul)),
+        static_cast<bool> (n.upper_right ().valid () & (ur != l) & (ur != ul) & (ur != u))}};
   }
-  /* As far as their choices tell. */
-  static Equals known_equals (const Neighbours &n)
+  /* The same as far as their choices tell. */
+  static Candidates known_candidates (const Neighbours &n)
   {
-    return {n.left.took (kTakeUpper), n.upper.took (kTakeLeft) || n.left.took (kTakeUpperRight),
-        n.upper_right.took (kTakeLeft)};
+    const PixelState l = n.left.state, u = n.states[0], ur = n.states[1];
+    return {{n.upper_left ().valid () && !took (l, kTakeUpper),
+        n.upper ().valid () && !took (u, kTakeLeft) && !took (l, kTakeUpperRight),
+        n.upper_right ().valid () && !took (ur, kTakeLeft)}};
   }
 
   /* One of the three above, or kPredict for none of them. */
-  int other_choice (const Neighbours &n, int chosen, const Equals &equal)
+  int other_choice (const Neighbours &n, int chosen, const Candidates &candidates)
   {
-    const bool candidate[] = {n.upper_left.valid () && !equal.upper_left,
-        n.upper.valid () && !equal.upper, n.upper_right.valid () && !equal.upper_right};
-    const int full = 2 * (n.left.kind () == 3) + (n.upper.kind () == 3);
+    const bool *const candidate = candidates.is;
+    const int full = 2 * (n.left.kind () == 3) + (n.upper ().kind () == 3);
     for (int i = 0; i < 3; i++) {
       if (!candidate[i])
         continue;

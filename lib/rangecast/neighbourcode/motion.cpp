@@ -45,18 +45,19 @@ MotionSearch::forget ()
 
 /* Every other pixel of every other row, or all of narrow blocks. */
 void
-MotionSearch::take_samples (const ConstRangeImage &image, const DepthQuantiser &depth,
-    const ColourQuantiser &colour, const Area &area)
+MotionSearch::take_samples (const Pictures &pictures, const Area &area)
 {
+  const ConstRangeImage &image = pictures.image;
+  const ColourQuantiser &colour = pictures.colour;
   samples_.clear ();
   const int step = area.width >= 8 && area.height >= 8 ? 2 : 1;
   for (int y = area.y; y < area.y + area.height; y += step) {
     const std::uint16_t *z = image.depth.row (y - image.roi.y) - image.roi.x;
     const Rgbx *c = image.colour.row (y - image.roi.y) - image.roi.x;
     for (int x = area.x; x < area.x + area.width; x += step)
-      if (depth.valid (z[x])) {
-        const Lanes own = {
-            depth.code (z[x]), colour.code (c[x].r), colour.code (c[x].g), colour.code (c[x].b)};
+      if (pictures.depth.valid (z[x])) {
+        const Components own = {pictures.depth.code (z[x]), colour.code (c[x].r),
+            colour.code (c[x].g), colour.code (c[x].b)};
         samples_.push_back ({own, x, y});
       }
   }
@@ -65,24 +66,22 @@ MotionSearch::take_samples (const ConstRangeImage &image, const DepthQuantiser &
 /* The best dz of one displacement is the middle one of the differences. */
 MotionSearch::Match
 MotionSearch::match (
-    const ReferencePlane &before, Lanes threshold, const Area &area, int dx, int dy)
+    const Pictures &pictures, Components threshold, const Area &area, int dx, int dy)
 {
   Match found = {{dx, dy, 0}, 0};
   if (std::abs (dx) > kMaxMotion || std::abs (dy) > kMaxMotion)
     return found;
   differences_.clear ();
-  Lanes colours = threshold;
-  colours[0] = 1 << 20;
   for (const Sample &s : samples_) {
     const PixelCode code = s.y + dy >= area.first_y && s.y + dy < area.end_y
-                               ? before.at (s.x + dx, s.y + dy)
+                               ? pictures.before.at (s.x + dx, s.y + dy)
                                : kNoPixel;
     if (code == kNoPixel)
       continue;
-    const Components c = components_of (code);
-    const auto rgb = to_rgb (c, 255);
-    if (are_near (s.own, Lanes{c[0], rgb[0], rgb[1], rgb[2]}, colours))
-      differences_.push_back (s.own[0] - c[0]);
+    const Components difference = s.own - to_rgb (components_of (code), pictures.limits);
+    const Components beyond = (difference > threshold) | (difference < -threshold);
+    if (is_zero (beyond & Components{0, -1, -1, -1}))
+      differences_.push_back (difference[0]);
   }
   if (differences_.empty ())
     return found;
@@ -100,18 +99,17 @@ MotionSearch::match (
 }
 
 BlockMotion
-MotionSearch::find (const ConstRangeImage &image, const DepthQuantiser &depth,
-    const ColourQuantiser &colour, const ReferencePlane &before, Lanes threshold, const Area &area,
+MotionSearch::find (const Pictures &pictures, Components threshold, const Area &area,
     std::span<const BlockMotion> near_by)
 {
   const std::size_t index =
       static_cast<std::size_t> (area.y / kMotionBlock) * static_cast<std::size_t> (across_) +
       static_cast<std::size_t> (area.x / kMotionBlock);
-  take_samples (image, depth, colour, area);
-  Match best = match (before, threshold, area, 0, 0);
+  take_samples (pictures, area);
+  Match best = match (pictures, threshold, area, 0, 0);
   const auto all = static_cast<int> (samples_.size ());
   const auto attempt = [&] (int dx, int dy) {
-    const Match other = match (before, threshold, area, dx, dy);
+    const Match other = match (pictures, threshold, area, dx, dy);
     if (other.hits <= best.hits + all / 32) /* a motion of its own costs bits */
       return false;
     best = other;

@@ -7,7 +7,6 @@
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
 #include "coded_pixel.hpp"
-#include "pixel_lanes.hpp"
 
 namespace rangecast {
 
@@ -63,24 +62,30 @@ public:
   void resize (int width, int height);
   void forget ();
 
-  /** @param before  with pixels as this profile has them
+  struct Pictures { ///< what to find motion between
+    const ConstRangeImage &image;
+    const DepthQuantiser &depth;
+    const ColourQuantiser &colour;
+    const ReferencePlane &before; ///< with pixels as these profiles have them
+    const Limits &limits;
+  };
+
+  /** @param threshold  of depth, R, G, B, codes
    *  @param near_by  motions that are likely: of neighbouring blocks */
-  BlockMotion find (const ConstRangeImage &image, const DepthQuantiser &depth,
-      const ColourQuantiser &colour, const ReferencePlane &before, Lanes threshold,
-      const Area &area, std::span<const BlockMotion> near_by);
+  BlockMotion find (const Pictures &pictures, Components threshold, const Area &area,
+      std::span<const BlockMotion> near_by);
 
 private:
   struct Sample {
-    Lanes own;
+    Components own; /* depth, R, G, B */
     int x, y;
   };
   struct Match {
     BlockMotion motion;
     int hits = -1;
   };
-  void take_samples (const ConstRangeImage &image, const DepthQuantiser &depth,
-      const ColourQuantiser &colour, const Area &area);
-  Match match (const ReferencePlane &before, Lanes threshold, const Area &area, int dx, int dy);
+  void take_samples (const Pictures &pictures, const Area &area);
+  Match match (const Pictures &pictures, Components threshold, const Area &area, int dx, int dy);
 
   std::vector<BlockMotion> last_; /* of each block, when it was last found */
   int across_ = 0;

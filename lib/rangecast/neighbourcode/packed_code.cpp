@@ -28,12 +28,35 @@ template <std::size_t N, std::size_t Size>
 void
 invert (const std::array<PrefixCode, N> &codes, std::array<PackedTables::Entry, Size> &table)
 {
-  table = {};
+  table.fill ({});
   for (std::size_t symbol = 0; symbol < N; symbol++)
     if (codes[symbol].length > 0)
       for (std::size_t i = codes[symbol].bits; i < Size;
            i += std::size_t{1} << codes[symbol].length)
         table[i] = {static_cast<std::uint8_t> (symbol), codes[symbol].length};
+}
+
+/* Sign and size of residuals, as PackedWriter::long_residual() writes them. */
+void
+build_quick (PackedTables &tables, std::size_t order)
+{
+  auto &codes = tables.quick[order];
+  auto &entries = tables.quick_of[order];
+  codes[kMaxQuickSize] = {0, 0};
+  for (std::uint32_t size = 1; size <= (1u << kQuickBits); size++) {
+    const GolombCode code (size - 1, static_cast<int> (order));
+    const int length = code.length + 1;
+    for (std::uint32_t sign = 0; sign < 2; sign++) {
+      const auto residual = static_cast<std::int32_t> (sign ? -size : size);
+      const std::uint64_t bits = code.bits << 1 | sign;
+      if (size <= kMaxQuickSize)
+        codes[static_cast<std::size_t> (residual + kMaxQuickSize)] = {
+            static_cast<std::uint32_t> (bits), static_cast<std::uint32_t> (length)};
+      if (length <= kQuickBits)
+        for (std::uint64_t i = bits; i < entries.size (); i += std::uint64_t{1} << length)
+          entries[i] = {static_cast<std::int16_t> (residual), static_cast<std::uint16_t> (length)};
+    }
+  }
 }
 
 PackedTables
@@ -48,6 +71,8 @@ build ()
     tables.pattern[i] = codes_of (kPatternLengths[i]);
     invert (tables.pattern[i], tables.pattern_of[i]);
   }
+  for (std::size_t order = 0; order < tables.quick.size (); order++)
+    build_quick (tables, order);
   return tables;
 }
 

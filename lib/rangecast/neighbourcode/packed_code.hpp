@@ -30,24 +30,51 @@ struct PrefixCode {
   std::uint8_t length = 0;
 };
 
+/** The exponential Golomb code of a number below 2^kMaxGolombBits. */
+struct GolombCode {
+  std::uint64_t bits;
+  int length;
+
+  constexpr GolombCode (std::uint32_t value, int order)
+  {
+    const std::uint64_t upper = (value >> order) + 1;
+    const int width = std::bit_width (upper) - 1;
+    const std::uint64_t top = std::uint64_t{1} << width;
+    const std::uint64_t low = value & ((std::uint64_t{1} << order) - 1);
+    bits = top | (upper ^ top) << (width + 1) | low << (2 * width + 1);
+    length = 2 * width + 1 + order;
+  }
+};
+
+/** What bits say that are no code. */
+inline constexpr int kNoSymbol = 16;
+
+/** Small residuals and their signs have tables of their own. */
+inline constexpr int kMaxQuickSize = 31, kQuickBits = 9;
+
 /** Codes and the tables that read them, built once from the lengths. */
 struct PackedTables {
+  /** Sign and size of a residual; no bits for 0. */
+  struct QuickCode {
+    std::uint32_t bits : 24, length : 8;
+  };
+  /** A residual that is known from the next kQuickBits bits; length 0: it is not. */
+  struct QuickEntry {
+    std::int16_t residual = 0;
+    std::uint16_t length = 0;
+  };
   struct Entry {
-    std::uint8_t symbol = 0, length = 0; /* length 0: no such code */
+    std::uint8_t symbol = kNoSymbol, length = 1;
   };
   std::array<std::array<PrefixCode, kChoices>, kPackedContexts> choice;
   std::array<std::array<PrefixCode, 16>, 2> pattern;
   std::array<std::array<Entry, 1 << kMaxChoiceBits>, kPackedContexts> choice_of;
   std::array<std::array<Entry, 1 << kMaxPatternBits>, 2> pattern_of;
+  /* For each order. */
+  std::array<std::array<QuickCode, 2 * kMaxQuickSize + 1>, 16> quick;
+  std::array<std::array<QuickEntry, 1 << kQuickBits>, 16> quick_of;
 };
 const PackedTables &packed_tables ();
-
-constexpr std::size_t
-packed_context (const Neighbours &n)
-{
-  return static_cast<std::size_t> (
-      n.left.kind () + 4 * n.upper.kind () + 16 * n.upper_right.kind ());
-}
 
 constexpr std::uint32_t
 zigzag (std::int32_t v)
@@ -65,6 +92,7 @@ unzigzag (std::uint32_t v)
 class PackedWriter {
 public:
   static constexpr bool kEarlierInRuns = true;
+
   PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const GolombOrders &orders)
       : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
   {
@@ -72,6 +100,8 @@ public:
 
   /** By how much a run ends later than the one above. */
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
+  /** The same for runs of pixels that equal those of the earlier frame set, or do not. */
+  void earlier_run (std::int32_t later) { golomb (zigzag (later), kEarlierRunOrder); }
   /** Of a block, from what it is expected to be. */
   void motion (const BlockMotion &expected, const BlockMotion &m)
   {
@@ -82,65 +112,106 @@ public:
     golomb (zigzag (m.dy - expected.dy), 0);
     golomb (zigzag (m.dz - expected.dz), kMotionDepthOrder);
   }
-  /** The same for runs of pixels that equal those of the earlier frame set, or do not. */
-  void earlier_run (std::int32_t later) { golomb (zigzag (later), kEarlierRunOrder); }
-  template <bool> void choice (const Neighbours &n, int chosen)
+  template <bool Delta> [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
-    put (tables_->choice[packed_context (n)][static_cast<std::size_t> (chosen)]);
+    put (tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)]);
   }
-  void residual (const Neighbours &, bool has_neighbour, const Components &r)
+  /** A pixel that equals no neighbour; its residual may be 0 if there is a neighbour. */
+  template <bool Delta>
+  [[gnu::always_inline]] void full (const Neighbours &n, bool has_neighbour, Components r)
   {
-    const unsigned pattern = (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3;
-    put (tables_->pattern[!has_neighbour][pattern]);
-    for (std::size_t i = 0; i < kComponents; i++)
-      if (r[i]) {
-        put (r[i] < 0, 1);
-        golomb (static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[i]);
-      }
+    const Components sizes = r < 0 ? -r : r;
+    const auto pattern = static_cast<std::size_t> (
+        (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
+    std::uint64_t bits = 0;
+    int length = 0;
+    const auto add = [&] (std::uint64_t more, int count) {
+      bits |= more << length;
+      length += count;
+    };
+    if (has_neighbour) [[likely]] {
+      const PrefixCode choice = tables_->choice[n.kinds ()][pattern == 0 ? kPredict : kCorrect];
+      add (choice.bits, choice.length);
+    }
+    const PrefixCode code = tables_->pattern[!has_neighbour][pattern]; /* none for 0 */
+    add (code.bits, code.length);
+    if (!is_zero (sizes > kMaxQuickSize)) [[unlikely]] {
+      put (bits, length);
+      long_residual (r, static_cast<unsigned> (pattern));
+      return;
+    }
+    const auto quick = [&] (int i) {
+      const auto code = tables_->quick[orders_[static_cast<std::size_t> (i)]]
+                                      [static_cast<std::size_t> (r[i] + kMaxQuickSize)];
+      add (code.bits, code.length);
+    };
+    quick (0);
+    quick (1);
+    put (bits, length);
+    bits = 0;
+    length = 0;
+    quick (2);
+    quick (3);
+    put (bits, length);
   }
-  [[nodiscard]] std::size_t bound () const { return static_cast<std::size_t> (to_ - begin_) + 8; }
+  /** The bytes that finish() comes to. */
+  [[nodiscard]] std::size_t bound () const
+  {
+    return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
+  }
   std::size_t finish ()
   {
-    for (; count_ > 0; count_ -= 8, held_ >>= 8)
-      *to_++ = static_cast<std::uint8_t> (held_);
-    return static_cast<std::size_t> (to_ - begin_);
+    put (0, 0); /* again, because a copy may have gone on */
+    return bound ();
   }
 
 private:
-  /* Up to 32 bits. */
-  void put (std::uint64_t value, int bits)
+  /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full.
+   */
+  [[gnu::always_inline]] void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
     count_ += bits;
-    if (count_ >= 32) {
-      for (int i = 0; i < 4; i++)
-        to_[i] = static_cast<std::uint8_t> (held_ >> 8 * i);
-      to_ += 4;
-      held_ >>= 32;
-      count_ -= 32;
-    }
+    std::uint64_t word = held_;
+    if constexpr (std::endian::native == std::endian::big)
+      word = __builtin_bswap64 (word);
+    std::memcpy (to_, &word, sizeof word);
+    to_ += count_ >> 3;
+    held_ >>= count_ & ~7;
+    count_ &= 7;
   }
   void put (const PrefixCode &code) { put (code.bits, code.length); }
+  void long_residual (Components r, unsigned pattern)
+  {
+    for (; pattern != 0; pattern &= pattern - 1) {
+      const int i = std::countr_zero (pattern);
+      put (r[i] < 0, 1);
+      golomb (
+          static_cast<std::uint32_t> (std::abs (r[i])) - 1, orders_[static_cast<std::size_t> (i)]);
+    }
+  }
   void golomb (std::uint32_t value, int order)
   {
-    const std::uint32_t upper = (value >> order) + 1;
-    const int width = std::bit_width (upper) - 1;
-    put (1u << width, width + 1);
-    put (upper & ((1u << width) - 1), width);
-    put (value & ((1u << order) - 1), order);
+    const GolombCode code (value, order);
+    put (code.bits, code.length);
   }
 
   std::uint8_t *begin_, *to_;
   std::uint64_t held_ = 0;
-  int count_ = 0;
+  int count_ = 0; /* below 8 between calls */
   GolombOrders orders_;
   const PackedTables *tables_;
 };
 
-/** Reads what a PackedWriter wrote. Behind the end it reads zeros, which soon are no code. */
+/** Reads what a PackedWriter wrote. Behind the end it reads zeros: who goes on for long has to look
+ *  at overrun() now and then. */
 class PackedReader {
 public:
   static constexpr bool kEarlierInRuns = true;
+
+  /** Zero bytes that have to be there behind the data. */
+  static constexpr std::size_t kPadding = 16;
+
   PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
       : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
   {
@@ -151,67 +222,81 @@ public:
     std::uint32_t value = 0;
     const bool good = golomb (kRunOrder, value);
     later = unzigzag (value);
-    return good;
-  }
-  bool motion (const BlockMotion &expected, BlockMotion &m)
-  {
-    refill ();
-    m = expected;
-    if (take (1))
-      return count_ >= 0;
-    std::uint32_t x = 0, y = 0, z = 0;
-    if (!golomb (0, x) || !golomb (0, y) || !golomb (kMotionDepthOrder, z))
-      return false;
-    m = {m.dx + unzigzag (x), m.dy + unzigzag (y), m.dz + unzigzag (z)};
-    return true;
+    return good && !overrun ();
   }
   bool earlier_run (std::int32_t &later)
   {
     std::uint32_t value = 0;
     const bool good = golomb (kEarlierRunOrder, value);
     later = unzigzag (value);
-    return good;
+    return good && !overrun ();
   }
-  /** A PixelChoice, or -1 for damage. */
-  template <bool> int choice (const Neighbours &n)
+  bool motion (const BlockMotion &expected, BlockMotion &m)
   {
-    return get (tables_->choice_of[packed_context (n)], kMaxChoiceBits);
-  }
-  bool residual (const Neighbours &, bool has_neighbour, Components &r)
-  {
-    const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
-    if (pattern < 0)
+    refill ();
+    m = expected;
+    if (take (1))
+      return true;
+    std::uint32_t x = 0, y = 0, z = 0;
+    if (!golomb (0, x) || !golomb (0, y) || !golomb (kMotionDepthOrder, z))
       return false;
-    for (std::size_t i = 0; i < kComponents; i++) {
-      r[i] = 0;
-      if (!(pattern >> i & 1))
-        continue;
-      refill ();
-      const bool negative = held_ & 1;
-      consume (1);
-      std::uint32_t size = 0;
-      if (!golomb (orders_[i], size) || size >= kMaxResidual)
-        return false;
-      r[i] = static_cast<std::int32_t> (size) + 1;
-      r[i] = negative ? -r[i] : r[i];
-    }
+    m = {m.dx + unzigzag (x), m.dy + unzigzag (y), m.dz + unzigzag (z)};
     return true;
   }
+  /** A PixelChoice, or kNoSymbol for damage. */
+  template <bool Delta> [[gnu::always_inline]] int choice (const Neighbours &n)
+  {
+    return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
+  }
+  [[gnu::always_inline]] bool residual (const Neighbours &, bool has_neighbour, Components &r)
+  {
+    const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
+    bool good = pattern != kNoSymbol;
+    const auto number = [&] (int i) {
+      const auto order = orders_[static_cast<std::size_t> (i)];
+      const std::uint32_t there = -(static_cast<std::uint32_t> (pattern) >> i & 1);
+      const auto quick = tables_->quick_of[order][held_ & ((1u << kQuickBits) - 1)];
+      if (there & !quick.length) [[unlikely]]
+        return long_residual (order, good);
+      consume (static_cast<int> (there & quick.length));
+      return static_cast<std::int32_t> (there) & quick.residual;
+    };
+    refill ();
+    const std::int32_t z = number (0), y = number (1), co = number (2);
+    refill ();
+    const std::int32_t cg = number (3);
+    r = Components{z, y, co, cg};
+    return good;
+  }
   /** More was taken than there is. */
-  [[nodiscard]] bool overrun () const { return count_ < 0; }
+  [[nodiscard]] bool overrun () const { return left () < 0; }
   /** Nothing is left but the zero bits that fill the last byte, and no more was read. */
   [[nodiscard]] bool at_clean_end () const
   {
-    return from_ == end_ && count_ >= 0 && count_ < 8 && held_ == 0;
+    const std::ptrdiff_t bits = left ();
+    return bits == 0 || (bits > 0 && bits < 8 && end_[-1] >> (8 - bits) == 0);
   }
 
 private:
-  template <std::size_t N> int get (const std::array<PackedTables::Entry, N> &table, int most)
+  template <std::size_t N>
+  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int most)
   {
-    refill ();
+    if (count_ < most)
+      refill ();
     const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
     consume (e.length);
-    return e.length > 0 && count_ >= 0 ? e.symbol : -1;
+    return e.symbol;
+  }
+  std::int32_t long_residual (int order, bool &good)
+  {
+    refill ();
+    const bool negative = held_ & 1;
+    consume (1);
+    std::uint32_t size = 0;
+    good &= golomb (order, size) && size < kMaxResidual;
+    refill ();
+    const auto r = static_cast<std::int32_t> (size) + 1;
+    return negative ? -r : r;
   }
   bool golomb (int order, std::uint32_t &value)
   {
@@ -225,7 +310,7 @@ private:
       return false;
     refill ();
     value = upper << order | take (order);
-    return count_ >= 0;
+    return true;
   }
   std::uint32_t take (int bits)
   {
@@ -233,32 +318,28 @@ private:
     consume (bits);
     return value;
   }
-  /* At least 56 bits are there afterwards, or all that are left. */
-  void refill ()
+  /* At least 56 bits are there afterwards. */
+  [[gnu::always_inline]] void refill ()
   {
-    if (end_ - from_ >= 8 && count_ >= 0) {
-      std::uint64_t word = 0;
-      for (int i = 0; i < 8; i++)
-        word |= std::uint64_t{from_[i]} << 8 * i;
-      held_ |= word << count_;
-      from_ += (63 - count_) >> 3;
-      count_ |= 56;
-      return;
-    }
-    while (count_ >= 0 && count_ <= 56 && from_ != end_) {
-      held_ |= std::uint64_t{*from_++} << count_;
-      count_ += 8;
-    }
+    std::uint64_t word = 0;
+    std::memcpy (&word, from_, sizeof word);
+    if constexpr (std::endian::native == std::endian::big)
+      word = __builtin_bswap64 (word);
+    held_ |= word << count_;
+    from_ = std::min (from_ + ((63 - count_) >> 3), end_ + 8);
+    count_ |= 56;
   }
   void consume (int bits)
   {
     held_ >>= bits;
     count_ -= bits;
   }
+  /* Bits that have not been taken; below 0, how many too many. */
+  [[nodiscard]] std::ptrdiff_t left () const { return 8 * (end_ - from_) + count_; }
 
   const std::uint8_t *from_, *end_;
   std::uint64_t held_ = 0; /* bits from count_ upwards are those of the next bytes, or zeros */
-  int count_ = 0;          /* below 0: more was taken than there is */
+  int count_ = 0;
   GolombOrders orders_;
   const PackedTables *tables_;
 };

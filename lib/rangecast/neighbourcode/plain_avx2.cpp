@@ -7,7 +7,7 @@
 #if defined __x86_64__
 #include <immintrin.h>
 
-#define AVX2 __attribute__ ((target ("avx2,bmi,bmi2,lzcnt,popcnt")))
+#define AVX2 __attribute__ ((target ("avx2,bmi,bmi2,popcnt")))
 
 namespace rangecast {
 namespace {
@@ -73,8 +73,8 @@ widen (PlainSpan &span, int x, unsigned mask)
   if (mask == 0)
     return;
   if (span.valid == 0)
-    span.begin = x;
-  span.end = x + kBlock - static_cast<int> (_lzcnt_u32 (mask)) / 2;
+    span.begin = x + static_cast<int> (_tzcnt_u32 (mask)) / 2;
+  span.end = x + kBlock - __builtin_clz (mask) / 2;
   span.valid += static_cast<int> (_mm_popcnt_u32 (mask)) / 2;
 }
 

@@ -36,12 +36,17 @@ PlainEncoder::slice_size (int rows, std::size_t full) const
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
-/* Valid depths are one interval; whichever way codes go, its ends have the first and the last. */
+/* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
+ * nearly so. */
 void
 PlainEncoder::set_depths (const DepthQuantiser &depth)
 {
   const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
   std::tie (near_, far_) = std::minmax ({depth.depth (0), depth.depth (last)});
+  while (near_ > 1 && depth.valid (static_cast<std::uint16_t> (near_ - 1)))
+    near_--;
+  while (far_ < 65535 && depth.valid (static_cast<std::uint16_t> (far_ + 1)))
+    far_++;
   codes_.assign (65536, 0);
   for (std::size_t d = near_; d <= far_; d++)
     codes_[d] = depth.code (static_cast<std::uint16_t> (d));
@@ -191,7 +196,7 @@ PlainEncoder::code_piece (
     for (; waiting < kBandRows && done + waiting < image.roi.height; waiting++)
       load_row (image, done + waiting, rows_[static_cast<std::size_t> (waiting)]);
     const int more = add_band (waiting, to);
-    std::ranges::rotate (rows_, rows_.begin () + more);
+    std::rotate (rows_.begin (), rows_.begin () + more, rows_.end ());
     waiting -= more;
     done += more;
   }

@@ -29,7 +29,7 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
     span.end = x + 1;
     span.valid++;
   }
-  span.begin = span.valid > 0 ? first / 16 * 16 : 0;
+  span.begin = span.valid > 0 ? first : 0;
   return span;
 }
 
@@ -46,29 +46,64 @@ lanes_of (PlainPixel pixel)
 }
 
 bool
-are_near (Lanes a, PlainPixel b, Lanes threshold)
+are_near (Lanes a, Lanes b, Lanes threshold)
 {
   typedef std::int64_t Halves __attribute__ ((vector_size (16)));
-  const Lanes difference = a - lanes_of (b);
+  const Lanes difference = a - b;
   const Lanes beyond = (difference > threshold) | (difference < -threshold);
   const Halves halves = reinterpret_cast<Halves> (beyond);
   return (halves[0] | halves[1]) == 0;
 }
 
-/* Codes one pixel. @return its symbol */
-Symbol
-code_pixel (PlainPixel &pixel, PlainPixel left, const PlainPixel *upper, Lanes threshold)
+/* The row above, which is replaced as it goes, but for the last pixel. */
+struct Above {
+  PlainPixel left, here, right;
+};
+
+/* Codes a valid pixel that is not near its left one. @return its symbol */
+inline Symbol
+choose_above (PlainPixel &pixel, Lanes own, const Above &above, Lanes threshold)
 {
-  if (pixel & kInvalidPixelBit)
-    return kInvalid;
-  const Lanes own = lanes_of (pixel);
-  const PlainPixel neighbours[] = {left, upper[-1], upper[0], upper[1]};
-  for (int i = kLeft; i <= kUpperRight; i++)
-    if (are_near (own, neighbours[i], threshold)) {
-      pixel = neighbours[i];
-      return static_cast<Symbol> (i);
-    }
+  if (are_near (own, lanes_of (above.left), threshold)) {
+    pixel = above.left;
+    return kUpperLeft;
+  }
+  if (are_near (own, lanes_of (above.here), threshold)) {
+    pixel = above.here;
+    return kUpper;
+  }
+  if (are_near (own, lanes_of (above.right), threshold)) {
+    pixel = above.right;
+    return kUpperRight;
+  }
   return kFull;
+}
+
+/* Codes at most a group of a row; `upper` becomes it. @return the symbols */
+std::uint64_t
+code_group (const PlainPixel *row, PlainPixel *upper, int count, PlainPixel &left_pixel,
+    PlainPixel &upper_left, Lanes threshold)
+{
+  std::uint64_t symbols = 0;
+  Lanes left = lanes_of (left_pixel);
+  for (int x = 0; x < count; x++) {
+    const Above above = {upper_left, upper[x], upper[x + 1]};
+    PlainPixel pixel = row[x];
+    Symbol symbol = kInvalid;
+    if (pixel & kInvalidPixelBit) {
+      left = lanes_of (pixel);
+    } else if (const Lanes own = lanes_of (pixel); are_near (own, left, threshold)) {
+      symbol = kLeft;
+      pixel = left_pixel;
+    } else {
+      symbol = choose_above (pixel, own, above, threshold);
+      left = lanes_of (pixel);
+    }
+    symbols |= std::uint64_t{symbol} << kSymbolBits * x;
+    upper_left = above.here;
+    upper[x] = left_pixel = pixel;
+  }
+  return symbols;
 }
 
 void
@@ -79,13 +114,10 @@ code_band (const PlainBand &band)
   for (int i = 0; i < kBandRows; i++) {
     BitWriter symbols (band.symbols[i]);
     PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];
-    for (int x = band.begin; x < band.end; x++) {
-      /* The row above is replaced as it goes, but for the last pixel. */
-      const PlainPixel above[] = {upper_left, upper[x], upper[x + 1]};
-      PlainPixel pixel = band.rows[i][x];
-      symbols.put (code_pixel (pixel, left, above + 1, threshold), kSymbolBits);
-      upper_left = above[1];
-      upper[x] = left = pixel;
+    for (int x = band.begin; x < band.end; x += kGroup) {
+      const int count = std::min (kGroup, band.end - x);
+      symbols.put (code_group (band.rows[i] + x, upper + x, count, left, upper_left, threshold),
+          count * kSymbolBits);
     }
     upper[band.begin - 1] = upper[band.end] = kOutsidePixel;
   }

@@ -46,7 +46,7 @@ struct PlainQuantising {
 
 /** The columns of a row that have something. */
 struct PlainSpan {
-  int begin = 0, end = 0; ///< all pixels elsewhere are invalid; begin is a multiple of 16
+  int begin = 0, end = 0; ///< all pixels elsewhere are invalid
   int valid = 0;          ///< valid pixels
 };
 

@@ -27,12 +27,19 @@ yes_part (std::uint32_t range, Probability p)
 constexpr void
 learn (Probability &p, bool yes)
 {
-  p = static_cast<Probability> (
-      yes ? p + ((65536 - p) >> kAdaptationShift) : p - (p >> kAdaptationShift));
+  /* 31 makes the shift round up what p loses: it loses a whole floor (p / 32). */
+  p = static_cast<Probability> (p + (((yes ? 65536 : 31) - p) >> kAdaptationShift));
+}
+
+/** Bits by which a range has to grow to be at least kMinRange: 0, 8 or 16. */
+constexpr int
+bits_to_grow (std::uint32_t range)
+{
+  return std::countl_zero (range) & 24;
 }
 
 /** Writes decisions. A copy taken at some point goes on from there: bytes already written stay as
- *  they are, because a carry only ever reaches the byte that is held back and the 0xff behind it.
+ *  they are, because a carry only ever reaches the two that are held back and the 0xff behind them.
  */
 class RangeEncoder {
 public:
@@ -41,12 +48,8 @@ public:
   void put (Probability &p, bool yes)
   {
     const std::uint32_t part = yes_part (range_, p);
-    if (yes) {
-      range_ = part;
-    } else {
-      low_ += part;
-      range_ -= part;
-    }
+    low_ += yes ? 0 : part;
+    range_ = yes ? part : range_ - part;
     learn (p, yes);
     normalise ();
   }
@@ -59,84 +62,105 @@ public:
       normalise ();
     }
   }
-  /** More than the bytes that finish() would come to. */
-  [[nodiscard]] std::size_t bound () const
-  {
-    return static_cast<std::size_t> (to_ - begin_) + pending_ + 5;
-  }
+  /** No less than the bytes that finish() would come to. */
+  [[nodiscard]] std::size_t bound () const { return shifted () + 4; }
   /** Writes the fewest bytes that say which number in the range is meant, and that let a reader go
    *  no more than kMaxOverrun bytes beyond them. @return how many */
   std::size_t finish ()
   {
-    std::uint64_t value = low_;
+    const std::uint64_t rest = low_ & 0xffffffffu;
+    std::uint64_t value = rest;
     for (int bits = 32; bits >= 0; bits -= 8) { /* the roundest number in the range */
       const std::uint64_t mask = (std::uint64_t{1} << bits) - 1;
-      value = (low_ + mask) & ~mask;
-      if (value < low_ + range_)
+      value = (rest + mask) & ~mask;
+      if (value < rest + range_)
         break;
     }
-    low_ = value;
-    const std::size_t read = static_cast<std::size_t> (to_ - begin_) + pending_ + holds_ + 4;
+    low_ += value - rest;
+    const std::size_t read = shifted () + 4;
     const std::size_t least = read > kMaxOverrun ? read - kMaxOverrun : 0;
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < 4; i++) { /* all that is held back goes out, and zeros behind it */
+      low_ <<= 16;
+      count_ += 16;
       shift ();
-    auto size = static_cast<std::size_t> (to_ - begin_);
+    }
+    auto size = read;
     while (size > least && begin_[size - 1] == 0)
       size--;
     return size;
   }
 
 private:
+  /* Bytes that have left the range. */
+  [[nodiscard]] std::size_t shifted () const
+  {
+    return static_cast<std::size_t> (to_ - begin_) + 2 * pending_ + (holds_ ? 2 : 0) +
+           static_cast<std::size_t> (count_) / 8;
+  }
   void normalise ()
   {
-    while (range_ < kMinRange) {
-      range_ <<= 8;
+    const int bits = bits_to_grow (range_);
+    range_ <<= bits;
+    low_ <<= bits;
+    count_ += bits;
+    if (count_ >= 16)
       shift ();
-    }
   }
-  /* Moves the uppermost byte of low out; it is held back as long as a carry may change it. */
+  /* Moves the uppermost 16 bits of low out; they are held back as long as a carry may change them.
+   */
   void shift ()
   {
-    if (low_ < 0xff000000u || low_ >> 32) {
-      const auto carry = static_cast<std::uint8_t> (low_ >> 32);
-      if (holds_)
-        *to_++ = static_cast<std::uint8_t> (held_ + carry);
-      for (; pending_ > 0; pending_--)
-        *to_++ = static_cast<std::uint8_t> (0xff + carry);
-      holds_ = true;
-      held_ = static_cast<std::uint8_t> (low_ >> 24);
-    } else {
+    const auto out = static_cast<std::uint32_t> (low_ >> (16 + count_));
+    count_ -= 16;
+    low_ &= (std::uint64_t{1} << (32 + count_)) - 1;
+    if (out == 0xffff) {
       pending_++;
+      return;
     }
-    low_ = (low_ & 0x00ffffff) << 8;
+    const std::uint32_t carry = out >> 16;
+    if (holds_)
+      write (held_ + carry);
+    for (; pending_ > 0; pending_--)
+      write (0xffff + carry);
+    holds_ = true;
+    held_ = out & 0xffff;
+  }
+  void write (std::uint32_t bits)
+  {
+    *to_++ = static_cast<std::uint8_t> (bits >> 8);
+    *to_++ = static_cast<std::uint8_t> (bits);
   }
 
   std::uint8_t *begin_, *to_;
-  std::uint64_t low_ = 0;
+  std::uint64_t low_ =
+      0; /* 32 bits, above them count_ more that have left the range, and a carry */
   std::uint32_t range_ = 0xffffffff;
-  std::size_t pending_ = 0; /* bytes 0xff behind the held one */
+  int count_ = 0;           /* 0 or 8 between decisions */
+  std::size_t pending_ = 0; /* pairs of bytes 0xff behind the held one */
   bool holds_ = false;
-  std::uint8_t held_ = 0;
+  std::uint32_t held_ = 0; /* two bytes */
 };
 
 /** Reads decisions; behind the end it reads zeros. */
 class RangeDecoder {
 public:
-  RangeDecoder (const std::uint8_t *from, std::size_t bytes) : from_ (from), end_ (from + bytes)
+  RangeDecoder (const std::uint8_t *from, std::size_t bytes) : data_ (from), size_ (bytes)
   {
-    for (int i = 0; i < 4; i++)
-      code_ = code_ << 8 | next_byte ();
+    ahead_ = -32;
+    for (int i = 0; i < 3; i++)
+      refill ();
   }
-  bool get (Probability &p)
+  [[gnu::always_inline]] bool get (Probability &p)
   {
     const std::uint32_t part = yes_part (range_, p);
-    if (code_ < part) {
+    const std::uint64_t split = std::uint64_t{part} << 32;
+    if (window_ < split) {
       range_ = part;
       learn (p, true);
       normalise ();
       return true;
     }
-    code_ -= part;
+    window_ -= split;
     range_ -= part;
     learn (p, false);
     normalise ();
@@ -147,37 +171,48 @@ public:
     std::uint32_t value = 0;
     while (count-- > 0) {
       range_ >>= 1;
-      const bool one = code_ < range_;
-      code_ -= one ? 0 : range_;
+      const std::uint64_t split = std::uint64_t{range_} << 32;
+      const bool one = window_ < split;
+      window_ -= one ? 0 : split;
       value = value << 1 | one;
       normalise ();
     }
     return value;
   }
   /** Every byte has been read. */
-  [[nodiscard]] bool at_end () const { return from_ == end_; }
+  [[nodiscard]] bool at_end () const { return read () >= size_; }
   /** More has been read than an encoder leaves out. */
-  [[nodiscard]] bool overrun () const { return overrun_ > kMaxOverrun; }
+  [[nodiscard]] bool overrun () const { return read () > size_ + kMaxOverrun; }
 
 private:
-  std::uint32_t next_byte ()
-  {
-    if (from_ != end_)
-      return *from_++;
-    overrun_++;
-    return 0;
-  }
+  /* Bytes that have come into the range, those behind the end too. */
+  [[nodiscard]] std::size_t read () const { return next_ - static_cast<std::size_t> (ahead_) / 8; }
   void normalise ()
   {
-    while (range_ < kMinRange) {
-      range_ <<= 8;
-      code_ = code_ << 8 | next_byte ();
-    }
+    const int bits = bits_to_grow (range_);
+    range_ <<= bits;
+    window_ <<= bits;
+    ahead_ -= bits;
+    if (ahead_ < 16)
+      refill ();
+  }
+  void refill ()
+  {
+    std::uint64_t two = 0;
+    if (next_ + 2 <= size_)
+      two = static_cast<std::uint64_t> (data_[next_] << 8 | data_[next_ + 1]);
+    else if (next_ < size_)
+      two = static_cast<std::uint64_t> (data_[next_] << 8);
+    next_ += 2;
+    window_ |= two << (16 - ahead_);
+    ahead_ += 16;
   }
 
-  const std::uint8_t *from_, *end_;
-  std::uint32_t range_ = 0xffffffff, code_ = 0;
-  std::size_t overrun_ = 0;
+  const std::uint8_t *data_;
+  std::size_t size_, next_ = 0;
+  std::uint64_t window_ = 0; /* what is compared with the range, then ahead_ bits that come next */
+  std::uint32_t range_ = 0xffffffff;
+  int ahead_ = 0; /* 16 to 31 between decisions */
 };
 
 } // namespace rangecast

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "coded_pixel.hpp"
+
+namespace rangecast {
+
+/** A row of a slice in the profiles packed and entropy, as it is when both sides have coded it. One
+ *  invalid pixel comes before it, and a few behind it, because vectors read beyond its end. */
+class CompactRow {
+public:
+  /** Pixels behind the row that may be read. */
+  static constexpr std::size_t kMargin = 8;
+
+  /** Makes all pixels invalid.
+   *  @param shown  of invalid pixels */
+  void reset (std::size_t columns, std::uint64_t shown)
+  {
+    codes_.assign (columns + 1 + kMargin, kNoPixel);
+    states_.assign (columns + 1 + kMargin, 0);
+    shown_.assign (columns + 1 + kMargin, shown);
+    valid_.assign (columns, 0);
+    earlier_.assign (columns, 0);
+  }
+  void invalidate (std::size_t begin, std::size_t end, std::uint64_t shown)
+  {
+    std::fill (codes () + begin, codes () + end, kNoPixel);
+    std::fill (states () + begin, states () + end, 0);
+    std::fill (this->shown () + begin, this->shown () + end, shown);
+  }
+
+  /** Of the first column; the pixel before it is at -1. */
+  [[nodiscard]] PixelCode *codes () { return codes_.data () + 1; }
+  [[nodiscard]] PixelState *states () { return states_.data () + 1; }
+  /** What is shown instead of YCoCg: encoders keep a PixelKey, decoders what goes into the image.
+   */
+  [[nodiscard]] std::uint64_t *shown () { return shown_.data () + 1; }
+  /** One byte a pixel, 0 = invalid. */
+  [[nodiscard]] std::vector<std::uint8_t> &valid () { return valid_; }
+
+  /** The same, not 0 = equals one of an earlier frame set. */
+  [[nodiscard]] std::vector<std::uint8_t> &earlier () { return earlier_; }
+
+private:
+  std::vector<PixelCode> codes_;
+  std::vector<PixelState> states_;
+  std::vector<std::uint64_t> shown_;
+  std::vector<std::uint8_t> valid_, earlier_;
+};
+
+} // namespace rangecast
