@@ -429,3 +429,138 @@ TEST_P (Robust, slices_that_claim_absurd_places_are_as_if_lost)
         EXPECT_TRUE (those_behind_are_right (1, not_wrong));
       }
 }
+
+/* ---- loss of one slice in twenty ---- */
+
+namespace {
+
+constexpr int kLossy = 60; /* frame sets with losses */
+constexpr std::size_t kOneIn = 20;
+constexpr unsigned kSeeds[] = {1, 2, 3};
+
+/* One view, in some hundred slices where nothing is rounded. */
+struct Loss : ::testing::TestWithParam<Mode> {
+  Rig rig;
+  std::vector<FrameSet> sets;
+  AccessUnitDecoder decoder;
+
+  void SetUp () override
+  {
+    const bool temporal = GetParam ().temporal;
+    rig.views.push_back (ring_view (0, 0, 0.8, 320, 200));
+    EncoderSettings settings = settings_of (GetParam ());
+    if (!temporal) {
+      settings.depth_bits = 16;
+      settings.colour_bits = 8;
+      settings.depth_threshold = settings.colour_threshold = 0;
+    }
+    sets = code (rig, {Roi{5, 20, 200, 170}}, settings, temporal ? kLossy + 4 : kLossy);
+    ASSERT_TRUE (decoder.set_rig (rig).ok ());
+  }
+  static std::vector<std::uint8_t> without (const FrameSet &set, const std::vector<bool> &lost)
+  {
+    Units units;
+    for (std::size_t i = 0; i < set.units.size (); i++)
+      if (!lost[i])
+        units.push_back (set.units[i]);
+    return joined (units);
+  }
+  static std::vector<bool> lose_at_random (const FrameSet &set, std::mt19937 &random)
+  {
+    std::vector<bool> lost (set.units.size ());
+    for (std::size_t i = 0; i < lost.size (); i++)
+      lost[i] = random () % kOneIn == 0;
+    return lost;
+  }
+  /* As many as one in twenty, no matter which. */
+  static std::vector<bool> lose_exactly (const FrameSet &set, std::mt19937 &random)
+  {
+    std::vector<bool> lost (set.units.size ());
+    std::fill_n (lost.begin (), lost.size () / kOneIn, true);
+    std::shuffle (lost.begin (), lost.end (), random);
+    return lost;
+  }
+  static Allowed missing_where_lost (const FrameSet &set, const std::vector<bool> &lost)
+  {
+    return [&] (int, int x, int y, Pixel what) {
+      std::size_t i = 0;
+      while (i < lost.size () && !contains (place_of (set.headers[i]), x, y))
+        i++;
+      return what == Pixel::kMissing && i < lost.size () && lost[i];
+    };
+  }
+};
+struct IntraLoss : Loss {};
+struct TemporalLoss : Loss {};
+
+} // namespace
+
+INSTANTIATE_TEST_SUITE_P (All, IntraLoss,
+    ::testing::Values (Mode{Profile::kPlain, false}, Mode{Profile::kPacked, false},
+        Mode{Profile::kEntropy, false}),
+    name_of);
+INSTANTIATE_TEST_SUITE_P (All, TemporalLoss,
+    ::testing::Values (
+        Mode{Profile::kPlain, true}, Mode{Profile::kPacked, true}, Mode{Profile::kEntropy, true}),
+    name_of);
+
+TEST_P (IntraLoss, costs_the_pixels_of_the_lost_slices_and_the_next_frame_set_is_whole)
+{
+  for (const unsigned seed : kSeeds) {
+    std::mt19937 random (seed);
+    Counts counts;
+    for (std::size_t i = 0; i + 1 < sets.size (); i++) {
+      const auto lost = lose_at_random (sets[i], random);
+      Decoded decoded = decode_exact (decoder, without (sets[i], lost));
+      EXPECT_TRUE (judge (decoded, sets[i].good, missing_where_lost (sets[i], lost), &counts));
+      Decoded next = decode_exact (decoder, joined (sets[i + 1].units));
+      EXPECT_TRUE (judge (next, sets[i + 1].good, nothing_but_right));
+    }
+    EXPECT_GT (counts.missing, 0u);
+    EXPECT_GE (double (counts.right) / double (counts.right + counts.missing), 0.94);
+  }
+}
+
+TEST_P (IntraLoss, of_one_slice_in_twenty_leaves_94_percent_of_every_frame_set_right)
+{
+  double least = 1;
+  for (const unsigned seed : kSeeds) {
+    std::mt19937 random (seed);
+    for (FrameSet &set : sets) {
+      const auto lost = lose_exactly (set, random);
+      ASSERT_GT (std::ranges::count (lost, true), 0);
+      Decoded decoded = decode_exact (decoder, without (set, lost));
+      Counts counts;
+      EXPECT_TRUE (judge (decoded, set.good, missing_where_lost (set, lost), &counts));
+      least = std::min (least, double (counts.right) / double (counts.right + counts.missing));
+    }
+  }
+  RecordProperty ("least", std::to_string (least));
+  EXPECT_GE (least, 0.94);
+}
+
+TEST_P (TemporalLoss, shows_nothing_wrong_and_is_gone_within_the_refresh_period)
+{
+  for (const unsigned seed : kSeeds) {
+    std::mt19937 random (seed);
+    Counts counts;
+    std::size_t last = 0, whole = 0;
+    decoder.forget_references ();
+    for (std::size_t i = 0; i < sets.size (); i++) {
+      const auto lost =
+          i < kLossy ? lose_at_random (sets[i], random) : std::vector<bool> (sets[i].units.size ());
+      if (std::ranges::count (lost, true) > 0)
+        last = i;
+      Decoded decoded = decode_exact (decoder, without (sets[i], lost));
+      const bool is_gone = (i - last) * kFrameNs >= kRefreshNs;
+      EXPECT_TRUE (
+          judge (decoded, sets[i].good, is_gone ? Allowed (nothing_but_right) : not_wrong, &counts))
+          << i - last << " behind the last loss";
+      whole += is_gone;
+    }
+    EXPECT_GT (counts.missing, 0u);
+    EXPECT_GT (whole, 0u);
+    RecordProperty (
+        "right", std::to_string (double (counts.right) / double (counts.right + counts.missing)));
+  }
+}

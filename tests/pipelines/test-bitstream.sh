@@ -98,6 +98,22 @@ depth-scale=inverse depth-bits=16 depth-threshold=0
 END
 }
 
+test_slices_without_key_decode_the_same () {
+  local settings profile
+  while read -r settings; do
+    for profile in plain packed entropy; do
+      # shellcheck disable=SC2086
+      record temporal.rcnc 2 48x136 "num-buffers=6 range-person-only=true motion=2" "profile=$profile" temporal=true $settings
+      expect_decoders_agree temporal.rcnc 2 "$profile temporal $settings"
+      expect_nothing_damaged "$profile temporal $settings"
+    done
+  done <<'END'
+refresh-period=200 max-slice-size=400 depth-scale=inverse
+depth-threshold=0 colour-threshold=0 depth-bits=16 refresh-period=200
+depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=30
+END
+}
+
 test_short_and_long_slices_decode_the_same () {
   local size profile
   for profile in plain packed entropy; do
