@@ -45,7 +45,7 @@ INITIAL = [int(word, 16) for word in table("initial probabilities")]
 INITIAL_WITHOUT_KEY = [int(word, 16) for word in table("initial probabilities without key")]
 CHOICES = [prefix_code([int(digit) for digit in word]) for word in table("choice lengths")]
 PATTERN_LENGTHS = [int(word) for word in table("pattern lengths")]
-PATTERNS = [prefix_code(PATTERN_LENGTHS[:16]), prefix_code(PATTERN_LENGTHS[16:])]
+PATTERNS = [prefix_code(PATTERN_LENGTHS[i : i + 16]) for i in (0, 16, 32)]
 
 
 class Pixel(NamedTuple):
@@ -99,9 +99,10 @@ class Neighbours(NamedTuple):
 class PackedData:
     """Bits, and what packed makes of them."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, exact: bool) -> None:
         if len(data) < 2:
             raise Damage("no orders")
+        self.exact = exact  # all steps are 1
         self.orders = [data[i // 2] >> 4 * (i % 2) & 15 for i in range(4)]
         self.size = 8 * len(data) - 16
         self.data = data[2:]
@@ -150,7 +151,7 @@ class PackedData:
         return self.symbol(CHOICES[near.kinds()])
 
     def residual(self, near: Neighbours) -> tuple[int, ...]:
-        pattern = self.symbol(PATTERNS[not any(near)])
+        pattern = self.symbol(PATTERNS[1 if not any(near) else 2 if self.exact else 0])
         return tuple(self.number(self.orders[i]) if pattern >> i & 1 else 0 for i in range(4))
 
     def number(self, order: int) -> int:
@@ -327,7 +328,7 @@ class CompactSlice:
         if 0 in self.steps:
             raise Damage("a step of 0")
         key = earlier is None
-        self.data: Data = PackedData(body[4:]) if profile == PACKED else EntropyData(body[4:], key)
+        self.data: Data = PackedData(body[4:], self.steps == (1, 1, 1, 1)) if profile == PACKED else EntropyData(body[4:], key)
         self.columns = columns
         self.limits = ((0, last), (0, maximum), (-maximum, maximum), (-maximum, maximum))
         self.latest = Pixel((last // 2, maximum // 2, 0, 0), 0, True)

@@ -166,6 +166,7 @@ GST_END_TEST;
 GST_START_TEST (test_exact_pictures_decode_as_ever)
 {
   expect_digests ("exact");
+  expect_digests ("exact-packed");
 }
 GST_END_TEST;
 

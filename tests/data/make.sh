@@ -21,6 +21,7 @@ record coarse "num-buffers=3 empty-frames=1 range-person-only=true" \
 for profile in packed entropy; do
   record "$profile" "num-buffers=2 range-person-only=true" "profile=$profile" max-slice-size=400
 done
+record exact-packed "num-buffers=1" profile=packed depth-bits=16 depth-threshold=0 colour-threshold=0 max-slice-size=400
 record inverse "num-buffers=2 range-person-only=true" depth-scale=inverse depth-bits=9 depth-threshold=2 profile=packed \
   max-slice-size=400
 # High enough for bands of 64 rows, each of which is refreshed in turn.
@@ -31,7 +32,7 @@ for profile in plain packed entropy; do
 done
 "$here/make-lossy.py" temporal-entropy.rcnc temporal-lossy.rcnc
 "$here/make-damaged.py" coarse.rcnc damaged.rcnc
-for stream in default exact coarse damaged packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
+for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
   "$here/../bitstream/decode.py" "$stream.rcnc" "$stream" >/dev/null
 done
 sha256sum -- *-depth-?.raw *-colour-?.raw >SHA256SUMS

@@ -180,7 +180,7 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
+  for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"

@@ -344,8 +344,8 @@ CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &h
   };
   bytes_.assign (data.begin (), data.end ());
   bytes_.resize (data.size () + PackedReader::kPadding);
-  return decode_code (
-      PackedReader (bytes_.data (), data.size (), {order (0), order (1), order (2), order (3)}),
+  return decode_code (PackedReader (bytes_.data (), data.size (),
+                          {{order (0), order (1), order (2), order (3)}, is_zero (steps_ - 1)}),
       header, quantisers, reference, image, decoded);
 }
 

@@ -45,7 +45,7 @@ public:
   static constexpr bool kEarlierInRuns = false;
 
   EntropyWriter (
-      std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const GolombOrders &)
+      std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const ResidualCodes &)
       : EntropyCode (EntropyWriting (to), model)
   {
     model = initial;
@@ -575,7 +575,8 @@ CompactEncoder::begin_slice (int first_row)
   header_.rows = 0;
   last_ = first_expected (limits_);
   upper_.reset (static_cast<std::size_t> (columns_), kInvalidKey);
-  return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel, orders_);
+  return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel,
+      {orders_, is_zero (steps_ - 1)});
 }
 
 template <class Code>

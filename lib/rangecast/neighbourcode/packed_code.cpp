@@ -67,7 +67,7 @@ build ()
     tables.choice[i] = codes_of (kChoiceLengths[i]);
     invert (tables.choice[i], tables.choice_of[i]);
   }
-  for (std::size_t i = 0; i < 2; i++) {
+  for (std::size_t i = 0; i < kPatternCodes; i++) {
     tables.pattern[i] = codes_of (kPatternLengths[i]);
     invert (tables.pattern[i], tables.pattern_of[i]);
   }
@@ -97,9 +97,10 @@ const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLen
     {0, 4, 3, 2, 4, 1}, {2, 4, 2, 3, 4, 2}, {2, 4, 2, 3, 4, 2}, {3, 4, 3, 4, 3, 1},
     {0, 4, 2, 3, 4, 1}, {2, 4, 2, 4, 3, 2}, {3, 4, 3, 4, 3, 1}, {3, 4, 3, 4, 3, 1},
 }};
-const std::array<std::array<std::uint8_t, 16>, 2> kPatternLengths = {{
+const std::array<std::array<std::uint8_t, 16>, kPatternCodes> kPatternLengths = {{
     {0, 3, 2, 2, 5, 4, 4, 4, 6, 6, 6, 6, 6, 6, 5, 5},
     {8, 5, 6, 1, 8, 6, 6, 3, 9, 7, 9, 7, 9, 6, 9, 2},
+    {0, 6, 6, 6, 6, 5, 4, 3, 6, 6, 5, 5, 4, 4, 2, 2},
 }};
 /* clang-format on */
 

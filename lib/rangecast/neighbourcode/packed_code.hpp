@@ -22,8 +22,22 @@ inline constexpr int kMotionDepthOrder = 3;
 
 /** Lengths of the codes in bits, 0 = there is none. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
-/** Which components of a residual are not zero: of pixels with a neighbour, and of the others. */
-extern const std::array<std::array<std::uint8_t, 16>, 2> kPatternLengths;
+/** Which components of a residual are not zero: of pixels with a neighbour, of the others, and of
+ *  pixels with a neighbour where all steps are 1, so that few components are 0. */
+inline constexpr std::size_t kPatternCodes = 3;
+extern const std::array<std::array<std::uint8_t, 16>, kPatternCodes> kPatternLengths;
+
+constexpr std::size_t
+pattern_code (bool has_neighbour, bool exact)
+{
+  return !has_neighbour ? 1 : exact ? 2 : 0;
+}
+
+/** What a packed slice says of its residuals' codes. */
+struct ResidualCodes {
+  GolombOrders orders;
+  bool exact; ///< all steps are 1
+};
 
 struct PrefixCode {
   std::uint16_t bits = 0;
@@ -67,9 +81,9 @@ struct PackedTables {
     std::uint8_t symbol = kNoSymbol, length = 1;
   };
   std::array<std::array<PrefixCode, kChoices>, kPackedContexts> choice;
-  std::array<std::array<PrefixCode, 16>, 2> pattern;
+  std::array<std::array<PrefixCode, 16>, kPatternCodes> pattern;
   std::array<std::array<Entry, 1 << kMaxChoiceBits>, kPackedContexts> choice_of;
-  std::array<std::array<Entry, 1 << kMaxPatternBits>, 2> pattern_of;
+  std::array<std::array<Entry, 1 << kMaxPatternBits>, kPatternCodes> pattern_of;
   /* For each order. */
   std::array<std::array<QuickCode, 2 * kMaxQuickSize + 1>, 16> quick;
   std::array<std::array<QuickEntry, 1 << kQuickBits>, 16> quick_of;
@@ -94,8 +108,9 @@ public:
   static constexpr bool kUsesActivity = false;
   static constexpr bool kEarlierInRuns = true;
 
-  PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const GolombOrders &orders)
-      : begin_ (to), to_ (to), orders_ (orders), tables_ (&packed_tables ())
+  PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const ResidualCodes &codes)
+      : begin_ (to), to_ (to), orders_ (codes.orders), exact_ (codes.exact),
+        tables_ (&packed_tables ())
   {
   }
 
@@ -134,7 +149,8 @@ public:
       const PrefixCode choice = tables_->choice[n.kinds ()][pattern == 0 ? kPredict : kCorrect];
       add (choice.bits, choice.length);
     }
-    const PrefixCode code = tables_->pattern[!has_neighbour][pattern]; /* none for 0 */
+    const PrefixCode code =
+        tables_->pattern[pattern_code (has_neighbour, exact_)][pattern]; /* none for 0 */
     add (code.bits, code.length);
     if (!is_zero (sizes > kMaxQuickSize)) [[unlikely]] {
       put (bits, length);
@@ -201,6 +217,7 @@ private:
   std::uint64_t held_ = 0;
   int count_ = 0; /* below 8 between calls */
   GolombOrders orders_;
+  bool exact_;
   const PackedTables *tables_;
 };
 
@@ -214,8 +231,9 @@ public:
   /** Zero bytes that have to be there behind the data. */
   static constexpr std::size_t kPadding = 16;
 
-  PackedReader (const std::uint8_t *from, std::size_t bytes, const GolombOrders &orders)
-      : from_ (from), end_ (from + bytes), orders_ (orders), tables_ (&packed_tables ())
+  PackedReader (const std::uint8_t *from, std::size_t bytes, const ResidualCodes &codes)
+      : from_ (from), end_ (from + bytes), orders_ (codes.orders), exact_ (codes.exact),
+        tables_ (&packed_tables ())
   {
   }
 
@@ -252,7 +270,8 @@ public:
   }
   [[gnu::always_inline]] bool residual (const Neighbours &, bool has_neighbour, Components &r)
   {
-    const int pattern = get (tables_->pattern_of[!has_neighbour], kMaxPatternBits);
+    const int pattern =
+        get (tables_->pattern_of[pattern_code (has_neighbour, exact_)], kMaxPatternBits);
     bool good = pattern != kNoSymbol;
     const auto number = [&] (int i) {
       const auto order = orders_[static_cast<std::size_t> (i)];
@@ -343,6 +362,7 @@ private:
   std::uint64_t held_ = 0; /* bits from count_ upwards are those of the next bytes, or zeros */
   int count_ = 0;
   GolombOrders orders_;
+  bool exact_;
   const PackedTables *tables_;
 };
 
