@@ -18,6 +18,7 @@ namespace rangecast {
 /** For tests: makes has_x86_64_v3() say no, in encoders and decoders that are made from then on. */
 inline std::atomic<bool> every_cpu_only = false;
 
+/** Whoever has AVX2 and BMI2 has LZCNT and POPCNT, too, for which not every compiler can ask. */
 inline bool
 has_x86_64_v3 ()
 {
