@@ -362,12 +362,12 @@ TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
     s.choice = i % 4 ? NeighbourChoice::kFirst : NeighbourChoice::kBest;
     const auto bytes = encode (rig (), pictures, s);
     Decoded here = decode_exact (decoder, bytes);
-    every_cpu_only = true;
+    limit_cpu (CpuLevel::kScalar);
     AccessUnitDecoder other;
     ASSERT_TRUE (other.set_rig (rig ()).ok ());
     const auto other_bytes = encode (rig (), pictures, s);
     Decoded there = decode_exact (other, bytes);
-    every_cpu_only = false;
+    limit_cpu (CpuLevel::kAvx2);
     ASSERT_EQ (bytes, other_bytes) << i;
     ASSERT_EQ (here.result.bad_slices + there.result.bad_slices, 0u) << i;
     expect_same (here.pictures[0], there.pictures[0]);
@@ -385,11 +385,11 @@ TEST_P (Profiles, code_for_every_cpu_and_for_this_one_agree_on_damage)
     for (int k = 0; k < 3; k++)
       bad[random () % bad.size ()] = static_cast<std::uint8_t> (random ());
     const Decoded here = decode_exact (decoder, bad);
-    every_cpu_only = true;
+    limit_cpu (CpuLevel::kScalar);
     AccessUnitDecoder other;
     ASSERT_TRUE (other.set_rig (rig ()).ok ());
     const Decoded there = decode_exact (other, bad);
-    every_cpu_only = false;
+    limit_cpu (CpuLevel::kAvx2);
     ASSERT_EQ (here.result.slices, there.result.slices) << i;
     ASSERT_EQ (here.result.bad_slices, there.result.bad_slices) << i;
     ASSERT_EQ (here.result.points, there.result.points) << i;

@@ -3,7 +3,7 @@
  * up to a tenth less time for the same bits. */
 #pragma once
 
-#include <atomic>
+#include "../cpu.hpp"
 
 /* On a function: what it calls becomes a part of it, so that all is made for that processor. */
 #if defined __x86_64__
@@ -15,19 +15,11 @@
 
 namespace rangecast {
 
-/** For tests: makes has_x86_64_v3() say no, in encoders and decoders that are made from then on. */
-inline std::atomic<bool> every_cpu_only = false;
-
-/** Whoever has AVX2 and BMI2 has LZCNT and POPCNT, too, for which not every compiler can ask. */
+/** Whoever has AVX2 and BMI2 has LZCNT, too, for which not every compiler can ask. */
 inline bool
 has_x86_64_v3 ()
 {
-#if defined __x86_64__
-  return !every_cpu_only && __builtin_cpu_supports ("avx2") && __builtin_cpu_supports ("bmi") &&
-         __builtin_cpu_supports ("bmi2");
-#else
-  return false;
-#endif
+  return cpu_level () >= CpuLevel::kAvx2;
 }
 
 } // namespace rangecast
