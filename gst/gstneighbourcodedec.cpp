@@ -26,6 +26,7 @@
 #include <gst/base/base.h>
 #include <gst/video/video.h>
 
+#include <algorithm>
 #include <atomic>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
@@ -210,7 +211,7 @@ request_key_unit (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResu
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   const GstClockTime now = GST_BUFFER_PTS (input), then = priv->last_request;
-  const bool is_lossy = result.unknown_pixels + result.missing_pixels + result.bad_slices > 0;
+  const bool is_lossy = result.unknown_pixels + result.missing_pixels > 0;
   if (!priv->is_temporal || !is_lossy)
     return;
   if (GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (then) && now >= then &&
@@ -225,6 +226,17 @@ request_key_unit (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResu
   GST_DEBUG_OBJECT (self, "asking for a key frame set");
   gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
       gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, FALSE, 0));
+}
+
+/* A view without pixels says nothing of it. */
+static void
+note_references (GstNeighbourCodeDecPrivate *priv)
+{
+  const auto views = priv->decoder.views ();
+  const auto refers = [] (const auto &view) { return view.reference.reference; };
+  const auto has_pixels = [] (const auto &view) { return view.coded_pixels > 0; };
+  if (std::ranges::any_of (views, has_pixels))
+    priv->is_temporal = std::ranges::any_of (views, refers);
 }
 
 static GstFlowReturn
@@ -249,8 +261,7 @@ decode_bytes (
   if (status.ok ())
     status = decode_into (priv, buffer, conceal, n_threads, result);
   count_frame (priv, result, bytes.size ());
-  if (!priv->decoder.views ().empty ())
-    priv->is_temporal = priv->decoder.views ()[0].reference.reference;
+  note_references (priv);
   request_key_unit (self, input, result);
   if (result.bad_slices)
     GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});

@@ -261,8 +261,8 @@ encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSet
   const Status status =
       priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
   if (status.ok ())
-    priv->rate.coded ({priv->encoder.size (), result.points, pixels,
-        settings.encoder.temporal && result.delta_slices == 0});
+    priv->rate.coded (
+        {priv->encoder.size (), result.points, pixels, result.delta_slices == 0 && !priv->is_key});
   return status;
 }
 
@@ -325,6 +325,7 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
     std::lock_guard guard (priv->lock);
     settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_interval_ms};
   }
+  settings.encoder.frame_interval_ns = frame_interval (priv->info);
   prepare_key (self, input, settings.key_interval_ms);
   EncoderResult result;
   const Status status = encode_frame (priv, input, settings, result);
@@ -480,12 +481,13 @@ static gboolean
 gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
-  priv->frame_number = 0;
   priv->rate.reset ();
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.forget ();
   std::lock_guard guard (priv->lock);
+  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
+  priv->frame_number = priv->settings.temporal ? g_random_int () : 0;
   priv->bits_per_s = 0;
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};

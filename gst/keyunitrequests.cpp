@@ -18,16 +18,10 @@ KeyUnitRequests::note (GstEvent *event)
                                 event, nullptr, nullptr, &running_time, &all_headers, &count);
   if (!parsed)
     return true;
+  constexpr std::size_t kMost = 32;
   std::lock_guard guard (lock_);
-  /* Of several the earliest counts; GST_CLOCK_TIME_NONE is the greatest number. */
-  const bool at_once = !GST_CLOCK_TIME_IS_VALID (running_time);
-  if (!waiting_)
-    running_time_ = running_time;
-  else if (at_once || (GST_CLOCK_TIME_IS_VALID (running_time_) && running_time < running_time_))
-    running_time_ = running_time;
-  all_headers_ = all_headers_ || all_headers;
-  count_ = count;
-  waiting_ = true;
+  if (waiting_.size () < kMost)
+    waiting_.push_back ({running_time, all_headers != FALSE, count});
   return true;
 }
 
@@ -35,20 +29,28 @@ GstEvent *
 KeyUnitRequests::answer (
     GstClockTime timestamp, GstClockTime stream_time, GstClockTime running_time)
 {
+  bool any = false, all_headers = false;
+  guint count = 0;
+  const auto answered = [&] (const Request &r) {
+    const bool early = GST_CLOCK_TIME_IS_VALID (r.running_time) &&
+                       GST_CLOCK_TIME_IS_VALID (running_time) && running_time < r.running_time;
+    if (early)
+      return false;
+    any = true;
+    all_headers = all_headers || r.all_headers;
+    count = r.count;
+    return true;
+  };
   std::lock_guard guard (lock_);
-  const bool early = GST_CLOCK_TIME_IS_VALID (running_time_) &&
-                     GST_CLOCK_TIME_IS_VALID (running_time) && running_time < running_time_;
-  if (!waiting_ || early)
-    return nullptr;
-  const bool all_headers = all_headers_;
-  waiting_ = all_headers_ = false;
-  return gst_video_event_new_downstream_force_key_unit (
-      timestamp, stream_time, running_time, all_headers, count_);
+  std::erase_if (waiting_, answered);
+  return any ? gst_video_event_new_downstream_force_key_unit (
+                   timestamp, stream_time, running_time, all_headers, count)
+             : nullptr;
 }
 
 void
 KeyUnitRequests::forget ()
 {
   std::lock_guard guard (lock_);
-  waiting_ = all_headers_ = false;
+  waiting_.clear ();
 }

@@ -4,11 +4,13 @@
 #include <gst/gst.h>
 
 #include <mutex>
+#include <vector>
 
 /** Requests for key frame sets (GstForceKeyUnit) that wait for their time. Any thread. */
 class KeyUnitRequests {
 public:
-  /** Takes note of an event from upstream or downstream. @return false if it is another event */
+  /** Takes note of an event from upstream or downstream. Of too many that wait the latest are
+   *  forgotten. @return false if it is another event */
   bool note (GstEvent *event);
 
   /** Whether the frame set of this running time is to be a key one; forgets the requests that it
@@ -19,8 +21,11 @@ public:
   void forget ();
 
 private:
+  struct Request {
+    GstClockTime running_time; /* none: at once */
+    bool all_headers;
+    guint count;
+  };
   std::mutex lock_;
-  bool waiting_ = false, all_headers_ = false;
-  GstClockTime running_time_ = GST_CLOCK_TIME_NONE; /* none: at once */
-  guint count_ = 0;
+  std::vector<Request> waiting_;
 };

@@ -33,6 +33,7 @@ RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
 MAX_RIG_PIXELS = 1 << 27
+MOST_REPEATS = 8  # of the pixels of a view's ROI, in its slices
 KEY, INVERSE_DEPTH, REFERENCE = 1, 2, 4
 FULL_PIXEL, INVALID, SAME_AS_EARLIER = 4, 5, 6
 NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
@@ -243,9 +244,15 @@ class Reader:
         agreeing = [part for part in parts if part.agrees(frequent)]
         self.counts["damaged slices"] += len(parts) - len(agreeing)
         picture = Picture(self.views[frequent.view], frequent)
+        kept = self.kept(picture) if frequent.reference else None
         drawn = set()
+        pixels_so_far = 0
         for part in sorted(agreeing, key=Slice.place):
+            pixels_so_far += 0 if part.too_short() else part.rows * part.columns
             if part.place() in drawn:
+                continue
+            if pixels_so_far > MOST_REPEATS * frequent.width * frequent.height and not part.too_short():
+                self.counts["damaged slices"] += 1
                 continue
             pixels: list[Pixel] = [None] * (part.rows * part.columns)
             try:
@@ -255,11 +262,24 @@ class Reader:
                 self.counts["damaged slices"] += 1
             if part.place() in drawn or not part.too_short():
                 picture.put(part, pixels)
+                if kept:
+                    kept.put(part, pixels)
         self.counts["unknown pixels"] += picture.pixels.count(UNKNOWN)
-        if frequent.reference:
-            others = [one for one in self.earlier.get(picture.view.id, []) if one.like.frame != frequent.frame]
-            self.earlier[picture.view.id] = [picture] + others[:1]
         return picture
+
+    def kept(self, picture: Picture) -> Picture | None:
+        """What takes the pixels of a picture for later frame sets to refer to; None if it comes too late."""
+        latest = self.earlier.get(picture.view.id, [])
+        age = (latest[0].like.frame - picture.like.frame) % (1 << 32) if latest else 0
+        if 1 <= age <= 255:
+            return None
+        if latest and latest[0].like.frame == picture.like.frame:
+            if latest[0].like.common() == picture.like.common():
+                return latest[0]
+            latest = latest[1:]
+        kept = Picture(picture.view, picture.like)
+        self.earlier[picture.view.id] = [kept] + latest[:1]
+        return kept
 
     def known(self, part: Slice) -> Callable[[int, int], Numbers | None]:
         """What is known, at each place of the view's image, of the frame set that a slice refers to."""

@@ -56,10 +56,21 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
     int threads, EncoderResult &result)
 {
   count_ = 0;
-  for (const RangeImage &image : images)
+  std::uint64_t there = 0;
+  for (const RangeImage &image : images) {
     if (!rig_.find (image.view_id))
       return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
                                          " is not in the rig of the caps"};
+    if (there >> image.view_id & 1)
+      return {StatusCode::kBadData,
+          "range buffer: view " + std::to_string (image.view_id) + " is there twice"};
+    there |= std::uint64_t{1} << image.view_id;
+  }
+  /* A view that is not there has nothing to refer to when it comes again: else a frame set of key
+   * slices would not be one at which a decoder can begin. */
+  for (const View &view : rig_.views)
+    if (!(there >> view.id & 1))
+      views_[view.id].request_key ();
   in_parallel (images.size (), threads, [&] (std::size_t i) {
     Work &work = work_[i];
     work.bytes.clear ();
@@ -107,7 +118,7 @@ AccessUnitDecoder::set_rig (const Rig &rig)
   for (const View &view : rig.views)
     if (Status s = decoders_[view.id].set_rig ({{view}}); !s.ok ())
       return s;
-  forget_references ();
+  references_ = {}; /* memory, too: views may be others */
   rig_ = rig;
   count_ = 0;
   return {};
@@ -243,8 +254,9 @@ AccessUnitDecoder::limit_pixels (const PlannedView &planned)
   }
 }
 
-/* An encoder gives at most 8/3 pixels a byte, so this is no ROI of which less than nine tenths are
- * lost: it stays as it is, the same from one frame set to the next. */
+/* An encoder of profile plain gives at most 8/3 pixels a byte, so this is no ROI of which less than
+ * nine tenths are lost: it stays as it is, the same from one frame set to the next. In other
+ * profiles it may shrink with fewer losses where little moves. */
 static constexpr std::uint64_t kMaxPixelsPerByte = 32;
 
 void
@@ -323,7 +335,7 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
   for (const PlannedSlice &slice : same) {
     const int id = slice.header.view_id;
     ReferencePair &pair = references_[id];
-    ReferencePlane *now = slice.header.reference ? &pair.now () : nullptr;
+    ReferencePlane *now = slice.header.reference ? pair.now_kept () : nullptr;
     const ReferencePlane &before = pair.before (slice.header.frame_number);
     DecodedPixels decoded;
     if (!slice.too_short &&
@@ -373,11 +385,8 @@ AccessUnitDecoder::decode_view (
   DecoderResult &result = results_[index];
   Coverage &covered = covered_[index];
   result = {};
-  if (planned.reference.reference) {
-    SliceHeader header = planned.reference;
-    header.roi = planned.roi;
-    references_[planned.view_id].begin (header);
-  }
+  if (planned.reference.reference)
+    references_[planned.view_id].begin (planned.reference);
   std::uint64_t have;
   const bool tiled = is_tiled (planned, have);
   if (!tiled) {

@@ -20,7 +20,8 @@ public:
 
   /** Codes a frame set. Its bytes are those of parts() in order, valid until the next call.
    *  @param threads  views at a time; 0 = number of cores
-   *  @return kNotFound for a view that the rig has not, kBadSize for a ROI outside its view */
+   *  @return kNotFound for a view that the rig has not, kBadData for one that is there twice,
+   *  kBadSize for a ROI outside its view */
   Status encode (std::span<const RangeImage> images, std::uint32_t frame_number, int threads,
       EncoderResult &result);
 

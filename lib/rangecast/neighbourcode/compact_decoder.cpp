@@ -305,7 +305,8 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     decoded.points += points - unknown;
     decoded.unknown += unknown;
     if (reference.now)
-      std::copy_n (row_.codes (), columns, reference.now->row (image_row) + header.first_column);
+      reference.now->keep (
+          header.roi.x + header.first_column, header.roi.y + image_row, {row_.codes (), columns});
     std::swap (row_, upper_);
   }
   return code.at_clean_end ();

@@ -622,7 +622,8 @@ void
 CompactEncoder::keep_row (int y)
 {
   if (reference_.now)
-    std::copy_n (row_.codes (), columns_, reference_.now->row (y) + header_.first_column);
+    reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
+        {row_.codes (), static_cast<std::size_t> (columns_)});
 }
 
 /* Codes all rows of a band in the columns that the header says.

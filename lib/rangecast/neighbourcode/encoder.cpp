@@ -66,8 +66,10 @@ ViewEncoder::plan_references (SliceHeader &header)
   const std::uint32_t distance = header.frame_number - before.frame_number ();
   const bool key = !before.held () || distance == 0 || distance > 255;
   header.reference_distance = key ? std::uint8_t{0} : static_cast<std::uint8_t> (distance);
-  refresh_.plan (header.roi, header.capture_time_ns, settings_.refresh_period_ns, key, bands_);
-  return {&before, &references_.now ()};
+  refresh_.plan (header.roi,
+      {header.capture_time_ns, settings_.frame_interval_ns, settings_.refresh_period_ns}, key,
+      bands_);
+  return {&before, references_.now_kept ()};
 }
 
 void
@@ -105,6 +107,7 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
   header.frame_number = frame_number;
   header.capture_time_ns = image.capture_time_ns;
   if (roi.empty ()) {
+    references_.forget (); /* as if it were absent */
     to.resize (to.size () + kSliceHeaderSize);
     write_slice_header (header, kSliceHeaderSize, to.data () + to.size () - kSliceHeaderSize);
     result.slices++;

@@ -34,6 +34,8 @@ struct EncoderSettings {
   /** Within this time every pixel is coded without reference to earlier frame sets; 0: only in key
    * frame sets. */
   std::uint64_t refresh_period_ns = 1'000'000'000;
+  /** Of frame sets whose capture times do not grow. */
+  std::uint64_t frame_interval_ns = 1'000'000'000 / 30;
 
   friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
 };

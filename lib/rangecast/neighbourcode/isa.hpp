@@ -7,7 +7,7 @@
 
 /* On a function: what it calls becomes a part of it, so that all is made for that processor. */
 #if defined __x86_64__
-#define RANGECAST_X86_64_V3 gnu::target ("avx2,bmi,bmi2,lzcnt,popcnt"), gnu::flatten
+#define RANGECAST_X86_64_V3 gnu::target ("avx2,bmi,bmi2,popcnt"), gnu::flatten
 #else
 #define RANGECAST_X86_64_V3 gnu::flatten
 #endif
@@ -15,7 +15,6 @@
 
 namespace rangecast {
 
-/** Whoever has AVX2 and BMI2 has LZCNT, too, for which not every compiler can ask. */
 inline bool
 has_x86_64_v3 ()
 {

@@ -138,6 +138,7 @@ PlainTemporalEncoder::code_piece (
   row_.assign (columns + 2, kInvalidLanes);
   upper_.assign (columns + 2, kInvalidLanes);
   earlier_.resize (std::max (earlier_.size (), columns));
+  kept_.resize (earlier_.size ());
   begin_slice (band.first_row);
   std::size_t pixels = 0, full = 0;
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
@@ -156,8 +157,9 @@ PlainTemporalEncoder::code_piece (
       load_row (image, y);
       more = code_row (0, 0);
     }
-    std::transform (
-        row_.begin () + 1, row_.end () - 1, reference_.now->row (y) + header_.first_column, kept);
+    std::transform (row_.begin () + 1, row_.end () - 1, kept_.begin (), kept);
+    reference_.now->keep (
+        header_.roi.x + header_.first_column, header_.roi.y + y, std::span (kept_).first (columns));
     header_.rows++;
     pixels += columns;
     full += more;
@@ -267,10 +269,18 @@ write_row (const std::uint64_t *row, const SliceHeader &header, int y, const Ran
     decoded.unknown += unknown;
     if (unknown)
       show_older (reference, image, header.first_column + x, y);
-    if (reference.now)
-      reference.now->row (y)[header.first_column + x] =
-          row[x] == kInvalidShown ? ReferencePlane::kNone : row[x];
   }
+}
+
+/* Row as later frame sets refer to it. */
+void
+keep_row (const std::uint64_t *row, const SliceHeader &header, int y, ReferencePlane &now,
+    std::vector<std::uint64_t> &kept)
+{
+  std::transform (row, row + header.columns, kept.begin (),
+      [] (std::uint64_t p) { return p == kInvalidShown ? ReferencePlane::kNone : p; });
+  now.keep (header.roi.x + header.first_column, header.roi.y + y,
+      std::span (kept).first (static_cast<std::size_t> (header.columns)));
 }
 
 } // namespace
@@ -285,8 +295,10 @@ PlainTemporalDecoder::decode (std::span<const std::uint8_t> body, const SliceHea
   BitReader symbols (body.data (), symbols_size);
   FullPixels full = {BitReader (body.data () + symbols_size, body.size () - symbols_size), depth,
       colour, header.depth_bits};
-  rows_.assign (std::max (rows_.size (), 2 * (columns + 2)), kInvalidShown);
+  rows_.resize (std::max (rows_.size (), 2 * (columns + 2)));
+  std::fill_n (rows_.begin (), 2 * (columns + 2), kInvalidShown);
   earlier_.assign (columns, ReferencePlane::kNone);
+  kept_.resize (std::max (kept_.size (), columns));
   std::uint64_t *row = rows_.data () + 1, *upper = row + columns + 2;
   for (int y = 0; y < header.rows; y++) {
     const int image_row = header.first_row + y;
@@ -297,6 +309,8 @@ PlainTemporalDecoder::decode (std::span<const std::uint8_t> body, const SliceHea
             symbols, full, upper, header.key ? nullptr : earlier_.data (), row, header.columns))
       return false;
     write_row (row, header, image_row, image, reference, decoded);
+    if (reference.now)
+      keep_row (row, header, image_row, *reference.now, kept_);
     std::swap (row, upper);
   }
   return symbols.at_clean_end () && full.bits.at_clean_end ();

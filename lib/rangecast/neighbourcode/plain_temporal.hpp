@@ -47,7 +47,7 @@ private:
   PlainResult result_;
 
   std::vector<Lanes> row_, upper_; /* with an invalid pixel on each side */
-  std::vector<std::uint64_t> earlier_;
+  std::vector<std::uint64_t> earlier_, kept_;
   std::vector<std::uint8_t> symbols_; /* of the open slice, one a byte */
   std::vector<std::uint64_t> full_;
 };
@@ -66,7 +66,7 @@ public:
 
 private:
   std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
-  std::vector<std::uint64_t> earlier_;
+  std::vector<std::uint64_t> earlier_, kept_;
 };
 
 } // namespace rangecast

@@ -2,27 +2,60 @@
 #include "reference.hpp"
 
 #include <algorithm>
+#include <atomic>
 
 namespace rangecast {
 
 void
 ReferencePlane::begin (const SliceHeader &header)
 {
+  for (std::size_t line = 0; line < written_.size (); line++)
+    if (written_[line])
+      std::fill_n (row (static_cast<int> (line)), header_.roi.width, std::uint64_t{0});
   header_ = header;
-  held_ = true;
-  pixels_.assign (
-      static_cast<std::size_t> (header.roi.width) * static_cast<std::size_t> (header.roi.height),
-      kNone);
+  const auto height = static_cast<std::size_t> (header.roi.height);
+  const std::size_t need = static_cast<std::size_t> (header.roi.width) * height;
+  if (need > capacity_) {
+    pixels_.reset (static_cast<std::uint64_t *> (std::calloc (need, sizeof (std::uint64_t))));
+    capacity_ = pixels_ ? need : 0;
+  }
+  held_ = need <= capacity_;
+  written_.assign (held_ ? height : 0, 0);
+}
+
+/* Of whatever profile that is not plain, codes are the same. */
+bool
+ReferencePlane::means_the_same (const SliceHeader &header) const
+{
+  return header.depth_bits == header_.depth_bits && header.inverse_depth == header_.inverse_depth &&
+         header.colour_bits == header_.colour_bits &&
+         (header.profile == Profile::kPlain) == (header_.profile == Profile::kPlain);
 }
 
 bool
 ReferencePlane::serves (const SliceHeader &header) const
 {
-  const bool plain = header.profile == Profile::kPlain;
   return held_ && !header.key &&
          header.frame_number - header.reference_distance == header_.frame_number &&
-         header.depth_bits == header_.depth_bits && header.inverse_depth == header_.inverse_depth &&
-         header.colour_bits == header_.colour_bits && plain == (header_.profile == Profile::kPlain);
+         means_the_same (header);
+}
+
+bool
+ReferencePlane::is_of (const SliceHeader &header) const
+{
+  return held_ && header.frame_number == header_.frame_number && header.roi == header_.roi &&
+         means_the_same (header);
+}
+
+void
+ReferencePlane::keep (int x, int y, std::span<const std::uint64_t> pixels)
+{
+  const int line = y - header_.roi.y, column = x - header_.roi.x;
+  if (!held_ || line < 0 || line >= header_.roi.height || column < 0 ||
+      column + static_cast<int> (pixels.size ()) > header_.roi.width)
+    return;
+  std::atomic_ref (written_[static_cast<std::size_t> (line)]).store (1, std::memory_order_relaxed);
+  std::ranges::transform (pixels, row (line) + column, [] (std::uint64_t p) { return ~p; });
 }
 
 void
@@ -31,31 +64,43 @@ ReferencePlane::fetch (int x, int y, std::span<std::uint64_t> to) const
   const Roi &roi = header_.roi;
   const int end = x + static_cast<int> (to.size ());
   const int left = std::clamp (roi.x, x, end), right = std::clamp (roi.x + roi.width, left, end);
-  if (y < roi.y || y >= roi.y + roi.height || left == right) {
+  if (!held_ || y < roi.y || y >= roi.y + roi.height || left == right) {
     std::ranges::fill (to, kNone);
     return;
   }
-  const std::uint64_t *from =
-      pixels_.data () +
-      static_cast<std::size_t> (y - roi.y) * static_cast<std::size_t> (roi.width) + (left - roi.x);
+  const std::uint64_t *from = row (y - roi.y) + (left - roi.x);
   std::fill_n (to.begin (), left - x, kNone);
-  std::copy_n (from, right - left, to.begin () + (left - x));
+  std::transform (
+      from, from + (right - left), to.begin () + (left - x), [] (std::uint64_t p) { return ~p; });
   std::fill (to.begin () + (right - x), to.end (), kNone);
 }
 
 void
 ReferencePlane::clear (const SliceHeader &slice)
 {
-  for (int y = slice.first_row; y < slice.first_row + slice.rows; y++)
-    std::fill_n (row (y) + slice.first_column, slice.columns, kNone);
+  const int line = slice.roi.y + slice.first_row - header_.roi.y;
+  const int column = slice.roi.x + slice.first_column - header_.roi.x;
+  if (!held_ || line < 0 || line + slice.rows > header_.roi.height || column < 0 ||
+      column + slice.columns > header_.roi.width)
+    return;
+  for (int i = line; i < line + slice.rows; i++)
+    if (written_[static_cast<std::size_t> (i)])
+      std::fill_n (row (i) + column, slice.columns, std::uint64_t{0});
 }
 
 void
 ReferencePair::begin (const SliceHeader &header)
 {
-  if (!now ().held () || now ().frame_number () != header.frame_number)
+  /* A frame set that comes late is none that a later one refers to. Where an encoder begins anew,
+   * its numbers jump further than that. */
+  constexpr std::uint32_t kOld = 255;
+  const std::uint32_t age = now ().held () ? now ().frame_number () - header.frame_number : 0;
+  keeps_ = age == 0 || age > kOld;
+  if (!keeps_ || now ().is_of (header))
+    return;
+  if (age != 0 || !now ().held ())
     now_ = 1 - now_;
-  now ().begin (header);
+  planes_[now_].begin (header);
 }
 
 void

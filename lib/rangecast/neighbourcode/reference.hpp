@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdlib>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -10,7 +12,8 @@
 namespace rangecast {
 
 /** The pixels of a view's last frame set, to which slices of the next one may refer. A pixel is one
- *  number, made as the profile pleases. */
+ *  number, made as the profile pleases. Places are those of the view's full image. Memory is taken
+ *  for the rows that are written: 8 bytes for each pixel of the ROI in them. */
 class ReferencePlane {
 public:
   /** Of pixels that are invalid, or were not received. */
@@ -25,37 +28,48 @@ public:
   [[nodiscard]] std::uint32_t frame_number () const { return header_.frame_number; }
   /** It is what such a slice refers to, pixels mean the same in both. */
   [[nodiscard]] bool serves (const SliceHeader &header) const;
+  /** It holds the frame set of such a slice, or the other slices of it. */
+  [[nodiscard]] bool is_of (const SliceHeader &header) const;
 
-  /** A row of the ROI. */
-  std::uint64_t *row (int y)
-  {
-    return pixels_.data () +
-           static_cast<std::size_t> (y) * static_cast<std::size_t> (header_.roi.width);
-  }
-  /** Of the view's full image; kNone outside the ROI. */
+  /** Takes pixels of a row, from column x on. Rows may be written at the same time. */
+  void keep (int x, int y, std::span<const std::uint64_t> pixels);
+  /** Pixels of the slice become kNone: it turned out to be damaged. */
+  void clear (const SliceHeader &slice);
+
+  /** kNone outside the ROI. */
   [[nodiscard]] std::uint64_t at (int x, int y) const
   {
     const int column = x - header_.roi.x, line = y - header_.roi.y;
     if (column < 0 || line < 0 || column >= header_.roi.width || line >= header_.roi.height)
       return kNone;
-    return pixels_[static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width) +
-                   static_cast<std::size_t> (column)];
+    return ~row (line)[column];
   }
-  /** Pixels of a row of the view's full image from column x on; kNone outside the ROI. */
+  /** Pixels of a row from column x on; kNone outside the ROI. */
   void fetch (int x, int y, std::span<std::uint64_t> to) const;
-  /** Pixels of the slice become kNone: it turned out to be damaged. */
-  void clear (const SliceHeader &slice);
 
 private:
+  struct Free {
+    void operator() (std::uint64_t *memory) const { std::free (memory); }
+  };
+  [[nodiscard]] std::uint64_t *row (int line) const
+  {
+    return pixels_.get () +
+           static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width);
+  }
+  [[nodiscard]] bool means_the_same (const SliceHeader &header) const;
+
   bool held_ = false;
   SliceHeader header_;
-  std::vector<std::uint64_t> pixels_;
+  /* Inverted, so that kNone is 0: of memory that was never written there is none. */
+  std::unique_ptr<std::uint64_t, Free> pixels_;
+  std::size_t capacity_ = 0;
+  std::vector<std::uint8_t> written_; /* rows of the ROI */
 };
 
 /** The last frame set of a view and the one that is being coded or decoded. */
 class ReferencePair {
 public:
-  /** Begins a frame set. One that was begun before, of the same number, is begun anew. */
+  /** Begins a frame set. One of the same number goes on; one that is older is not kept. */
   void begin (const SliceHeader &header);
   void forget ();
 
@@ -66,12 +80,14 @@ public:
   {
     return now ().held () && now ().frame_number () != frame_number ? now () : before ();
   }
-  ReferencePlane &now () { return planes_[now_]; }
+  /** Takes the pixels of the frame set that was begun; nullptr if it is not kept. */
+  ReferencePlane *now_kept () { return keeps_ ? &planes_[now_] : nullptr; }
   [[nodiscard]] const ReferencePlane &now () const { return planes_[now_]; }
 
 private:
   ReferencePlane planes_[2];
   int now_ = 0;
+  bool keeps_ = false;
 };
 
 /** What slices may refer to, and where their pixels are kept; nullptr = nothing, nowhere. */

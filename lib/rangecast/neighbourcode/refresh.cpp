@@ -18,20 +18,20 @@ RefreshSchedule::reset (int view_height, int view_id)
 
 /* Time since the frame set before. */
 std::uint64_t
-RefreshSchedule::advance (std::uint64_t time_ns)
+RefreshSchedule::advance (const Time &time)
 {
-  constexpr std::uint64_t kUnknown = 1'000'000'000 / 30;
-  const std::uint64_t elapsed = time_ns > last_time_ns_ ? time_ns - last_time_ns_ : kUnknown;
-  last_time_ns_ = time_ns;
+  const bool grows = time.now_ns > last_time_ns_;
+  const std::uint64_t elapsed = grows ? time.now_ns - last_time_ns_ : time.interval_ns;
+  last_time_ns_ = time.now_ns;
   return elapsed;
 }
 
 void
-RefreshSchedule::plan (const Roi &roi, std::uint64_t time_ns, std::uint64_t period_ns, bool key,
-    std::vector<RowBand> &bands)
+RefreshSchedule::plan (const Roi &roi, const Time &time, bool key, std::vector<RowBand> &bands)
 {
+  const std::uint64_t period_ns = time.period_ns;
   bands.clear ();
-  const std::uint64_t elapsed = advance (time_ns);
+  const std::uint64_t elapsed = advance (time);
   const std::size_t count = age_ns_.size ();
   for (std::size_t i = 0; i < count; i++) {
     std::uint64_t &age = age_ns_[i];

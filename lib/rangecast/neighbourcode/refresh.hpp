@@ -17,9 +17,15 @@ struct RowBand {
 /** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
  *  without reference to earlier frame sets at least once in a period, one after the other. Slices
  *  do not cross bands, so what a lost packet damaged is whole again when its band has been
- *  refreshed. */
+ *  refreshed: after a period, and a frame interval more where those grow. */
 class RefreshSchedule {
 public:
+  struct Time {
+    std::uint64_t now_ns;      ///< of the frame set
+    std::uint64_t interval_ns; ///< of frame sets whose times do not grow
+    std::uint64_t period_ns;   ///< 0: no refresh
+  };
+
   /** Rows of a band: a quarter of the image, but not so few that slices become small. */
   [[nodiscard]] int band_rows () const { return band_rows_; }
 
@@ -27,14 +33,11 @@ public:
   void reset (int view_height, int view_id);
 
   /** Which bands of a ROI are coded how.
-   *  @param time_ns  of the frame set; times that do not grow count as a 30th of a second each
-   *  @param period_ns  0: no refresh
    *  @param key  everything without reference */
-  void plan (const Roi &roi, std::uint64_t time_ns, std::uint64_t period_ns, bool key,
-      std::vector<RowBand> &bands);
+  void plan (const Roi &roi, const Time &time, bool key, std::vector<RowBand> &bands);
 
 private:
-  std::uint64_t advance (std::uint64_t time_ns);
+  std::uint64_t advance (const Time &time);
 
   std::vector<std::uint64_t> age_ns_; /* of each band, since it was refreshed */
   std::uint64_t last_time_ns_ = 0;
