@@ -165,6 +165,72 @@ GST_START_TEST (test_a_request_from_upstream_waits_for_its_running_time)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_requests_for_several_times_are_all_answered)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = encoder (rig);
+  fail_unless_equals_string (kinds (h, rig, 0, 1).c_str (), "k");
+  for (const guint frame : {5u, 3u})
+    fail_unless (gst_harness_push_upstream_event (
+        h, gst_video_event_new_upstream_force_key_unit (frame * kFrame, FALSE, frame)));
+  fail_unless (gst_harness_push_upstream_event (
+      h, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, FALSE, 0)));
+  fail_unless_equals_string (kinds (h, rig, 1, 7).c_str (), "kdkdkd");
+  fail_unless_equals_int (count_requests (h, false), 3);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_decoder_can_begin_at_every_frame_set_without_the_delta_flag)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *enc = encoder (rig);
+  const Roi whole = {10, 10, 200, 180};
+  std::string kinds;
+  for (guint i = 0; i < 8; i++) {
+    GstBuffer *frame_set = make_frame_set (rig, i * kFrame, whole);
+    if (i == 3) { /* nobody is there */
+      gst_buffer_unref (frame_set);
+      frame_set = gst_range_buffer_new (2, 320, 240);
+      for (int id = 0; id < 2; id++)
+        gst_range_buffer_add_view (frame_set, id, 0, 0, 0, 0, i * kFrame);
+      gst_range_buffer_set_capture_time (frame_set, i * kFrame);
+      GST_BUFFER_PTS (frame_set) = i * kFrame;
+    }
+    GstBuffer *coded = gst_harness_push_and_pull (enc, frame_set);
+    kinds += is_delta (coded) ? 'd' : 'k';
+    gst_buffer_unref (coded);
+  }
+  fail_unless_equals_string (kinds.c_str (), "kddkkddd");
+  gst_harness_teardown (enc);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_late_slice_wipes_nothing_out)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *enc = encoder (rig, "profile=packed refresh-period=0");
+  GstHarness *dec = decoder (rig);
+  guint all = 0;
+  std::vector<guint8> first_slice;
+  for (guint i = 0; i < 4; i++) {
+    GstBuffer *coded = code (enc, rig, i);
+    const auto units = units_of (bytes_of (coded));
+    GstBuffer *shown = gst_harness_push_and_pull (dec, coded);
+    all = std::max (all, valid_pixels (shown));
+    fail_unless_equals_int (valid_pixels (shown), all);
+    gst_buffer_unref (shown);
+    /* One of this frame set again, and one of the frame set before. */
+    for (const auto &late : {units[0], first_slice})
+      if (!late.empty ())
+        gst_buffer_unref (gst_harness_push_and_pull (dec, buffer_of ({late}, i * kFrame)));
+    first_slice = units[0];
+  }
+  gst_harness_teardown (enc);
+  gst_harness_teardown (dec);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_key_interval_flush_caps_and_changed_bits_begin_anew)
 {
   const Rig rig = ring_rig (1);
@@ -329,6 +395,9 @@ temporal_suite (void)
   tcase_add_test (tc, test_each_row_is_coded_anew_within_the_refresh_period);
   tcase_add_test (tc, test_a_request_from_downstream_makes_a_key_frame_set_and_is_announced);
   tcase_add_test (tc, test_a_request_from_upstream_waits_for_its_running_time);
+  tcase_add_test (tc, test_requests_for_several_times_are_all_answered);
+  tcase_add_test (tc, test_a_decoder_can_begin_at_every_frame_set_without_the_delta_flag);
+  tcase_add_test (tc, test_a_late_slice_wipes_nothing_out);
   tcase_add_test (tc, test_key_interval_flush_caps_and_changed_bits_begin_anew);
   tcase_add_test (tc, test_lossless_stays_lossless);
   tcase_add_test (tc, test_what_refers_to_a_lost_frame_set_is_left_out_and_a_key_one_is_asked_for);

@@ -293,8 +293,11 @@ TEST (NeighbourCode, bad_settings_and_rois_are_refused)
   const RangeImage image = outside.image ();
   EXPECT_EQ (encoder.encode ({&image, 1}, 0, 1, result).code (), StatusCode::kBadSize);
   Picture unknown (7, {0, 0, 10, 10});
-  const RangeImage other = unknown.image ();
+  RangeImage other = unknown.image ();
   EXPECT_EQ (encoder.encode ({&other, 1}, 0, 1, result).code (), StatusCode::kNotFound);
+  other.view_id = 0;
+  const RangeImage twice[] = {other, other};
+  EXPECT_EQ (encoder.encode (twice, 0, 2, result).code (), StatusCode::kBadData);
 }
 
 TEST (NeighbourCode, missing_pixels_come_from_the_older_picture)
