@@ -1,27 +1,68 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Any bytes as one slice, under the header fields that they say: decoded into an image of exactly
- * the ROI's size, of which nothing beyond the slice's rows and columns may change. */
+/* Any bytes as one slice of any profile, under a header that is sound: decoded into an image of
+ * exactly the ROI's size, with or without an earlier frame set. The first bytes say what header and
+ * what earlier frame set there are (struct Ask), so that the others are read as pixels. */
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <rangecast/neighbourcode/access_unit.hpp>
+#include <rangecast/neighbourcode/isa.hpp>
 #include <rangecast/neighbourcode/symbols.hpp>
 
 using namespace rangecast;
 
-static constexpr int kWidth = 80, kHeight = 60;
+static constexpr int kWidth = 80, kHeight = 64;
 static constexpr std::uint16_t kUntouched = 0xabcd;
+static constexpr Rgbx kUntouchedColour = {1, 2, 3, 4};
+static constexpr std::uint8_t kRightSize = 1, kLongest = 255; /* Ask::length */
 
+/* The first bytes; others take the nearest that makes sense. */
+struct Ask {
+  std::uint8_t profile; /* bits 0-1; 4: no key; 8: reference; 16: older image; 32: once */
+  std::uint8_t earlier; /* bits 0-1: none, same ROI, other ROI, does not serve; from 2: how known */
+  std::uint8_t depth;   /* bits - 6; 128: inverse */
+  std::uint8_t colour;  /* bits - 4 */
+  std::uint8_t width, height, x, y;        /* of the ROI, less 1 where it cannot be 0 */
+  std::uint8_t columns, rows, column, row; /* of the slice */
+  std::uint8_t distance;
+  std::uint8_t length; /* kRightSize: cut or filled for plain; kLongest: repeated */
+};
+
+/* A view for each kind of depth code: tables are kept by view. */
 static Rig
-one_view ()
+views_of_all_depths ()
 {
-  View view;
-  view.width = kWidth;
-  view.height = kHeight;
-  view.intrinsics = {60, 60, 39.5, 29.5};
-  return {{view}};
+  Rig rig;
+  for (int id = 0; id < 22; id++) {
+    View view;
+    view.id = id;
+    view.width = kWidth;
+    view.height = kHeight;
+    view.intrinsics = {60, 60, 39.5, 31.5};
+    rig.views.push_back (view);
+  }
+  return rig;
 }
 
-/* Bytes of a slice with as many full pixels as its symbols ask for. */
+static SliceDecoder *
+make_decoder (bool every_cpu)
+{
+  every_cpu_only = every_cpu;
+  auto made = new SliceDecoder;
+  every_cpu_only = false;
+  if (!made->set_rig (views_of_all_depths ()).ok ())
+    std::abort ();
+  return made;
+}
+
+static void
+expect (bool fact)
+{
+  if (!fact)
+    std::abort ();
+}
+
+/* Bytes of a plain slice with as many full pixels as its symbols ask for. */
 static std::size_t
 size_of_slice (const SliceHeader &header, std::span<const std::uint8_t> body)
 {
@@ -31,74 +72,190 @@ size_of_slice (const SliceHeader &header, std::span<const std::uint8_t> body)
   for (std::size_t i = 0; i < pixels; i++)
     full += symbols.get (kSymbolBits) == kFull;
   const auto bits = std::size_t (header.depth_bits + 3 * header.colour_bits);
-  return std::min (kSliceHeaderSize + symbol_bytes (pixels) + (full * bits + 7) / 8, kMaxUnitSize);
+  return std::min (
+      header_size_of (header) + symbol_bytes (pixels) + (full * bits + 7) / 8, kMaxUnitSize);
 }
 
-/* Makes a header that is sound of the first bytes, so that the others are read as symbols. */
-static std::vector<std::uint8_t>
-make_slice (std::span<const std::uint8_t> data)
+static SliceHeader
+make_header (const Ask &ask)
 {
-  const auto at_most = [&] (
-                           std::size_t i, int most) { return most > 0 ? data[i] % (most + 1) : 0; };
+  const auto at_most = [] (int value, int most) { return value % (most + 1); };
   SliceHeader header;
-  header.depth_bits = static_cast<std::uint8_t> (6 + at_most (0, 10));
-  header.colour_bits = static_cast<std::uint8_t> (4 + at_most (1, 4));
-  header.inverse_depth = data[1] & 0x80;
-  header.roi.width = 1 + at_most (2, kWidth - 1);
-  header.roi.height = 1 + at_most (3, kHeight - 1);
-  header.roi.x = at_most (4, kWidth - header.roi.width);
-  header.roi.y = at_most (5, kHeight - header.roi.height);
-  header.columns = 1 + at_most (6, header.roi.width - 1);
-  header.rows = 1 + at_most (7, header.roi.height - 1);
-  header.first_column = at_most (8, header.roi.width - header.columns);
-  header.first_row = at_most (9, header.roi.height - header.rows);
-  const auto body = data.subspan (10);
-  const bool right_size = data[0] & 0x80;
-  std::vector<std::uint8_t> unit (kSliceHeaderSize);
+  header.profile = Profile{static_cast<std::uint8_t> (at_most (ask.profile & 3, 2))};
+  header.key = !(ask.profile & 4);
+  header.reference = ask.profile & 8;
+  header.inverse_depth = ask.depth & 128;
+  header.depth_bits = static_cast<std::uint8_t> (6 + at_most (ask.depth & 127, 10));
+  header.colour_bits = static_cast<std::uint8_t> (4 + at_most (ask.colour, 4));
+  header.view_id = static_cast<std::uint8_t> (2 * (header.depth_bits - 6) + header.inverse_depth);
+  header.frame_number = 100;
+  header.reference_distance =
+      header.key ? std::uint8_t{0} : std::max (ask.distance, std::uint8_t{1});
+  header.roi.width = 1 + at_most (ask.width, kWidth - 1);
+  header.roi.height = 1 + at_most (ask.height, kHeight - 1);
+  header.roi.x = at_most (ask.x, kWidth - header.roi.width);
+  header.roi.y = at_most (ask.y, kHeight - header.roi.height);
+  header.columns = 1 + at_most (ask.columns, header.roi.width - 1);
+  header.rows = 1 + at_most (ask.rows, header.roi.height - 1);
+  header.first_column = at_most (ask.column, header.roi.width - header.columns);
+  header.first_row = at_most (ask.row, header.roi.height - header.rows);
+  return header;
+}
+
+static std::vector<std::uint8_t>
+make_slice (const SliceHeader &header, std::uint8_t length, std::span<const std::uint8_t> body)
+{
+  std::vector<std::uint8_t> unit (header_size_of (header));
   unit.insert (unit.end (), body.begin (), body.end ());
-  if (right_size)
+  if (length == kRightSize && header.profile == Profile::kPlain)
     unit.resize (size_of_slice (header, body));
+  while (length == kLongest && unit.size () < kMaxUnitSize && !body.empty ())
+    unit.insert (unit.end (), body.begin (),
+        body.begin () + std::ptrdiff_t (std::min (body.size (), kMaxUnitSize - unit.size ())));
+  unit.shrink_to_fit (); /* or reading too far would not be seen */
   write_slice_header (header, unit.size (), unit.data ());
   return unit;
 }
 
-static void
-check_untouched (const SliceHeader &header, ImageView<const std::uint16_t> depth)
+/* A pixel as a decoder could have kept it. */
+static std::uint64_t
+earlier_pixel (const SliceHeader &header, std::uint32_t random)
 {
+  if (header.profile == Profile::kPlain)
+    return (random & 0xffff) | 1 | std::uint64_t{random >> 8} << 16;
+  const std::int32_t most = (1 << header.colour_bits) - 1;
+  const auto chroma = [&] (int shift) {
+    return static_cast<std::int32_t> (random >> shift & 0x1ff) % (2 * most + 1) - most;
+  };
+  const auto depth = static_cast<std::int32_t> (random % 64); /* of all bits */
+  return pack_components (Components{depth,
+      static_cast<std::int32_t> (random >> 6 & 0xff) % (most + 1), chroma (14), chroma (23)});
+}
+
+/* An earlier frame set that the slice may refer to, of made-up pixels. */
+static void
+fill_earlier (const Ask &ask, SliceHeader header, ReferencePlane &plane)
+{
+  const int kind = ask.earlier & 3;
+  header.frame_number -= header.reference_distance;
+  header.colour_bits =
+      kind == 3 ? static_cast<std::uint8_t> (12 - header.colour_bits) : header.colour_bits;
+  if (kind == 2)
+    header.roi = {kWidth / 4, kHeight / 4, kWidth / 2, kHeight / 2};
+  plane.begin (header);
+  std::uint32_t random = 12345u + ask.earlier;
   for (int y = 0; y < header.roi.height; y++)
     for (int x = 0; x < header.roi.width; x++) {
-      const bool own = y >= header.first_row && y < header.first_row + header.rows &&
-                       x >= header.first_column && x < header.first_column + header.columns;
-      if (!own && depth.row (y)[x] != kUntouched)
-        std::abort ();
+      random = random * 1664525u + 1013904223u;
+      if (random >> 26 >= static_cast<std::uint32_t> (ask.earlier >> 2)) /* else unknown */
+        plane.row (y)[x] = earlier_pixel (header, random >> 3 ^ random << 13);
     }
+}
+
+/* What a slice is decoded into. */
+struct Picture {
+  std::vector<std::uint16_t> depth;
+  std::vector<Rgbx> colour;
+  ReferencePlane kept;
+  DecodedPixels decoded;
+  bool good = false;
+
+  void decode (SliceDecoder &decoder, std::span<const std::uint8_t> unit, const SliceHeader &header,
+      const ReferencePlane *before, const ConstRangeImage *older)
+  {
+    const int width = header.roi.width, height = header.roi.height;
+    depth.assign (std::size_t (width) * std::size_t (height), kUntouched);
+    colour.assign (depth.size (), kUntouchedColour);
+    const RangeImage image = {header.view_id, header.roi, {depth.data (), width, height, width * 2},
+        {colour.data (), width, height, width * 4}, 0};
+    if (header.reference)
+      kept.begin (header);
+    good = decoder
+               .decode (unit, header, {before, header.reference ? &kept : nullptr, older}, image,
+                   decoded)
+               .ok ();
+  }
+};
+
+static bool
+same_colour (const Rgbx &a, const Rgbx &b)
+{
+  return std::memcmp (&a, &b, sizeof a) == 0;
+}
+
+/* Nothing outside the slice may have changed, and what is inside is what was counted. */
+static void
+check_picture (const SliceHeader &header, Picture &picture, bool with_older)
+{
+  const auto width = static_cast<std::size_t> (header.roi.width);
+  std::uint64_t valid = 0, kept = 0;
+  for (int y = 0; y < header.roi.height; y++)
+    for (int x = 0; x < header.roi.width; x++) {
+      const std::size_t i = std::size_t (y) * width + std::size_t (x);
+      const bool known = header.reference && picture.kept.row (y)[x] != ReferencePlane::kNone;
+      if (y >= header.first_row && y < header.first_row + header.rows && x >= header.first_column &&
+          x < header.first_column + header.columns) {
+        valid += picture.depth[i] != kInvalidDepth;
+        kept += known;
+      } else {
+        expect (picture.depth[i] == kUntouched && !known &&
+                same_colour (picture.colour[i], kUntouchedColour));
+      }
+    }
+  const DecodedPixels &decoded = picture.decoded;
+  const auto pixels =
+      static_cast<std::uint64_t> (header.rows) * static_cast<std::uint64_t> (header.columns);
+  expect (decoded.points + decoded.unknown <= pixels && !(header.key && decoded.unknown));
+  if (!picture.good)
+    return;
+  expect (valid >= decoded.points && valid <= decoded.points + decoded.unknown);
+  expect (with_older || valid == decoded.points);
+  expect (!header.reference || kept == decoded.points);
+}
+
+/* The same by another decoder, which has code for every CPU and another history. */
+static void
+check_same (const SliceHeader &header, Picture &a, Picture &b)
+{
+  expect (a.good == b.good);
+  if (!a.good)
+    return;
+  expect (a.depth == b.depth && a.decoded.points == b.decoded.points &&
+          a.decoded.unknown == b.decoded.unknown);
+  for (std::size_t i = 0; i < a.colour.size (); i++)
+    expect (a.depth[i] == kInvalidDepth || same_colour (a.colour[i], b.colour[i]));
+  for (int y = 0; header.reference && y < header.roi.height; y++)
+    expect (std::equal (a.kept.row (y), a.kept.row (y) + header.roi.width, b.kept.row (y)));
 }
 
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
 {
-  static SliceDecoder &decoder = *[] {
-    auto made = new SliceDecoder;
-    if (!made->set_rig (one_view ()).ok ())
-      std::abort ();
-    return made;
-  }();
-  if (size < 10 || size > kMaxUnitSize - kSliceHeaderSize)
+  static SliceDecoder &decoder = *make_decoder (false), &other = *make_decoder (true);
+  static const std::vector<std::uint16_t> older_depth (kWidth * kHeight / 4, 0x4321);
+  static const std::vector<Rgbx> older_colour (older_depth.size ());
+  static const ConstRangeImage older = {0, {kWidth / 4, kHeight / 4, kWidth / 2, kHeight / 2},
+      {older_depth.data (), kWidth / 2, kHeight / 2, kWidth},
+      {older_colour.data (), kWidth / 2, kHeight / 2, kWidth * 2}, 0};
+  Ask ask;
+  if (size < sizeof ask || size > kMaxUnitSize - kSliceHeaderSize)
     return 0;
-  const auto unit = make_slice ({data, size});
+  std::memcpy (&ask, data, sizeof ask);
+  const SliceHeader wanted = make_header (ask);
+  const auto unit = make_slice (wanted, ask.length, {data + sizeof ask, size - sizeof ask});
   SliceHeader header;
-  if (!decoder.read_header (unit, header).ok ())
-    std::abort ();
-  const int width = header.roi.width, height = header.roi.height;
-  std::vector<std::uint16_t> depth (std::size_t (width) * std::size_t (height), kUntouched);
-  std::vector<Rgbx> colour (depth.size ());
-  const RangeImage image = {0, header.roi, {depth.data (), width, height, width * 2},
-      {colour.data (), width, height, width * 4}, 0};
-  DecodedPixels decoded;
-  const bool good = decoder.decode (unit, header, {}, image, decoded).ok ();
-  check_untouched (header, {depth.data (), width, height, width * 2});
-  if (good && decoded.points > static_cast<std::uint64_t> (header.rows) *
-                           static_cast<std::uint64_t> (header.columns))
-    std::abort ();
+  expect (decoder.read_header (unit, header).ok ());
+  ReferencePlane before;
+  const bool has_before = !header.key && ask.earlier & 3, has_older = ask.profile & 16;
+  if (has_before)
+    fill_earlier (ask, header, before);
+  Picture picture, again;
+  picture.decode (
+      decoder, unit, header, has_before ? &before : nullptr, has_older ? &older : nullptr);
+  check_picture (header, picture, has_older);
+  if (ask.profile & 32) /* the other decoder's history becomes another one */
+    return 0;
+  again.decode (other, unit, header, has_before ? &before : nullptr, has_older ? &older : nullptr);
+  check_same (header, picture, again);
   return 0;
 }

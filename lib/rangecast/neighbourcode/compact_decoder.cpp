@@ -115,7 +115,7 @@ CompactDecoder::decode_run (
     const auto chosen = static_cast<unsigned> (
         x > begin || n.any () ? code.template choice<Delta> (n) : int{kCorrect});
     if (chosen < kPredict) [[likely]] {
-      const std::size_t from = x + chosen - kTakeUpper;
+      const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
       const std::uint64_t take_left = mask_of_zero (chosen);
       left_shown = either (take_left, left_shown, upper_shown[from]);
       if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */

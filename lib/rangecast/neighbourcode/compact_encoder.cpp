@@ -449,7 +449,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     const std::uint64_t chosen = either (take_left, kTakeLeft, other);
     if (chosen != kPredict) [[likely]] {
       code.template choice<Delta> (n, static_cast<int> (chosen));
-      const std::size_t from = x + other - kTakeUpper;
+      const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
       left_key = either (take_left, left_key, upper_keys[from]);
       left = {either (take_left, left.code, upper_codes[from]),
           Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
