@@ -111,16 +111,18 @@ struct Player {
 
   void check (bool conceal) const
   {
-    std::uint64_t coded = 0, slices = 0;
+    std::uint64_t coded = 0, slices = 0, foretold = 0;
     for (std::size_t i = 0; i < decoder.views ().size (); i++) {
       const auto &view = decoder.views ()[i];
       expect (i == 0 || view.view_id > decoder.views ()[i - 1].view_id);
       coded += view.coded_pixels;
       slices += view.slice_count;
+      foretold += decoder.missing_pixels (i);
     }
     expect (result.missing_pixels <= coded && result.points <= coded && result.slices <= slices);
     expect (conceal ? result.points <= pictures.valid () : result.points == pictures.valid ());
     expect (result.points == 0 || result.slices > 0);
+    expect (foretold > 0 || result.missing_pixels == 0);
     expect (result.points + result.missing_pixels <= coded || conceal);
   }
 };

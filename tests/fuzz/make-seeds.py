@@ -18,6 +18,7 @@ LARGEST = 2000  # bytes of a seed
 SLICE = streams.SLICE
 STREAMS = [path for path in sorted(DATA.glob("*.rcnc"))]
 KEY, INVERSE, REFERENCE = 1, 2, 4
+KEY_SLICE, OTHER_SLICE = 2, 6  # Ask::profile of profile entropy
 
 
 def slices_of(units: list[bytes]) -> list[bytes]:
@@ -53,6 +54,31 @@ def slice_seeds(units: list[bytes]) -> list[bytes]:
             earlier = 1 + i % 3 | (i * 5 % 64) << 2
             seeds.append(slice_seed(unit, earlier, 16 * (i % 2), (0, 0, 1, 255)[i % 4]))
     return seeds
+
+
+def entropy_data(initial: list[int], decisions: list[tuple[int, bool]]) -> bytes:
+    """Numbers of probabilities, each but once, and what is decided; all that follows is yes."""
+    low, size, taken = 0, (1 << 32) - 1, 4
+    for i, yes in decisions:
+        part = (size >> 12) * (initial[i] >> 4)
+        low += 0 if yes else part
+        size = part if yes else size - part
+        while size < 1 << 24:
+            low, size, taken = low << 8, size << 8, taken + 1
+    return low.to_bytes(taken, "big")
+
+
+def too_large_numbers() -> list[bytes]:
+    """Of entropy slices: a motion, a run and a residual of one pixel that say that they have more than 17 bits."""
+    steps = bytes((1, 0, 1, 1))
+    tables = streams.compact
+    inputs = [
+        (OTHER_SLICE, 5, entropy_data(tables.INITIAL_WITHOUT_KEY, [(383, False)])),
+        (KEY_SLICE, 5, b""),
+        # The run of invalid pixels ends one before what is expected, that of valid ones one behind it.
+        (KEY_SLICE, 0, entropy_data(tables.INITIAL, [(0, True), (2, True), (3, False), (1, True), (18, False), (19, False)])),
+    ]
+    return [bytes((profile, 1, 8, 4, columns, 0, 0, 0, columns, 0, 0, 0, 1, 0)) + steps + data for profile, columns, data in inputs]
 
 
 def access_unit_seed(options: int, access_units: list[list[bytes]], how: int = 0) -> bytes:
@@ -96,7 +122,7 @@ def rtp_seeds(access_units: list[list[bytes]]) -> list[bytes]:
 
 def main() -> None:
     to = Path(sys.argv[1])
-    seeds: dict[str, list[bytes]] = {"slice": [], "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
+    seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
     for path in STREAMS:
         data = path.read_bytes()
         if path.stem == "damaged":  # its sizes are lies
