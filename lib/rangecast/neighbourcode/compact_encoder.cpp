@@ -12,9 +12,16 @@ namespace {
 /* What one pixel may add to a slice at most, whatever its code; and one run. */
 constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
 
-/* About as wide as high, so that few pixels lack their upper neighbours: a slice has so many
- * columns for each byte^(1/2) of its size. */
-constexpr double kColumnsOfSlice = 2.8;
+/* A slice has so many columns for each byte^(1/2) of its size; found by trying. In entropy slices
+ * are about as wide as high, so that few pixels lack their upper neighbours; packed would rather
+ * begin few runs. Without loss rows are long and slices low. */
+double
+columns_of_slice (Profile profile, bool is_exact)
+{
+  if (profile == Profile::kPacked)
+    return is_exact ? 1.4 : 9;
+  return is_exact ? 1 : 2.4;
+}
 
 /* How full slices with a reference are meant to be: then few of them break in their band. */
 constexpr double kFillOfDeltaSlice = 0.8;
@@ -162,7 +169,8 @@ CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> b
 int
 CompactEncoder::pieces_of (const RowBand &band, int width) const
 {
-  double side = kColumnsOfSlice * std::sqrt (settings_.max_slice_size);
+  double side = columns_of_slice (header_.profile, is_zero (steps_ - 1)) *
+                std::sqrt (settings_.max_slice_size);
   if (!band.key && delta_bytes_per_pixel_ > 0) {
     const double columns =
         kFillOfDeltaSlice * settings_.max_slice_size / (delta_bytes_per_pixel_ * band.rows);
@@ -643,7 +651,6 @@ CompactEncoder::code_piece (
     const CompactResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
-    model_before_ = model_;
     const bool begins_block = header_.rows == 0 || (header_.roi.y + y) % kMotionBlock == 0;
     if (!code_row<Code, Delta> (code, begins_block)) {
       if (header_.rows == 0)

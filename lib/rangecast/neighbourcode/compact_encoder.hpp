@@ -120,7 +120,7 @@ private:
   PixelCode last_ = kNoPixel;
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
-  EntropyModel model_{}, model_before_{};
+  EntropyModel model_{};
   std::vector<std::uint8_t> bytes_;        /* of the open slice, behind its header */
   Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};

@@ -37,12 +37,6 @@ MotionSearch::resize (int width, int height)
   sorted_.reserve (kMotionBlock * kMotionBlock);
 }
 
-void
-MotionSearch::forget ()
-{
-  std::ranges::fill (last_, BlockMotion{});
-}
-
 /* Every other pixel of every other row, or all of narrow blocks. */
 void
 MotionSearch::take_samples (const Pictures &pictures, const Area &area)

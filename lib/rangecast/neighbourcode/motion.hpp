@@ -60,7 +60,6 @@ public:
 
   /** @param width, height  of the view's full image */
   void resize (int width, int height);
-  void forget ();
 
   struct Pictures { ///< what to find motion between
     const ConstRangeImage &image;
