@@ -132,7 +132,7 @@ make_player (bool every_cpu)
 {
   every_cpu_only = every_cpu;
   auto made = new Player;
-  every_cpu_only = false;
+  limit_cpu (CpuLevel::kAvx2);
   expect (made->decoder.set_rig (two_views ()).ok ());
   return made;
 }

@@ -50,7 +50,7 @@ make_decoder (bool every_cpu)
 {
   every_cpu_only = every_cpu;
   auto made = new SliceDecoder;
-  every_cpu_only = false;
+  limit_cpu (CpuLevel::kAvx2);
   if (!made->set_rig (views_of_all_depths ()).ok ())
     std::abort ();
   return made;
