@@ -155,68 +155,92 @@ AvatarSettings::get (guint id, GValue *value) const
   }
 }
 
-void
-AvatarSettings::install (GObjectClass *klass)
-{
-  const auto ready =
+/* Adds properties that may change in NULL and READY. */
+struct Installer {
+  GObjectClass *klass;
+  static constexpr auto kReady =
       GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-  const auto add_int = [&] (guint id, const char *name, const char *blurb, int low, int high,
-                           int value) {
+
+  void add_int (guint id, const char *name, const char *nick, const char *blurb, int low, int high,
+      int value) const
+  {
     g_object_class_install_property (
-        klass, id, g_param_spec_int (name, name, blurb, low, high, value, ready));
-  };
-  const auto add_uint = [&] (guint id, const char *name, const char *blurb, guint value) {
+        klass, id, g_param_spec_int (name, nick, blurb, low, high, value, kReady));
+  }
+  void add_uint (guint id, const char *name, const char *nick, const char *blurb, guint value) const
+  {
     g_object_class_install_property (
-        klass, id, g_param_spec_uint (name, name, blurb, 0, G_MAXUINT, value, ready));
-  };
-  const auto add_double = [&] (guint id, const char *name, const char *blurb, double low,
-                              double high, double value) {
+        klass, id, g_param_spec_uint (name, nick, blurb, 0, G_MAXUINT, value, kReady));
+  }
+  void add_double (guint id, const char *name, const char *nick, const char *blurb, double low,
+      double high, double value) const
+  {
     g_object_class_install_property (
-        klass, id, g_param_spec_double (name, name, blurb, low, high, value, ready));
-  };
-  const auto add_bool = [&] (guint id, const char *name, const char *blurb) {
+        klass, id, g_param_spec_double (name, nick, blurb, low, high, value, kReady));
+  }
+  void add_bool (guint id, const char *name, const char *nick, const char *blurb) const
+  {
     g_object_class_install_property (
-        klass, id, g_param_spec_boolean (name, name, blurb, FALSE, ready));
-  };
-  const auto add_string = [&] (guint id, const char *name, const char *blurb) {
+        klass, id, g_param_spec_boolean (name, nick, blurb, FALSE, kReady));
+  }
+  void add_string (guint id, const char *name, const char *nick, const char *blurb) const
+  {
     g_object_class_install_property (
-        klass, id, g_param_spec_string (name, name, blurb, nullptr, ready));
-  };
-  add_int (PROP_VIEWS, "views", "Stereo cameras in the rig (1 to 64, default: 4)", 1, 64, 4);
-  add_int (PROP_VIEW_ID, "view-id",
+        klass, id, g_param_spec_string (name, nick, blurb, nullptr, kReady));
+  }
+};
+
+static void
+install_scene (const Installer &to)
+{
+  to.add_int (
+      PROP_VIEWS, "views", "Views", "Stereo cameras in the rig (1 to 64, default: 4)", 1, 64, 4);
+  to.add_int (PROP_VIEW_ID, "view-id", "View",
       "Which view to give (0 to 63; -1, the default: all on src, view 0 on left, right and third)",
-      kAllViews, 63, kAllViews);
-  add_double (PROP_ARC, "arc",
+      AvatarSettings::kAllViews, 63, AvatarSettings::kAllViews);
+  to.add_double (PROP_ARC, "arc", "Arc",
       "Arc on which the views stand, degrees (1 to 360; 360, the default: a ring, view 0 in front; "
       "less: the figure's front in the middle)",
       1, 360, 360);
-  add_double (PROP_DISTANCE, "distance",
+  to.add_double (PROP_DISTANCE, "distance", "Distance",
       "From the left cameras to the figure's axis, metres (0.5 to 1.2, default: 0.8)", 0.5, 1.2,
       0.8);
-  add_double (PROP_BASELINE, "baseline",
+  to.add_double (PROP_BASELINE, "baseline", "Baseline",
       "From left to right and to third camera, metres (0.01 to 0.3, default: 0.1)", 0.01, 0.3, 0.1);
-  add_uint (PROP_SEED, "seed", "Of all patterns and the noise (default: 1)", 1);
-  add_double (PROP_NOISE, "noise",
+  to.add_uint (PROP_SEED, "seed", "Seed", "Of all patterns and the noise (default: 1)", 1);
+  to.add_double (PROP_NOISE, "noise", "Noise",
       "Sensor noise, standard deviation in grey levels (0 to 20, default: 1)", 0, 20, 1);
-  add_double (
-      PROP_MOTION, "motion", "How much the figure moves (0 = still, to 2; default: 1)", 0, 2, 1);
-  add_uint (PROP_EMPTY_FRAMES, "empty-frames",
+  to.add_double (PROP_MOTION, "motion", "Motion",
+      "How much the figure moves (0 = still, to 2; default: 1)", 0, 2, 1);
+}
+
+static void
+install_model_and_stream (const Installer &to)
+{
+  to.add_uint (PROP_EMPTY_FRAMES, "empty-frames", "Empty frames",
       "So many frames at first show the room without the figure (default: 0)", 0);
-  add_int (
-      PROP_NUM_BUFFERS, "num-buffers", "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);
-  add_bool (PROP_IS_LIVE, "is-live",
+  to.add_int (PROP_NUM_BUFFERS, "num-buffers", "Number of buffers",
+      "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);
+  to.add_bool (PROP_IS_LIVE, "is-live", "Is live",
       "Take pictures at multiples of the frame period of the pipeline's clock (default: false)");
-  add_string (
-      PROP_LOCATION, "location", "Model of the figure, glTF or OBJ (default: the built-in one)");
-  add_string (PROP_TEXTURE, "texture",
+  to.add_string (PROP_LOCATION, "location", "Location",
+      "Model of the figure, glTF or OBJ (default: the built-in one)");
+  to.add_string (PROP_TEXTURE, "texture", "Texture",
       "Picture for the model (default: what the model names, or a colour map beside it)");
-  add_bool (PROP_TEXTURE_FLIP, "texture-flip",
+  to.add_bool (PROP_TEXTURE_FLIP, "texture-flip", "Texture upside down",
       "Turn the model's texture upside down, for a picture made for the other direction of v "
       "(default: false)");
-  add_string (PROP_RIG_EXPORT, "rig-export",
+  to.add_string (PROP_RIG_EXPORT, "rig-export", "Rig export",
       "Write the calibration of all cameras to this file, YAML or JSON (default: none)");
-  add_bool (PROP_RANGE_PERSON_ONLY, "range-person-only",
+  to.add_bool (PROP_RANGE_PERSON_ONLY, "range-person-only", "Range of person only",
       "Crop range images to the person's bounding box (default: false)");
-  add_int (PROP_N_THREADS, "n-threads",
+  to.add_int (PROP_N_THREADS, "n-threads", "Threads",
       "Threads that draw range images (0, the default: one a core)", 0, 64, 0);
+}
+
+void
+AvatarSettings::install (GObjectClass *klass)
+{
+  install_scene ({klass});
+  install_model_and_stream ({klass});
 }

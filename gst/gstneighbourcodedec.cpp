@@ -35,6 +35,8 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
+#include "recycledbuffers.hpp"
+
 using rangecast::DecoderResult;
 using rangecast::Status;
 
@@ -126,14 +128,6 @@ forget_stream (GstNeighbourCodeDecPrivate *priv)
   priv->last_request = GST_CLOCK_TIME_NONE;
 }
 
-static void
-drop_pool (GstNeighbourCodeDecPrivate *priv)
-{
-  if (priv->pool)
-    gst_buffer_pool_set_active (priv->pool, FALSE);
-  gst_clear_object (&priv->pool);
-}
-
 static gboolean
 gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
@@ -148,7 +142,7 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   forget_stream (priv);
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
-  drop_pool (priv);
+  drop_pool (priv->pool);
   status = gstrange::make_pool (out, priv->pool);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
@@ -450,7 +444,7 @@ gst_neighbour_code_dec_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   forget_stream (priv);
-  drop_pool (priv);
+  drop_pool (priv->pool);
   return TRUE;
 }
 
@@ -515,7 +509,7 @@ gst_neighbour_code_dec_finalize (GObject *object)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
   forget_stream (priv);
-  drop_pool (priv);
+  drop_pool (priv->pool);
   delete priv;
   G_OBJECT_CLASS (gst_neighbour_code_dec_parent_class)->finalize (object);
 }

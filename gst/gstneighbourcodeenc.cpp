@@ -35,6 +35,7 @@
 
 #include "keyunitrequests.hpp"
 #include "neighbourcoderate.hpp"
+#include "recycledbuffers.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -85,8 +86,7 @@ struct GstNeighbourCodeEncPrivate {
   std::uint32_t frame_number = 0;
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
-  GstBufferPool *pool = nullptr;
-  gsize pool_size = 0;
+  RecycledBytes buffers;
   bool by_slices = false;     /* alignment of the output */
   GstBuffer *input = nullptr; /* what encoder holds is of this one, and not yet all pushed */
   std::size_t part = 0;
@@ -201,34 +201,6 @@ configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
   return {};
 }
 
-static void
-drop_pool (GstNeighbourCodeEncPrivate *priv)
-{
-  if (priv->pool)
-    gst_buffer_pool_set_active (priv->pool, FALSE);
-  gst_clear_object (&priv->pool);
-  priv->pool_size = 0;
-}
-
-/* A recycled buffer of that size. The pool grows to the largest seen. */
-static GstBuffer *
-acquire (GstNeighbourCodeEncPrivate *priv, gsize size)
-{
-  if (!priv->pool || size > priv->pool_size) {
-    drop_pool (priv);
-    priv->pool = gst_buffer_pool_new ();
-    priv->pool_size = size + size / 2;
-    GstStructure *config = gst_buffer_pool_get_config (priv->pool);
-    gst_buffer_pool_config_set_params (config, nullptr, guint (priv->pool_size), 0, 0);
-    gst_buffer_pool_set_config (priv->pool, config);
-    gst_buffer_pool_set_active (priv->pool, TRUE);
-  }
-  GstBuffer *buffer = nullptr;
-  if (gst_buffer_pool_acquire_buffer (priv->pool, &buffer, nullptr) == GST_FLOW_OK)
-    gst_buffer_set_size (buffer, gssize (size));
-  return buffer;
-}
-
 struct FrameSettings {
   EncoderSettings encoder;
   NeighbourCodeRateSettings rate;
@@ -341,12 +313,9 @@ static GstBuffer *
 make_output (GstNeighbourCodeEnc *self, gsize size)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  GstBuffer *buffer = acquire (priv, size);
-  if (!buffer) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory for %" G_GSIZE_FORMAT " coded bytes", size));
+  GstBuffer *buffer = priv->buffers.acquire (GST_ELEMENT (self), size, "a coded frame set");
+  if (!buffer)
     return nullptr;
-  }
   GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
       GST_BASE_TRANSFORM (self), priv->input, buffer);
   const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
@@ -500,7 +469,7 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->is_configured = false;
   forget_input (priv);
-  drop_pool (priv);
+  priv->buffers.drop ();
   return TRUE;
 }
 
@@ -628,7 +597,6 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
 static void
 gst_neighbour_code_enc_finalize (GObject *object)
 {
-  drop_pool (GST_NEIGHBOUR_CODE_ENC (object)->priv);
   delete GST_NEIGHBOUR_CODE_ENC (object)->priv;
   G_OBJECT_CLASS (gst_neighbour_code_enc_parent_class)->finalize (object);
 }

@@ -21,9 +21,8 @@
  *
  * Since: 0.1
  */
-/* Locking: `lock` guards what a seek, in the application's thread, shares with the streaming
- * thread. It is never held while pulling, pushing, querying or posting. Messages are posted in any
- * thread: what they depend on is atomic. */
+/* Locking: NeighbourCodeSeek has a lock of its own. Messages are posted in any thread: what they
+ * depend on is atomic. */
 #include "gstneighbourcodeparse.h"
 
 #include <gst/base/base.h>
@@ -33,12 +32,11 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
-#include <mutex>
 #include <rangecast/neighbourcode/byte_stream.hpp>
 #include <span>
 #include <vector>
 
-#include "neighbourcodefile.hpp"
+#include "neighbourcodeseek.hpp"
 
 using rangecast::AccessUnitHeader;
 using rangecast::kAccessUnitHeaderSize;
@@ -85,16 +83,8 @@ struct Stream {               /* streaming thread only */
   GstClockTime last_rig = GST_CLOCK_TIME_NONE;
 };
 
-struct SeekState { /* guarded by the lock */
-  GstClockTime first_pts = GST_CLOCK_TIME_NONE;
-  /* The rig of the access unit at that offset, which may not have one of its own. */
-  guint64 rig_offset = G_MAXUINT64;
-  std::vector<guint8> rig_units;
-};
-
 struct GstNeighbourCodeParsePrivate {
-  std::mutex lock;
-  SeekState seek;
+  NeighbourCodeSeek seek;
   Stream stream;
   std::atomic<Seen> seen = Seen::kNothing; /* written by the streaming thread */
   std::atomic<bool> failed = false;        /* an error was posted since start or flush */
@@ -394,29 +384,6 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
   return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
-/* ---- files ---- */
-
-static bool
-reads_file (GstBaseParse *base)
-{
-  return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
-}
-
-/* From the first time of a file to the end of its last access unit. */
-static void
-find_duration (GstBaseParse *base, GstClockTime first_pts)
-{
-  GstClockTime duration =
-      NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
-  if (!GST_CLOCK_TIME_IS_VALID (duration))
-    return; /* the base class goes on estimating */
-  const auto &info = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.info;
-  if (GST_CLOCK_TIME_IS_VALID (info.frame_duration ()))
-    duration += info.frame_duration ();
-  if (duration <= G_MAXINT64)
-    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
-}
-
 /* ---- from the byte stream ---- */
 
 static GstFlowReturn
@@ -459,15 +426,7 @@ add_rig_view (GstBaseParse *base, Bytes unit)
 static void
 use_rig_of_seek (GstBaseParse *base, guint64 offset)
 {
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  std::vector<guint8> units;
-  {
-    std::lock_guard guard (priv->lock);
-    if (priv->seek.rig_offset != offset)
-      return;
-    units = std::move (priv->seek.rig_units);
-    priv->seek.rig_offset = G_MAXUINT64;
-  }
+  const std::vector<guint8> units = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.take_rig (offset);
   UnitReader reader (units);
   UnitHeader header;
   while (const auto unit = reader.next (header))
@@ -510,27 +469,6 @@ update_caps (GstBaseParse *base)
   const rangecast::StreamInfo &info = stream.collector.info ();
   stream.info = gstrange::make_info (info.rig, info.fps_n, info.fps_d);
   return set_source_caps (base);
-}
-
-/* Times of a file begin at 0. */
-static GstClockTime
-time_of (GstBaseParse *base, const AccessUnitHeader &header)
-{
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  if (!GST_CLOCK_TIME_IS_VALID (header.pts_ns))
-    return GST_CLOCK_TIME_NONE;
-  bool first = false;
-  GstClockTime first_pts;
-  {
-    std::lock_guard guard (priv->lock);
-    first = !GST_CLOCK_TIME_IS_VALID (priv->seek.first_pts);
-    if (first)
-      priv->seek.first_pts = header.pts_ns;
-    first_pts = priv->seek.first_pts;
-  }
-  if (first && reads_file (base))
-    find_duration (base, first_pts);
-  return header.pts_ns >= first_pts ? header.pts_ns - first_pts : 0;
 }
 
 static GstMemory *
@@ -576,9 +514,10 @@ static GstFlowReturn
 finish_access_unit (
     GstBaseParse *base, GstBaseParseFrame *frame, const AccessUnitHeader &header, gsize length)
 {
-  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  Stream &stream = priv->stream;
   GstBuffer *output = make_output (stream, frame->buffer, length);
-  const GstClockTime pts = time_of (base, header);
+  const GstClockTime pts = priv->seek.time_of (base, header.pts_ns, stream.info.frame_duration ());
   /* Where there is none, the base class goes on from the one before, or from where it sought. */
   if (GST_CLOCK_TIME_IS_VALID (pts))
     GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = pts;
@@ -588,7 +527,7 @@ finish_access_unit (
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   gst_range_buffer_set_capture_time (output, header.capture_time_ns);
   stream.discont = false;
-  GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen = Seen::kSlices;
+  priv->seen = Seen::kSlices;
   frame->out_buffer = output;
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
@@ -648,89 +587,15 @@ gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *
   return GST_FLOW_OK;
 }
 
-/* ---- seeking ---- */
-
-/* The rig is not with each access unit: keep it until the streaming thread is there. */
-static void
-keep_rig (GstNeighbourCodeParsePrivate *priv, NeighbourCodeFile::Place &place)
-{
-  std::lock_guard guard (priv->lock);
-  priv->seek.rig_offset = place.offset;
-  priv->seek.rig_units = std::move (place.rig_units);
-}
-
-static GstClockTime
-first_pts_of (GstNeighbourCodeParsePrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  return priv->seek.first_pts;
-}
-
-/* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
- * played. Returns: the time there; none if it could not be found. */
-static GstClockTime
-find_place (GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
-{
-  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  const GstClockTime first_pts = first_pts_of (priv);
-  if (!GST_CLOCK_TIME_IS_VALID (first_pts))
-    return GST_CLOCK_TIME_NONE;
-  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first_pts);
-  auto place = file.find (time, stop, flags);
-  if (!place)
-    return GST_CLOCK_TIME_NONE;
-  keep_rig (priv, *place);
-  gst_base_parse_add_index_entry (base, place->offset, place->time, TRUE, TRUE);
-  return place->time;
-}
-
-/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
-static GstClockTime
-end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
-{
-  const GstClockTime end =
-      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
-  return std::min<GstClockTime> (end, G_MAXINT64);
-}
-
-/* Returns: (transfer full): the seek that the base class shall do. */
-static GstEvent *
-aim (GstBaseParse *base, GstEvent *event)
-{
-  gdouble rate;
-  GstFormat format;
-  GstSeekFlags flags;
-  GstSeekType start_type, stop_type;
-  gint64 start, stop;
-  gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
-    return event;
-  const GstClockTime end = end_of (base, stop_type, stop);
-  const GstClockTime found = find_place (base, GstClockTime (start), end, flags);
-  if (!GST_CLOCK_TIME_IS_VALID (found))
-    return event;
-  if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
-    start = gint64 (found);
-  /* The base class uses the place only where it shall be accurate. */
-  flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
-  GstEvent *aimed = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
-  gst_event_set_seqnum (aimed, gst_event_get_seqnum (event));
-  gst_event_unref (event);
-  return aimed;
-}
+/* ---- events ---- */
 
 static gboolean
 gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && reads_file (base)) {
-    gdouble rate;
-    gst_event_parse_seek (event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
-    if (rate < 0) { /* nothing here reads backwards */
-      gst_event_unref (event);
-      return FALSE;
-    }
-    event = aim (base, event);
-  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && NeighbourCodeSeek::reads_file (base))
+    event = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.aim (base, event);
+  if (!event)
+    return FALSE;
   return GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->src_event (base, event);
 }
 
@@ -764,9 +629,8 @@ gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 static void
 forget_stream (GstNeighbourCodeParsePrivate *priv)
 {
-  std::lock_guard guard (priv->lock);
   priv->stream = {};
-  priv->seek = {};
+  priv->seek.reset ();
   priv->seen = Seen::kNothing;
   priv->failed = false;
 }

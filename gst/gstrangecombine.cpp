@@ -30,6 +30,8 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <string>
 
+#include "recycledbuffers.hpp"
+
 using rangecast::RangeImage;
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -173,9 +175,7 @@ make_view (const CombineSettings &settings, int width, int height, View &view)
 static void
 drop_pool_and_converter (GstRangeCombinePrivate *priv)
 {
-  if (priv->pool)
-    gst_buffer_pool_set_active (priv->pool, FALSE);
-  gst_clear_object (&priv->pool);
+  drop_pool (priv->pool);
   if (priv->converter)
     gst_video_converter_free (priv->converter);
   priv->converter = nullptr;

@@ -30,6 +30,8 @@
 #include <rangecast/geometry/paste.hpp>
 #include <vector>
 
+#include "recycledbuffers.hpp"
+
 using rangecast::ConstRangeImage;
 using rangecast::ImageView;
 using rangecast::Rgbx;
@@ -60,14 +62,8 @@ struct SplitPad {
   }
   ~SplitPad ()
   {
-    drop_pool ();
+    drop_pool (pool);
     gst_object_unref (pad);
-  }
-  void drop_pool ()
-  {
-    if (pool)
-      gst_buffer_pool_set_active (pool, FALSE);
-    gst_clear_object (&pool);
   }
 };
 using SplitPads = std::vector<std::shared_ptr<SplitPad>>;
@@ -136,7 +132,7 @@ set_up_pool (SplitPad &pad, GstCaps *caps)
 {
   guint size = static_cast<guint> (GST_VIDEO_INFO_SIZE (&pad.video)), min = 0, max = 0;
   GstQuery *query = gst_query_new_allocation (caps, TRUE);
-  pad.drop_pool ();
+  drop_pool (pad.pool);
   gst_pad_peer_query (pad.pad, query);
   if (gst_query_get_n_allocation_pools (query) > 0)
     gst_query_parse_nth_allocation_pool (query, 0, &pad.pool, &size, &min, &max);
@@ -222,7 +218,7 @@ push_view (GstRangeSplit *self, SplitPad &pad, const gstrange::RangeFrameMap &fr
       image = view;
 
   GstBuffer *out = nullptr;
-  flow = gst_buffer_pool_acquire_buffer (pad.pool, &out, nullptr);
+  flow = acquire_buffer (GST_ELEMENT (self), pad.pool, "a picture", &out);
   if (flow != GST_FLOW_OK)
     return flow;
   GstVideoFrame video;
@@ -388,7 +384,7 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
     gst_segment_init (&self->priv->segment, GST_FORMAT_TIME);
     gst_flow_combiner_reset (self->priv->combiner);
     for (const auto &pad : self->priv->pads) {
-      pad->drop_pool ();
+      drop_pool (pad->pool);
       pad->needs_start = pad->needs_caps = pad->needs_segment = true;
     }
   }

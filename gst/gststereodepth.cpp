@@ -23,6 +23,7 @@
 #include "gststereodepth.h"
 
 #include "picturereader.hpp"
+#include "recycledbuffers.hpp"
 
 #include <gst/video/video.h>
 
@@ -204,14 +205,6 @@ make_view (const StereoProperties &p, int width, int height, View &view)
 
 /* ---- negotiation ---- */
 
-static void
-drop_pool (GstStereoDepthPrivate *priv)
-{
-  if (priv->pool)
-    gst_buffer_pool_set_active (priv->pool, FALSE);
-  gst_clear_object (&priv->pool);
-}
-
 static Status
 configure_core (GstStereoDepthPrivate *priv)
 {
@@ -249,7 +242,7 @@ negotiate (GstStereoDepth *self)
   GstCaps *caps = gstrange::make_range_caps (info);
   priv->frame_duration = info.frame_duration ();
   priv->since_refresh = 0;
-  drop_pool (priv);
+  drop_pool (priv->pool);
   const Status pooled = gstrange::make_pool (caps, priv->pool);
   if (pooled.ok ())
     gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
@@ -448,7 +441,7 @@ static gboolean
 gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  drop_pool (priv);
+  drop_pool (priv->pool);
   for (PictureReader &reader : priv->readers)
     reader.reset ();
   return TRUE;
@@ -602,7 +595,7 @@ static void
 gst_stereo_depth_finalize (GObject *object)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
-  drop_pool (priv);
+  drop_pool (priv->pool);
   delete priv;
   G_OBJECT_CLASS (gst_stereo_depth_parent_class)->finalize (object);
 }

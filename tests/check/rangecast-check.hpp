@@ -99,4 +99,18 @@ next_message_text (GstBus *bus, GstMessageType type)
   return text;
 }
 
+/** Plays a pipeline until EOS, which must come before any error and within 20 s, and stops it. */
+inline void
+play_to_the_end (GstElement *pipeline)
+{
+  fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  GstMessage *message = gst_bus_timed_pop_filtered (
+      bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
+  gst_message_unref (message);
+  gst_object_unref (bus);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+}
+
 } // namespace rangecast::testing

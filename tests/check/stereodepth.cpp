@@ -355,16 +355,8 @@ GST_START_TEST (test_changes_states_twice)
       "avatartestsrc name=c num-buffers=2 c.left ! queue ! d.left c.right ! queue ! "
       "d.right stereodepth name=d focal-length=320 baseline=0.1 ! fakesink",
       nullptr);
-  for (int i = 0; i < 2; i++) {
-    gst_element_set_state (pipeline, GST_STATE_PLAYING);
-    GstBus *bus = gst_element_get_bus (pipeline);
-    GstMessage *message = gst_bus_timed_pop_filtered (
-        bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-    fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
-    gst_message_unref (message);
-    gst_object_unref (bus);
-    gst_element_set_state (pipeline, GST_STATE_NULL);
-  }
+  for (int i = 0; i < 2; i++)
+    play_to_the_end (pipeline);
   gst_object_unref (pipeline);
 }
 GST_END_TEST;

@@ -3,6 +3,8 @@
 
 #include "test-support.hpp"
 
+#include <cstring>
+#include <memory>
 #include <random>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
@@ -109,6 +111,33 @@ units_of (std::span<const std::uint8_t> bytes)
     units.emplace_back (unit->begin (), unit->end ());
   EXPECT_TRUE (reader.status ().ok ());
   return units;
+}
+
+/** The same in a copy of exactly its size, so that one byte too far is seen. */
+inline Decoded
+decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
+    std::span<const RangeImage> older = {})
+{
+  const auto copy = std::make_unique<std::uint8_t[]> (bytes.size ());
+  if (!bytes.empty ())
+    std::memcpy (copy.get (), bytes.data (), bytes.size ());
+  return decode (decoder, {copy.get (), bytes.size ()}, older);
+}
+
+/** Each prefix of a stream must give all its whole slices, and one bad one for a cut one. */
+inline void
+expect_prefixes_cost_only_their_last_slice (
+    AccessUnitDecoder &decoder, std::span<const std::uint8_t> stream)
+{
+  const auto units = units_of (stream);
+  for (std::size_t size = 0; size < stream.size (); size++) {
+    std::size_t whole = 0, end = 0;
+    while (whole < units.size () && end + units[whole].size () <= size)
+      end += units[whole++].size ();
+    const Decoded decoded = decode_exact (decoder, stream.first (size));
+    EXPECT_EQ (decoded.result.slices, whole) << size;
+    EXPECT_EQ (decoded.result.bad_slices, size == end ? 0u : 1u) << size;
+  }
 }
 
 } // namespace rangecast::testing

@@ -4,9 +4,7 @@
 #include "neighbourcode-support.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <functional>
-#include <memory>
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -57,15 +55,6 @@ moving_picture (int id, const Roi &first, int frame)
     depth = depth ? static_cast<std::uint16_t> (depth + random () % 100) : depth;
   }
   return picture;
-}
-
-Decoded
-decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes)
-{
-  const auto copy = std::make_unique<std::uint8_t[]> (bytes.size ());
-  if (!bytes.empty ())
-    std::memcpy (copy.get (), bytes.data (), bytes.size ());
-  return decode (decoder, {copy.get (), bytes.size ()});
 }
 
 /* Codes frame sets of some views that move. */

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstring>
 
+#include "pixel_lanes.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -30,8 +32,6 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
   return span;
 }
 
-/* Four numbers of a pixel side by side; compilers make vector code of it where there is some. */
-typedef std::int32_t Lanes __attribute__ ((vector_size (16)));
 typedef std::uint16_t Packed __attribute__ ((vector_size (8)));
 
 Lanes
@@ -40,16 +40,6 @@ lanes_of (PlainPixel pixel)
   Packed packed;
   std::memcpy (&packed, &pixel, sizeof packed);
   return __builtin_convertvector(packed, Lanes);
-}
-
-bool
-are_near (Lanes a, Lanes b, Lanes threshold)
-{
-  typedef std::int64_t Halves __attribute__ ((vector_size (16)));
-  const Lanes difference = a - b;
-  const Lanes beyond = (difference > threshold) | (difference < -threshold);
-  const Halves halves = reinterpret_cast<Halves> (beyond);
-  return (halves[0] | halves[1]) == 0;
 }
 
 /* The row above, which is replaced as it goes, but for the last pixel. */
