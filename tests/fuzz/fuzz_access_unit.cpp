@@ -130,7 +130,7 @@ struct Player {
 static Player *
 make_player (bool every_cpu)
 {
-  every_cpu_only = every_cpu;
+  limit_cpu (every_cpu ? CpuLevel::kScalar : CpuLevel::kAvx2);
   auto made = new Player;
   limit_cpu (CpuLevel::kAvx2);
   expect (made->decoder.set_rig (two_views ()).ok ());

@@ -48,7 +48,7 @@ views_of_all_depths ()
 static SliceDecoder *
 make_decoder (bool every_cpu)
 {
-  every_cpu_only = every_cpu;
+  limit_cpu (every_cpu ? CpuLevel::kScalar : CpuLevel::kAvx2);
   auto made = new SliceDecoder;
   limit_cpu (CpuLevel::kAvx2);
   if (!made->set_rig (views_of_all_depths ()).ok ())
