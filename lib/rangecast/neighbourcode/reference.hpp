@@ -40,7 +40,8 @@ public:
   [[nodiscard]] std::uint64_t at (int x, int y) const
   {
     const int column = x - header_.roi.x, line = y - header_.roi.y;
-    if (column < 0 || line < 0 || column >= header_.roi.width || line >= header_.roi.height)
+    if (!held_ || column < 0 || line < 0 || column >= header_.roi.width ||
+        line >= header_.roi.height)
       return kNone;
     return ~row (line)[column];
   }
