@@ -19,7 +19,7 @@ double
 columns_of_slice (Profile profile, bool is_exact)
 {
   if (profile == Profile::kPacked)
-    return is_exact ? 1.4 : 9;
+    return is_exact ? 1.4 : 4.5;
   return is_exact ? 1 : 2.4;
 }
 
