@@ -31,6 +31,7 @@
 #include <rangecast/parallel.hpp>
 #include <vector>
 
+#include "camerapainter.hpp"
 #include "strippainter.hpp"
 #include "stripsettings.hpp"
 
@@ -61,6 +62,7 @@ struct GstStripRenderPrivate {
   GError *gl_error = nullptr;   /* why OpenGL cannot be used */
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
   StripPainter painter;
+  CameraPainter camera_painter;
   std::array<std::vector<StripVertex>, rangecast::kMaxViews> vertices; /* by number in the buffer */
 };
 
@@ -212,6 +214,7 @@ gst_strip_render_gl_stop (GstGLBaseFilter *filter)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   priv->painter.stop ();
+  priv->camera_painter.stop ();
   gst_clear_object (&priv->framebuffer);
 }
 
@@ -232,6 +235,7 @@ struct DrawJob {
   GstStripRender *self;
   StripPainter::Picture picture;
   std::span<const StripPainter::Layer> layers;
+  bool show_cameras;
   GstGLMemory *target;
   GstGLSyncMeta *sync; /* nullptr where downstream wants none */
   guint64 uploaded = 0;
@@ -242,7 +246,11 @@ static gboolean
 draw_bound (gpointer user_data)
 {
   auto job = static_cast<DrawJob *> (user_data);
-  job->uploaded = job->self->priv->painter.draw (job->picture, job->layers);
+  GstStripRenderPrivate *priv = job->self->priv;
+  job->uploaded = priv->painter.draw (job->picture, job->layers);
+  if (job->show_cameras)
+    priv->camera_painter.draw (
+        GST_GL_BASE_FILTER (job->self)->context, priv->info.rig, job->picture.clip_from_world);
   return TRUE;
 }
 
@@ -354,6 +362,7 @@ draw_frame (GstStripRender *self, const gstrange::RangeFrameMap &frame, GstBuffe
   job.self = self;
   job.picture = make_picture (priv, settings, running);
   job.layers = {layers.data (), count};
+  job.show_cameras = settings.show_cameras;
   if (!draw_into (self, out, job))
     return GST_FLOW_ERROR;
   stats.uploaded_bytes = job.uploaded;

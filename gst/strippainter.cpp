@@ -3,6 +3,8 @@
 
 #include <cstring>
 
+#include "glshader.hpp"
+
 using rangecast::StripMode;
 using rangecast::StripVertex;
 
@@ -75,23 +77,12 @@ void main ()
 }
 )";
 
-static const char *const kFragmentShader = R"(
-precision highp float;
-in vec3 v_colour;
-out vec4 fragment;
-void main ()
-{
-  fragment = vec4 (v_colour, 1.0);
-}
-)";
-
 bool
 StripPainter::start (GstGLContext *context, GError **error)
 {
   context_ = context;
-  const bool gles = gst_gl_context_check_gl_version (context, GST_GL_API_GLES2, 3, 0);
-  if (!gles && !gst_gl_context_check_gl_version (
-                   context, GstGLAPI (GST_GL_API_OPENGL3 | GST_GL_API_OPENGL), 3, 3)) {
+  if (!is_gles (context) && !gst_gl_context_check_gl_version (
+                                context, GstGLAPI (GST_GL_API_OPENGL3 | GST_GL_API_OPENGL), 3, 3)) {
     g_set_error (error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_OLD_LIBS,
         "expected OpenGL 3.3 or OpenGL ES 3.0");
     return false;
@@ -103,16 +94,7 @@ StripPainter::start (GstGLContext *context, GError **error)
         "OpenGL has no glVertexAttribIPointer");
     return false;
   }
-  const GstGLSLVersion version = gles ? GST_GLSL_VERSION_300 : GST_GLSL_VERSION_330;
-  const GstGLSLProfile profile = gles ? GST_GLSL_PROFILE_ES : GST_GLSL_PROFILE_CORE;
-  const char *const header = gles ? "#version 300 es\n" : "#version 330 core\n";
-  const auto stage = [&] (guint type, const char *source) {
-    const char *parts[] = {header, source};
-    return gst_glsl_stage_new_with_strings (context, type, version, profile, 2, parts);
-  };
-  shader_ =
-      gst_gl_shader_new_link_with_stages (context, error, stage (GL_VERTEX_SHADER, kVertexShader),
-          stage (GL_FRAGMENT_SHADER, kFragmentShader), nullptr);
+  shader_ = make_shader (context, kVertexShader, kColourFragmentShader, error);
   return shader_ != nullptr;
 }
 

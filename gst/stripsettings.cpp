@@ -53,7 +53,8 @@ enum : guint {
   PROP_NUMBERS = 1,
   PROP_MODE = PROP_NUMBERS + std::size (kNumbers),
   PROP_BACKGROUND,
-  PROP_MAX_GAP
+  PROP_MAX_GAP,
+  PROP_SHOW_CAMERAS
 };
 
 GType
@@ -89,7 +90,12 @@ install_strip_settings (GObjectClass *object_class)
       g_param_spec_int ("max-gap", "Maximum gap",
           "Invalid pixels of a row that a strip bridges (0 to 1000, default 3)", 0, 1000,
           kDefaults.max_gap, kFlags));
-  return PROP_MAX_GAP;
+  g_object_class_install_property (object_class, PROP_SHOW_CAMERAS,
+      g_param_spec_boolean ("show-cameras", "Show cameras",
+          "Also draw where the rig's cameras stand, and their frusta from near to far (default "
+          "false)",
+          FALSE, kFlags));
+  return PROP_SHOW_CAMERAS;
 }
 
 static double
@@ -117,6 +123,8 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.background = g_value_get_uint (value);
   else if (id == PROP_MAX_GAP)
     settings.strips.max_gap = g_value_get_int (value);
+  else if (id == PROP_SHOW_CAMERAS)
+    settings.show_cameras = g_value_get_boolean (value);
   else
     return false;
   return true;
@@ -133,6 +141,8 @@ get_strip_setting (const Settings &settings, guint id, GValue *value)
     g_value_set_uint (value, settings.background);
   else if (id == PROP_MAX_GAP)
     g_value_set_int (value, settings.strips.max_gap);
+  else if (id == PROP_SHOW_CAMERAS)
+    g_value_set_boolean (value, settings.show_cameras);
   else
     return false;
   return true;

@@ -14,6 +14,7 @@ struct StripRenderSettings {
   OrbitControl camera;
   guint background = kDefaultBackground; ///< ARGB
   double point_size = 1;                 ///< footprints of a pixel
+  bool show_cameras = false;
   rangecast::StripSettings strips;
 };
 

@@ -34,7 +34,7 @@ measure room "${pairs[@]}" --near 0.4 --far 8
 
 # A recorded stereo pair through stereodepth and roiextract: ten frames in which somebody walks through.
 people=$data/luxonis_people_stereo
-"$pipelines/rig-from-luxonis.py" "$people/calib.json" "$out/rig.yaml" --near 0.7 --far 4 --scale 0.5
+rig-convert luxonis "$people/calib.json" "$out/rig.yaml" --near 0.7 --far 4 --scale 0.5
 side () { # file, pad
   echo "filesrc location=$1 ! decodebin ! videoconvert ! videorate drop-only=true ! video/x-raw,framerate=10/1
     ! videoscale method=bilinear2 ! video/x-raw,width=640,height=400 ! queue ! $2"

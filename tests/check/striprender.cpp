@@ -7,6 +7,7 @@
 #include <gst/video/navigation.h>
 
 #include <cstdlib>
+#include <rangecast/strips/camera_lines.hpp>
 #include <vector>
 
 using namespace rangecast;
@@ -94,6 +95,43 @@ GST_START_TEST (test_default_picture_is_the_first_views_own_in_every_mode)
     fail_unless_equals_int (picture.at (160, 225, 2), 0x2a);
     gst_harness_teardown (h);
   }
+}
+GST_END_TEST;
+
+/* Views 1 and 3 stand at the first view's sides and look across: their frusta cross the picture in
+ * their own colours. Its own lines lie on the picture's very edge. */
+GST_START_TEST (test_cameras_are_drawn_where_they_stand)
+{
+  GstHarness *h = render_harness (ring_rig (4), "show-cameras=true distance=3 elevation=30");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstBuffer *empty = gst_range_buffer_new (1, 1, 1);
+  gst_range_buffer_add_view (empty, 0, 0, 0, 0, 0, 0);
+  GST_BUFFER_PTS (empty) = 0;
+  const Rendered picture = render (h, gst_buffer_ref (empty));
+  int drawn[4] = {}, left[4] = {};
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      for (std::size_t i = 0; i < 4; i++) {
+        const LineColour c = camera_colour (i);
+        const bool is = picture.at (x, y, 0) == c.red && picture.at (x, y, 1) == c.green &&
+                        picture.at (x, y, 2) == c.blue;
+        drawn[i] += is;
+        left[i] += is && x < 160;
+      }
+  for (int i = 0; i < 4; i++)
+    fail_unless (drawn[i] > 50, "view %d: %d pixels", i, drawn[i]);
+  fail_unless (left[1] == 0, "the camera at the right is at the left");
+  fail_unless_equals_int (left[3], drawn[3]);
+
+  GstElement *element = gst_bin_get_by_name (GST_BIN (h->element), "r");
+  g_object_set (element, "show-cameras", FALSE, nullptr);
+  gst_object_unref (element);
+  GST_BUFFER_PTS (empty) = GST_SECOND;
+  const Rendered without = render (h, empty);
+  for (std::size_t i = 0; i < without.rgba.size (); i += 4)
+    fail_unless_equals_int (without.rgba[i], 0x20);
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -553,6 +591,7 @@ striprender_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_default_picture_is_the_first_views_own_in_every_mode);
+  tcase_add_test (tc, test_cameras_are_drawn_where_they_stand);
   tcase_add_test (tc, test_edges_lose_no_pixel_and_gain_none);
   tcase_add_test (tc, test_edges_of_a_smaller_roi_do_not_read_the_last_frame);
   tcase_add_test (tc, test_padded_strides_give_the_same_picture);

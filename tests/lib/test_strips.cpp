@@ -3,6 +3,7 @@
 #include "test-support.hpp"
 
 #include <random>
+#include <rangecast/strips/camera_lines.hpp>
 #include <rangecast/strips/orbit.hpp>
 #include <rangecast/strips/strips.hpp>
 
@@ -353,4 +354,51 @@ TEST (Orbit, panning_by_a_pictures_size_moves_the_target_so_far)
         EXPECT_NEAR (to.x - from.x, 80, 1e-2);
         EXPECT_NEAR (to.y - from.y, -30, 1e-2);
       }
+}
+
+/* The first view of a ring stands at z = 0.8 and looks along -z. */
+TEST (CameraLines, pyramid_and_frustum_reach_from_the_camera_to_near_and_far)
+{
+  View view = ring_rig (4).views[0];
+  view.near_m = 0.5;
+  view.far_m = 2;
+  std::vector<LineVertex> lines;
+  append_camera_lines (view, camera_colour (0), lines);
+  ASSERT_EQ (lines.size () % 2, 0u);
+  const Vec3 eye = view.world_from_view.translation;
+  int at_eye = 0, at_near = 0, at_far = 0;
+  for (const LineVertex &p : lines) {
+    const Vec3 seen = view.world_from_view.inverse () * Vec3{p.x, p.y, p.z};
+    at_eye += norm (Vec3{p.x, p.y, p.z} - eye) < 1e-6;
+    at_near += std::abs (seen.z - 0.5) < 1e-6;
+    at_far += std::abs (seen.z - 2) < 1e-6;
+    if (std::abs (seen.z - 2) < 1e-6) { /* the outer edges of the corner pixels */
+      EXPECT_NEAR (std::abs (seen.x / seen.z * view.intrinsics.fx), view.width / 2.0, 1e-3);
+      EXPECT_NEAR (std::abs (seen.y / seen.z * view.intrinsics.fy), view.height / 2.0, 1e-3);
+    }
+  }
+  EXPECT_EQ (at_eye, 4);
+  EXPECT_EQ (at_far, 8 + 4);
+  EXPECT_EQ (at_near, int (lines.size ()) - at_eye - at_far);
+}
+
+TEST (CameraLines, roof_is_on_the_pictures_upper_side)
+{
+  std::vector<LineVertex> lines;
+  append_camera_lines (ring_rig (1).views[0], camera_colour (0), lines);
+  const View view = ring_rig (1).views[0];
+  double highest = -1e9, picture_top = -1e9;
+  for (const LineVertex &p : lines) {
+    const Vec3 seen = view.world_from_view.inverse () * Vec3{p.x, p.y, p.z};
+    if (std::abs (seen.z - view.near_m) < 1e-6)
+      (std::abs (seen.x) < 1e-3 ? highest : picture_top) =
+          std::max (std::abs (seen.x) < 1e-3 ? highest : picture_top, double (p.y));
+  }
+  EXPECT_GT (highest, picture_top + 0.1 * (2 * picture_top));
+}
+
+TEST (CameraLines, neighbours_have_colours_that_differ)
+{
+  for (std::size_t i = 0; i < 16; i++)
+    EXPECT_NE (camera_colour (i).name, camera_colour (i + 1).name);
 }

@@ -99,7 +99,7 @@ test_bunny_scans_go_through_everything () {
 test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   need_data luxonis_people_stereo/left.mp4
   local input=$data/luxonis_people_stereo empty n
-  "$pipelines/rig-from-luxonis.py" "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
+  rig-convert luxonis "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
   "$pipelines/stereo-to-cutout.sh" "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 \
     --fps 5 --settle 17 --learn 8 --stereo "block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05" \
     --roi "cue=depth depth-threshold=0.3 min-area=1000 max-hole=400"

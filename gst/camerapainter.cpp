@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "camerapainter.hpp"
+
+#include <gst/gl/gstglfuncs.h>
+
+#include <cstddef>
+
+#include "glshader.hpp"
+
+using rangecast::LineVertex;
+
+static const char *const kVertexShader = R"(
+precision highp float;
+uniform mat4 u_clip_from_world;
+in vec3 a_position;
+in vec3 a_colour;
+out vec3 v_colour;
+void main ()
+{
+  gl_Position = u_clip_from_world * vec4 (a_position, 1.0);
+  v_colour = a_colour;
+}
+)";
+
+bool
+CameraPainter::start (GstGLContext *context)
+{
+  if (shader_ || failed_)
+    return shader_ != nullptr;
+  GError *error = nullptr;
+  shader_ = make_shader (context, kVertexShader, kColourFragmentShader, &error);
+  if (!shader_) {
+    failed_ = true;
+    GST_WARNING ("cameras cannot be drawn: %s", error ? error->message : "no shader");
+    g_clear_error (&error);
+    return false;
+  }
+  context_ = context;
+  const GstGLFuncs *gl = context->gl_vtable;
+  gl->GenBuffers (1, &vertices_);
+  gl->GenVertexArrays (1, &array_);
+  gl->BindVertexArray (array_);
+  gl->BindBuffer (GL_ARRAY_BUFFER, vertices_);
+  const auto attribute = [&] (const char *name, guint type, gboolean normalised, gsize offset) {
+    const gint at = gst_gl_shader_get_attribute_location (shader_, name);
+    gl->EnableVertexAttribArray (guint (at));
+    gl->VertexAttribPointer (guint (at), 3, type, normalised, sizeof (LineVertex),
+        reinterpret_cast<const void *> (offset)); /* NOLINT: an offset, as OpenGL wants it */
+  };
+  attribute ("a_position", GL_FLOAT, FALSE, offsetof (LineVertex, x));
+  attribute ("a_colour", GL_UNSIGNED_BYTE, TRUE, offsetof (LineVertex, red));
+  return true;
+}
+
+bool
+CameraPainter::draw (
+    GstGLContext *context, const rangecast::Rig &rig, const rangecast::Mat4 &clip_from_world)
+{
+  if (!start (context))
+    return false;
+  lines_.clear ();
+  for (std::size_t i = 0; i < rig.views.size (); i++)
+    rangecast::append_camera_lines (rig.views[i], rangecast::camera_colour (i), lines_);
+  const GstGLFuncs *gl = context->gl_vtable;
+  gst_gl_shader_use (shader_);
+  gst_gl_shader_set_uniform_matrix_4fv (
+      shader_, "u_clip_from_world", 1, FALSE, clip_from_world.data ());
+  gl->BindVertexArray (array_);
+  gl->BindBuffer (GL_ARRAY_BUFFER, vertices_);
+  gl->BufferData (GL_ARRAY_BUFFER, gsize (lines_.size () * sizeof (LineVertex)), lines_.data (),
+      GL_STREAM_DRAW);
+  gl->Enable (GL_DEPTH_TEST);
+  gl->DrawArrays (GL_LINES, 0, GLsizei (lines_.size ()));
+  gl->Disable (GL_DEPTH_TEST);
+  gl->BindVertexArray (0);
+  gl->BindBuffer (GL_ARRAY_BUFFER, 0);
+  gst_gl_context_clear_shader (context);
+  return true;
+}
+
+void
+CameraPainter::stop ()
+{
+  failed_ = false;
+  if (!context_)
+    return;
+  const GstGLFuncs *gl = context_->gl_vtable;
+  gl->DeleteBuffers (1, &vertices_);
+  gl->DeleteVertexArrays (1, &array_);
+  gst_clear_object (&shader_);
+  context_ = nullptr;
+}

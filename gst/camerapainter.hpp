@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gl/gl.h>
+
+#include <rangecast/strips/camera_lines.hpp>
+#include <rangecast/strips/orbit.hpp>
+
+/** Draws where a rig's cameras stand and what they see, with OpenGL (core 3.3 or GLES 3.0). All
+ *  functions in the GL thread. */
+class CameraPainter {
+public:
+  /** Draws into the bound framebuffer; makes what it needs when first called.
+   *  @return false without a shader; the reason has been logged */
+  bool draw (
+      GstGLContext *context, const rangecast::Rig &rig, const rangecast::Mat4 &clip_from_world);
+  /** Deletes everything that OpenGL holds for us. */
+  void stop ();
+
+private:
+  bool start (GstGLContext *context);
+
+  GstGLContext *context_ = nullptr;
+  GstGLShader *shader_ = nullptr;
+  bool failed_ = false; /* to make the shader: not to be tried for each picture */
+  guint vertices_ = 0, array_ = 0;
+  std::vector<rangecast::LineVertex> lines_;
+};
