@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Seeks, durations and times of files in neighbourcodeparse. */
 #include "parse-check.hpp"
+#include "scene-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -222,11 +223,82 @@ GST_START_TEST (test_error_after_a_seek_in_a_file_is_posted_too)
 }
 GST_END_TEST;
 
+/* The byte stream of a person who moves, temporal, with a key access unit every fifth. */
+static std::vector<guint8>
+temporal_stream (const Scene &scene, const char *profile)
+{
+  /* 5 frames of 1/15 s are 333 ms and a bit */
+  GstHarness *h = gst_harness_new_parse (
+      (std::string ("neighbourcodeenc temporal=true key-interval=334 profile=") + profile +
+          " ! neighbourcodeparse ! capsfilter caps=" + kStreamCaps)
+          .c_str ());
+  gst_harness_set_src_caps (h, gst_caps_ref (scene.caps));
+  std::vector<guint8> bytes;
+  for (GstBuffer *frame_set : scene.frame_sets) {
+    gst_harness_push (h, gst_buffer_ref (frame_set));
+    for (GstBuffer *written : pull_all (h)) {
+      const auto part = bytes_of (written);
+      bytes.insert (bytes.end (), part.begin (), part.end ());
+      gst_buffer_unref (written);
+    }
+  }
+  gst_harness_teardown (h);
+  return bytes;
+}
+
+/* Pixels of what reaches the player's sink, by PTS. */
+struct Shown {
+  std::map<GstClockTime, Pixels> pixels;
+
+  explicit Shown (Player &player)
+  {
+    GstPad *pad = gst_element_get_static_pad (player.sink, "sink");
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_BUFFER,
+        [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
+          GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
+          static_cast<Shown *> (data)->pixels[GST_BUFFER_PTS (buffer)] =
+              pixels_of (buffer, 160, 120);
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+    gst_object_unref (pad);
+  }
+};
+
+GST_START_TEST (test_seek_in_a_temporal_file_shows_all_pixels_right_from_there_on)
+{
+  const Scene scene (2, 160, 120, 20);
+  for (const char *profile : {"plain", "packed", "entropy"}) {
+    const TemporaryFile file (temporal_stream (scene, profile));
+    Player player (file, "", "neighbourcodedec name=dec !");
+    fail_unless (player.wait ());
+    Shown shown (player);
+    fail_unless (player.seek (0, GST_SEEK_FLAG_KEY_UNIT));
+    fail_unless (player.finish ());
+    const auto whole = shown.pixels;
+    fail_unless_equals_int (int (whole.size ()), 20);
+    for (const int frame : {13, 4, 17, 10}) {
+      const GstClockTime time = whole.begin ()->first + GstClockTime (frame) * Scene::kInterval;
+      gst_element_set_state (player.pipeline, GST_STATE_PAUSED);
+      fail_unless (player.wait ());
+      shown.pixels.clear ();
+      fail_unless (player.seek (time + Scene::kInterval / 2, GST_SEEK_FLAG_KEY_UNIT));
+      fail_unless (player.finish ());
+      fail_unless_equals_int (int (shown.pixels.size ()), 20 - frame / 5 * 5);
+      for (const auto &[pts, pixels] : shown.pixels)
+        fail_unless (pixels == whole.at (pts), "%s: after a seek to %d", profile, frame);
+    }
+  }
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodeseek_suite ()
 {
   Suite *suite = suite_create ("neighbourcodeseek");
   TCase *tc = tcase_create ("general");
+  tcase_set_timeout (tc, 60);
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_file_tells_its_duration_before_it_plays);
   tcase_add_test (tc, test_key_unit_seek_lands_on_the_key_access_unit_at_or_before);
@@ -242,6 +314,7 @@ neighbourcodeseek_suite ()
   tcase_add_test (tc, test_pushed_file_is_sought_by_time_too);
   tcase_add_test (tc, test_reverse_playback_is_refused);
   tcase_add_test (tc, test_error_after_a_seek_in_a_file_is_posted_too);
+  tcase_add_test (tc, test_seek_in_a_temporal_file_shows_all_pixels_right_from_there_on);
   return suite;
 }
 

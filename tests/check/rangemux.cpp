@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rangecast-check.hpp"
 
+#include <gst/video/video.h>
+
 #include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
@@ -289,6 +291,26 @@ GST_START_TEST (test_coded_access_units_are_joined)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_request_for_a_key_frame_set_goes_to_all_streams)
+{
+  Mux mux (3, true);
+  fail_unless (gst_harness_push_upstream_event (
+      mux.out, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 7)));
+  for (GstHarness *in : mux.in) {
+    int requests = 0;
+    while (GstEvent *event = gst_harness_try_pull_upstream_event (in)) {
+      guint count = 0;
+      if (gst_video_event_is_force_key_unit (event)) {
+        gst_video_event_parse_upstream_force_key_unit (event, nullptr, nullptr, &count);
+        requests += count == 7;
+      }
+      gst_event_unref (event);
+    }
+    fail_unless_equals_int (requests, 1);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_plays_twice)
 {
   GstElement *element = gst_element_factory_make ("rangemux", nullptr);
@@ -351,6 +373,7 @@ rangemux_suite ()
   tcase_add_test (tc, test_two_pads_with_one_view_are_one_error_that_names_both);
   tcase_add_test (tc, test_raw_and_coded_together_are_one_error);
   tcase_add_test (tc, test_coded_access_units_are_joined);
+  tcase_add_test (tc, test_request_for_a_key_frame_set_goes_to_all_streams);
   tcase_add_test (tc, test_plays_twice);
   tcase_add_test (tc, test_17_streams_keep_the_pixels_of_each_view);
   return suite;
