@@ -302,15 +302,20 @@ protected:
     for (CpuLevel level : rungs ()) {
       limit_cpu (level);
       static std::map<CpuLevel, ViewEncoder> encoders; /* memory is used again */
+      static std::map<CpuLevel, PieceEncoder> piece_encoders;
       ViewEncoder &encoder = encoders[level];
       EXPECT_TRUE (encoder.configure (view_of (pixels.width, pixels.height), settings).ok ());
       std::vector<std::uint8_t> bytes;
-      EncoderResult result;
-      EXPECT_TRUE (encoder.encode (pixels.image (), 5, bytes, result).ok ());
+      EXPECT_TRUE (encoder.begin (pixels.image (), 5).ok ());
+      encoder.for_open_pieces (
+          [&] (ViewEncoder::PieceId piece) { encoder.code (piece, piece_encoders[level]); });
+      EXPECT_TRUE (encoder.finish ());
+      encoder.for_coded_pieces (
+          [&] (auto piece) { bytes.insert (bytes.end (), piece.begin (), piece.end ()); });
       EXPECT_EQ (bytes, straight) << cpu_level_name (level) << ": " << pixels.width << "x"
                                   << pixels.height << ", bits " << settings.depth_bits << " + "
                                   << settings.colour_bits;
-      EXPECT_EQ (result.points, valid) << cpu_level_name (level);
+      EXPECT_EQ (encoder.result ().points, valid) << cpu_level_name (level);
     }
     return straight;
   }

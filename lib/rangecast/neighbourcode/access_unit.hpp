@@ -5,12 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "../parallel.hpp"
 #include "decoder.hpp"
 #include "encoder.hpp"
 
 namespace rangecast {
 
-/** Codes whole frame sets; views in parallel. */
+/** Codes whole frame sets; views and pieces of each in parallel. */
 class AccessUnitEncoder {
 public:
   Status configure (const Rig &rig, const EncoderSettings &settings);
@@ -19,7 +20,7 @@ public:
   void set_thresholds (int depth, int colour);
 
   /** Codes a frame set. Its bytes are those of parts() in order, valid until the next call.
-   *  @param threads  views at a time; 0 = number of cores
+   *  @param threads  pieces at a time; 0 = number of cores. The bytes do not depend on it
    *  @return kNotFound for a view that the rig has not, kBadData for one that is there twice,
    *  kBadSize for a ROI outside its view */
   Status encode (std::span<const RangeImage> images, std::uint32_t frame_number, int threads,
@@ -28,27 +29,32 @@ public:
   /** The next frame set is coded without reference to earlier ones. */
   void request_key ();
 
-  [[nodiscard]] std::size_t parts () const { return count_; }
-  [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return work_[i].bytes; }
+  /** Whole slices each, one or more. */
+  [[nodiscard]] std::size_t parts () const { return parts_.size (); }
+  [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return parts_[i]; }
   [[nodiscard]] std::size_t size () const;
   /** Metres by which a decoded depth differs from the one that was coded at most, over all views:
    *  quantisation, threshold and rounded residuals together. */
   [[nodiscard]] double max_depth_error_m () const { return max_depth_error_m_; }
 
 private:
-  void find_max_depth_error ();
-
-  struct Work { /* of one image of the frame set */
-    std::vector<std::uint8_t> bytes;
-    EncoderResult result;
-    Status status;
+  struct Job {
+    ViewEncoder *view;
+    ViewEncoder::PieceId piece;
   };
+  void find_max_depth_error ();
+  Status check_views (std::span<const RangeImage> images);
+  Status begin_views (std::span<const RangeImage> images, std::uint32_t frame_number, int threads);
+  void add_jobs (ViewEncoder &view);
+
   Rig rig_;
   EncoderSettings settings_;
   double max_depth_error_m_ = 0;
   std::array<ViewEncoder, kMaxViews> views_; /* by view-id */
-  std::array<Work, kMaxViews> work_;
-  std::size_t count_ = 0;
+  std::array<Status, kMaxViews> begun_;      /* by image of the frame set */
+  std::vector<Job> jobs_;
+  WorkerMemory<PieceEncoder> memory_;
+  std::vector<std::span<const std::uint8_t>> parts_;
 };
 
 struct DecoderResult {

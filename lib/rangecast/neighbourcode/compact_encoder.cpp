@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "compact_encoder.hpp"
 
-#include <cmath>
-
 #include "entropy_code.hpp"
 #include "packed_code.hpp"
 
@@ -11,20 +9,6 @@ namespace {
 
 /* What one pixel may add to a slice at most, whatever its code; and one run. */
 constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
-
-/* A slice has so many columns for each byte^(1/2) of its size; found by trying. In entropy slices
- * are about as wide as high, so that few pixels lack their upper neighbours; packed would rather
- * begin few runs. Without loss rows are long and slices low. */
-double
-columns_of_slice (Profile profile, bool is_exact)
-{
-  if (profile == Profile::kPacked)
-    return is_exact ? 1.4 : 4.5;
-  return is_exact ? 1 : 2.4;
-}
-
-/* How full slices with a reference are meant to be: then few of them break in their band. */
-constexpr double kFillOfDeltaSlice = 0.8;
 
 /* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
  * residuals come to on average in recordings; their price was found by trying. */
@@ -107,20 +91,25 @@ steps_within (int depth_threshold, int colour_threshold)
   return {step (depth, 65535), step (luma, 255), step (chroma, 255)};
 }
 
+CompactSettings
+finer_settings (const CompactSettings &settings, bool is_reference)
+{
+  CompactSettings finer = settings;
+  if (is_reference) {
+    finer.depth_threshold = (3 * settings.depth_threshold + 2) / 4;
+    finer.colour_threshold = (3 * settings.colour_threshold + 2) / 4;
+  }
+  return finer;
+}
+
 void
 CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_reference)
 {
   const auto bias = [] (int depth, int colour) {
     return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
   };
-  /* Pixels to which later frame sets refer are made finer than need be: they can then be taken
-   * again for longer. */
-  const auto finer = [&] (int threshold) {
-    return is_reference ? (3 * threshold + 2) / 4 : threshold;
-  };
-  settings_ = settings;
-  const int d = settings_.depth_threshold = finer (settings.depth_threshold);
-  const int c = settings_.colour_threshold = finer (settings.colour_threshold);
+  settings_ = finer_settings (settings, is_reference);
+  const int d = settings_.depth_threshold, c = settings_.colour_threshold;
   earlier_bias_ = bias (settings.depth_threshold, settings.colour_threshold);
   earlier_threshold_ = Components{settings.depth_threshold, settings.colour_threshold,
       settings.colour_threshold, settings.colour_threshold};
@@ -135,76 +124,34 @@ CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_referen
   colour_weight_ = weight (c);
 }
 
-CompactResult
-CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> bands,
-    const CodingReference &reference, const CompactQuantisers &quantisers,
-    const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to)
+bool
+CompactEncoder::code_piece (const CompactPicture &picture, const RowBand &band,
+    const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
 {
-  reference_ = reference;
-  quantisers_ = &quantisers;
+  reference_ = picture.reference;
+  quantisers_ = &picture.quantisers;
+  motion_memory_ = &picture.motions;
   header_ = header;
   result_ = {};
-  set_thresholds (settings, reference.now != nullptr);
-  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
-
-  std::size_t delta_bytes = 0, delta_pixels = 0;
-  for (const RowBand &band : bands) {
-    const std::size_t begin = to.size ();
-    header_.key = band.key;
-    header_.reference_distance = band.key ? std::uint8_t{0} : header.reference_distance;
-    code_band (image, band, to);
-    if (!band.key) {
-      delta_bytes += to.size () - begin;
-      delta_pixels +=
-          static_cast<std::size_t> (band.rows) * static_cast<std::size_t> (image.roi.width);
-    }
-  }
-  if (delta_pixels > 0)
-    delta_bytes_per_pixel_ = double (delta_bytes) / double (delta_pixels);
-  return result_;
+  set_thresholds (picture.settings, reference_.now != nullptr);
+  limits_ =
+      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+  orders_ = {};
+  size_sums_ = size_counts_ = Components{};
+  const bool fits = header.profile == Profile::kPacked
+                        ? code_rows<PackedWriter> (picture.image, band, to)
+                        : code_rows<EntropyWriter> (picture.image, band, to);
+  result += result_;
+  return fits;
 }
 
-/* Slices about as wide as high; but with a reference they are as high as their band, if last time
- * is anything to go by. */
-int
-CompactEncoder::pieces_of (const RowBand &band, int width) const
-{
-  double side = columns_of_slice (header_.profile, is_zero (steps_ - 1)) *
-                std::sqrt (settings_.max_slice_size);
-  if (!band.key && delta_bytes_per_pixel_ > 0) {
-    const double columns =
-        kFillOfDeltaSlice * settings_.max_slice_size / (delta_bytes_per_pixel_ * band.rows);
-    side = std::clamp (columns, side, double (std::max (width, int (side) + 1)));
-  }
-  return std::clamp (int (std::lround (width / side)), 1, width);
-}
-
-void
-CompactEncoder::code_band (
+template <class Code>
+bool
+CompactEncoder::code_rows (
     const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
-  const int width = image.roi.width;
-  const std::size_t begin = to.size ();
-  const CompactResult before = result_;
-  const bool packed = header_.profile == Profile::kPacked;
-  for (int pieces = pieces_of (band, width);; pieces = std::min (2 * pieces, width)) {
-    bool fits = true;
-    orders_ = {};
-    for (int i = 0; i < pieces && fits; i++) {
-      header_.first_column = width * i / pieces;
-      header_.columns = width * (i + 1) / pieces - header_.first_column;
-      if (band.key)
-        fits = packed ? code_piece<PackedWriter, false> (image, band, to)
-                      : code_piece<EntropyWriter, false> (image, band, to);
-      else
-        fits = packed ? code_piece<PackedWriter, true> (image, band, to)
-                      : code_piece<EntropyWriter, true> (image, band, to);
-    }
-    if (fits)
-      return;
-    to.resize (begin); /* a row alone was too long: narrower pieces */
-    result_ = before;
-  }
+  return band.key ? code_rows<Code, false> (image, band, to)
+                  : code_rows<Code, true> (image, band, to);
 }
 
 std::size_t
@@ -295,8 +242,8 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
     const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
     near_by[1] = motions_[i];
-    motions_[i] = search_.find (
-        pictures, earlier_threshold_, {x, first_y, next - x, height, band_y, end_y}, near_by);
+    motions_[i] = search_.find (pictures, earlier_threshold_,
+        {x, first_y, next - x, height, band_y, end_y}, near_by, *motion_memory_);
     near_by[0] = motions_[i];
   }
 }
@@ -638,17 +585,16 @@ CompactEncoder::keep_row (int y)
  * @return false if one row alone is longer than a slice may be */
 template <class Code, bool Delta>
 bool
-CompactEncoder::code_piece (
+CompactEncoder::code_rows (
     const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
   resize (header_.columns);
   motions_.assign (
       motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
-  size_sums_ = size_counts_ = Components{};
   Code code = begin_slice<Code, Delta> (band.first_row);
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
     load<Delta> (image, y, band);
-    const CompactResult result = result_;
+    const EncoderResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
     const bool begins_block = header_.rows == 0 || (header_.roi.y + y) % kMotionBlock == 0;

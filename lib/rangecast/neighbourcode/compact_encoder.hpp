@@ -10,6 +10,7 @@
 #include "compact_row.hpp"
 #include "entropy_code.hpp"
 #include "isa.hpp"
+#include "pieces.hpp"
 #include "pixel_key.hpp"
 #include "refresh.hpp"
 
@@ -21,13 +22,6 @@ struct CompactSettings {
   bool best; ///< what costs least in error and bits, not the first that is near enough
 };
 
-struct CompactResult {
-  std::uint64_t slices = 0;
-  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
-  std::uint64_t points = 0;       ///< valid pixels
-  std::uint64_t full_pixels = 0;  ///< those without a neighbour that is near enough
-};
-
 struct CompactQuantisers {
   const DepthQuantiser &depth;
   const ColourQuantiser &colour;
@@ -36,19 +30,30 @@ struct CompactQuantisers {
 /** The steps of residuals that keep every pixel within the thresholds; all 1 for thresholds of 0.
  */
 Steps steps_within (int depth_threshold, int colour_threshold);
+/** Thresholds of pixels that have no reference. Those to which later frame sets refer are made
+ * finer than need be: they can then be taken again for longer. */
+CompactSettings finer_settings (const CompactSettings &settings, bool is_reference);
 
-/** Codes range images in the profiles packed and entropy. Keeps its memory. */
+/** What the pieces of a range image have in common. */
+struct CompactPicture {
+  const ConstRangeImage &image;
+  CodingReference reference;
+  CompactQuantisers quantisers;
+  CompactSettings settings;
+  MotionMemory &motions; ///< of the view
+};
+
+/** Codes pieces of range images in the profiles packed and entropy, each without anything of those
+ *  before. Keeps its memory. */
 class CompactEncoder {
 public:
-  /** Makes room for motion in a view of this size. */
-  void set_size (int width, int height) { search_.resize (width, height); }
-
-  /** Appends the slices of one range image whose ROI is not empty.
-   *  @param bands  that make up the ROI
-   *  @param header  of all slices: profile, bits, ROI, times, distance of the reference */
-  CompactResult encode (const ConstRangeImage &image, std::span<const RowBand> bands,
-      const CodingReference &reference, const CompactQuantisers &quantisers,
-      const CompactSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
+  /** Appends the slices of a piece.
+   *  @param band    its rows
+   *  @param header  of all slices: profile, bits, ROI, columns, times, what they refer to
+   *  @param[out] result  grows
+   *  @return false if a row alone is longer than a slice may be: pieces have to be narrower */
+  bool code_piece (const CompactPicture &picture, const RowBand &band, const SliceHeader &header,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
 
 private:
   typedef float Reciprocals __attribute__ ((vector_size (16)));
@@ -60,11 +65,10 @@ private:
   };
 
   void set_thresholds (const CompactSettings &settings, bool is_reference);
-  void code_band (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
-  [[nodiscard]] int pieces_of (const RowBand &band, int width) const;
+  template <class Code>
+  bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   template <class Code, bool Delta>
-  bool code_piece (
-      const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   template <bool Delta> void load (const ConstRangeImage &image, int y, const RowBand &band);
   template <class Code, bool Delta> bool code_row (Code &slice_code, bool begins_block);
   template <class Code> void code_runs (Code &code);
@@ -98,16 +102,16 @@ private:
 
   const bool has_v3_ = has_x86_64_v3 ();
   CompactSettings settings_{};
-  const CompactQuantisers *quantisers_ = nullptr; /* while encode() runs */
+  const CompactQuantisers *quantisers_ = nullptr; /* while code_piece() runs */
+  MotionMemory *motion_memory_ = nullptr;         /* too */
   SliceHeader header_;
-  CompactResult result_;
+  EncoderResult result_;
   Components steps_{}, half_steps_{};
   Reciprocals reciprocals_{};
   Limits limits_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};
   CodingReference reference_;
-  double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
   float depth_weight_ = 0, colour_weight_ = 0;
 
   CompactRow row_, upper_;

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "encoder.hpp"
 
+#include <algorithm>
+#include <atomic>
+
 namespace rangecast {
 
 Status
@@ -34,7 +37,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
     return s;
   colour_ = ColourQuantiser (settings.colour_bits);
-  plain_.set_codes (depth_, colour_);
+  plain_codes_.set (depth_, colour_);
   const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
                           settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits &&
@@ -43,7 +46,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     references_.forget ();
   if (!same_view) {
     refresh_.reset (view.height, view.id);
-    compact_.set_size (view.width, view.height);
+    motions_.resize (view.width, view.height);
   }
   view_ = view;
   settings_ = settings;
@@ -51,93 +54,225 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   return {};
 }
 
+void
+ViewEncoder::fill_header (const ConstRangeImage &image, std::uint32_t frame_number)
+{
+  header_ = {};
+  header_.view_id = static_cast<std::uint8_t> (view_.id);
+  header_.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
+  header_.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
+  header_.profile = settings_.profile;
+  header_.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
+  header_.frame_number = frame_number;
+  header_.capture_time_ns = image.capture_time_ns;
+  if (!image.roi.empty ())
+    header_.roi = image.roi;
+}
+
 /* Begins to keep the coded pixels, if later frame sets are to refer to them, and plans which rows
  * refer to the frame set before. */
-CodingReference
-ViewEncoder::plan_references (SliceHeader &header)
+void
+ViewEncoder::plan_references ()
 {
-  if (!settings_.temporal) {
-    bands_.assign (1, {0, header.roi.height, true});
-    return {};
+  reference_ = {};
+  header_.reference = settings_.temporal;
+  if (settings_.temporal)
+    references_.begin (header_);
+  if (!settings_.temporal || !references_.now_kept ()) {
+    header_.reference = false;
+    rows_.assign (1, {0, header_.roi.height, true});
+    return;
   }
-  header.reference = true;
-  references_.begin (header);
+  motions_.begin ();
   const ReferencePlane &before = references_.before ();
-  const std::uint32_t distance = header.frame_number - before.frame_number ();
+  const std::uint32_t distance = header_.frame_number - before.frame_number ();
   const bool key = !before.held () || distance == 0 || distance > 255;
-  header.reference_distance = key ? std::uint8_t{0} : static_cast<std::uint8_t> (distance);
-  refresh_.plan (header.roi,
-      {header.capture_time_ns, settings_.frame_interval_ns, settings_.refresh_period_ns}, key,
-      bands_);
-  return {&before, references_.now_kept ()};
+  header_.reference_distance = key ? std::uint8_t{0} : static_cast<std::uint8_t> (distance);
+  refresh_.plan (header_.roi,
+      {header_.capture_time_ns, settings_.frame_interval_ns, settings_.refresh_period_ns}, key,
+      rows_);
+  reference_ = {&before, references_.now_kept ()};
+}
+
+CompactSettings
+ViewEncoder::compact_settings () const
+{
+  return {settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size,
+      settings_.choice == NeighbourChoice::kBest};
+}
+
+int
+ViewEncoder::pieces_of (const RowBand &rows) const
+{
+  if (settings_.profile == Profile::kPlain)
+    return plain_pieces (header_, settings_.max_slice_size);
+  const CompactSettings finer = finer_settings (compact_settings (), reference_.now != nullptr);
+  const bool is_exact =
+      is_zero (steps_within (finer.depth_threshold, finer.colour_threshold).components () - 1);
+  return compact_pieces (header_, rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
+}
+
+/* Room for what pieces mostly come to, and for ROIs that grow: so that frame sets need no memory
+ * anew. */
+constexpr std::size_t kUsualBytesOfPixel = 2;
+
+static void
+make_room (std::vector<std::uint8_t> &bytes, int columns, int rows)
+{
+  const std::size_t usual =
+      kUsualBytesOfPixel * static_cast<std::size_t> (columns) * static_cast<std::size_t> (rows);
+  bytes.clear ();
+  if (bytes.capacity () < usual)
+    bytes.reserve (usual + usual / 2);
 }
 
 void
-ViewEncoder::encode_compact (const ConstRangeImage &image, SliceHeader header,
-    std::vector<std::uint8_t> &to, EncoderResult &result)
+ViewEncoder::cut (Band &band, int pieces)
 {
-  const CodingReference reference = plan_references (header);
-  const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
-      settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
-  const CompactResult done =
-      compact_.encode (image, bands_, reference, {depth_, colour_}, compact, header, to);
-  result.slices += done.slices;
-  result.delta_slices += done.delta_slices;
-  result.full_pixels += done.full_pixels;
-  add_points (done.points, image.roi, result);
+  const int width = header_.roi.width;
+  band.count = static_cast<std::size_t> (pieces);
+  band.is_open = true;
+  band.misfits = false;
+  if (band.pieces.size () < band.count)
+    band.pieces.resize (band.count);
+  for (int i = 0; i < pieces; i++) {
+    Piece &piece = band.pieces[static_cast<std::size_t> (i)];
+    piece.first_column = width * i / pieces;
+    piece.columns = width * (i + 1) / pieces - piece.first_column;
+    make_room (piece.bytes, piece.columns, band.rows.rows);
+  }
+}
+
+void
+ViewEncoder::cut_bands ()
+{
+  band_count_ = rows_.size ();
+  if (bands_.size () < band_count_)
+    bands_.resize (band_count_);
+  for (std::size_t i = 0; i < band_count_; i++) {
+    bands_[i].rows = rows_[i];
+    cut (bands_[i], header_.roi.empty () ? 1 : pieces_of (rows_[i]));
+  }
+}
+
+void
+ViewEncoder::make_empty_slice ()
+{
+  rows_.assign (1, {0, 0, true});
+  cut_bands ();
+  bands_[0].is_open = false;
+  Piece &piece = bands_[0].pieces[0];
+  piece.bytes.resize (kSliceHeaderSize);
+  write_slice_header (header_, kSliceHeaderSize, piece.bytes.data ());
+  piece.result = {};
+  piece.result.slices = 1;
 }
 
 Status
-ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
-    std::vector<std::uint8_t> &to, EncoderResult &result)
+ViewEncoder::begin (const ConstRangeImage &image, std::uint32_t frame_number)
 {
   const Roi &roi = image.roi;
+  band_count_ = 0;
   if (!configured_)
     return {StatusCode::kBadValue, "encoder: not configured"};
   if (!roi.empty () && (roi.x < 0 || roi.y < 0 || roi.x + roi.width > view_.width ||
                            roi.y + roi.height > view_.height))
     return {StatusCode::kBadSize,
         "view " + std::to_string (view_.id) + ": the ROI does not lie in the view's image"};
-  SliceHeader header;
-  header.view_id = static_cast<std::uint8_t> (view_.id);
-  header.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
-  header.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
-  header.profile = settings_.profile;
-  header.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
-  header.frame_number = frame_number;
-  header.capture_time_ns = image.capture_time_ns;
+  image_ = image;
+  fill_header (image, frame_number);
   if (roi.empty ()) {
     references_.forget (); /* as if it were absent */
-    to.resize (to.size () + kSliceHeaderSize);
-    write_slice_header (header, kSliceHeaderSize, to.data () + to.size () - kSliceHeaderSize);
-    result.slices++;
+    make_empty_slice ();
     return {};
   }
-  header.roi = roi;
-  if (settings_.profile == Profile::kPlain) {
-    const PlainSettings plain = {
-        settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
-    const CodingReference reference = plan_references (header);
-    const PlainResult done = reference.now ? plain_temporal_.encode (image, bands_, reference,
-                                                 depth_, colour_, plain, header, to)
-                                           : plain_.encode (image, plain, header, to);
-    result.slices += done.slices;
-    result.delta_slices += done.delta_slices;
-    result.full_pixels += done.full_pixels;
-    add_points (done.points, roi, result);
-  } else {
-    encode_compact (image, header, to, result);
-  }
+  plan_references ();
+  cut_bands ();
   return {};
 }
 
-void
-ViewEncoder::add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const
+bool
+ViewEncoder::code_compact (
+    const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with)
 {
-  result.points += points;
-  result.raw_bits +=
-      points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
-      static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
+  const CompactPicture picture = {
+      image_, reference_, {depth_, colour_}, compact_settings (), motions_};
+  return with.code_piece (picture, band.rows, header, piece.bytes, piece.result);
+}
+
+void
+ViewEncoder::code (PieceId id, PieceEncoder &with)
+{
+  Band &band = bands_[id.band];
+  Piece &piece = band.pieces[id.piece];
+  const std::atomic_ref misfits (band.misfits);
+  piece.bytes.clear ();
+  piece.result = {};
+  if (misfits.load (std::memory_order_relaxed))
+    return; /* all of the band is to be coded again */
+  SliceHeader header = header_;
+  header.key = band.rows.key;
+  header.reference_distance = header.key ? std::uint8_t{0} : header_.reference_distance;
+  header.first_column = piece.first_column;
+  header.columns = piece.columns;
+  const PlainSettings plain = {
+      settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
+  if (settings_.profile != Profile::kPlain) {
+    if (!code_compact (band, header, piece, with.compact))
+      misfits.store (true, std::memory_order_relaxed);
+  } else if (reference_.now) {
+    with.plain_temporal.code_piece (
+        image_, band.rows, reference_, depth_, colour_, plain, header, piece.bytes, piece.result);
+  } else {
+    with.plain.code_piece (image_, plain_codes_, plain, header, piece.bytes, piece.result);
+  }
+}
+
+bool
+ViewEncoder::finish ()
+{
+  bool is_done = true;
+  for (Band &band : std::span (bands_).first (band_count_)) {
+    band.is_open = band.misfits;
+    if (!band.misfits)
+      continue;
+    cut (band, std::min (2 * static_cast<int> (band.count), header_.roi.width));
+    is_done = false;
+  }
+  if (is_done && settings_.profile != Profile::kPlain)
+    note_delta_bytes ();
+  return is_done;
+}
+
+/* What slices with a reference come to says how wide the next ones may be. */
+void
+ViewEncoder::note_delta_bytes ()
+{
+  std::size_t bytes = 0, pixels = 0;
+  for (const Band &band : std::span (bands_).first (band_count_)) {
+    if (band.rows.key)
+      continue;
+    for (const Piece &piece : std::span (band.pieces).first (band.count))
+      bytes += piece.bytes.size ();
+    pixels +=
+        static_cast<std::size_t> (band.rows.rows) * static_cast<std::size_t> (header_.roi.width);
+  }
+  if (pixels > 0)
+    delta_bytes_per_pixel_ = double (bytes) / double (pixels);
+}
+
+EncoderResult
+ViewEncoder::result () const
+{
+  EncoderResult sum;
+  for (const Band &band : std::span (bands_).first (band_count_))
+    for (const Piece &piece : std::span (band.pieces).first (band.count))
+      sum += piece.result;
+  sum.raw_bits =
+      sum.points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
+      static_cast<std::uint64_t> (header_.roi.width) *
+          static_cast<std::uint64_t> (header_.roi.height);
+  return sum;
 }
 
 } // namespace rangecast

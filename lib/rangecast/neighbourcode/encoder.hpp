@@ -8,6 +8,7 @@
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
 #include "compact_encoder.hpp"
+#include "pieces.hpp"
 #include "plain_encoder.hpp"
 #include "plain_temporal.hpp"
 #include "unit.hpp"
@@ -42,16 +43,15 @@ struct EncoderSettings {
 
 Status validate (const EncoderSettings &settings);
 
-/** What one view came to. */
-struct EncoderResult {
-  std::uint64_t points = 0;      ///< valid pixels
-  std::uint64_t full_pixels = 0; ///< of these, written in full
-  std::uint64_t slices = 0;
-  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
-  std::uint64_t raw_bits = 0;     ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+/** Codes pieces of any view. Nothing of one piece has an effect on the next. */
+struct PieceEncoder {
+  PlainEncoder plain;
+  PlainTemporalEncoder plain_temporal;
+  CompactEncoder compact; ///< profiles packed and entropy
 };
 
-/** Codes range images of one view and keeps its memory from frame to frame. */
+/** Codes range images of one view, in pieces that do not depend on one another: in whatever order
+ *  and with whatever helper they are coded, their bytes are the same. Keeps its memory. */
 class ViewEncoder {
 public:
   /** Sets up for a view. Builds tables only if something changed. */
@@ -63,15 +63,41 @@ public:
     settings_.colour_threshold = colour;
   }
 
-  /** Appends the slices of one range image.
+  /** Begins a range image: finds into which pieces it is cut.
    *
    *  Pixels are scanned row by row. A valid one is compared with its left, upper-left, upper and
    *  upper-right neighbours, as they are after quantisation and replacement; the first that is near
    *  enough in depth and in each of R, G, B replaces it. Neighbours outside the slice do not exist.
    *  An empty ROI gives one slice without pixels. Depths outside near..far are invalid.
+   *  @param image  must live until all pieces are coded
    *  @return kBadSize if the ROI does not lie in the view's image */
-  Status encode (const ConstRangeImage &image, std::uint32_t frame_number,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
+  Status begin (const ConstRangeImage &image, std::uint32_t frame_number);
+
+  struct PieceId {
+    std::size_t band, piece;
+  };
+  /** Calls take (id) for each piece that is to be coded. */
+  template <typename Take> void for_open_pieces (const Take &take) const
+  {
+    for (std::size_t b = 0; b < band_count_; b++)
+      for (std::size_t p = 0; bands_[b].is_open && p < bands_[b].count; p++)
+        take (PieceId{b, p});
+  }
+  /** Codes a piece. Different ones may be coded at the same time. */
+  void code (PieceId id, PieceEncoder &with);
+  /** To be called when all open pieces have been coded. @return false if some bands had to be cut
+   * into more pieces: these are open now */
+  bool finish ();
+
+  /** What the range image came to. */
+  [[nodiscard]] EncoderResult result () const;
+  /** Calls take (bytes) for each piece, in order; valid until the next begin(). */
+  template <typename Take> void for_coded_pieces (const Take &take) const
+  {
+    for (std::size_t b = 0; b < band_count_; b++)
+      for (std::size_t p = 0; p < bands_[b].count; p++)
+        take (std::span<const std::uint8_t> (bands_[b].pieces[p].bytes));
+  }
 
   /** The next range image is coded without reference to earlier ones. */
   void request_key () { references_.forget (); }
@@ -79,22 +105,47 @@ public:
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
-  CodingReference plan_references (SliceHeader &header);
-  void encode_compact (const ConstRangeImage &image, SliceHeader header,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
-  void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
+  struct Piece {
+    int first_column = 0, columns = 0; /* of the ROI */
+    std::vector<std::uint8_t> bytes;
+    EncoderResult result;
+  };
+  struct Band {
+    RowBand rows;
+    std::vector<Piece> pieces; /* those behind the first `count` are memory for later */
+    std::size_t count = 0;
+    bool is_open = false;
+    bool misfits = false; /* a row of a piece is longer than a slice may be */
+  };
+  void fill_header (const ConstRangeImage &image, std::uint32_t frame_number);
+  void make_empty_slice ();
+  void plan_references ();
+  void cut_bands ();
+  void cut (Band &band, int pieces);
+  [[nodiscard]] int pieces_of (const RowBand &rows) const;
+  [[nodiscard]] CompactSettings compact_settings () const;
+  bool code_compact (
+      const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with);
+  void note_delta_bytes ();
 
   View view_;
   EncoderSettings settings_;
   bool configured_ = false;
   DepthQuantiser depth_;
   ColourQuantiser colour_;
-  PlainEncoder plain_;
-  PlainTemporalEncoder plain_temporal_;
-  CompactEncoder compact_; /* profiles packed and entropy */
+  PlainCodes plain_codes_;
   ReferencePair references_;
   RefreshSchedule refresh_;
-  std::vector<RowBand> bands_;
+  MotionMemory motions_;
+  double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
+
+  /* Of the range image that was begun last. */
+  ConstRangeImage image_;
+  SliceHeader header_;
+  CodingReference reference_;
+  std::vector<RowBand> rows_;
+  std::vector<Band> bands_; /* those behind the first band_count_ are memory for later */
+  std::size_t band_count_ = 0;
 };
 
 } // namespace rangecast

@@ -26,12 +26,15 @@ fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const Bloc
 }
 
 void
-MotionSearch::resize (int width, int height)
+MotionMemory::resize (int width, int height)
 {
-  across_ = (width + kMotionBlock - 1) / kMotionBlock;
-  last_.assign (static_cast<std::size_t> (across_) *
-                    static_cast<std::size_t> ((height + kMotionBlock - 1) / kMotionBlock),
-      BlockMotion{});
+  across_ = motion_blocks (0, width);
+  now_.assign (across_ * motion_blocks (0, height), BlockMotion{});
+  before_ = now_;
+}
+
+MotionSearch::MotionSearch ()
+{
   samples_.reserve (kMotionBlock * kMotionBlock);
   differences_.reserve (kMotionBlock * kMotionBlock);
   sorted_.reserve (kMotionBlock * kMotionBlock);
@@ -94,11 +97,8 @@ MotionSearch::match (
 
 BlockMotion
 MotionSearch::find (const Pictures &pictures, Components threshold, const Area &area,
-    std::span<const BlockMotion> near_by)
+    std::span<const BlockMotion> near_by, MotionMemory &memory)
 {
-  const std::size_t index =
-      static_cast<std::size_t> (area.y / kMotionBlock) * static_cast<std::size_t> (across_) +
-      static_cast<std::size_t> (area.x / kMotionBlock);
   take_samples (pictures, area);
   Match best = match (pictures, threshold, area, 0, 0);
   const auto all = static_cast<int> (samples_.size ());
@@ -112,7 +112,8 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
   if (best.hits < all - all / 32) {
     for (const BlockMotion &m : near_by)
       attempt (m.dx, m.dy);
-    attempt (last_[index].dx, last_[index].dy);
+    const BlockMotion last = memory.before (area.x, area.y);
+    attempt (last.dx, last.dy);
     for (bool better = true; better && best.hits < all - all / 32;) {
       const int x = best.motion.dx, y = best.motion.dy;
       better = attempt (x - 1, y);
@@ -121,7 +122,10 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
       better |= attempt (x, y + 1);
     }
   }
-  last_[index] = best.motion;
+  /* Pieces may share a block: the one that has its first pixel keeps its motion. */
+  const auto begins = [] (int at, int of_roi) { return at % kMotionBlock == 0 || at == of_roi; };
+  if (begins (area.x, pictures.image.roi.x) && begins (area.y, pictures.image.roi.y))
+    memory.keep (area.x, area.y, best.motion);
   return best.motion;
 }
 

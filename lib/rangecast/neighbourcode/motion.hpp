@@ -49,6 +49,30 @@ motion_blocks (int x, int columns)
   return static_cast<std::size_t> ((x + columns - 1) / kMotionBlock - x / kMotionBlock + 1);
 }
 
+/** The motion of a view's blocks when it was last found. Pieces of a frame set that are coded at
+ * the same time all see that of frame sets before. */
+class MotionMemory {
+public:
+  /** @param width, height  of the view's full image */
+  void resize (int width, int height);
+  /** Begins a frame set. */
+  void begin () { before_ = now_; }
+
+  [[nodiscard]] BlockMotion before (int x, int y) const { return before_[index (x, y)]; }
+  /** To be called once for each block of a frame set. */
+  void keep (int x, int y, const BlockMotion &motion) { now_[index (x, y)] = motion; }
+
+private:
+  [[nodiscard]] std::size_t index (int x, int y) const
+  {
+    return static_cast<std::size_t> (y / kMotionBlock) * across_ +
+           static_cast<std::size_t> (x / kMotionBlock);
+  }
+
+  std::vector<BlockMotion> before_, now_;
+  std::size_t across_ = 0;
+};
+
 /** Finds the motion of blocks between two frame sets of a view: that with which the most pixels
  *  come near enough to those of the earlier one. */
 class MotionSearch {
@@ -58,8 +82,7 @@ public:
     int first_y, end_y;
   };
 
-  /** @param width, height  of the view's full image */
-  void resize (int width, int height);
+  MotionSearch ();
 
   struct Pictures { ///< what to find motion between
     const ConstRangeImage &image;
@@ -70,9 +93,10 @@ public:
   };
 
   /** @param threshold  of depth, R, G, B, codes
-   *  @param near_by  motions that are likely: of neighbouring blocks */
+   *  @param near_by  motions that are likely: of neighbouring blocks
+   *  @param memory   of the view */
   BlockMotion find (const Pictures &pictures, Components threshold, const Area &area,
-      std::span<const BlockMotion> near_by);
+      std::span<const BlockMotion> near_by, MotionMemory &memory);
 
 private:
   struct Sample {
@@ -86,8 +110,6 @@ private:
   void take_samples (const Pictures &pictures, const Area &area);
   Match match (const Pictures &pictures, Components threshold, const Area &area, int dx, int dy);
 
-  std::vector<BlockMotion> last_; /* of each block, when it was last found */
-  int across_ = 0;
   std::vector<Sample> samples_;
   std::vector<std::int32_t> differences_;
   std::vector<std::int32_t> sorted_;

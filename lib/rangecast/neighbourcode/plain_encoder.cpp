@@ -23,6 +23,23 @@ put_invalid (BitWriter &bits, int count)
 
 } // namespace
 
+/* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
+ * nearly so. */
+void
+PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
+{
+  colour = colours;
+  const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
+  std::tie (near, far) = std::minmax ({depth.depth (0), depth.depth (last)});
+  while (near > 1 && depth.valid (static_cast<std::uint16_t> (near - 1)))
+    near--;
+  while (far < 65535 && depth.valid (static_cast<std::uint16_t> (far + 1)))
+    far++;
+  codes.assign (65536, 0);
+  for (std::size_t d = near; d <= far; d++)
+    codes[d] = depth.code (static_cast<std::uint16_t> (d));
+}
+
 std::size_t
 PlainEncoder::pixels_of (int rows) const
 {
@@ -34,23 +51,6 @@ PlainEncoder::slice_size (int rows, std::size_t full) const
 {
   return kSliceHeaderSize + symbol_bytes (pixels_of (rows)) +
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
-}
-
-/* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
- * nearly so. */
-void
-PlainEncoder::set_codes (const DepthQuantiser &depth, const ColourQuantiser &colour)
-{
-  colour_ = colour;
-  const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
-  std::tie (near_, far_) = std::minmax ({depth.depth (0), depth.depth (last)});
-  while (near_ > 1 && depth.valid (static_cast<std::uint16_t> (near_ - 1)))
-    near_--;
-  while (far_ < 65535 && depth.valid (static_cast<std::uint16_t> (far_ + 1)))
-    far_++;
-  codes_.assign (65536, 0);
-  for (std::size_t d = near_; d <= far_; d++)
-    codes_[d] = depth.code (static_cast<std::uint16_t> (d));
 }
 
 /* Makes room for pieces of so many columns. */
@@ -74,7 +74,7 @@ PlainEncoder::resize (int columns)
 void
 PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
 {
-  const PlainQuantising how = {near_, far_, codes_.data (), colour_, y};
+  const PlainQuantising how = {codes_->near, codes_->far, codes_->codes.data (), codes_->colour, y};
   row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
       image.colour.row (y) + header_.first_column, header_.columns,
       row.pixels.data () + kPixelsBefore);
@@ -183,14 +183,18 @@ PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
   return rows;
 }
 
-/* Codes all rows of some columns of the ROI, in as many slices as their size asks for. */
+/* In as many slices as the size of the piece asks for. */
 void
-PlainEncoder::code_piece (
-    const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to)
+PlainEncoder::code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+    EncoderResult &result)
 {
-  header_.first_column = first_column;
-  header_.columns = columns;
-  resize (columns);
+  codes_ = &codes;
+  settings_ = settings;
+  header_ = header;
+  result_ = {};
+  functions_ = &plain_functions (cpu_level ());
+  resize (header.columns);
   begin_slice (0);
   int waiting = 0;
   for (int done = 0; done < image.roi.height;) {
@@ -202,25 +206,7 @@ PlainEncoder::code_piece (
     done += more;
   }
   close_slice (to);
-}
-
-PlainResult
-PlainEncoder::encode (const ConstRangeImage &image, const PlainSettings &settings,
-    SliceHeader header, std::vector<std::uint8_t> &to)
-{
-  settings_ = settings;
-  header_ = header;
-  result_ = {};
-  functions_ = &plain_functions (cpu_level ());
-  /* As many columns as fit in one row even if every pixel of it is written in full. */
-  const int bits = kSymbolBits + bits_of_full ();
-  const int most = (settings.max_slice_size - int (kSliceHeaderSize) - 2) * 8 / bits;
-  const int width = image.roi.width, pieces = (width + most - 1) / most;
-  for (int i = 0; i < pieces; i++) {
-    const int begin = width * i / pieces, end = width * (i + 1) / pieces;
-    code_piece (image, begin, end - begin, to);
-  }
-  return result_;
+  result += result_;
 }
 
 } // namespace rangecast

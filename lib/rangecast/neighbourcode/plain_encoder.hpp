@@ -8,6 +8,7 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "pieces.hpp"
 #include "plain_functions.hpp"
 #include "symbols.hpp"
 #include "unit.hpp"
@@ -19,23 +20,25 @@ struct PlainSettings {
   int max_slice_size;                    ///< bytes
 };
 
-struct PlainResult {
-  std::uint64_t slices = 0;
-  std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
-  std::uint64_t full_pixels = 0;
-  std::uint64_t points = 0; ///< valid pixels
+/** The codes of depths and colours, as vectors look them up. */
+struct PlainCodes {
+  void set (const DepthQuantiser &depth, const ColourQuantiser &colour);
+
+  std::uint16_t near = 1, far = 0;  ///< of valid depths
+  std::vector<std::uint16_t> codes; ///< of all depths
+  ColourQuantiser colour;
 };
 
-/** Codes range images in profile plain. Keeps its memory. */
+/** Codes pieces of range images in profile plain, each without anything of those before. Keeps its
+ *  memory. */
 class PlainEncoder {
 public:
-  /** The codes of depths and colours from now on. */
-  void set_codes (const DepthQuantiser &depth, const ColourQuantiser &colour);
-
-  /** Appends the slices of one range image whose ROI is not empty.
-   *  @param header  of all slices: bits, ROI, times */
-  PlainResult encode (const ConstRangeImage &image, const PlainSettings &settings,
-      SliceHeader header, std::vector<std::uint8_t> &to);
+  /** Appends the slices of a piece: all rows of some columns of the ROI.
+   *  @param header  of all slices: bits, ROI, columns, times
+   *  @param[out] result  grows */
+  void code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+      const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+      EncoderResult &result);
 
 private:
   /* A row that waits to be coded. */
@@ -48,8 +51,6 @@ private:
   PlainSpan code_band (int rows);
   [[nodiscard]] PlainRow coded_row (int row, const PlainSpan &span) const;
   void add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full);
-  void code_piece (
-      const ConstRangeImage &image, int first_column, int columns, std::vector<std::uint8_t> &to);
   int add_band (int rows, std::vector<std::uint8_t> &to);
   void begin_slice (int first_row);
   void close_slice (std::vector<std::uint8_t> &to);
@@ -59,12 +60,10 @@ private:
 
   PlainSettings settings_{};
   const PlainFunctions *functions_ = nullptr;
-  std::uint16_t near_ = 1, far_ = 0; /* of valid depths */
-  std::vector<std::uint16_t> codes_; /* of all depths */
-  ColourQuantiser colour_;
-  SliceHeader header_;          /* of the open slice */
-  std::size_t full_pixels_ = 0; /* of the open slice */
-  PlainResult result_;
+  const PlainCodes *codes_ = nullptr; /* while code_piece() runs */
+  SliceHeader header_;                /* of the open slice */
+  std::size_t full_pixels_ = 0;       /* of the open slice */
+  EncoderResult result_;
 
   std::array<Row, kBandRows> rows_;
   std::vector<PlainPixel> upper_, outside_;

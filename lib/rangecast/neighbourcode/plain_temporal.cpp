@@ -131,7 +131,7 @@ PlainTemporalEncoder::close_slice (
 
 /* Codes all rows of a band in the columns that the header says. */
 void
-PlainTemporalEncoder::code_piece (
+PlainTemporalEncoder::code_rows (
     const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
   const auto columns = static_cast<std::size_t> (header_.columns);
@@ -168,10 +168,11 @@ PlainTemporalEncoder::code_piece (
   close_slice (pixels, full, to);
 }
 
-PlainResult
-PlainTemporalEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> bands,
+void
+PlainTemporalEncoder::code_piece (const ConstRangeImage &image, const RowBand &band,
     const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
-    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to)
+    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+    EncoderResult &result)
 {
   depth_ = &depth;
   colour_ = &colour;
@@ -181,20 +182,8 @@ PlainTemporalEncoder::encode (const ConstRangeImage &image, std::span<const RowB
   result_ = {};
   const int c = settings.colour_threshold;
   threshold_ = Lanes{settings.depth_threshold, c, c, c};
-  /* As many columns as fit in one row even if every pixel of it is written in full. */
-  const int bits = kSymbolBits + bits_of_full ();
-  const int most = (settings.max_slice_size - int (kSliceHeaderSize) - 3) * 8 / bits;
-  const int width = image.roi.width, pieces = (width + most - 1) / most;
-  for (const RowBand &band : bands) {
-    header_.key = band.key;
-    header_.reference_distance = band.key ? std::uint8_t{0} : header.reference_distance;
-    for (int i = 0; i < pieces; i++) {
-      header_.first_column = width * i / pieces;
-      header_.columns = width * (i + 1) / pieces - header_.first_column;
-      code_piece (image, band, to);
-    }
-  }
-  return result_;
+  code_rows (image, band, to);
+  result += result_;
 }
 
 /* ---- decoder ---- */

@@ -16,35 +16,35 @@
 
 namespace rangecast {
 
-/** Codes range images that are kept as references. Keeps its memory. */
+/** Codes pieces of range images that are kept as references. Keeps its memory. */
 class PlainTemporalEncoder {
 public:
-  /** Appends the slices of one range image whose ROI is not empty.
-   *  @param bands  that make up the ROI
-   *  @param header  of all slices: bits, ROI, times, distance of the reference
-   *  @param[out] delta_slices  grows by the slices that are not key ones */
-  PlainResult encode (const ConstRangeImage &image, std::span<const RowBand> bands,
+  /** Appends the slices of a piece.
+   *  @param band    its rows
+   *  @param header  of all slices: bits, ROI, columns, times, what they refer to
+   *  @param[out] result  grows */
+  void code_piece (const ConstRangeImage &image, const RowBand &band,
       const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
-      const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to);
+      const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+      EncoderResult &result);
 
 private:
   void load_row (const ConstRangeImage &image, int y);
   [[nodiscard]] int symbol_of (int x) const;
   std::size_t code_row (std::size_t symbols_at, std::size_t full_at);
-  void code_piece (
-      const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  void code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   void begin_slice (int first_row);
   void close_slice (std::size_t pixels, std::size_t full, std::vector<std::uint8_t> &to);
   [[nodiscard]] std::size_t slice_size (std::size_t pixels, std::size_t full) const;
   [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
 
-  const DepthQuantiser *depth_ = nullptr; /* while encode() runs */
+  const DepthQuantiser *depth_ = nullptr; /* while code_piece() runs */
   const ColourQuantiser *colour_ = nullptr;
   CodingReference reference_;
   PlainSettings settings_{};
   Lanes threshold_{};
   SliceHeader header_; /* of the open slice */
-  PlainResult result_;
+  EncoderResult result_;
 
   std::vector<Lanes> row_, upper_; /* with an invalid pixel on each side */
   std::vector<std::uint64_t> earlier_, kept_;
