@@ -246,11 +246,7 @@ count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsiz
   priv->bits_per_s = priv->rate.bits_per_s ();
   priv->frames++;
   priv->coded_bytes += size;
-  priv->totals.points += result.points;
-  priv->totals.full_pixels += result.full_pixels;
-  priv->totals.slices += result.slices;
-  priv->totals.delta_slices += result.delta_slices;
-  priv->totals.raw_bits += result.raw_bits;
+  priv->totals += result;
 }
 
 /* Asks the encoder for a key frame set where one is due. */

@@ -82,11 +82,7 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
     const Work &work = work_[i];
     if (!work.status.ok ())
       return work.status;
-    result.points += work.result.points;
-    result.full_pixels += work.result.full_pixels;
-    result.slices += work.result.slices;
-    result.delta_slices += work.result.delta_slices;
-    result.raw_bits += work.result.raw_bits;
+    result += work.result;
   }
   count_ = images.size ();
   return {};

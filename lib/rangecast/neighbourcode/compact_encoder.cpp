@@ -108,7 +108,7 @@ steps_within (int depth_threshold, int colour_threshold)
 }
 
 void
-CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_reference)
+CompactEncoder::set_thresholds (const CompactSettings &settings)
 {
   const auto bias = [] (int depth, int colour) {
     return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
@@ -116,7 +116,7 @@ CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_referen
   /* Pixels to which later frame sets refer are made finer than need be: they can then be taken
    * again for longer. */
   const auto finer = [&] (int threshold) {
-    return is_reference ? (3 * threshold + 2) / 4 : threshold;
+    return settings.fine ? (3 * threshold + 2) / 4 : threshold;
   };
   settings_ = settings;
   const int d = settings_.depth_threshold = finer (settings.depth_threshold);
@@ -144,7 +144,7 @@ CompactEncoder::encode (const ConstRangeImage &image, std::span<const RowBand> b
   quantisers_ = &quantisers;
   header_ = header;
   result_ = {};
-  set_thresholds (settings, reference.now != nullptr);
+  set_thresholds (settings);
   limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
 
   std::size_t delta_bytes = 0, delta_pixels = 0;

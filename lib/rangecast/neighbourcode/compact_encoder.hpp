@@ -19,6 +19,7 @@ struct CompactSettings {
   int depth_threshold, colour_threshold; ///< codes
   int max_slice_size;                    ///< bytes
   bool best; ///< what costs least in error and bits, not the first that is near enough
+  bool fine; ///< finer than need be, for later frame sets to take pixels again and again
 };
 
 struct CompactResult {
@@ -59,7 +60,7 @@ private:
     PixelKey key;
   };
 
-  void set_thresholds (const CompactSettings &settings, bool is_reference);
+  void set_thresholds (const CompactSettings &settings);
   void code_band (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   [[nodiscard]] int pieces_of (const RowBand &band, int width) const;
   template <class Code, bool Delta>

@@ -39,11 +39,13 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
                           settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits &&
                           settings.profile == settings_.profile && settings.temporal;
-  if (!comparable)
-    references_.forget ();
   if (!same_view) {
     refresh_.reset (view.height, view.id);
     compact_.set_size (view.width, view.height);
+  }
+  if (!comparable) {
+    references_.forget ();
+    reference_choice_.reset (refresh_.bands ());
   }
   view_ = view;
   settings_ = settings;
@@ -51,15 +53,37 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   return {};
 }
 
+/* Of the ROI in a band. */
+static std::size_t
+pixels_of (const RowBand &band, const Roi &roi)
+{
+  return static_cast<std::size_t> (band.rows) * static_cast<std::size_t> (roi.width);
+}
+
+SliceHeader
+ViewEncoder::make_header (const ConstRangeImage &image, std::uint32_t frame_number) const
+{
+  SliceHeader header;
+  header.view_id = static_cast<std::uint8_t> (view_.id);
+  header.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
+  header.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
+  header.profile = settings_.profile;
+  header.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
+  header.frame_number = frame_number;
+  header.capture_time_ns = image.capture_time_ns;
+  return header;
+}
+
 /* Begins to keep the coded pixels, if later frame sets are to refer to them, and plans which rows
  * refer to the frame set before. */
 CodingReference
 ViewEncoder::plan_references (SliceHeader &header)
 {
-  if (!settings_.temporal) {
-    bands_.assign (1, {0, header.roi.height, true});
+  fine_.clear ();
+  both_.clear ();
+  coarse_.assign (1, {0, header.roi.height, true, 0});
+  if (!settings_.temporal)
     return {};
-  }
   header.reference = true;
   references_.begin (header);
   const ReferencePlane &before = references_.before ();
@@ -69,22 +93,79 @@ ViewEncoder::plan_references (SliceHeader &header)
   refresh_.plan (header.roi,
       {header.capture_time_ns, settings_.frame_interval_ns, settings_.refresh_period_ns}, key,
       bands_);
+  reference_choice_.sort (bands_, fine_, coarse_, both_);
   return {&before, references_.now_kept ()};
 }
 
-void
-ViewEncoder::encode_compact (const ConstRangeImage &image, SliceHeader header,
-    std::vector<std::uint8_t> &to, EncoderResult &result)
+/* Appends the slices of some bands. @return what they came to, but for raw_bits */
+EncoderResult
+ViewEncoder::code_bands (const Frame &frame, std::span<const RowBand> bands, bool fine)
 {
-  const CodingReference reference = plan_references (header);
-  const CompactSettings compact = {settings_.depth_threshold, settings_.colour_threshold,
-      settings_.max_slice_size, settings_.choice == NeighbourChoice::kBest};
-  const CompactResult done =
-      compact_.encode (image, bands_, reference, {depth_, colour_}, compact, header, to);
-  result.slices += done.slices;
-  result.delta_slices += done.delta_slices;
-  result.full_pixels += done.full_pixels;
-  add_points (done.points, image.roi, result);
+  const auto result_of = [] (const auto &done) {
+    return EncoderResult{done.points, done.full_pixels, done.slices, done.delta_slices, 0};
+  };
+  const auto &[image, header, reference, to] = frame;
+  const int depth = settings_.depth_threshold, colour = settings_.colour_threshold;
+  const int size = settings_.max_slice_size;
+  if (settings_.profile != Profile::kPlain)
+    return result_of (compact_.encode (image, bands, reference, {depth_, colour_},
+        {depth, colour, size, settings_.choice == NeighbourChoice::kBest, fine}, header, to));
+  const PlainSettings plain = {depth, colour, size};
+  return result_of (reference.now ? plain_temporal_.encode (
+                                        image, bands, reference, depth_, colour_, plain, header, to)
+                                  : plain_.encode (image, plain, header, to));
+}
+
+/* Codes the bands for which a reference pays, and notes what each came to. */
+EncoderResult
+ViewEncoder::code_fine_bands (const Frame &frame)
+{
+  const std::size_t begin = frame.to.size ();
+  const EncoderResult result = code_bands (frame, fine_, true);
+  UnitReader units (std::span (frame.to).subspan (begin));
+  UnitHeader unit;
+  SliceHeader slice;
+  costs_.assign (fine_.size (), 0);
+  while (const auto bytes = units.next (unit)) {
+    (void)read_slice_header (*bytes, slice);
+    for (std::size_t i = 0; i < fine_.size (); i++)
+      if (slice.first_row >= fine_[i].first_row &&
+          slice.first_row < fine_[i].first_row + fine_[i].rows)
+        costs_[i] += bytes->size ();
+  }
+  for (std::size_t i = 0; i < fine_.size (); i++)
+    reference_choice_.coded (fine_[i], {costs_[i], pixels_of (fine_[i], frame.image.roi)});
+  return result;
+}
+
+/* Codes a band with a reference and without one, and keeps the smaller. */
+EncoderResult
+ViewEncoder::code_both_ways (const Frame &frame, RowBand band)
+{
+  std::vector<std::uint8_t> &to = frame.to;
+  const std::size_t begin = to.size ();
+  std::size_t bytes[2] = {};
+  const auto code = [&] (bool key) {
+    const std::size_t before = to.size ();
+    band.key = key;
+    const EncoderResult result = code_bands (frame, {&band, 1}, !key);
+    bytes[key] = to.size () - before;
+    return result;
+  };
+  /* What is coded last is what later frame sets refer to. */
+  const bool expects_key = !reference_choice_.expects_delta (band);
+  (void)code (!expects_key);
+  EncoderResult result = code (expects_key);
+  const bool takes_key = bytes[true] <= bytes[false];
+  if (takes_key == expects_key) {
+    to.erase (to.begin () + std::ptrdiff_t (begin),
+        to.begin () + std::ptrdiff_t (begin + bytes[!expects_key]));
+  } else {
+    to.resize (begin);
+    result = code (takes_key);
+  }
+  reference_choice_.tried (band, bytes[false], {bytes[true], pixels_of (band, frame.image.roi)});
+  return result;
 }
 
 Status
@@ -98,46 +179,28 @@ ViewEncoder::encode (const ConstRangeImage &image, std::uint32_t frame_number,
                            roi.y + roi.height > view_.height))
     return {StatusCode::kBadSize,
         "view " + std::to_string (view_.id) + ": the ROI does not lie in the view's image"};
-  SliceHeader header;
-  header.view_id = static_cast<std::uint8_t> (view_.id);
-  header.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
-  header.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
-  header.profile = settings_.profile;
-  header.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
-  header.frame_number = frame_number;
-  header.capture_time_ns = image.capture_time_ns;
+  Frame frame = {image, make_header (image, frame_number), {}, to};
   if (roi.empty ()) {
     references_.forget (); /* as if it were absent */
     to.resize (to.size () + kSliceHeaderSize);
-    write_slice_header (header, kSliceHeaderSize, to.data () + to.size () - kSliceHeaderSize);
+    write_slice_header (frame.header, kSliceHeaderSize, to.data () + to.size () - kSliceHeaderSize);
     result.slices++;
     return {};
   }
-  header.roi = roi;
-  if (settings_.profile == Profile::kPlain) {
-    const PlainSettings plain = {
-        settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
-    const CodingReference reference = plan_references (header);
-    const PlainResult done = reference.now ? plain_temporal_.encode (image, bands_, reference,
-                                                 depth_, colour_, plain, header, to)
-                                           : plain_.encode (image, plain, header, to);
-    result.slices += done.slices;
-    result.delta_slices += done.delta_slices;
-    result.full_pixels += done.full_pixels;
-    add_points (done.points, roi, result);
-  } else {
-    encode_compact (image, header, to, result);
-  }
-  return {};
-}
-
-void
-ViewEncoder::add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const
-{
-  result.points += points;
-  result.raw_bits +=
-      points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
+  frame.header.roi = roi;
+  frame.reference = plan_references (frame.header);
+  EncoderResult done;
+  for (const RowBand &band : both_)
+    done += code_both_ways (frame, band);
+  if (!fine_.empty ())
+    done += code_fine_bands (frame);
+  if (!coarse_.empty ())
+    done += code_bands (frame, coarse_, false);
+  done.raw_bits =
+      done.points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
       static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
+  result += done;
+  return {};
 }
 
 } // namespace rangecast

@@ -10,6 +10,7 @@
 #include "compact_encoder.hpp"
 #include "plain_encoder.hpp"
 #include "plain_temporal.hpp"
+#include "reference_choice.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -49,6 +50,16 @@ struct EncoderResult {
   std::uint64_t slices = 0;
   std::uint64_t delta_slices = 0; ///< of these, with reference to an earlier frame set
   std::uint64_t raw_bits = 0;     ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+
+  EncoderResult &operator+= (const EncoderResult &other)
+  {
+    points += other.points;
+    full_pixels += other.full_pixels;
+    slices += other.slices;
+    delta_slices += other.delta_slices;
+    raw_bits += other.raw_bits;
+    return *this;
+  }
 };
 
 /** Codes range images of one view and keeps its memory from frame to frame. */
@@ -79,10 +90,19 @@ public:
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
+  /* What all bands of a frame set share. */
+  struct Frame {
+    const ConstRangeImage &image;
+    SliceHeader header;
+    CodingReference reference;
+    std::vector<std::uint8_t> &to;
+  };
+  [[nodiscard]] SliceHeader make_header (
+      const ConstRangeImage &image, std::uint32_t frame_number) const;
   CodingReference plan_references (SliceHeader &header);
-  void encode_compact (const ConstRangeImage &image, SliceHeader header,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
-  void add_points (std::uint64_t points, const Roi &roi, EncoderResult &result) const;
+  EncoderResult code_bands (const Frame &frame, std::span<const RowBand> bands, bool fine);
+  EncoderResult code_fine_bands (const Frame &frame);
+  EncoderResult code_both_ways (const Frame &frame, RowBand band);
 
   View view_;
   EncoderSettings settings_;
@@ -94,7 +114,9 @@ private:
   CompactEncoder compact_; /* profiles packed and entropy */
   ReferencePair references_;
   RefreshSchedule refresh_;
-  std::vector<RowBand> bands_;
+  ReferenceChoice reference_choice_;
+  std::vector<RowBand> bands_, fine_, coarse_, both_;
+  std::vector<std::size_t> costs_; /* bytes of fine_ */
 };
 
 } // namespace rangecast
