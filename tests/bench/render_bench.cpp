@@ -82,9 +82,7 @@ code_and_decode (FrameSet &set)
   if (!encoder.configure (set.rig, {}).ok () || !decoder.set_rig (set.rig).ok () ||
       !encoder.encode (set.images, 1, 1, encoded).ok ())
     return false;
-  std::vector<std::uint8_t> bytes;
-  for (std::size_t i = 0; i < encoder.parts (); i++)
-    bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+  const std::vector<std::uint8_t> bytes = encoder.bytes ();
   decoder.plan (bytes, decoded);
   return decoder.decode (set.images, 1, decoded).ok ();
 }

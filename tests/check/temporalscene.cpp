@@ -240,7 +240,8 @@ kinds_of_numbers (const std::vector<guint32> &numbers, Profile profile)
       EncoderResult coded;
       fail_unless (enc.encode (from.views (), numbers[i], 1, coded).ok ());
       DecoderResult result;
-      dec.plan (enc.part (0), result);
+      const auto bytes = enc.bytes ();
+      dec.plan (bytes, result);
       fail_unless (dec.decode (to.views (), 1, result).ok ());
       points = coded.points;
       kinds += coded.delta_slices ? 'd' : 'k';
@@ -286,7 +287,7 @@ public:
     gstrange::RangeFrameMap from (in_, GST_MAP_READ);
     EncoderResult coded;
     fail_unless (enc_.encode (from.views (), number, 1, coded).ok ());
-    return {enc_.part (0).begin (), enc_.part (0).end ()};
+    return enc_.bytes ();
   }
 
 private:

@@ -65,10 +65,7 @@ encode (const Rig &rig, std::vector<Picture> &pictures, const EncoderSettings &s
   EncoderResult own;
   const Status status = encoder.encode (images, frame, 1, result ? *result : own);
   EXPECT_TRUE (status.ok ()) << status.message ();
-  std::vector<std::uint8_t> bytes;
-  for (std::size_t i = 0; i < encoder.parts (); i++)
-    bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
-  return bytes;
+  return encoder.bytes ();
 }
 
 struct Decoded {

@@ -202,9 +202,7 @@ TEST (DepthError, thresholds_set_alone_give_the_bytes_and_the_error_of_a_new_enc
       encoder.set_thresholds (threshold, threshold + 2);
       EncoderResult result;
       ASSERT_TRUE (encoder.encode (images, 5, 1, result).ok ());
-      std::vector<std::uint8_t> bytes;
-      for (std::size_t i = 0; i < encoder.parts (); i++)
-        bytes.insert (bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+      const std::vector<std::uint8_t> bytes = encoder.bytes ();
       EXPECT_EQ (bytes, encode (rig, pictures, settings));
       EXPECT_DOUBLE_EQ (encoder.max_depth_error_m (), stated_error (rig, settings));
     }

@@ -33,6 +33,8 @@ public:
   [[nodiscard]] std::size_t parts () const { return parts_.size (); }
   [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return parts_[i]; }
   [[nodiscard]] std::size_t size () const;
+  /** A copy of all parts together. */
+  [[nodiscard]] std::vector<std::uint8_t> bytes () const;
   /** Metres by which a decoded depth differs from the one that was coded at most, over all views:
    *  quantisation, threshold and rounded residuals together. */
   [[nodiscard]] double max_depth_error_m () const { return max_depth_error_m_; }

@@ -131,4 +131,14 @@ AccessUnitEncoder::size () const
   return size;
 }
 
+std::vector<std::uint8_t>
+AccessUnitEncoder::bytes () const
+{
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve (size ());
+  for (const auto part : parts_)
+    bytes.insert (bytes.end (), part.begin (), part.end ());
+  return bytes;
+}
+
 } // namespace rangecast

@@ -92,10 +92,10 @@ steps_within (int depth_threshold, int colour_threshold)
 }
 
 CompactSettings
-finer_settings (const CompactSettings &settings, bool is_reference)
+finer_settings (const CompactSettings &settings)
 {
   CompactSettings finer = settings;
-  if (is_reference) {
+  if (settings.fine) {
     finer.depth_threshold = (3 * settings.depth_threshold + 2) / 4;
     finer.colour_threshold = (3 * settings.colour_threshold + 2) / 4;
   }
@@ -103,12 +103,12 @@ finer_settings (const CompactSettings &settings, bool is_reference)
 }
 
 void
-CompactEncoder::set_thresholds (const CompactSettings &settings, bool is_reference)
+CompactEncoder::set_thresholds (const CompactSettings &settings)
 {
   const auto bias = [] (int depth, int colour) {
     return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
   };
-  settings_ = finer_settings (settings, is_reference);
+  settings_ = finer_settings (settings);
   const int d = settings_.depth_threshold, c = settings_.colour_threshold;
   earlier_bias_ = bias (settings.depth_threshold, settings.colour_threshold);
   earlier_threshold_ = Components{settings.depth_threshold, settings.colour_threshold,
@@ -133,7 +133,7 @@ CompactEncoder::code_piece (const CompactPicture &picture, const RowBand &band,
   motion_memory_ = &picture.motions;
   header_ = header;
   result_ = {};
-  set_thresholds (picture.settings, reference_.now != nullptr);
+  set_thresholds (picture.settings);
   limits_ =
       Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
   orders_ = {};

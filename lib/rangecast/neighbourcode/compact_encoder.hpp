@@ -20,6 +20,7 @@ struct CompactSettings {
   int depth_threshold, colour_threshold; ///< codes
   int max_slice_size;                    ///< bytes
   bool best; ///< what costs least in error and bits, not the first that is near enough
+  bool fine; ///< finer than need be: later frame sets can then take pixels again for longer
 };
 
 struct CompactQuantisers {
@@ -30,9 +31,8 @@ struct CompactQuantisers {
 /** The steps of residuals that keep every pixel within the thresholds; all 1 for thresholds of 0.
  */
 Steps steps_within (int depth_threshold, int colour_threshold);
-/** Thresholds of pixels that have no reference. Those to which later frame sets refer are made
- * finer than need be: they can then be taken again for longer. */
-CompactSettings finer_settings (const CompactSettings &settings, bool is_reference);
+/** Thresholds of pixels that are not taken from an earlier frame set. */
+CompactSettings finer_settings (const CompactSettings &settings);
 
 /** What the pieces of a range image have in common. */
 struct CompactPicture {
@@ -64,7 +64,7 @@ private:
     PixelKey key;
   };
 
-  void set_thresholds (const CompactSettings &settings, bool is_reference);
+  void set_thresholds (const CompactSettings &settings);
   template <class Code>
   bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   template <class Code, bool Delta>

@@ -42,11 +42,13 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
                           settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits &&
                           settings.profile == settings_.profile && settings.temporal;
-  if (!comparable)
-    references_.forget ();
   if (!same_view) {
     refresh_.reset (view.height, view.id);
     motions_.resize (view.width, view.height);
+  }
+  if (!comparable) {
+    references_.forget ();
+    reference_choice_.reset (refresh_.bands ());
   }
   view_ = view;
   settings_ = settings;
@@ -75,12 +77,14 @@ void
 ViewEncoder::plan_references ()
 {
   reference_ = {};
+  fine_.clear ();
+  both_.clear ();
+  coarse_.assign (1, {0, header_.roi.height, true, 0});
   header_.reference = settings_.temporal;
   if (settings_.temporal)
     references_.begin (header_);
   if (!settings_.temporal || !references_.now_kept ()) {
     header_.reference = false;
-    rows_.assign (1, {0, header_.roi.height, true});
     return;
   }
   motions_.begin ();
@@ -91,25 +95,27 @@ ViewEncoder::plan_references ()
   refresh_.plan (header_.roi,
       {header_.capture_time_ns, settings_.frame_interval_ns, settings_.refresh_period_ns}, key,
       rows_);
+  reference_choice_.sort (rows_, fine_, coarse_, both_);
   reference_ = {&before, references_.now_kept ()};
 }
 
 CompactSettings
-ViewEncoder::compact_settings () const
+ViewEncoder::compact_settings (bool fine) const
 {
   return {settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size,
-      settings_.choice == NeighbourChoice::kBest};
+      settings_.choice == NeighbourChoice::kBest, fine};
 }
 
 int
-ViewEncoder::pieces_of (const RowBand &rows) const
+ViewEncoder::pieces_of (const Band &band) const
 {
   if (settings_.profile == Profile::kPlain)
     return plain_pieces (header_, settings_.max_slice_size);
-  const CompactSettings finer = finer_settings (compact_settings (), reference_.now != nullptr);
+  const CompactSettings finer = finer_settings (compact_settings (band.fine));
   const bool is_exact =
       is_zero (steps_within (finer.depth_threshold, finer.colour_threshold).components () - 1);
-  return compact_pieces (header_, rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
+  return compact_pieces (
+      header_, band.rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
 }
 
 /* Room for what pieces mostly come to, and for ROIs that grow: so that frame sets need no memory
@@ -144,22 +150,39 @@ ViewEncoder::cut (Band &band, int pieces)
 }
 
 void
+ViewEncoder::add_bands (std::span<const RowBand> rows, bool fine, Trial trial)
+{
+  if (bands_.size () < band_count_ + rows.size ())
+    bands_.resize (band_count_ + rows.size ());
+  for (const RowBand &r : rows) {
+    Band &band = bands_[band_count_++];
+    band.rows = r;
+    band.fine = fine;
+    band.trial = trial;
+    if (trial == Trial::kFirst) {
+      band.rows.key = reference_choice_.expects_delta (r);
+      band.fine = !band.rows.key;
+    }
+  }
+}
+
+void
 ViewEncoder::cut_bands ()
 {
-  band_count_ = rows_.size ();
-  if (bands_.size () < band_count_)
-    bands_.resize (band_count_);
-  for (std::size_t i = 0; i < band_count_; i++) {
-    bands_[i].rows = rows_[i];
-    cut (bands_[i], header_.roi.empty () ? 1 : pieces_of (rows_[i]));
-  }
+  band_count_ = 0;
+  add_bands (both_, true, Trial::kFirst);
+  add_bands (fine_, true, Trial::kNone);
+  add_bands (coarse_, false, Trial::kNone);
+  for (Band &band : std::span (bands_).first (band_count_))
+    cut (band, pieces_of (band));
 }
 
 void
 ViewEncoder::make_empty_slice ()
 {
-  rows_.assign (1, {0, 0, true});
-  cut_bands ();
+  const RowBand none = {0, 0, true, 0};
+  add_bands ({&none, 1}, false, Trial::kNone);
+  cut (bands_[0], 1);
   bands_[0].is_open = false;
   Piece &piece = bands_[0].pieces[0];
   piece.bytes.resize (kSliceHeaderSize);
@@ -196,7 +219,7 @@ ViewEncoder::code_compact (
     const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with)
 {
   const CompactPicture picture = {
-      image_, reference_, {depth_, colour_}, compact_settings (), motions_};
+      image_, reference_, {depth_, colour_}, compact_settings (band.fine), motions_};
   return with.code_piece (picture, band.rows, header, piece.bytes, piece.result);
 }
 
@@ -228,34 +251,78 @@ ViewEncoder::code (PieceId id, PieceEncoder &with)
   }
 }
 
+std::size_t
+ViewEncoder::bytes_of (const Band &band)
+{
+  std::size_t bytes = 0;
+  for (const Piece &piece : std::span (band.pieces).first (band.count))
+    bytes += piece.bytes.size ();
+  return bytes;
+}
+
+std::size_t
+ViewEncoder::pixels_of (const Band &band) const
+{
+  return static_cast<std::size_t> (band.rows.rows) * static_cast<std::size_t> (header_.roi.width);
+}
+
+/* Goes on with a trial whose pieces have been coded. @return false if that was all */
+bool
+ViewEncoder::go_on (Band &band)
+{
+  const bool was_key = band.rows.key;
+  if (band.trial == Trial::kFirst) {
+    band.first_bytes = bytes_of (band);
+    band.trial = Trial::kSecond;
+  } else if (band.trial == Trial::kSecond) {
+    const std::size_t bytes = bytes_of (band);
+    const std::size_t key_bytes = was_key ? bytes : band.first_bytes;
+    const std::size_t delta_bytes = was_key ? band.first_bytes : bytes;
+    reference_choice_.tried (band.rows, delta_bytes, {key_bytes, pixels_of (band)});
+    band.trial = Trial::kAgain;
+    if (was_key == (key_bytes <= delta_bytes))
+      return false;
+  } else {
+    return false;
+  }
+  band.rows.key = !was_key;
+  band.fine = was_key;
+  cut (band, pieces_of (band));
+  return true;
+}
+
 bool
 ViewEncoder::finish ()
 {
   bool is_done = true;
   for (Band &band : std::span (bands_).first (band_count_)) {
-    band.is_open = band.misfits;
-    if (!band.misfits)
+    if (!band.is_open)
       continue;
-    cut (band, std::min (2 * static_cast<int> (band.count), header_.roi.width));
-    is_done = false;
+    band.is_open = band.misfits;
+    if (band.misfits)
+      cut (band, std::min (2 * static_cast<int> (band.count), header_.roi.width));
+    else
+      band.is_open = go_on (band);
+    is_done = is_done && !band.is_open;
   }
-  if (is_done && settings_.profile != Profile::kPlain)
-    note_delta_bytes ();
+  if (is_done)
+    note_bytes ();
   return is_done;
 }
 
-/* What slices with a reference come to says how wide the next ones may be. */
+/* What bands come to says how wide the next slices with a reference may be, and whether a reference
+ * still pays. */
 void
-ViewEncoder::note_delta_bytes ()
+ViewEncoder::note_bytes ()
 {
   std::size_t bytes = 0, pixels = 0;
   for (const Band &band : std::span (bands_).first (band_count_)) {
+    if (band.fine && band.trial == Trial::kNone)
+      reference_choice_.coded (band.rows, {bytes_of (band), pixels_of (band)});
     if (band.rows.key)
       continue;
-    for (const Piece &piece : std::span (band.pieces).first (band.count))
-      bytes += piece.bytes.size ();
-    pixels +=
-        static_cast<std::size_t> (band.rows.rows) * static_cast<std::size_t> (header_.roi.width);
+    bytes += bytes_of (band);
+    pixels += pixels_of (band);
   }
   if (pixels > 0)
     delta_bytes_per_pixel_ = double (bytes) / double (pixels);

@@ -11,6 +11,7 @@
 #include "pieces.hpp"
 #include "plain_encoder.hpp"
 #include "plain_temporal.hpp"
+#include "reference_choice.hpp"
 #include "unit.hpp"
 
 namespace rangecast {
@@ -86,7 +87,7 @@ public:
   /** Codes a piece. Different ones may be coded at the same time. */
   void code (PieceId id, PieceEncoder &with);
   /** To be called when all open pieces have been coded. @return false if some bands had to be cut
-   * into more pieces: these are open now */
+   * into more pieces, or are to be coded another way: these are open now */
   bool finish ();
 
   /** What the range image came to. */
@@ -110,9 +111,16 @@ private:
     std::vector<std::uint8_t> bytes;
     EncoderResult result;
   };
+  /* Whether a band is coded with a reference and without one, to see which is smaller. What is
+   * coded last is what later frame sets refer to, so the way that is expected to be comes second,
+   * and the other one once more if it has been. */
+  enum class Trial : std::uint8_t { kNone, kFirst, kSecond, kAgain };
   struct Band {
     RowBand rows;
-    std::vector<Piece> pieces; /* those behind the first `count` are memory for later */
+    bool fine = false; /* pixels are finer than need be, for later frame sets to take them */
+    Trial trial = Trial::kNone;
+    std::size_t first_bytes = 0; /* of a trial */
+    std::vector<Piece> pieces;   /* those behind the first `count` are memory for later */
     std::size_t count = 0;
     bool is_open = false;
     bool misfits = false; /* a row of a piece is longer than a slice may be */
@@ -120,13 +128,17 @@ private:
   void fill_header (const ConstRangeImage &image, std::uint32_t frame_number);
   void make_empty_slice ();
   void plan_references ();
+  void add_bands (std::span<const RowBand> rows, bool fine, Trial trial);
   void cut_bands ();
   void cut (Band &band, int pieces);
-  [[nodiscard]] int pieces_of (const RowBand &rows) const;
-  [[nodiscard]] CompactSettings compact_settings () const;
+  [[nodiscard]] int pieces_of (const Band &band) const;
+  [[nodiscard]] CompactSettings compact_settings (bool fine) const;
+  [[nodiscard]] std::size_t pixels_of (const Band &band) const;
+  static std::size_t bytes_of (const Band &band);
+  bool go_on (Band &band);
   bool code_compact (
       const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with);
-  void note_delta_bytes ();
+  void note_bytes ();
 
   View view_;
   EncoderSettings settings_;
@@ -136,6 +148,7 @@ private:
   PlainCodes plain_codes_;
   ReferencePair references_;
   RefreshSchedule refresh_;
+  ReferenceChoice reference_choice_;
   MotionMemory motions_;
   double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
 
@@ -143,7 +156,7 @@ private:
   ConstRangeImage image_;
   SliceHeader header_;
   CodingReference reference_;
-  std::vector<RowBand> rows_;
+  std::vector<RowBand> rows_, fine_, coarse_, both_; /* as planned, and sorted */
   std::vector<Band> bands_; /* those behind the first band_count_ are memory for later */
   std::size_t band_count_ = 0;
 };

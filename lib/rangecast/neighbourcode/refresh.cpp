@@ -49,7 +49,7 @@ RefreshSchedule::plan (const Roi &roi, const Time &time, bool key, std::vector<R
     const int top = std::max (int (i) * band_rows_, roi.y) - roi.y;
     const int bottom = std::min ((int (i) + 1) * band_rows_, roi.y + roi.height) - roi.y;
     if (top < bottom)
-      bands.push_back ({top, bottom - top, refresh});
+      bands.push_back ({top, bottom - top, refresh, i});
   }
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,7 @@ namespace rangecast {
 struct RowBand {
   int first_row = 0, rows = 0; ///< of the ROI
   bool key = true;             ///< without reference to an earlier frame set
+  std::size_t index = 0;       ///< of the band, from the top of the view's full image
 };
 
 /** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
@@ -28,6 +30,8 @@ public:
 
   /** Rows of a band: a quarter of the image, but not so few that slices become small. */
   [[nodiscard]] int band_rows () const { return band_rows_; }
+  /** Bands of the image. */
+  [[nodiscard]] std::size_t bands () const { return age_ns_.size (); }
 
   /** @param view_id  spreads the bands of several views over time */
   void reset (int view_height, int view_id);

@@ -47,13 +47,7 @@ public:
     return encoder_.encode (images_, frame_number_++, 1, result);
   }
 
-  void collect (Coded &to) const override
-  {
-    to.resize (1);
-    to[0].clear ();
-    for (std::size_t i = 0; i < encoder_.parts (); i++)
-      to[0].insert (to[0].end (), encoder_.part (i).begin (), encoder_.part (i).end ());
-  }
+  void collect (Coded &to) const override { to.assign (1, encoder_.bytes ()); }
 
   Status decode (const Coded &from, std::vector<Picture> &pictures) override
   {

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "reference_choice.hpp"
+
+#include <algorithm>
+
+namespace rangecast {
+namespace {
+
+/* What does not pay is tried again after 1, 2, 4... frame sets: a second at 30 a second in the end.
+ */
+constexpr int kLongestWait = 32;
+
+/* With a reference a band has doubts from this part of what it took without one on: that was made
+ * finer than need be, and would be smaller. */
+constexpr double kDoubt = 0.85;
+
+} // namespace
+
+void
+ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fine,
+    std::vector<RowBand> &coarse, std::vector<RowBand> &both)
+{
+  fine.clear ();
+  coarse.clear ();
+  both.clear ();
+  bool has_tried = false; /* one of those that are known, so that no frame set takes much longer */
+  for (const RowBand &band : bands) {
+    Band &known = of (band);
+    known.waited = std::min (known.waited + 1, kLongestWait);
+    const bool is_due = known.waited >= known.wait && !has_tried;
+    const bool may_try = known.state == State::kUnknown ||
+                         (is_due && (known.state == State::kPaysNot || known.is_doubtful));
+    if (!band.key && may_try) {
+      has_tried = has_tried || known.state != State::kUnknown;
+      both.push_back (band);
+    } else if (known.state != State::kPaysNot) {
+      fine.push_back (band);
+    } else if (!coarse.empty () &&
+               coarse.back ().first_row + coarse.back ().rows == band.first_row) {
+      coarse.back ().rows += band.rows;
+    } else {
+      coarse.push_back (band);
+      coarse.back ().key = true;
+    }
+  }
+}
+
+bool
+ReferenceChoice::expects_delta (const RowBand &band) const
+{
+  return bands_[band.index].state != State::kPaysNot;
+}
+
+void
+ReferenceChoice::tried (const RowBand &band, std::size_t delta_bytes, const Cost &key)
+{
+  Band &known = of (band);
+  const bool pays = delta_bytes < key.bytes;
+  const State state = pays ? State::kPays : State::kPaysNot;
+  const bool is_new = pays && known.state == State::kPaysNot;
+  known.wait = state == known.state ? std::min (2 * known.wait, kLongestWait) : 1;
+  known.state = state;
+  known.waited = 0;
+  known.key_bytes = double (key.bytes) / double (std::max<std::size_t> (key.pixels, 1));
+  known.is_doubtful = false;
+  if (is_new) /* then in others, too, as it seems */
+    for (Band &other : bands_)
+      other.wait = 1;
+}
+
+void
+ReferenceChoice::coded (const RowBand &band, const Cost &cost)
+{
+  Band &known = of (band);
+  const double bytes = double (cost.bytes) / double (std::max<std::size_t> (cost.pixels, 1));
+  if (band.key)
+    known.key_bytes = bytes;
+  known.is_doubtful = !band.key && bytes > kDoubt * known.key_bytes;
+}
+
+} // namespace rangecast
