@@ -25,8 +25,8 @@ struct Scene {
     GstHarness *h = gst_harness_new_parse (launch.c_str ());
     gst_harness_play (h);
     for (int i = 0; i < count; i++) {
-      GstBuffer *frame_set = gst_harness_pull (h);
-      if (!frame_set) /* under valgrind it takes longer than a harness waits */
+      GstBuffer *frame_set = nullptr; /* under valgrind it takes longer than a harness waits */
+      for (int tries = 0; !frame_set && tries < 10; tries++)
         frame_set = gst_harness_pull (h);
       fail_unless (frame_set != nullptr);
       frame_sets.push_back (frame_set);
