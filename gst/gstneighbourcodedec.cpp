@@ -33,8 +33,10 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <optional>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
+#include "concealment.hpp"
 #include "recycledbuffers.hpp"
 
 using rangecast::DecoderResult;
@@ -47,9 +49,6 @@ enum { PROP_0, PROP_CONCEAL, PROP_REQUEST_KEY_UNITS, PROP_N_THREADS, PROP_STATS 
 
 /* Upstream is asked for a key frame set no more often. */
 static constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
-
-/* Pixels from before a jump in time are not shown after it. */
-static constexpr GstClockTime kMaxConcealAge = GST_SECOND;
 
 enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
@@ -64,7 +63,7 @@ struct GstNeighbourCodeDecPrivate {
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
-  GstBuffer *last = nullptr;            /* what conceal=last takes pixels from */
+  Concealment shown;                    /* what conceal=last takes pixels from */
   std::atomic<bool> by_slices{false};   /* alignment of the input */
   std::atomic<bool> is_temporal{false}; /* the latest frame set is a reference of later ones */
   GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that made us ask */
@@ -119,13 +118,19 @@ forget_slices (GstNeighbourCodeDecPrivate *priv)
 }
 
 static void
-forget_stream (GstNeighbourCodeDecPrivate *priv)
+forget_references (GstNeighbourCodeDecPrivate *priv)
 {
-  forget_slices (priv);
-  gst_clear_buffer (&priv->last);
   priv->decoder.forget_references ();
   priv->is_temporal = false;
   priv->last_request = GST_CLOCK_TIME_NONE;
+}
+
+static void
+forget_stream (GstNeighbourCodeDecPrivate *priv)
+{
+  forget_slices (priv);
+  forget_references (priv);
+  priv->shown.forget ();
 }
 
 static gboolean
@@ -136,10 +141,13 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   gstrange::RangeInfo info;
   Status status = gstrange::parse_caps (in, info);
   if (status.ok ())
+    priv->shown.change_rig (priv->decoder.rig (), info.rig);
+  if (status.ok ())
     status = priv->decoder.set_rig (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
-  forget_stream (priv);
+  forget_slices (priv);
+  forget_references (priv);
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   drop_pool (priv->pool);
@@ -160,28 +168,22 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- data ---- */
 
-/* Makes room for the planned views; views of the rig that did not come are left out. */
+/* Makes room for views and decodes them; those of the rig that did not come are left out, or shown
+ * as they were. `older` may be nullptr. */
 static Status
-lay_out (const rangecast::AccessUnitDecoder &decoder, GstBuffer *buffer)
-{
-  for (const auto &view : decoder.views ())
-    if (Status s = gstrange::add_view (buffer, view.view_id, view.roi, view.capture_time_ns);
-        !s.ok ())
-      return s;
-  return {};
-}
-
-static Status
-decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, bool conceal, int n_threads,
+decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, GstBuffer *older, int n_threads,
     DecoderResult &result)
 {
+  std::optional<gstrange::RangeFrameMap> shown;
+  std::span<const rangecast::RangeImage> older_views;
+  if (older)
+    older_views = shown.emplace (older, GST_MAP_READ).views ();
+  if (Status s = priv->shown.lay_out (priv->decoder, older_views, output); !s.ok ())
+    return s;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  if (!conceal)
-    return priv->decoder.decode (frame.views (), n_threads, result);
-  gstrange::RangeFrameMap older (priv->last, GST_MAP_READ);
-  return priv->decoder.decode (frame.views (), n_threads, result, older.views ());
+  return Concealment::decode (priv->decoder, frame.views (), older_views, n_threads, result);
 }
 
 static void
@@ -242,18 +244,19 @@ decode_bytes (
   int n_threads;
   {
     std::lock_guard guard (priv->lock);
-    conceal = priv->conceal == CONCEAL_LAST && priv->last;
+    conceal = priv->conceal == CONCEAL_LAST;
     n_threads = priv->n_threads;
   }
+  GstBuffer *older = priv->shown.begin (input);
+  if (!conceal)
+    older = nullptr;
   DecoderResult result;
-  priv->decoder.plan (bytes, result, conceal);
+  priv->decoder.plan (bytes, result, older);
   GstBuffer *buffer = nullptr;
   const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
   if (flow != GST_FLOW_OK)
     return flow;
-  Status status = lay_out (priv->decoder, buffer);
-  if (status.ok ())
-    status = decode_into (priv, buffer, conceal, n_threads, result);
+  const Status status = decode_into (priv, buffer, older, n_threads, result);
   count_frame (priv, result, bytes.size ());
   note_references (priv);
   request_key_unit (self, input, result);
@@ -267,7 +270,6 @@ decode_bytes (
   return GST_FLOW_OK;
 }
 
-/* Whoever writes to the output from here on gets a copy of what we hold. */
 static void
 keep_for_concealment (GstNeighbourCodeDecPrivate *priv, GstBuffer *output)
 {
@@ -276,20 +278,10 @@ keep_for_concealment (GstNeighbourCodeDecPrivate *priv, GstBuffer *output)
     std::lock_guard guard (priv->lock);
     conceal = priv->conceal == CONCEAL_LAST;
   }
-  gst_buffer_replace (&priv->last, conceal ? output : nullptr);
-}
-
-/* DISCONT comes with every lost packet, when the last pixels are needed most; they are too old only
- * where the time jumps. */
-static void
-forget_what_is_too_old (GstNeighbourCodeDecPrivate *priv, GstBuffer *input)
-{
-  if (!priv->last || !GST_BUFFER_IS_DISCONT (input))
-    return;
-  const GstClockTime now = GST_BUFFER_PTS (input), then = GST_BUFFER_PTS (priv->last);
-  if (!GST_CLOCK_TIME_IS_VALID (now) || !GST_CLOCK_TIME_IS_VALID (then) || now < then ||
-      now - then > kMaxConcealAge)
-    gst_clear_buffer (&priv->last);
+  if (conceal)
+    priv->shown.keep (output);
+  else
+    priv->shown.forget ();
 }
 
 /* `input` gives times and flags; bytes are its own, or also those of slices that came later. */
@@ -298,7 +290,6 @@ decode_frame_set (
     GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  forget_what_is_too_old (priv, input);
   const GstFlowReturn flow = decode_bytes (self, input, bytes, output);
   if (flow != GST_FLOW_OK)
     return flow;

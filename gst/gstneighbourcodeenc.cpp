@@ -233,6 +233,9 @@ encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSet
   for (const rangecast::RangeImage &image : frame.views ())
     pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
   const GstClockTime interval = frame_interval (priv->info);
+  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
+  if (settings.encoder.temporal && !(priv->is_configured && priv->configured.temporal))
+    priv->frame_number = g_random_int ();
   if (Status s = configure (
           priv, priv->rate.next (settings.encoder, settings.rate, input, pixels, interval));
       !s.ok ())
@@ -468,8 +471,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   priv->encoder.request_key ();
   priv->key_requests.forget ();
   std::lock_guard guard (priv->lock);
-  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
-  priv->frame_number = priv->settings.temporal ? g_random_int () : 0;
+  priv->frame_number = 0;
   priv->bits_per_s = 0;
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};

@@ -350,6 +350,32 @@ GST_START_TEST (test_frame_sets_without_time_come_at_the_frame_rate_of_the_caps)
 }
 GST_END_TEST;
 
+/* Key frame sets have up to twice the bytes of the others here, and so have those in which a band
+ * of rows is refreshed, half of the picture at this size. */
+GST_START_TEST (test_temporal_is_within_a_tenth_of_the_target_and_thresholds_hardly_swing)
+{
+  for (const char *profile : kProfiles)
+    for (const char *keys : {"", " key-interval=1000"}) {
+      const std::string properties = std::string ("temporal=true profile=") + profile + keys;
+      const auto unlimited = play ("num-buffers=30", properties);
+      const double wanted = 0.7 * rate_of (unlimited, 0, unlimited.size ());
+      const auto coded = play ("num-buffers=105", properties + target (wanted));
+      expect_windows_on_target (coded, kTwoSeconds, wanted);
+      Thresholds least = coded.back ().thresholds, most = least;
+      for (std::size_t i = kTwoSeconds; i < coded.size (); i++) {
+        const Thresholds a = coded[i - 1].thresholds, b = coded[i].thresholds;
+        fail_unless (std::abs (a.colour - b.colour) <= 3, "%s%s: from %d to %d", profile, keys,
+            a.colour, b.colour);
+        least = {std::min (least.depth, b.depth), std::min (least.colour, b.colour)};
+        most = {std::max (most.depth, b.depth), std::max (most.colour, b.colour)};
+      }
+      for (const auto &[low, high] :
+          {std::pair{least.depth, most.depth}, {least.colour, most.colour}})
+        fail_unless (high <= 1.7 * low, "%s%s: %d to %d", profile, keys, low, high);
+    }
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcoderate_suite ()
 {
@@ -370,6 +396,7 @@ neighbourcoderate_suite ()
   tcase_add_test (tc, test_target_follows_a_controller);
   tcase_add_test (tc, test_goes_on_after_a_flush_and_begins_anew_after_ready);
   tcase_add_test (tc, test_frame_sets_without_time_come_at_the_frame_rate_of_the_caps);
+  tcase_add_test (tc, test_temporal_is_within_a_tenth_of_the_target_and_thresholds_hardly_swing);
   return suite;
 }
 

@@ -18,13 +18,19 @@ struct Scene {
   Scene (int views, int width, int height, int count, const char *properties = "")
   {
     const std::string launch =
-        "avatartestsrc range-person-only=true views=" + std::to_string (views) + " " + properties +
+        "avatartestsrc range-person-only=true num-buffers=" + std::to_string (count) +
+        " views=" + std::to_string (views) + " " + properties +
         " ! capsfilter caps=video/x-range,framerate=15/1,width=" + std::to_string (width) +
         ",height=" + std::to_string (height);
     GstHarness *h = gst_harness_new_parse (launch.c_str ());
     gst_harness_play (h);
-    for (int i = 0; i < count; i++)
-      frame_sets.push_back (gst_harness_pull (h));
+    for (int i = 0; i < count; i++) {
+      GstBuffer *frame_set = nullptr; /* under valgrind it takes longer than a harness waits */
+      for (int tries = 0; !frame_set && tries < 10; tries++)
+        frame_set = gst_harness_pull (h);
+      fail_unless (frame_set != nullptr);
+      frame_sets.push_back (frame_set);
+    }
     caps = gst_pad_get_current_caps (h->sinkpad);
     gst_harness_teardown (h);
   }

@@ -385,6 +385,26 @@ GST_START_TEST (test_rtp_and_the_parser_keep_the_delta_flag)
 }
 GST_END_TEST;
 
+/* A decoder that held the one's frame sets would take them for those that the other refers to. */
+GST_START_TEST (test_encoders_have_other_numbers_also_where_temporal_is_switched_on_later)
+{
+  const Rig rig = ring_rig (1);
+  for (const bool later : {false, true}) {
+    guint32 numbers[2];
+    for (guint32 &number : numbers) {
+      GstHarness *h = encoder (rig, later ? "temporal=false" : "");
+      gst_buffer_unref (code (h, rig, 0));
+      g_object_set (h->element, "temporal", TRUE, nullptr);
+      GstBuffer *coded = code (h, rig, 1);
+      number = header_of (units_of (bytes_of (coded))[0]).frame_number;
+      gst_buffer_unref (coded);
+      gst_harness_teardown (h);
+    }
+    fail_unless (numbers[0] != numbers[1], "later: %d, both %u", later, numbers[0]);
+  }
+}
+GST_END_TEST;
+
 static Suite *
 temporal_suite (void)
 {
@@ -405,6 +425,7 @@ temporal_suite (void)
   tcase_add_test (tc, test_concealment_fills_what_refers_to_something_lost);
   tcase_add_test (tc, test_frame_sets_that_others_refer_to_are_decoded_also_when_late);
   tcase_add_test (tc, test_rtp_and_the_parser_keep_the_delta_flag);
+  tcase_add_test (tc, test_encoders_have_other_numbers_also_where_temporal_is_switched_on_later);
   return s;
 }
 

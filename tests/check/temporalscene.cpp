@@ -3,6 +3,8 @@
  * pixel, over slices, threads, rangemux, and numbers that wrap around. */
 #include "scene-check.hpp"
 
+#include <gst/video/video.h>
+
 #include <utility>
 
 using namespace rangecast;
@@ -366,6 +368,173 @@ GST_START_TEST (test_encoder_of_each_view_and_rangemux_give_what_one_encoder_of_
 }
 GST_END_TEST;
 
+/* ---- a camera that vanishes and returns ---- */
+
+/* Two cameras with an encoder each, rangemux, and a decoder, by hand; beside each encoder a decoder
+ * that misses nothing. */
+class TwoCameras {
+public:
+  struct Scenes {
+    Scene of[2] = {{2, kWidth, kHeight, 14, "view-id=0"}, {2, kWidth, kHeight, 14, "view-id=1"}};
+  };
+
+  TwoCameras (const Scenes &scenes, const char *profile, bool feedback)
+      : profile_ (profile), feedback_ (feedback), cameras_{{&scenes.of[0]}, {&scenes.of[1]}}
+  {
+    GstElement *mux = gst_element_factory_make ("rangemux", nullptr);
+    mux_ = gst_harness_new_with_element (mux, nullptr, "src");
+    for (Camera &camera : cameras_) {
+      start (camera);
+      camera.in = gst_harness_new_with_element (mux, "sink_%u", nullptr);
+      GstCaps *caps = gst_pad_get_current_caps (camera.encoder->sinkpad);
+      camera.witness = gst_harness_new ("neighbourcodedec");
+      gst_harness_set_src_caps (camera.witness, gst_caps_ref (caps));
+      gst_harness_set_src_caps (camera.in, caps);
+    }
+    gst_object_unref (mux);
+    gst_harness_play (mux_);
+    decoder_ = gst_harness_new ("neighbourcodedec");
+  }
+  TwoCameras (const TwoCameras &) = delete;
+  ~TwoCameras ()
+  {
+    for (Camera &camera : cameras_)
+      for (GstHarness *h : {camera.encoder, camera.in, camera.witness})
+        gst_harness_teardown (h);
+    gst_harness_teardown (mux_);
+    gst_harness_teardown (decoder_);
+  }
+
+  /* The second camera begins anew, as after a loss of power. */
+  void restart ()
+  {
+    gst_harness_teardown (cameras_[1].encoder);
+    start (cameras_[1]);
+  }
+
+  /* One frame set of both, of which the second does not arrive if it is cut off.
+   * @return what is there of the second, beside what its encoder sent */
+  Compared frame (std::size_t i, bool cut_off)
+  {
+    Pixels sent;
+    for (Camera &camera : cameras_) {
+      GstBuffer *coded =
+          gst_harness_push_and_pull (camera.encoder, gst_buffer_ref (camera.scene->frame_sets[i]));
+      GstBuffer *seen = gst_harness_push_and_pull (camera.witness, gst_buffer_ref (coded));
+      sent = pixels_of (seen, kWidth, kHeight); /* of the last camera */
+      gst_buffer_unref (seen);
+      if (cut_off && &camera == &cameras_[1]) {
+        gst_harness_push_event (
+            camera.in, gst_event_new_gap (GST_BUFFER_PTS (coded), Scene::kInterval));
+        gst_buffer_unref (coded);
+      } else {
+        gst_harness_push (camera.in, coded);
+      }
+    }
+    GstBuffer *joined = gst_harness_pull (mux_);
+    if (i == 0)
+      gst_harness_set_src_caps (decoder_, gst_pad_get_current_caps (mux_->sinkpad));
+    GstBuffer *shown = gst_harness_push_and_pull (decoder_, joined);
+    Pixels pixels = pixels_of (shown, kWidth, kHeight);
+    gst_buffer_unref (shown);
+    fail_unless (pixels.erase (0) == 1, "the first camera is always there");
+    pass_requests_on ();
+    return compare (sent, pixels);
+  }
+
+private:
+  struct Camera {
+    const Scene *scene;
+    GstHarness *encoder = nullptr, *in = nullptr, *witness = nullptr;
+  };
+
+  void start (Camera &camera)
+  {
+    camera.encoder = harness_of (encoder (profile_, "refresh-period=400"));
+    gst_harness_set_src_caps (camera.encoder, gst_caps_ref (camera.scene->caps));
+  }
+
+  void pass_requests_on ()
+  {
+    const auto pass = [] (GstHarness *from, GstHarness *to, bool is_on) {
+      while (GstEvent *event = gst_harness_try_pull_upstream_event (from))
+        if (is_on && gst_video_event_is_force_key_unit (event))
+          gst_harness_push_upstream_event (to, event);
+        else
+          gst_event_unref (event);
+    };
+    pass (decoder_, mux_, feedback_);
+    for (Camera &camera : cameras_)
+      pass (camera.in, camera.encoder, true);
+  }
+
+  const char *profile_;
+  bool feedback_;
+  Camera cameras_[2];
+  GstHarness *mux_ = nullptr, *decoder_ = nullptr;
+};
+
+/* In frame sets 3 to 6 the second camera is gone. */
+static bool
+is_gone (std::size_t i)
+{
+  return i >= 3 && i < 7;
+}
+
+GST_START_TEST (test_camera_that_was_cut_off_is_whole_again_within_the_refresh_period)
+{
+  const TwoCameras::Scenes scenes;
+  for (const char *profile : kProfiles) {
+    TwoCameras cameras (scenes, profile, false);
+    for (std::size_t i = 0; i < 14; i++) {
+      const Compared c = cameras.frame (i, is_gone (i));
+      fail_unless_equals_uint64 (c.wrong, 0);
+      if (is_gone (i)) {
+        fail_unless_equals_uint64 (c.right, 0);
+      } else if (i == 7) {
+        fail_unless (c.right < c.valid, "%s: nothing to wait for", profile);
+      } else if (i < 3 || i >= 7 + 6) {
+        fail_unless (
+            c.right == c.valid, "%s: %g right in frame set %zu", profile, c.right_share (), i);
+      }
+    }
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_that_was_cut_off_is_whole_in_the_next_frame_set_where_it_can_be_asked)
+{
+  const TwoCameras::Scenes scenes;
+  for (const char *profile : kProfiles) {
+    TwoCameras cameras (scenes, profile, true);
+    for (std::size_t i = 0; i < 12; i++) {
+      const Compared c = cameras.frame (i, is_gone (i));
+      fail_unless_equals_uint64 (c.wrong, 0);
+      if (i < 3 || i >= 8)
+        fail_unless (
+            c.right == c.valid, "%s: %g right in frame set %zu", profile, c.right_share (), i);
+    }
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_that_began_anew_is_whole_at_once)
+{
+  const TwoCameras::Scenes scenes;
+  for (const char *profile : kProfiles) {
+    TwoCameras cameras (scenes, profile, false);
+    for (std::size_t i = 0; i < 10; i++) {
+      if (i == 7)
+        cameras.restart ();
+      const Compared c = cameras.frame (i, is_gone (i));
+      fail_unless_equals_uint64 (c.wrong, 0);
+      fail_unless (c.right == (is_gone (i) ? 0 : c.valid), "%s: %g right in frame set %zu", profile,
+          c.right_share (), i);
+    }
+  }
+}
+GST_END_TEST;
+
 static Suite *
 temporalscene_suite (void)
 {
@@ -384,6 +553,10 @@ temporalscene_suite (void)
   tcase_add_test (
       tc, test_decoder_keeps_no_reference_that_is_255_numbers_late_and_begins_anew_at_256);
   tcase_add_test (tc, test_encoder_of_each_view_and_rangemux_give_what_one_encoder_of_all_gives);
+  tcase_add_test (tc, test_camera_that_was_cut_off_is_whole_again_within_the_refresh_period);
+  tcase_add_test (
+      tc, test_camera_that_was_cut_off_is_whole_in_the_next_frame_set_where_it_can_be_asked);
+  tcase_add_test (tc, test_camera_that_began_anew_is_whole_at_once);
   return s;
 }
 

@@ -347,6 +347,31 @@ TEST (RateControl, refreshes_five_times_as_large_do_not_swing_thresholds)
   stream.expect_on_target (106);
 }
 
+/* 32 times as large they take two thirds of the bytes at 15 frames a second. */
+TEST (RateControl, key_frame_sets_every_second_are_on_target_however_large_they_are)
+{
+  for (double fps : {15.0, 30.0})
+    for (double key : {2.0, 4.0, 8.0, 16.0, 32.0})
+      for (double slope : {0.3, 0.6, 1.0}) {
+        Stream stream;
+        stream.interval_s = stream.settings.interval_s = 1 / fps;
+        stream.encoder.slope = slope;
+        stream.settings.best = {2, 2};
+        stream.settings.worst = {200, 200};
+        const double mean = (key + fps - 1) / fps;
+        stream.settings.bits_per_s = 40000 * fps * 2.5 * mean * std::pow (0.7, slope);
+        for (int i = 0; i < 30 * int (fps); i++) {
+          const bool refresh = i % int (fps) == 0;
+          stream.encoder.times = refresh ? key : 1;
+          stream.frame (refresh && i > 0);
+        }
+        stream.expect_on_target (106);
+        const auto [least, greatest] = stream.range (106);
+        EXPECT_LE (greatest, (key > 16 ? 3.5 : 1.6) * least) << key << ", slope " << slope;
+        EXPECT_LE (stream.greatest_change (106), key > 16 ? 3 : 2);
+      }
+}
+
 TEST (RateControl, one_refresh_is_paid_back_within_some_seconds)
 {
   Stream stream;

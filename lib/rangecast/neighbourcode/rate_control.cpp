@@ -7,8 +7,15 @@
 namespace rangecast {
 namespace {
 
-/* Seconds. The account is paid back over the first; refreshes enter it over the second. */
+/* Seconds. The account is paid back over the first. What refreshes cost more is paid in two steps
+ * of the second each: of large ones, one a second, every frame set then bears the same within 6 %.
+ */
 constexpr double kPayBack = 1.0, kSpread = 1.0;
+
+/* The share of the target that refreshes take of other frame sets at most, and the seconds' worth
+ * of bytes that each of the two steps holds at most: what refreshes of that share come to. */
+constexpr double kMostForRefreshes = 0.9, kMostSpread = 1.6;
+
 constexpr double kMemoryOfModel = 0.3, kMemoryOfInterval = 0.5;
 
 /* A frame set that comes later, or so many intervals later, than the one before is a new beginning:
@@ -94,7 +101,7 @@ RateControl::configure (const RateSettings &wanted)
     return;
   const bool first = !configured_;
   if (first || settings.bits_per_s != settings_.bits_per_s)
-    account_ = spread_ = 0;
+    account_ = entering_ = spread_ = 0;
   const Thresholds before = thresholds_;
   const bool same_limits = settings.best == settings_.best && settings.worst == settings_.worst;
   settings_ = settings;
@@ -134,17 +141,29 @@ RateControl::take_time (std::uint64_t time_ns)
   time_ns_ = time_ns;
 }
 
+/* What the next frame set bears of the refreshes before it, bytes. */
+double
+RateControl::pay_for_refreshes ()
+{
+  const double share = gain (elapsed_s_, kSpread);
+  const double moved = entering_ * share;
+  entering_ -= moved;
+  spread_ = std::min (spread_ + moved, kMostSpread * bytes_per_s ());
+  const double paid = std::min (spread_ * share, kMostForRefreshes * bytes_per_s () * elapsed_s_);
+  spread_ -= paid;
+  return paid;
+}
+
 /* Bytes that the next frame set should have. */
 double
 RateControl::plan_bytes ()
 {
-  const double paid = spread_ * gain (elapsed_s_, kSpread);
-  spread_ -= paid;
-  account_ += paid - bytes_per_s () * elapsed_s_;
-  const double fair = bytes_per_s () * interval_s_;
-  const double excess = account_ + fair; /* if this one is as it should be */
-  const double share = 1 - excess / fair * std::min (interval_s_ / kPayBack, 0.5);
-  return fair * std::clamp (share, kLeastShare, kGreatestShare);
+  const double fair = bytes_per_s () * elapsed_s_ - pay_for_refreshes ();
+  account_ -= fair;
+  const double usual = fair * interval_s_ / elapsed_s_;
+  const double excess = account_ + usual; /* if this one is as it should be */
+  const double share = 1 - excess / usual * std::min (interval_s_ / kPayBack, 0.5);
+  return usual * std::clamp (share, kLeastShare, kGreatestShare);
 }
 
 Thresholds
@@ -202,20 +221,19 @@ void
 RateControl::coded (const CodedFrame &frame)
 {
   const auto bytes = static_cast<double> (frame.bytes);
-  account_ += bytes;
+  const auto points = static_cast<double> (frame.points);
+  const bool refresh = frame.refresh && frames_ > 0;
+  const double usual = points * std::exp (a_ - b_ * coarseness_of (thresholds_)) / 8;
+  const double more = refresh ? std::max (0.0, bytes - usual) : 0;
+  entering_ = std::min (entering_ + more, kMostSpread * bytes_per_s ());
+  account_ += bytes - more;
   limit_account ();
   if (frame.points == 0 || frame.bytes == 0) {
     account_ = std::max (account_, -kLittle * bytes_per_s ());
     return;
   }
-  const auto points = static_cast<double> (frame.points);
-  if (frame.refresh && frames_ > 0) {
-    const double usual = points * std::exp (a_ - b_ * coarseness_of (thresholds_)) / 8;
-    const double more = std::max (0.0, bytes - usual);
-    account_ -= more;
-    spread_ = std::min (spread_ + more, bytes_per_s ());
+  if (refresh)
     return;
-  }
   if (frame.pixels > 0) {
     const double fill = points / static_cast<double> (frame.pixels);
     fill_ += (frames_ == 0 ? 1 : gain (elapsed_s_, kMemoryOfModel)) * (fill - fill_);

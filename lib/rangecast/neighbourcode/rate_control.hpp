@@ -70,6 +70,7 @@ private:
   [[nodiscard]] double coarseness_of (const Thresholds &thresholds) const;
   [[nodiscard]] double bytes_per_s () const { return settings_.bits_per_s / 8; }
   void take_time (std::uint64_t time_ns);
+  double pay_for_refreshes ();
   double plan_bytes ();
   void learn (double bits_per_point);
   void limit_account ();
@@ -88,7 +89,9 @@ private:
   std::uint64_t time_ns_ = 0;
   double interval_s_ = 0, elapsed_s_ = 0;
   double account_ = 0; /* bytes sent beyond the target */
-  double spread_ = 0;  /* bytes of refreshes that are still to enter the account */
+  /* Bytes of refreshes beyond what other frame sets have that are still to be paid: those that go
+   * over into spread_ first. */
+  double entering_ = 0, spread_ = 0;
 };
 
 /** Bits per second over the last two seconds of frame sets. */
