@@ -56,6 +56,7 @@ enum {
   PROP_TEMPORAL,
   PROP_REFRESH_PERIOD,
   PROP_KEY_INTERVAL,
+  PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
   PROP_N_THREADS,
   PROP_MAX_DEPTH_ERROR,
   PROP_STATS
@@ -63,12 +64,18 @@ enum {
 
 static constexpr EncoderSettings kDefaults;
 
+/* When there are key frame sets. */
+struct KeySettings {
+  guint interval_ms = 0;                /* at most between two; 0: no limit */
+  GstClockTime min_forced_interval = 0; /* at least before one that somebody asked for */
+};
+
 struct GstNeighbourCodeEncPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
   EncoderSettings settings;
   NeighbourCodeRateSettings rate_settings;
   int n_threads = 0;
-  guint key_interval_ms = 0;
+  KeySettings key_settings;
   double max_depth_error_m = 0;
   guint64 frames = 0, coded_bytes = 0;
   EncoderResult totals;
@@ -205,7 +212,7 @@ struct FrameSettings {
   EncoderSettings encoder;
   NeighbourCodeRateSettings rate;
   int n_threads;
-  guint key_interval_ms;
+  KeySettings key;
 };
 
 static GstClockTime
@@ -249,35 +256,45 @@ count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsiz
   priv->totals += result;
 }
 
-/* Asks the encoder for a key frame set where one is due. */
-static void
-prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, guint interval_ms)
+static GstClockTime
+running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  const GstSegment *segment = &GST_BASE_TRANSFORM (self)->segment;
-  const GstClockTime pts = GST_BUFFER_PTS (input);
-  const GstClockTime now = gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
-  /* The next frame set would come too late. */
-  const GstClockTime until = now + frame_interval (priv->info);
-  const bool is_old = interval_ms > 0 && GST_CLOCK_TIME_IS_VALID (now) &&
-                      GST_CLOCK_TIME_IS_VALID (priv->last_key) &&
-                      (now < priv->last_key || until - priv->last_key > interval_ms * GST_MSECOND);
-  GstEvent *announcement = priv->key_requests.answer (
-      pts, gst_segment_to_stream_time (segment, GST_FORMAT_TIME, pts), now);
-  if (announcement || is_old)
-    priv->encoder.request_key ();
-  if (announcement)
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
+  return gst_segment_to_running_time (
+      &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
 }
 
+/* Asks the encoder for a key frame set where one is due. Requests that come too soon after one
+ * wait, as with GstVideoEncoder. */
+static void
+prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const KeySettings &settings)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
+  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
+  /* The next frame set would come too late. */
+  const GstClockTime until = now + frame_interval (priv->info);
+  const bool is_old = settings.interval_ms > 0 && has_times &&
+                      (now < last || until - last > settings.interval_ms * GST_MSECOND);
+  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_interval) &&
+                       now >= last && now - last < settings.min_forced_interval;
+  if (is_old || (!is_soon && priv->key_requests.is_due (now)))
+    priv->encoder.request_key ();
+}
+
+/* Any key frame set answers those who asked for one, and is announced to them. */
 static void
 note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &result)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime pts = GST_BUFFER_PTS (input), now = running_time_of (self, input);
   priv->is_key = result.delta_slices == 0;
-  if (priv->is_key)
-    priv->last_key = gst_segment_to_running_time (
-        &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
+  if (!priv->is_key)
+    return;
+  priv->last_key = now;
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  if (GstEvent *announcement = priv->key_requests.answer (pts, stream_time, now))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
 }
 
 static GstFlowReturn
@@ -291,10 +308,10 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
   FrameSettings settings;
   {
     std::lock_guard guard (priv->lock);
-    settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_interval_ms};
+    settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_settings};
   }
   settings.encoder.frame_interval_ns = frame_interval (priv->info);
-  prepare_key (self, input, settings.key_interval_ms);
+  prepare_key (self, input, settings.key);
   EncoderResult result;
   const Status status = encode_frame (priv, input, settings, result);
   if (!status.ok ())
@@ -510,7 +527,10 @@ gst_neighbour_code_enc_set_property (
       settings.refresh_period_ns = g_value_get_uint (value) * GST_MSECOND;
       break;
     case PROP_KEY_INTERVAL:
-      priv->key_interval_ms = g_value_get_uint (value);
+      priv->key_settings.interval_ms = g_value_get_uint (value);
+      break;
+    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
+      priv->key_settings.min_forced_interval = g_value_get_uint64 (value);
       break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
@@ -574,7 +594,10 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
       g_value_set_uint (value, guint (settings.refresh_period_ns / GST_MSECOND));
       break;
     case PROP_KEY_INTERVAL:
-      g_value_set_uint (value, priv->key_interval_ms);
+      g_value_set_uint (value, priv->key_settings.interval_ms);
+      break;
+    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
+      g_value_set_uint64 (value, priv->key_settings.min_forced_interval);
       break;
     case PROP_N_THREADS:
       g_value_set_int (value, priv->n_threads);
@@ -662,6 +685,12 @@ install_properties (GObjectClass *object_class)
       "With temporal: a key frame set comes at least so often, milliseconds; files can be sought "
       "to those (0 to 3600000, default 0: only first and on request)",
       0);
+  g_object_class_install_property (object_class, PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
+      g_param_spec_uint64 ("min-force-key-unit-interval", "Minimum interval of forced key units",
+          "With temporal: a key frame set that somebody asks for (GstForceKeyUnit) waits until the "
+          "last one is so old, nanoseconds (0 to 18446744073709551615, default 0: it never waits; "
+          "18446744073709551615: nor does it then)",
+          0, G_MAXUINT64, 0, live));
   install_int (PROP_N_THREADS, "n-threads", "Threads",
       "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,

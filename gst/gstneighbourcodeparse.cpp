@@ -26,6 +26,7 @@
 #include "gstneighbourcodeparse.h"
 
 #include <gst/base/base.h>
+#include <gst/video/video.h>
 
 #include <algorithm>
 #include <atomic>
@@ -609,10 +610,23 @@ finish_stream (GstBaseParse *base)
     post_what_is_missing (base);
 }
 
+/* With the key access unit that the event announces the rig is written again. */
+static void
+note_wanted_headers (GstBaseParse *base, GstEvent *event)
+{
+  gboolean all_headers = FALSE;
+  if (gst_video_event_is_force_key_unit (event) &&
+      gst_video_event_parse_downstream_force_key_unit (
+          event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
+      all_headers)
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.last_rig = GST_CLOCK_TIME_NONE;
+}
+
 static gboolean
 gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 {
   const GstEventType type = GST_EVENT_TYPE (event);
+  note_wanted_headers (base, event);
   if (type == GST_EVENT_EOS)
     finish_stream (base);
   else if (type == GST_EVENT_GAP)

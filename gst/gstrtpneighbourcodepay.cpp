@@ -18,6 +18,7 @@
 #include "gstrtpneighbourcodepay.h"
 
 #include <gst/rtp/rtp.h>
+#include <gst/video/video.h>
 
 #include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
@@ -251,6 +252,22 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   return gst_rtp_base_payload_push_list (base, packer.packets);
 }
 
+/* ---- events ---- */
+
+/* With the key frame set that the event announces the rig is sent again. */
+static gboolean
+gst_rtp_neighbour_code_pay_sink_event (GstRTPBasePayload *base, GstEvent *event)
+{
+  gboolean all_headers = FALSE;
+  if (gst_video_event_is_force_key_unit (event) &&
+      gst_video_event_parse_downstream_force_key_unit (
+          event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
+      all_headers)
+    GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->last_config = GST_CLOCK_TIME_NONE;
+  return GST_RTP_BASE_PAYLOAD_CLASS (gst_rtp_neighbour_code_pay_parent_class)
+      ->sink_event (base, event);
+}
+
 /* ---- life ---- */
 
 static void
@@ -311,6 +328,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       "gst-rangecast");
 
   payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
+  payload_class->sink_event = gst_rtp_neighbour_code_pay_sink_event;
   payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;
 
   GST_DEBUG_CATEGORY_INIT (

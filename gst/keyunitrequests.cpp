@@ -3,6 +3,8 @@
 
 #include <gst/video/video.h>
 
+#include <algorithm>
+
 bool
 KeyUnitRequests::note (GstEvent *event)
 {
@@ -25,6 +27,14 @@ KeyUnitRequests::note (GstEvent *event)
   return true;
 }
 
+bool
+KeyUnitRequests::is_due (GstClockTime running_time)
+{
+  std::lock_guard guard (lock_);
+  return std::ranges::any_of (
+      waiting_, [&] (const Request &request) { return request.is_due (running_time); });
+}
+
 GstEvent *
 KeyUnitRequests::answer (
     GstClockTime timestamp, GstClockTime stream_time, GstClockTime running_time)
@@ -32,9 +42,7 @@ KeyUnitRequests::answer (
   bool any = false, all_headers = false;
   guint count = 0;
   const auto answered = [&] (const Request &r) {
-    const bool early = GST_CLOCK_TIME_IS_VALID (r.running_time) &&
-                       GST_CLOCK_TIME_IS_VALID (running_time) && running_time < r.running_time;
-    if (early)
+    if (!r.is_due (running_time))
       return false;
     any = true;
     all_headers = all_headers || r.all_headers;

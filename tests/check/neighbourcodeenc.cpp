@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "coded-check.hpp"
 
+#include <gst/video/video.h>
+
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -394,6 +396,129 @@ GST_START_TEST (test_only_the_first_slice_has_discont_and_only_the_last_the_mark
 }
 GST_END_TEST;
 
+static constexpr GstClockTime kFrame = GST_SECOND / 30;
+
+/* GstForceKeyUnit events that have come out. */
+static int
+count_announcements (GstHarness *h)
+{
+  int count = 0;
+  while (GstEvent *event = gst_harness_try_pull_event (h)) {
+    count += gst_video_event_is_force_key_unit (event);
+    gst_event_unref (event);
+  }
+  return count;
+}
+
+static void
+ask_for_key (GstHarness *h, gboolean all_headers = FALSE)
+{
+  fail_unless (gst_harness_push_upstream_event (
+      h, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, all_headers, 1)));
+}
+
+/* Codes frame sets that all show the same. @return 'k' for each key one, else 'd' */
+static std::string
+kinds (GstHarness *h, const Rig &rig, guint from, guint to)
+{
+  std::string kinds;
+  for (guint i = from; i < to; i++) {
+    GstBuffer *coded = gst_harness_push_and_pull (h, make_frame_set (rig, i * kFrame));
+    kinds += GST_BUFFER_FLAG_IS_SET (coded, GST_BUFFER_FLAG_DELTA_UNIT) ? 'd' : 'k';
+    gst_buffer_unref (coded);
+  }
+  return kinds;
+}
+
+GST_START_TEST (test_a_request_waits_until_the_last_key_frame_set_is_old_enough)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h =
+      encoder (rig, "temporal=true profile=packed min-force-key-unit-interval=90000000");
+  fail_unless_equals_string (kinds (h, rig, 0, 1).c_str (), "k");
+  ask_for_key (h);
+  ask_for_key (h); /* both get the same answer */
+  fail_unless_equals_string (kinds (h, rig, 1, 5).c_str (), "ddkd");
+  fail_unless_equals_int (count_announcements (h), 1);
+  ask_for_key (h);
+  fail_unless_equals_string (kinds (h, rig, 5, 8).c_str (), "dkd");
+  /* Long enough after it there is nothing to wait for. */
+  fail_unless_equals_string (kinds (h, rig, 8, 12).c_str (), "dddd");
+  ask_for_key (h);
+  fail_unless_equals_string (kinds (h, rig, 12, 14).c_str (), "kd");
+  fail_unless_equals_int (count_announcements (h), 2);
+  g_object_set (h->element, "min-force-key-unit-interval", guint64{0}, nullptr);
+  ask_for_key (h);
+  fail_unless_equals_string (kinds (h, rig, 14, 16).c_str (), "kd");
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_key_frame_set_that_comes_anyway_answers_those_who_wait)
+{
+  const Rig rig = ring_rig (1);
+  for (const char *anyway : {"temporal=true profile=packed key-interval=100", "temporal=false"}) {
+    GstHarness *h =
+        encoder (rig, (std::string ("min-force-key-unit-interval=10000000000 ") + anyway).c_str ());
+    (void)kinds (h, rig, 0, 1);
+    ask_for_key (h);
+    fail_unless_equals_int (count_announcements (h), 0);
+    (void)kinds (h, rig, 1, 5);
+    fail_unless_equals_int (count_announcements (h), 1);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* Rig views of a buffer that has so many bytes in front of its units. */
+static int
+count_rig_views (GstBuffer *buffer, std::size_t before)
+{
+  const auto bytes = bytes_of (buffer);
+  int count = 0;
+  for (const auto &unit : units_of (std::span (bytes).subspan (before)))
+    count += (unit[0] & 15) == int (UnitType::kRigView);
+  return count;
+}
+
+GST_START_TEST (test_all_headers_make_parser_and_payloader_repeat_the_rig_with_the_key_frame_set)
+{
+  const Rig rig = ring_rig (2, 64, 48);
+  const struct {
+    const char *launch;
+    std::size_t before; /* start code; RTP header */
+    std::string all_headers, none;
+  } cases[] = {
+      {"neighbourcodeparse ! capsfilter caps=application/x-neighbour-code,alignment=byte-stream", 4,
+          "20020", "20000"},
+      {"rtpneighbourcodepay config-interval=3600 mtu=60000", 12, "20020", "20000"},
+      {"rtpneighbourcodepay config-interval=0 mtu=60000", 12, "00000", "00000"},
+  };
+  for (const auto &c : cases)
+    for (const bool all_headers : {true, false}) {
+      GstHarness *h = gst_harness_new_parse (
+          (std::string ("neighbourcodeenc temporal=true profile=packed ! ") + c.launch).c_str ());
+      gst_harness_set_src_caps (h, range_caps (rig));
+      std::string rig_views;
+      for (guint i = 0; i < 5; i++) {
+        if (i == 3)
+          ask_for_key (h, all_headers);
+        gst_harness_push (h, make_frame_set (rig, i * kFrame));
+        auto buffers = pull_all (h);
+        fail_if (buffers.empty ());
+        int count = 0;
+        for (GstBuffer *buffer : buffers)
+          count += count_rig_views (buffer, c.before);
+        rig_views += std::to_string (count);
+        unref_all (buffers);
+      }
+      fail_unless_equals_string (
+          rig_views.c_str (), (all_headers ? c.all_headers : c.none).c_str ());
+      gst_harness_teardown (h);
+    }
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodeenc_suite ()
 {
@@ -419,6 +544,10 @@ neighbourcodeenc_suite ()
   tcase_add_test (tc, test_access_units_are_what_downstream_gets_if_it_does_not_care);
   tcase_add_test (tc, test_slices_come_one_a_buffer_with_the_times_of_their_frame_set);
   tcase_add_test (tc, test_only_the_first_slice_has_discont_and_only_the_last_the_marker);
+  tcase_add_test (tc, test_a_request_waits_until_the_last_key_frame_set_is_old_enough);
+  tcase_add_test (tc, test_a_key_frame_set_that_comes_anyway_answers_those_who_wait);
+  tcase_add_test (
+      tc, test_all_headers_make_parser_and_payloader_repeat_the_rig_with_the_key_frame_set);
   return suite;
 }
 
