@@ -70,14 +70,17 @@ code (const EncoderSettings &settings, int frames, const std::function<unsigned 
     EncoderResult result;
     EXPECT_TRUE (encoder.encode ({&image, 1}, std::uint32_t (i), 1, result).ok ());
     coded.bytes.push_back (encoder.size ());
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t part = 0; part < encoder.parts (); part++)
+      bytes.insert (bytes.end (), encoder.part (part).begin (), encoder.part (part).end ());
     coded.slices.emplace_back ();
     std::size_t slices = 0;
-    for (const auto &unit : units_of (encoder.part (0))) {
+    for (const auto &unit : units_of (bytes)) {
       EXPECT_TRUE (read_slice_header (unit, coded.slices.back ().emplace_back ()).ok ());
       slices++;
     }
     EXPECT_EQ (result.slices, slices);
-    const Decoded decoded = decode (decoder, encoder.part (0));
+    const Decoded decoded = decode (decoder, bytes);
     EXPECT_EQ (
         decoded.result.bad_slices + decoded.result.missing_pixels + decoded.result.unknown_pixels,
         0u)
