@@ -631,13 +631,16 @@ gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
 static void
 install_properties (GObjectClass *object_class)
 {
-  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+  /* Those with which tables, references or threads begin anew are none for a controller, which may
+   * set them with every frame set. */
+  const auto live =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const auto steered = GParamFlags (live | GST_PARAM_CONTROLLABLE);
   const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
   const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                               int minimum, int maximum, int fallback) {
+                               int minimum, int maximum, int fallback, GParamFlags flags) {
     g_object_class_install_property (
-        object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, live));
+        object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, flags));
   };
   g_object_class_install_property (object_class, PROP_PROFILE,
       g_param_spec_enum ("profile", "Profile",
@@ -647,28 +650,28 @@ install_properties (GObjectClass *object_class)
       g_param_spec_enum ("choice", "Choice",
           "Which neighbour within the thresholds replaces a pixel, if any; plain always takes the "
           "first (first, best, default first)",
-          GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), live));
+          GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), steered));
   install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
       "Bits of a depth code, of depths between the view's near and far (6 to 16, default 12)", 6,
-      16, kDefaults.depth_bits);
+      16, kDefaults.depth_bits, live);
   g_object_class_install_property (object_class, PROP_DEPTH_SCALE,
       g_param_spec_enum ("depth-scale", "Depth scale",
           "What depth codes are linear in: depth, or 1/depth, where codes stand for more depth the "
           "further it is (linear, inverse, default linear)",
           GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, int (kDefaults.depth_scale), live));
   install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits",
-      "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits);
+      "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits, live);
   install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
       "A neighbour replaces a pixel if their depths differ by no more than so many codes (0 to "
       "65535, default 8; 0 and colour-threshold 0: lossless after quantisation)",
-      0, 65535, kDefaults.depth_threshold);
+      0, 65535, kDefaults.depth_threshold, steered);
   install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
       "Neighbours replace a pixel if also R, G and B each differ by no more than so many codes (0 "
       "to 255, default 10)",
-      0, 255, kDefaults.colour_threshold);
+      0, 255, kDefaults.colour_threshold, steered);
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
       "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
-      int (rangecast::kMaxUnitSize), kDefaults.max_slice_size);
+      int (rangecast::kMaxUnitSize), kDefaults.max_slice_size, steered);
   g_object_class_install_property (object_class, PROP_TEMPORAL,
       g_param_spec_boolean ("temporal", "Temporal",
           "Pixels may equal those of the frame set before, too (default false: every frame set "
@@ -677,7 +680,7 @@ install_properties (GObjectClass *object_class)
   const auto install_ms = [&] (guint id, const char *name, const char *nick, const char *blurb,
                               guint fallback) {
     g_object_class_install_property (
-        object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, live));
+        object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, steered));
   };
   install_ms (PROP_REFRESH_PERIOD, "refresh-period", "Refresh period",
       "With temporal: every pixel is coded without reference to earlier frame sets at least so "
@@ -692,9 +695,10 @@ install_properties (GObjectClass *object_class)
           "With temporal: a key frame set that somebody asks for (GstForceKeyUnit) waits until the "
           "last one is so old, nanoseconds (0 to 18446744073709551615, default 0: it never waits; "
           "18446744073709551615: nor does it then)",
-          0, G_MAXUINT64, 0, live));
+          0, G_MAXUINT64, 0, steered));
   install_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0);
+      "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0,
+      live);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
       g_param_spec_double ("max-depth-error", "Maximum depth error",
           "Metres by which a decoded depth differs from the one that came in at most, of any view, "

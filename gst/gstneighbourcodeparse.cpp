@@ -34,6 +34,7 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <rangecast/neighbourcode/byte_stream.hpp>
+#include <rangecast/neighbourcode/key_check.hpp>
 #include <span>
 #include <vector>
 
@@ -80,6 +81,7 @@ struct Stream {               /* streaming thread only */
   gstrange::RangeInfo info; /* of the source caps */
   std::vector<Range> output;
 
+  rangecast::KeyCheck key_check;
   std::vector<guint8> rig_units; /* of access units to be written */
   GstClockTime last_rig = GST_CLOCK_TIME_NONE;
 };
@@ -282,9 +284,10 @@ note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
 
 /* What the header of an access unit says of its slices. */
 static AccessUnitHeader
-summarise (Bytes access_unit)
+summarise (Bytes access_unit, rangecast::KeyCheck &check)
 {
   AccessUnitHeader summary;
+  check.reset ();
   UnitReader units (access_unit);
   UnitHeader header;
   SliceHeader slice;
@@ -294,9 +297,10 @@ summarise (Bytes access_unit)
       continue;
     if (first)
       summary.capture_time_ns = slice.capture_time_ns;
-    summary.key = summary.key && slice.key;
+    check.add (slice);
     first = false;
   }
+  summary.key = check.is_key ();
   return summary;
 }
 
@@ -376,8 +380,10 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
   GstMapInfo map;
   if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
     return refuse_unreadable_buffer (base);
-  const AccessUnitHeader header = summarise ({map.data, map.size});
+  AccessUnitHeader header = summarise ({map.data, map.size}, stream.key_check);
   gst_buffer_unmap (frame->buffer, &map);
+  /* Upstream knows more: of lost packets, for one. */
+  header.key = header.key && !GST_BUFFER_FLAG_IS_SET (frame->buffer, GST_BUFFER_FLAG_DELTA_UNIT);
   frame->buffer = gst_buffer_make_writable (frame->buffer);
   set_key (frame->buffer, header.key);
   if (stream.writes_stream)

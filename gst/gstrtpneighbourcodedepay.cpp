@@ -25,6 +25,8 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <optional>
+#include <rangecast/neighbourcode/key_check.hpp>
 #include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
@@ -52,9 +54,12 @@ struct GstRtpNeighbourCodeDepayPrivate {
   bool warned_of_size = false;
   unsigned used_generation = 0;
   bool have_caps = false;
+  std::size_t rig_views = 0;
   std::vector<guint8> access_unit; /* slices that arrived so far */
-  bool is_delta = false;           /* one of them refers to an earlier frame set */
+  rangecast::KeyCheck key_check;   /* of them */
+  bool has_gap = false;            /* packets were lost before or between them */
   guint32 timestamp = 0;           /* RTP time of them */
+  std::optional<guint16> sequence; /* of the last packet */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
@@ -80,7 +85,8 @@ static void
 forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
 {
   priv->access_unit.clear ();
-  priv->is_delta = false;
+  priv->key_check.reset ();
+  priv->has_gap = false;
   priv->pts = priv->capture_time = GST_CLOCK_TIME_NONE;
 }
 
@@ -94,6 +100,7 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
   gst_pad_set_caps (GST_RTP_BASE_DEPAYLOAD_SRCPAD (base), caps);
   gst_caps_unref (caps);
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
 }
 
 static Status
@@ -143,9 +150,19 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
 
 /* ---- packets ---- */
 
+/* Nobody can begin at an access unit in which key slices are missing, or where all those of a view
+ * may be.
+ * @param has_end  its last packet came */
+static bool
+is_key_unit (GstRtpNeighbourCodeDepayPrivate *priv, bool has_end)
+{
+  const bool is_whole = has_end && !priv->has_gap;
+  return priv->key_check.is_key () && (is_whole || priv->key_check.views () == priv->rig_views);
+}
+
 /* The access unit as a buffer; nullptr if there is none or its rig is not known. */
 static GstBuffer *
-take_access_unit (GstRtpNeighbourCodeDepay *self)
+take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   GstBuffer *buffer = nullptr;
@@ -154,7 +171,7 @@ take_access_unit (GstRtpNeighbourCodeDepay *self)
     if (priv->have_caps) {
       buffer = gst_buffer_new_memdup (priv->access_unit.data (), priv->access_unit.size ());
       GST_BUFFER_PTS (buffer) = priv->pts;
-      if (priv->is_delta)
+      if (!is_key_unit (priv, has_end))
         GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
       priv->counters.access_units++;
     } else {
@@ -168,14 +185,14 @@ take_access_unit (GstRtpNeighbourCodeDepay *self)
 }
 
 /* The earliest capture time of its slices, because views of one frame set may differ by parts of a
- * frame; and whether one of them refers to an earlier frame set. */
+ * frame; and what makes a key unit. */
 static void
 note_slice (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
 {
   rangecast::SliceHeader slice;
   if (!rangecast::read_slice_header (unit, slice).ok ())
     return;
-  priv->is_delta = priv->is_delta || !slice.key;
+  priv->key_check.add (slice);
   if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
     priv->capture_time = slice.capture_time_ns;
 }
@@ -232,7 +249,7 @@ push_unmarked (GstRtpNeighbourCodeDepay *self)
     std::lock_guard guard (priv->lock);
     priv->counters.unmarked++;
   }
-  if (GstBuffer *buffer = take_access_unit (self))
+  if (GstBuffer *buffer = take_access_unit (self, false))
     gst_rtp_base_depayload_push (GST_RTP_BASE_DEPAYLOAD (self), buffer);
 }
 
@@ -242,8 +259,12 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
+  const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
+  const bool after_gap = priv->sequence && sequence != static_cast<guint16> (*priv->sequence + 1);
+  priv->sequence = sequence;
   if (timestamp != priv->timestamp)
     push_unmarked (self);
+  priv->has_gap = priv->has_gap || after_gap;
   if (priv->access_unit.empty ()) {
     priv->timestamp = timestamp;
     priv->pts = GST_BUFFER_PTS (rtp->buffer);
@@ -254,15 +275,16 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
     priv->used_generation = priv->collector.generation ();
     set_source_caps (base, priv->collector.info ());
   }
-  return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self) : nullptr;
+  return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self, true) : nullptr;
 }
 
 static gboolean
 gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *event)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->sequence.reset ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
   return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
       ->handle_event (base, event);
@@ -281,6 +303,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
+    priv->sequence.reset ();
     std::lock_guard guard (priv->lock);
     priv->counters = {};
   }

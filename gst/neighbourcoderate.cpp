@@ -99,6 +99,7 @@ NeighbourCodeRate::next (const EncoderSettings &configured, const NeighbourCodeR
   const GstClockTime capture = gst_range_buffer_get_capture_time (input),
                      time = GST_CLOCK_TIME_IS_VALID (capture) ? capture : GST_BUFFER_PTS (input);
   time_ = GST_CLOCK_TIME_IS_VALID (time) ? time : time_ + interval;
+  interval_ = interval;
   if (rate.target_bitrate == 0) {
     if (is_on_)
       control_.reset ();

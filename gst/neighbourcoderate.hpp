@@ -35,11 +35,11 @@ public:
   void coded (const rangecast::CodedFrame &frame);
 
   /** Bits/s over the last two seconds of frame sets. */
-  [[nodiscard]] double bits_per_s () const { return meter_.bits_per_s (); }
+  [[nodiscard]] double bits_per_s () const { return meter_.bits_per_s (interval_); }
 
 private:
   rangecast::RateControl control_;
   rangecast::RateMeter meter_;
   bool is_on_ = false;
-  GstClockTime time_ = 0; /* of the frame set at hand */
+  GstClockTime time_ = 0, interval_ = 0; /* of the frame set at hand */
 };

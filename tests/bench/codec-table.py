@@ -28,7 +28,7 @@ def variants(rows, max_depth_rms):
 
 
 def peer_rows(rows, area):
-    return sorted((r for r in rows if r["codec"] == PEER.format(area)), key=lambda r: r["psnr_db"])
+    return sorted((r for r in rows if r["codec"] == PEER.format(area) and r["psnr_db"] is not None), key=lambda r: r["psnr_db"])
 
 
 def speed(rows, peer, key):
@@ -51,13 +51,15 @@ def main():
     parser.add_argument("files", nargs="+", metavar="NAME=FILE")
     parser.add_argument("--max-depth-rms", type=float, default=1.0, help="mm (default 1)")
     options = parser.parse_args()
-    print("| | profile | bpvp at 34.5 / 38 dB | of peer | speed, encode / decode | beside the whole picture |")
-    print("|---|---|---|---|---|---|")
+    files = []
     for argument in options.files:
         name, equals, path = argument.partition("=")
         if not equals:
             sys.exit(f"codec-table.py: {argument}: expected NAME=FILE")
-        rows = read_rows(path)
+        files.append((name, read_rows(path)))
+    print("| | profile | bpvp at 34.5 / 38 dB | of peer | speed, encode / decode | beside the whole picture |")
+    print("|---|---|---|---|---|---|")
+    for name, rows in files:
         roi, whole = peer_rows(rows, "ROI"), peer_rows(rows, "whole picture")
         for profile, own in variants(rows, options.max_depth_rms).items():
             print(f"| {name} | {profile} | " + " | ".join(cells(own, roi, whole)) + " |")

@@ -2,6 +2,7 @@
 """Reads what codec_bench --json wrote, for the scripts beside this file."""
 import json
 import math
+import os
 import sys
 
 KEYS = ("codec", "settings", "bytes", "bpvp", "psnr_db", "depth_rms_mm", "depth_max_mm", "encode_ms", "decode_ms")
@@ -11,11 +12,29 @@ def read_rows(path):
     try:
         with open(path, encoding="utf-8") as f:
             rows = json.load(f)
-    except (OSError, ValueError) as error:
-        sys.exit(f"{path}: {error}, expected what codec_bench --json wrote")
-    if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) and all(k in r for k in KEYS) for r in rows):
-        sys.exit(f"{path}: expected what codec_bench --json wrote, rows with {', '.join(KEYS)}")
+    except (OSError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or error
+        sys.exit(f"{program()}: {path}: {reason}, expected what codec_bench --json wrote")
+    if not isinstance(rows, list) or not rows or not all(map(is_row, rows)):
+        sys.exit(f"{program()}: {path}: expected what codec_bench --json wrote, rows with {', '.join(KEYS)}")
     return rows
+
+
+def program():
+    """For the beginning of an error."""
+    return os.path.basename(sys.argv[0])
+
+
+def is_row(row):
+    """Whether it has names and numbers with which one can calculate."""
+    def number(key, least):
+        value = row[key]
+        return isinstance(value, (int, float)) and math.isfinite(value) and value >= least
+
+    return (isinstance(row, dict) and all(k in row for k in KEYS) and isinstance(row["codec"], str)
+            and isinstance(row["settings"], str) and (row["psnr_db"] is None or number("psnr_db", 0))
+            and all(number(key, 1e-9) for key in ("bytes", "bpvp"))
+            and all(number(key, 0) for key in KEYS[5:]))
 
 
 def front(rows):

@@ -134,10 +134,13 @@ def main():
     for index, (codec, (line, exact)) in enumerate(codecs.items()):
         parts += draw_codec(axes, codec, index, line, exact)
     parts.append(text(LEFT, TOP - 12, f"depth error at most {options.max_depth_rms:g} mm rms", fill="#555"))
-    with open(options.out, "w", encoding="utf-8") as f:
-        f.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
-                'font-family="sans-serif" font-size="13">\n'
-                f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>\n' + "\n".join(parts) + "\n</svg>\n")
+    try:
+        with open(options.out, "w", encoding="utf-8") as f:
+            f.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
+                    f'height="{HEIGHT}" font-family="sans-serif" font-size="13">\n'
+                    f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>\n' + "\n".join(parts) + "\n</svg>\n")
+    except OSError as error:
+        sys.exit(f"plot-codecs.py: --out {options.out}: {error.strerror}, expected a file to write")
 
 
 if __name__ == "__main__":

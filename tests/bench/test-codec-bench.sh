@@ -119,8 +119,8 @@ sys.exit(not all(1.6 < b["bytes"] / a["bytes"] < 2.4 for a, b in zip(one, two)))
 
 test_mask_clears_the_rest () {
   make_pictures
-  codec_bench "${pair0[@]}" "${quick[@]}" --only none >all.txt
-  codec_bench "${pair0[@]}" --mask mask0.png "${quick[@]}" --only none >masked.txt
+  codec_bench "${pair0[@]}" "${quick[@]}" --only "RVL + JPEG" >all.txt
+  codec_bench "${pair0[@]}" --mask mask0.png "${quick[@]}" --only "RVL + JPEG" >masked.txt
   head -1 all.txt | grep -q "valid pixels a frame set: 6144," || fail "$(head -1 all.txt)"
   head -1 masked.txt | grep -q "valid pixels a frame set: 15[0-9][0-9], depth 0.[78]" || fail "$(head -1 masked.txt)"
 }
@@ -165,7 +165,7 @@ test_rendered_figure_moves () {
 
 test_own_settings_are_run () {
   make_pictures
-  codec_bench "${pair0[@]}" "${quick[@]}" --only none --try "profile=packed depth-bits=9 colour-bits=5" --json out.json >/dev/null
+  codec_bench "${pair0[@]}" "${quick[@]}" --only "RVL + JPEG" --try "profile=packed depth-bits=9 colour-bits=5" --json out.json >/dev/null
   check_json out.json "of('packed')[0]['settings'] == 'depth-bits=9 depth-threshold=8 colour-threshold=10 colour-bits=5'" "--try"
   refuse 2 "profile=plain, packed or entropy" "${pair0[@]}" --try "profile=best"
   refuse 2 "6 to 16" "${pair0[@]}" --try "depth-bits=99"
@@ -207,8 +207,64 @@ test_bad_files_are_named () {
   refuse 1 "black-mask.png" "${pair0[@]}" --mask black-mask.png
   refuse 1 "no-depth.png" --color colour0.png --depth no-depth.png
   refuse 1 "depth0.png" "${pair0[@]}" --near 5 --far 6
-  refuse 1 "nowhere/out.json" "${pair0[@]}" --only none --json nowhere/out.json
+  refuse 1 "nowhere/out.json" "${pair0[@]}" --json nowhere/out.json
   refuse 1 nowhere.glb --model nowhere.glb
+}
+
+test_json_is_checked_before_the_work () {
+  make_pictures
+  mkdir full
+  refuse 1 "--json full: cannot be written" "${pair0[@]}" --json full
+  # Nothing was measured: not even the pictures were looked at.
+  refuse 1 "nowhere/out.json" --color nowhere.png --depth depth0.png --json nowhere/out.json
+  echo "what was there" >old.json
+  refuse 1 nowhere.png --color nowhere.png --depth depth0.png --json old.json
+  grep -q "what was there" old.json || fail "the file was lost without new rows"
+}
+
+test_only_what_is_not_there_is_told_what_is () {
+  make_pictures
+  refuse 2 "--only entrppy: no such codec, expected part of one of 'RVL + JPEG, ROI'" "${pair0[@]}" --only entrppy
+  for name in plain packed entropy "entropy, long slices"; do
+    grep -qF "'$name'" error.txt || fail "$name is not in: $(cat error.txt)"
+  done
+  # Temporal ones are there only where there is time.
+  refuse 2 "no such codec" "${pair0[@]}" --only temporal
+  codec_bench "${pair0[@]}" "${pair1[@]}" --sequence "${quick[@]}" --only temporal >table.txt
+  grep -qx "entropy, temporal" table.txt || fail "$(cat table.txt)"
+  codec_bench --help >help.txt
+  for word in temporal=true --sequence --frames; do grep -qF -- "$word" help.txt || fail "$word: $(cat help.txt)"; done
+}
+
+# usage: say_in_one_line TEXT script...: status 1 and one line on stderr that holds TEXT.
+say_in_one_line () {
+  local text=$1
+  shift
+  expect_status 1 python3 "$@"
+  grep -qF -- "$text" error.txt || fail "expected '$text' from: $* ; got $(cat error.txt)"
+}
+
+test_scripts_say_in_one_line_what_is_wrong_with_a_file () {
+  make_pictures
+  codec_bench "${pair0[@]}" "${quick[@]}" --json good.json >/dev/null
+  head -c 1000 /dev/urandom >noise
+  echo '[{"codec": "plain"}]' >keys.json
+  sed 's/"bpvp": [0-9.]*/"bpvp": 0/' good.json >zero.json
+  sed 's/"bytes": [0-9.]*/"bytes": "many"/' good.json >words.json
+  sed 's/"psnr_db": [0-9.]*/"psnr_db": NaN/' good.json >nan.json
+  printf '[%.0s' {1..100000} >deep.json
+  mkdir directory
+  for bad in noise keys.json zero.json words.json nan.json deep.json nowhere.json directory; do
+    say_in_one_line "plot-codecs.py: $bad" "$source_dir/tests/bench/plot-codecs.py" "$bad" --out plot.svg
+    say_in_one_line "codec-table.py: $bad" "$source_dir/tests/bench/codec-table.py" "good=good.json" "bad=$bad"
+  done
+  say_in_one_line "plot-codecs.py: --out nowhere/plot.svg" "$source_dir/tests/bench/plot-codecs.py" good.json --out nowhere/plot.svg
+  say_in_one_line "expected NAME=FILE" "$source_dir/tests/bench/codec-table.py" good.json
+  local decode=$source_dir/tests/bitstream/decode.py
+  say_in_one_line "decode.py: nowhere.rcnc" "$decode" nowhere.rcnc out
+  say_in_one_line "decode.py: directory" "$decode" directory out
+  say_in_one_line "decode.py: noise: no access unit" "$decode" noise out
+  say_in_one_line "decode.py: nowhere/out-depth-0.raw" "$decode" "$source_dir/tests/data/default.rcnc" nowhere/out
 }
 
 test_plot_draws_every_codec () {

@@ -7,6 +7,7 @@ The tables of both profiles are read from that page, so that they are what it sa
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from typing import Callable, NamedTuple, Optional, Union
 
@@ -24,8 +25,13 @@ class Damage(Exception):
 
 def table(name: str) -> list[str]:
     """The words of a table of the page."""
-    found = re.search(rf"<!-- table: {name} -->(.*?)<!-- end -->", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert found, name
+    try:
+        page = PAGE.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        sys.exit(f"{PAGE}: {error}, expected the document that the decoder takes its tables from")
+    found = re.search(rf"<!-- table: {name} -->(.*?)<!-- end -->", page, re.DOTALL)
+    if not found:
+        sys.exit(f"{PAGE}: expected a table of {name}")
     return found[1].split()
 
 

@@ -474,19 +474,32 @@ def write(pictures: dict[int, Picture], views: Iterable[View], prefix: str, file
             files[name].write(content)
 
 
+def decode(path: str, prefix: str) -> dict[str, int]:
+    """Decodes a whole file. @return counts of what was read"""
+    with open(path, "rb") as stream:
+        reader = Reader(stream.read())
+    files: dict[str, BinaryIO] = {}
+    for pictures in reader.access_units():
+        write(pictures, reader.views.values(), prefix, files)
+    for file in files.values():
+        file.close()
+    return reader.counts
+
+
 def main() -> int:
     if len(sys.argv) != 3:
         print("usage: decode.py FILE OUT_PREFIX", file=sys.stderr)
         return 2
-    with open(sys.argv[1], "rb") as stream:
-        reader = Reader(stream.read())
-    files: dict[str, BinaryIO] = {}
-    for pictures in reader.access_units():
-        write(pictures, reader.views.values(), sys.argv[2], files)
-    for file in files.values():
-        file.close()
-    print(", ".join(f"{count} {what}" for what, count in reader.counts.items()))
-    return 0 if reader.counts["access units"] else 1
+    try:
+        counts = decode(sys.argv[1], sys.argv[2])
+    except OSError as error:
+        print(f"decode.py: {error.filename}: {error.strerror}, expected a file to read and one to write", file=sys.stderr)
+        return 1
+    print(", ".join(f"{count} {what}" for what, count in counts.items()))
+    if not counts["access units"]:
+        print(f"decode.py: {sys.argv[1]}: no access unit, expected a neighbour code byte stream of version 1", file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":

@@ -344,6 +344,51 @@ GST_START_TEST (test_written_header_is_key_only_if_all_slices_are)
 }
 GST_END_TEST;
 
+/* Whether the header that is written for it says key; the flag of the buffer must say so, too. */
+static bool
+is_written_as_key (const Recording &recording, GstBuffer *coded)
+{
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_sink_caps_str (h, kStreamCaps);
+  gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
+                                   gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+  GstBuffer *written = gst_harness_push_and_pull (h, coded);
+  guint8 flags = 7;
+  gst_buffer_extract (written, 4 + 1, &flags, 1);
+  fail_unless (flags == !GST_BUFFER_FLAG_IS_SET (written, GST_BUFFER_FLAG_DELTA_UNIT));
+  gst_buffer_unref (written);
+  gst_harness_teardown (h);
+  return flags;
+}
+
+GST_START_TEST (test_written_header_is_not_key_where_slices_are_missing)
+{
+  const Recording recording (1, 160);
+  const auto units = units_of (bytes_of (recording.access_units[0]));
+  fail_unless (units.size () > 4); /* of two views */
+  fail_unless (is_written_as_key (recording, buffer_of (units)));
+  for (std::size_t lost = 0; lost < units.size (); lost++) {
+    auto rest = units;
+    rest.erase (rest.begin () + std::ptrdiff_t (lost));
+    fail_if (is_written_as_key (recording, buffer_of (rest)));
+    rest.push_back (rest[0]); /* one that comes twice is none that is missing */
+    fail_if (is_written_as_key (recording, buffer_of (rest)));
+  }
+  auto twice = units;
+  twice.push_back (units[1]);
+  fail_unless (is_written_as_key (recording, buffer_of (twice)));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_written_header_is_not_key_where_upstream_knows_of_a_loss)
+{
+  const Recording recording (1);
+  GstBuffer *coded = gst_buffer_copy_deep (recording.access_units[0]);
+  GST_BUFFER_FLAG_SET (coded, GST_BUFFER_FLAG_DELTA_UNIT);
+  fail_if (is_written_as_key (recording, coded));
+}
+GST_END_TEST;
+
 GST_START_TEST (test_rig_that_changes_gives_new_caps)
 {
   const Recording first (10, 64), second (10, 32);
@@ -688,6 +733,8 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_access_unit_that_came_in_pieces_is_one_copy);
   tcase_add_test (tc, test_delta_unit_is_set_where_the_header_says_no_key);
   tcase_add_test (tc, test_written_header_is_key_only_if_all_slices_are);
+  tcase_add_test (tc, test_written_header_is_not_key_where_slices_are_missing);
+  tcase_add_test (tc, test_written_header_is_not_key_where_upstream_knows_of_a_loss);
   tcase_add_test (tc, test_rig_that_changes_gives_new_caps);
   tcase_add_test (tc, test_flush_forgets_what_was_half_there);
   tcase_add_test (tc, test_times_that_are_missing_are_counted);

@@ -287,6 +287,47 @@ GST_START_TEST (test_works_again_after_null)
 }
 GST_END_TEST;
 
+/* Whether a packet holds slices. */
+static bool
+has_slices (GstBuffer *packet)
+{
+  const auto payload = payload_of (packet);
+  UnitReader reader (payload);
+  UnitHeader header;
+  bool any = false;
+  while (reader.next (header))
+    any = any || header.type == guint8 (UnitType::kSlice);
+  return any;
+}
+
+/* Large views, of which parts are lost, and small ones, each in a packet of its own. */
+GST_START_TEST (test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are)
+{
+  for (const int width : {160, 24}) {
+    const Sent sent (ring_rig (2, width, width * 3 / 4), 3);
+    if (width == 24) /* the rig's in front of the first, and one for each view */
+      fail_unless_equals_int (int (sent.packets.size ()), 1 + 3 * 2);
+    for (std::size_t lost = 0; lost < sent.packets.size (); lost++) {
+      GstHarness *h = receiver (gst_caps_ref (sent.caps));
+      for (std::size_t i = 0; i < sent.packets.size (); i++)
+        if (i != lost)
+          gst_harness_push (h, gst_buffer_ref (sent.packets[i]));
+      gst_harness_push_event (h, gst_event_new_eos ());
+      int buffers = 0;
+      for (; GstBuffer *buffer = gst_harness_try_pull (h); buffers++) {
+        const bool lacks = GST_BUFFER_PTS (buffer) == GST_BUFFER_PTS (sent.packets[lost]) &&
+                           has_slices (sent.packets[lost]);
+        fail_unless (lacks == GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT),
+            "width %d: buffer %d without packet %zu", width, buffers, lost);
+        gst_buffer_unref (buffer);
+      }
+      fail_unless_equals_int (buffers, 3);
+      gst_harness_teardown (h);
+    }
+  }
+}
+GST_END_TEST;
+
 static Suite *
 rtpneighbourcodedepay_suite ()
 {
@@ -297,6 +338,7 @@ rtpneighbourcodedepay_suite ()
   tcase_add_test (tc, test_every_packet_fits_the_mtu_and_holds_whole_units);
   tcase_add_test (tc, test_marker_is_on_the_last_packet_of_each_access_unit);
   tcase_add_test (tc, test_any_one_lost_packet_costs_only_its_own_units);
+  tcase_add_test (tc, test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are);
   tcase_add_test (tc, test_rig_of_64_views_comes_in_band);
   tcase_add_test (tc, test_rig_of_the_caps_suffices);
   tcase_add_test (tc, test_nothing_comes_out_before_the_rig_is_known);

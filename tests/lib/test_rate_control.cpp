@@ -481,6 +481,22 @@ TEST (RateMeter, begins_anew_where_time_goes_back)
   meter.add (1'100'000'000, 100);
   meter.add (5, 100);
   EXPECT_EQ (meter.bits_per_s (), 0);
-  meter.add (100'000'005, 1000);
+  meter.add (100'000'005, 1900);
   EXPECT_NEAR (meter.bits_per_s (), 80'000, 1);
+}
+
+TEST (RateMeter, counts_the_first_frame_set_until_two_seconds_are_full)
+{
+  constexpr std::uint64_t kInterval = 40'000'000;
+  RateMeter meter;
+  meter.add (0, 50'000);
+  EXPECT_NEAR (meter.bits_per_s (kInterval), 10e6, 1);
+  for (std::uint64_t i = 1; i < 50; i++) {
+    meter.add (i * kInterval, 5000);
+    const double seconds = double ((i + 1) * kInterval) / 1e9;
+    EXPECT_NEAR (meter.bits_per_s (kInterval), 8 * (50'000 + double (i) * 5000) / seconds, 1) << i;
+  }
+  meter.add (50 * kInterval, 5000);
+  meter.add (51 * kInterval, 5000);
+  EXPECT_NEAR (meter.bits_per_s (kInterval), 1e6, 1);
 }

@@ -34,14 +34,16 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     return {};
   if (Status s = validate (settings); !s.ok ())
     return s;
-  if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
-    return s;
-  colour_ = ColourQuantiser (settings.colour_bits);
-  plain_codes_.set (depth_, colour_);
-  const bool comparable = same_view && settings.depth_bits == settings_.depth_bits &&
+  const bool same_codes = same_view && settings.depth_bits == settings_.depth_bits &&
                           settings.depth_scale == settings_.depth_scale &&
-                          settings.colour_bits == settings_.colour_bits &&
-                          settings.profile == settings_.profile && settings.temporal;
+                          settings.colour_bits == settings_.colour_bits;
+  if (!same_codes) {
+    if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
+      return s;
+    colour_ = ColourQuantiser (settings.colour_bits);
+    plain_codes_.set (depth_, colour_);
+  }
+  const bool comparable = same_codes && settings.profile == settings_.profile && settings.temporal;
   if (!same_view) {
     refresh_.reset (view.height, view.id);
     motions_.resize (view.width, view.height);

@@ -250,6 +250,7 @@ RateMeter::add (std::uint64_t time_ns, std::uint64_t bytes)
     sum_ -= at (0).bytes;
     first_ = (first_ + 1) % entries_.size ();
     count_--;
+    is_full_ = true;
   };
   while (count_ > 1 && (count_ == entries_.size () || time_ns - at (1).time_ns >= kWindowNs))
     drop ();
@@ -259,12 +260,17 @@ RateMeter::add (std::uint64_t time_ns, std::uint64_t bytes)
 }
 
 double
-RateMeter::bits_per_s () const
+RateMeter::bits_per_s (std::uint64_t interval_ns) const
 {
+  const auto rate = [] (std::uint64_t bytes, double ns) { return 8e9 * double (bytes) / ns; };
+  if (count_ == 1 && interval_ns > 0)
+    return rate (sum_, double (interval_ns));
   if (count_ < 2)
     return 0;
-  const std::uint64_t ns = at (count_ - 1).time_ns - at (0).time_ns;
-  return 8e9 * static_cast<double> (sum_ - at (0).bytes) / static_cast<double> (ns);
+  const double ns = double (at (count_ - 1).time_ns - at (0).time_ns);
+  if (is_full_) /* the oldest one is where the two seconds begin */
+    return rate (sum_ - at (0).bytes, ns);
+  return rate (sum_, ns * double (count_) / double (count_ - 1));
 }
 
 } // namespace rangecast

@@ -99,8 +99,9 @@ class RateMeter {
 public:
   void reset () { *this = RateMeter (); }
   void add (std::uint64_t time_ns, std::uint64_t bytes);
-  /** 0 before the second frame set. */
-  [[nodiscard]] double bits_per_s () const;
+  /** Until two seconds are full, that of all frame sets so far, the first among them.
+   *  @param interval_ns  of frame sets, where there is only one; 0 = not known, and then no rate */
+  [[nodiscard]] double bits_per_s (std::uint64_t interval_ns = 0) const;
 
 private:
   static constexpr std::uint64_t kWindowNs = 2'000'000'000;
@@ -114,6 +115,7 @@ private:
   std::array<Entry, 256> entries_{}; /* a ring; of faster streams the window is shorter */
   std::size_t first_ = 0, count_ = 0;
   std::uint64_t sum_ = 0;
+  bool is_full_ = false;
 };
 
 } // namespace rangecast

@@ -27,7 +27,9 @@ const char *const kUsage =
     "  --depth FILE       its depth: 16 bits, one channel, 0 = none\n"
     "  --mask FILE        8 bits, non-zero = keep (default: all pixels that have depth)\n"
     "  --sequence         the pairs are frame sets of one view in order of time; without it, they\n"
-    "                     are the views of one frame set\n"
+    "                     are the views of one frame set. Only where there are several frame sets\n"
+    "                     (this, --recording, --frames) temporal profiles run, too: they refer to\n"
+    "                     the frame set before, the first one is a key one\n"
     "  --depth-unit M     metres that a depth of 1 is (default 0.001)\n"
     "  --near M, --far M  depths outside are cleared, and depth codes lie between (default: the\n"
     "                     least and the greatest depth of the pictures)\n"
@@ -39,11 +41,17 @@ const char *const kUsage =
     "  --size WxH         of each of its four views (default 320x240)\n"
     "  --noise LEVELS     of its colours, standard deviation in grey levels (default 1.5)\n"
     "  --depth-noise MM   of its depth, standard deviation (default 0)\n"
-    "  --frames N         frame sets to render (default 1), or to read of a recording (default "
-    "all)\n"
+    "  --frames N         frame sets to render, 30 a second (default 1), or to read of a "
+    "recording\n"
+    "                     (default all). With temporal, take 30 or more: the first costs most, "
+    "and\n"
+    "                     all pixels are refreshed within a second\n"
     "  --rounds N         times are medians of so many (default 11)\n"
-    "  --try \"P=V ...\"    also run these properties of neighbourcodeenc; may be repeated\n"
-    "  --only TEXT        only codecs with TEXT in their names, and RVL + JPEG\n"
+    "  --try \"P=V ...\"    also run these properties of neighbourcodeenc, as in "
+    "\"profile=entropy\n"
+    "                     temporal=true\"; may be repeated\n"
+    "  --only TEXT        only codecs with TEXT in their names (temporal: ', temporal'), and\n"
+    "                     RVL + JPEG; \"RVL + JPEG\": nothing else\n"
     "  --depth-rms MM     worst depth error in the list of best settings (default 1)\n"
     "  --json FILE        also write all rows as an array of objects\n"
     "Sizes and times are of a frame set, all views, one thread, means over frame sets.\n";
@@ -135,6 +143,21 @@ load (const Job &job, Input &input)
   return render_input (job.scene, job.frames ? job.frames : 1, job.depth_noise_mm, input);
 }
 
+/* @return what is wrong with --only, if anything */
+std::string
+check_only (const Job &job, const Codecs &codecs)
+{
+  std::string names;
+  for (std::size_t i = 0; i < codecs.size (); i++) {
+    const std::string &name = codecs[i]->name ();
+    if (name.find (job.only) != std::string::npos)
+      return {};
+    if (i == 0 || name != codecs[i - 1]->name ())
+      names += (names.empty () ? "'" : ", '") + name + "'";
+  }
+  return "--only " + job.only + ": no such codec, expected part of one of " + names;
+}
+
 Status
 make_codecs (const Job &job, const Input &input, Codecs &codecs)
 {
@@ -143,6 +166,8 @@ make_codecs (const Job &job, const Input &input, Codecs &codecs)
     std::printf ("left out, not in this build: %s\n", name.c_str ());
   if (Status s = add_profiles (rig, input.sets.size () > 1, codecs); !s.ok ())
     return s;
+  if (const std::string wrong = check_only (job, codecs); !wrong.empty ())
+    return {StatusCode::kUnsupported, wrong};
   std::erase_if (codecs, [&] (const std::unique_ptr<Codec> &codec) {
     return codec->name ().find (job.only) == std::string::npos &&
            !codec->name ().starts_with (kPeerName);
@@ -156,6 +181,9 @@ make_codecs (const Job &job, const Input &input, Codecs &codecs)
 Status
 run (const Job &job)
 {
+  if (!job.json.empty ()) /* before all the work */
+    if (Status s = check_json (job.json); !s.ok ())
+      return s;
   Input input;
   if (Status s = load (job, input); !s.ok ())
     return s;
@@ -194,7 +222,7 @@ main (int argc, char **argv)
     return options.refuse (wrong);
   if (const Status s = run (job); !s.ok ()) {
     std::fprintf (stderr, "codec_bench: %s\n", s.message ().c_str ());
-    return 1;
+    return s.message ().starts_with ("--only") ? 2 : 1;
   }
   return 0;
 }

@@ -140,14 +140,30 @@ print_choices (const std::vector<Row> &rows, double depth_rms_mm)
   }
 }
 
+/* What to say of a file that cannot be written. */
+static Status
+not_writable (const std::string &path)
+{
+  return {
+      StatusCode::kNotFound, "--json " + path + ": cannot be written, expected a file to write"};
+}
+
+Status
+check_json (const std::string &path)
+{
+  std::FILE *file = std::fopen (path.c_str (), "a"); /* keeps what is in it */
+  if (!file)
+    return not_writable (path);
+  std::fclose (file);
+  return {};
+}
+
 Status
 write_json (const std::string &path, const std::vector<Row> &rows)
 {
-  const Status failed = {
-      StatusCode::kNotFound, "--json " + path + ": cannot be written, expected a file to write"};
   std::FILE *file = std::fopen (path.c_str (), "w");
   if (!file)
-    return failed;
+    return not_writable (path);
   std::fputs ("[", file);
   for (std::size_t i = 0; i < rows.size (); i++) {
     const Row &r = rows[i];
@@ -160,7 +176,7 @@ write_json (const std::string &path, const std::vector<Row> &rows)
   }
   std::fputs ("\n]\n", file);
   const bool written = !std::ferror (file);
-  return std::fclose (file) == 0 && written ? Status{} : failed;
+  return std::fclose (file) == 0 && written ? Status{} : not_writable (path);
 }
 
 } // namespace bench

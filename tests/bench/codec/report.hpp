@@ -13,6 +13,10 @@ void print_rows (const std::vector<Row> &rows);
  *  @param depth_rms_mm  settings with a greater depth error do not count */
 void print_choices (const std::vector<Row> &rows, double depth_rms_mm);
 
+/** Whether write_json() will be able to write there. Makes the file if it is not there, and leaves
+ *  what it holds. @return kNotFound if not */
+rangecast::Status check_json (const std::string &path);
+
 /** Writes an array of objects, one a row. @return kNotFound if the file cannot be written */
 rangecast::Status write_json (const std::string &path, const std::vector<Row> &rows);
 
