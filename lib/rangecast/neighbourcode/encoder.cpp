@@ -104,6 +104,8 @@ ViewEncoder::compact_settings () const
 int
 ViewEncoder::pieces_of (const RowBand &rows) const
 {
+  if (header_.roi.empty ())
+    return 1;
   if (settings_.profile == Profile::kPlain)
     return plain_pieces (header_, settings_.max_slice_size);
   const CompactSettings finer = finer_settings (compact_settings (), reference_.now != nullptr);
@@ -112,34 +114,41 @@ ViewEncoder::pieces_of (const RowBand &rows) const
   return compact_pieces (header_, rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
 }
 
-/* Room for what pieces mostly come to, and for ROIs that grow: so that frame sets need no memory
- * anew. */
-constexpr std::size_t kUsualBytesOfPixel = 2;
-
-static void
-make_room (std::vector<std::uint8_t> &bytes, int columns, int rows)
+/* Room for what pieces mostly come to, and for ROIs that grow, so that frame sets need no memory
+ * anew. With a reference there may be fewer pieces than without, but no more; and a piece behind i
+ * others is no wider than one of i + 1. */
+void
+ViewEncoder::make_room (Band &band, int pieces)
 {
-  const std::size_t usual =
-      kUsualBytesOfPixel * static_cast<std::size_t> (columns) * static_cast<std::size_t> (rows);
-  bytes.clear ();
-  if (bytes.capacity () < usual)
-    bytes.reserve (usual + usual / 2);
+  constexpr std::size_t kUsualBytesOfPixel = 2;
+  RowBand key = band.rows;
+  key.key = true;
+  const int most = std::max (pieces, band.rows.key ? 0 : pieces_of (key));
+  const int rows = std::max (band.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
+  if (band.pieces.size () < static_cast<std::size_t> (most))
+    band.pieces.resize (static_cast<std::size_t> (most));
+  for (std::size_t i = 0; i < static_cast<std::size_t> (most); i++) {
+    const std::size_t columns = static_cast<std::size_t> (header_.roi.width) / (i + 1) + 1;
+    const std::size_t usual = kUsualBytesOfPixel * columns * static_cast<std::size_t> (rows);
+    std::vector<std::uint8_t> &bytes = band.pieces[i].bytes;
+    bytes.clear ();
+    if (bytes.capacity () < usual)
+      bytes.reserve (usual + usual / 2);
+  }
 }
 
 void
 ViewEncoder::cut (Band &band, int pieces)
 {
   const int width = header_.roi.width;
+  make_room (band, pieces);
   band.count = static_cast<std::size_t> (pieces);
   band.is_open = true;
   band.misfits = false;
-  if (band.pieces.size () < band.count)
-    band.pieces.resize (band.count);
   for (int i = 0; i < pieces; i++) {
     Piece &piece = band.pieces[static_cast<std::size_t> (i)];
     piece.first_column = width * i / pieces;
     piece.columns = width * (i + 1) / pieces - piece.first_column;
-    make_room (piece.bytes, piece.columns, band.rows.rows);
   }
 }
 
@@ -151,7 +160,7 @@ ViewEncoder::cut_bands ()
     bands_.resize (band_count_);
   for (std::size_t i = 0; i < band_count_; i++) {
     bands_[i].rows = rows_[i];
-    cut (bands_[i], header_.roi.empty () ? 1 : pieces_of (rows_[i]));
+    cut (bands_[i], pieces_of (rows_[i]));
   }
 }
 

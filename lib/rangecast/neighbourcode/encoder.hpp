@@ -122,6 +122,7 @@ private:
   void plan_references ();
   void cut_bands ();
   void cut (Band &band, int pieces);
+  void make_room (Band &band, int pieces);
   [[nodiscard]] int pieces_of (const RowBand &rows) const;
   [[nodiscard]] CompactSettings compact_settings () const;
   bool code_compact (
