@@ -536,8 +536,9 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
           TRUE, playing));
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
-          "Views decoded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64,
-          0, playing));
+          "Slices decoded at the same time, of one view or of several (0 to 64, default 0: as many "
+          "as there are cores)",
+          0, 64, 0, playing));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, points, slices, bad-slices, missing-pixels, "

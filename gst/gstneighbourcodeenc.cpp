@@ -697,8 +697,9 @@ install_properties (GObjectClass *object_class)
           "18446744073709551615: nor does it then)",
           0, G_MAXUINT64, 0, steered));
   install_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Views coded at the same time (0 to 64, default 0: as many as there are cores)", 0, 64, 0,
-      live);
+      "Pieces coded at the same time, of one view or of several; bytes do not depend on it (0 to "
+      "64, default 0: as many as there are cores)",
+      0, 64, 0, live);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
       g_param_spec_double ("max-depth-error", "Maximum depth error",
           "Metres by which a decoded depth differs from the one that came in at most, of any view, "

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <memory>
 #include <opencv2/core/utility.hpp>
+#include <thread>
 #include <vector>
 
 namespace rangecast {
@@ -41,17 +42,25 @@ in_parallel (std::size_t n, int threads, const Work &work)
       call (i, 0);
     return;
   }
-  /* What jobs have written is seen by who reads the counter after them. */
   std::atomic<std::size_t> next{0};
+  const auto run = [&] (std::size_t worker) {
+    for (std::size_t i; (i = next.fetch_add (1)) < n;)
+      call (i, worker);
+  };
+#ifdef __SANITIZE_THREAD__
+  /* ThreadSanitizer cannot see how OpenCV's pool, built without it, hands work to its threads. */
+  std::vector<std::jthread> workers_running;
+  for (std::size_t worker = 0; worker < workers; worker++)
+    workers_running.emplace_back (run, worker);
+#else
   cv::parallel_for_ (
       cv::Range (0, static_cast<int> (workers)),
       [&] (const cv::Range &range) {
         for (int worker = range.start; worker < range.end; worker++)
-          for (std::size_t i; (i = next.fetch_add (1)) < n;)
-            call (i, static_cast<std::size_t> (worker));
+          run (static_cast<std::size_t> (worker));
       },
       static_cast<double> (workers));
-  (void)next.load ();
+#endif
 }
 
 /** Memory that jobs need while they run and that nobody needs afterwards; one for each worker, kept

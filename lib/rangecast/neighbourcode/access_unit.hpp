@@ -68,11 +68,22 @@ struct DecoderResult {
    * set that were not received. */
   std::uint64_t unknown_pixels = 0;
   std::uint64_t raw_bits = 0; ///< points x (depth bits + 3 x colour bits) + 1 for each pixel
+
+  DecoderResult &operator+= (const DecoderResult &other)
+  {
+    slices += other.slices;
+    bad_slices += other.bad_slices;
+    missing_pixels += other.missing_pixels;
+    points += other.points;
+    unknown_pixels += other.unknown_pixels;
+    raw_bits += other.raw_bits;
+    return *this;
+  }
 };
 
 /** Decodes whole frame sets in two steps: plan() finds which views there are and how large, so that
- *  the caller can make room; decode() fills it, views in parallel. No input makes it write outside
- *  the images, and a damaged slice costs that slice. */
+ *  the caller can make room; decode() fills it, views and slices of each in parallel. No input
+ *  makes it write outside the images, and a damaged slice costs that slice. */
 class AccessUnitDecoder {
 public:
   struct PlannedView {
@@ -82,6 +93,8 @@ public:
     std::size_t first_slice = 0, slice_count = 0; ///< those that agree; by column, row, arrival
     SliceHeader reference;                        ///< of these the first that came
     std::uint64_t coded_pixels = 0;               ///< of the ROI as the slices have it
+    std::uint64_t held_pixels = 0;                ///< of all slices that are long enough
+    bool overlaps = false;                        ///< two slices have a pixel in common
   };
 
   Status set_rig (const Rig &rig);
@@ -97,14 +110,14 @@ public:
    *  image; pass true with older images to decode() */
   void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
-  /** Pixels of a view's coded ROI that no slice holds; at least 1 unless the slices cover it for
-   * sure. */
+  /** Pixels of a view's coded ROI that no slice holds; where slices overlap a guess, at least 1. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
 
   /** Fills all pixels of `images`. Those that no sound slice gives become what they are in `older`,
    *  or invalid. Where slices overlap, the later by column, then row, replaces the earlier.
    *  @param images  one for each of views(), in that order, with its ROI
-   *  @param threads  views at a time; 0 = number of cores
+   *  @param threads  slices at a time, those of a view that overlap one by one; 0 = number of
+   *  cores. What comes out does not depend on it
    *  @param older  earlier images of any views, also with other ROIs; none: invalid pixels
    *  @return kBadSize, with nothing decoded, if the images are not those of views() */
   Status decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
@@ -119,30 +132,39 @@ private:
                             small units would cost much time */
   };
   enum class Place : std::uint8_t { kNothing, kDamaged, kSound };
-  struct Coverage { /* of a view that slices do not tile; a bit for each pixel of its ROI */
+  struct Coverage { /* of a view whose slices overlap; a bit for each pixel of its ROI */
     std::vector<bool> seen, valid;
     std::uint64_t seen_pixels, points;
+  };
+  struct Job { /* some slices of a view, and all others of their places */
+    std::size_t view;
+    std::size_t first, count;
+    DecoderResult result;
   };
 
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
   void limit_pixels (const PlannedView &planned);
   void crop_to_slices (PlannedView &planned);
-  [[nodiscard]] bool is_tiled (const PlannedView &planned, std::uint64_t &have) const;
+  void find_overlaps (PlannedView &planned);
+  [[nodiscard]] static bool is_tiled (const PlannedView &planned);
   static void cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image);
-  void decode_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
+  void begin_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
+  void add_jobs (std::size_t view);
+  void run (Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory);
+  [[nodiscard]] DecoderResult sum_up (std::size_t index) const;
   Place decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
-      const ConstRangeImage &older, DecoderResult &result);
+      const ConstRangeImage &older, DecoderResult &result, SliceMemory &memory);
 
   Rig rig_;
-  SliceDecoder header_reader_;
-  std::array<SliceDecoder, kMaxViews> decoders_;    /* by view-id */
+  SliceDecoder decoder_;
   std::array<ReferencePair, kMaxViews> references_; /* by view-id */
   std::array<PlannedView, kMaxViews> planned_;
-  /* by planned view */
-  std::array<DecoderResult, kMaxViews> results_;
-  std::array<Coverage, kMaxViews> covered_;
+  std::array<Coverage, kMaxViews> covered_; /* by planned view */
   std::size_t count_ = 0;
   std::vector<PlannedSlice> slices_;
+  std::vector<int> row_ends_; /* while find_overlaps() runs */
+  std::vector<Job> jobs_;
+  WorkerMemory<SliceMemory> memory_;
 };
 
 /** Fills part of an image (rows and columns of its ROI) from an older one of the same view: where

@@ -237,7 +237,9 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
   const MotionSearch::Pictures pictures = {
       image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
-  BlockMotion near_by[2];
+  BlockMotion near_by[2];                   /* to the left, above */
+  if (header_.first_column >= kMotionBlock) /* another piece's: as it was last time */
+    near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
   for (std::size_t i = 0; i < motions_.size (); i++) {
     const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);

@@ -41,26 +41,36 @@ SliceDecoder::read_header (std::span<const std::uint8_t> unit, SliceHeader &head
   return {};
 }
 
-const DepthQuantiser *
-SliceDecoder::depth_of (const SliceHeader &header)
+void
+SliceDecoder::prepare (const SliceHeader &header)
 {
   auto &tables = views_[header.view_id];
+  if (depth_of (header))
+    return;
   if (!tables)
     tables = std::make_unique<ViewTables> ();
-  if (tables->depth_bits != header.depth_bits || tables->inverse != header.inverse_depth) {
-    const View *view = rig_.find (header.view_id);
-    const auto scale = header.inverse_depth ? DepthScale::kInverse : DepthScale::kLinear;
-    if (!view || !tables->depth.set (*view, header.depth_bits, scale).ok ())
-      return nullptr;
-    tables->depth_bits = header.depth_bits;
-    tables->inverse = header.inverse_depth;
-  }
-  return &tables->depth;
+  const View *view = rig_.find (header.view_id);
+  const auto scale = header.inverse_depth ? DepthScale::kInverse : DepthScale::kLinear;
+  const bool good = view && tables->depth.set (*view, header.depth_bits, scale).ok ();
+  tables->depth_bits = good ? header.depth_bits : 0;
+  tables->inverse = header.inverse_depth;
+}
+
+/* @return nullptr if there is no such table */
+const DepthQuantiser *
+SliceDecoder::depth_of (const SliceHeader &header) const
+{
+  const auto &tables = views_[header.view_id];
+  return tables && tables->depth_bits == header.depth_bits &&
+                 tables->inverse == header.inverse_depth
+             ? &tables->depth
+             : nullptr;
 }
 
 Status
 SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-    const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded)
+    const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded,
+    SliceMemory &memory) const
 {
   if (!(image.roi == header.roi) || image.depth.width != header.roi.width ||
       image.depth.height != header.roi.height)
@@ -80,11 +90,11 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
     usable.before = nullptr;
   bool good = depth;
   if (depth && header.profile != Profile::kPlain)
-    good = compact_.decode (body, header, {*depth, colour}, usable, image, decoded);
+    good = memory.compact.decode (body, header, {*depth, colour}, usable, image, decoded);
   else if (depth && (header.reference || !header.key))
-    good = plain_temporal_.decode (body, header, *depth, colour, usable, image, decoded);
+    good = memory.plain_temporal.decode (body, header, *depth, colour, usable, image, decoded);
   else if (depth)
-    good = plain_.decode (body, header, *depth, colour, image, decoded.points);
+    good = memory.plain.decode (body, header, *depth, colour, image, decoded.points);
   return good ? Status{} : damaged ();
 }
 

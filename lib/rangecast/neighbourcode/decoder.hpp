@@ -15,7 +15,14 @@
 
 namespace rangecast {
 
-/** Decodes slices into range images, and keeps tables and memory between them. */
+/** What slices need while they are decoded. Nothing of one has an effect on the next. */
+struct SliceMemory {
+  PlainDecoder plain;
+  PlainTemporalDecoder plain_temporal;
+  CompactDecoder compact; ///< profiles packed and entropy
+};
+
+/** Decodes slices into range images, and keeps tables between them. */
 class SliceDecoder {
 public:
   /** The cameras whose views may come. Forgets the tables. */
@@ -34,7 +41,20 @@ public:
    *  @param[out] pixels  grows
    *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels);
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels)
+  {
+    prepare (header);
+    return decode (unit, header, reference, image, pixels, memory_);
+  }
+
+  /** Makes the tables for slices of this view and these bits, unless they are there. Different
+   *  views may be prepared at the same time. */
+  void prepare (const SliceHeader &header);
+  /** The same as above for what has been prepared; at the same time for slices that have no pixel
+   *  in common, each with memory of its own. */
+  Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels,
+      SliceMemory &memory) const;
 
   /** Bytes of a slice all of whose pixels are invalid or equal a neighbour; no slice has fewer. */
   static std::size_t smallest_size (const SliceHeader &header);
@@ -45,15 +65,13 @@ private:
     int depth_bits = 0;
     bool inverse = false;
   };
-  const DepthQuantiser *depth_of (const SliceHeader &header);
+  [[nodiscard]] const DepthQuantiser *depth_of (const SliceHeader &header) const;
 
   Rig rig_;
   std::array<std::unique_ptr<ViewTables>, kMaxViews> views_;
   std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
       ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
-  PlainDecoder plain_;
-  PlainTemporalDecoder plain_temporal_;
-  CompactDecoder compact_; /* profiles packed and entropy */
+  SliceMemory memory_;
 };
 
 } // namespace rangecast

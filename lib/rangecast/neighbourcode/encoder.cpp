@@ -109,82 +109,86 @@ ViewEncoder::compact_settings (bool fine) const
 }
 
 int
-ViewEncoder::pieces_of (const Band &band) const
+ViewEncoder::pieces_of (const Plan &plan) const
 {
+  if (header_.roi.empty ())
+    return 1;
   if (settings_.profile == Profile::kPlain)
     return plain_pieces (header_, settings_.max_slice_size);
-  const CompactSettings finer = finer_settings (compact_settings (band.fine));
+  const CompactSettings finer = finer_settings (compact_settings (plan.fine));
   const bool is_exact =
       is_zero (steps_within (finer.depth_threshold, finer.colour_threshold).components () - 1);
   return compact_pieces (
-      header_, band.rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
+      header_, plan.rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
 }
 
-/* Room for what pieces mostly come to, and for ROIs that grow: so that frame sets need no memory
- * anew. */
-constexpr std::size_t kUsualBytesOfPixel = 2;
-
-static void
-make_room (std::vector<std::uint8_t> &bytes, int columns, int rows)
+/* Room for what pieces mostly come to, and for ROIs that grow, so that frame sets need no memory
+ * anew. With a reference there may be fewer pieces than without, but no more; and a piece behind i
+ * others is no wider than one of i + 1. */
+void
+ViewEncoder::make_room (Band &band, int pieces)
 {
-  const std::size_t usual =
-      kUsualBytesOfPixel * static_cast<std::size_t> (columns) * static_cast<std::size_t> (rows);
-  bytes.clear ();
-  if (bytes.capacity () < usual)
-    bytes.reserve (usual + usual / 2);
+  constexpr std::size_t kUsualBytesOfPixel = 2;
+  Plan key = band.plan;
+  key.rows.key = true;
+  const int most = std::max (pieces, band.plan.rows.key ? 0 : pieces_of (key));
+  const int rows = std::max (band.plan.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
+  if (band.pieces.size () < static_cast<std::size_t> (most))
+    band.pieces.resize (static_cast<std::size_t> (most));
+  for (std::size_t i = 0; i < static_cast<std::size_t> (most); i++) {
+    const std::size_t columns = static_cast<std::size_t> (header_.roi.width) / (i + 1) + 1;
+    const std::size_t usual = kUsualBytesOfPixel * columns * static_cast<std::size_t> (rows);
+    std::vector<std::uint8_t> &bytes = band.pieces[i].bytes;
+    bytes.clear ();
+    if (bytes.capacity () < usual)
+      bytes.reserve (usual + usual / 2);
+  }
 }
 
 void
 ViewEncoder::cut (Band &band, int pieces)
 {
   const int width = header_.roi.width;
+  make_room (band, pieces);
   band.count = static_cast<std::size_t> (pieces);
   band.is_open = true;
   band.misfits = false;
-  if (band.pieces.size () < band.count)
-    band.pieces.resize (band.count);
   for (int i = 0; i < pieces; i++) {
     Piece &piece = band.pieces[static_cast<std::size_t> (i)];
     piece.first_column = width * i / pieces;
     piece.columns = width * (i + 1) / pieces - piece.first_column;
-    make_room (piece.bytes, piece.columns, band.rows.rows);
-  }
-}
-
-void
-ViewEncoder::add_bands (std::span<const RowBand> rows, bool fine, Trial trial)
-{
-  if (bands_.size () < band_count_ + rows.size ())
-    bands_.resize (band_count_ + rows.size ());
-  for (const RowBand &r : rows) {
-    Band &band = bands_[band_count_++];
-    band.rows = r;
-    band.fine = fine;
-    band.trial = trial;
-    if (trial == Trial::kFirst) {
-      band.rows.key = reference_choice_.expects_delta (r);
-      band.fine = !band.rows.key;
-    }
   }
 }
 
 void
 ViewEncoder::cut_bands ()
 {
-  band_count_ = 0;
-  add_bands (both_, true, Trial::kFirst);
-  add_bands (fine_, true, Trial::kNone);
-  add_bands (coarse_, false, Trial::kNone);
-  for (Band &band : std::span (bands_).first (band_count_))
-    cut (band, pieces_of (band));
+  plans_.clear ();
+  for (const RowBand &rows : both_) {
+    const bool delta = reference_choice_.expects_delta (rows);
+    plans_.push_back ({{rows.first_row, rows.rows, delta, rows.index}, !delta, Trial::kFirst});
+  }
+  for (const RowBand &rows : fine_)
+    plans_.push_back ({rows, true, Trial::kNone});
+  for (const RowBand &rows : coarse_)
+    plans_.push_back ({rows, false, Trial::kNone});
+  std::ranges::sort (plans_, {}, [] (const Plan &plan) { return plan.rows.first_row; });
+  band_count_ = plans_.size ();
+  if (bands_.size () < band_count_)
+    bands_.resize (band_count_);
+  for (std::size_t i = 0; i < band_count_; i++) {
+    bands_[i].plan = plans_[i];
+    cut (bands_[i], pieces_of (plans_[i]));
+  }
 }
 
 void
 ViewEncoder::make_empty_slice ()
 {
-  const RowBand none = {0, 0, true, 0};
-  add_bands ({&none, 1}, false, Trial::kNone);
-  cut (bands_[0], 1);
+  fine_.clear ();
+  both_.clear ();
+  coarse_.assign (1, {0, 0, true, 0});
+  cut_bands ();
   bands_[0].is_open = false;
   Piece &piece = bands_[0].pieces[0];
   piece.bytes.resize (kSliceHeaderSize);
@@ -221,8 +225,8 @@ ViewEncoder::code_compact (
     const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with)
 {
   const CompactPicture picture = {
-      image_, reference_, {depth_, colour_}, compact_settings (band.fine), motions_};
-  return with.code_piece (picture, band.rows, header, piece.bytes, piece.result);
+      image_, reference_, {depth_, colour_}, compact_settings (band.plan.fine), motions_};
+  return with.code_piece (picture, band.plan.rows, header, piece.bytes, piece.result);
 }
 
 void
@@ -236,7 +240,7 @@ ViewEncoder::code (PieceId id, PieceEncoder &with)
   if (misfits.load (std::memory_order_relaxed))
     return; /* all of the band is to be coded again */
   SliceHeader header = header_;
-  header.key = band.rows.key;
+  header.key = band.plan.rows.key;
   header.reference_distance = header.key ? std::uint8_t{0} : header_.reference_distance;
   header.first_column = piece.first_column;
   header.columns = piece.columns;
@@ -246,8 +250,8 @@ ViewEncoder::code (PieceId id, PieceEncoder &with)
     if (!code_compact (band, header, piece, with.compact))
       misfits.store (true, std::memory_order_relaxed);
   } else if (reference_.now) {
-    with.plain_temporal.code_piece (
-        image_, band.rows, reference_, depth_, colour_, plain, header, piece.bytes, piece.result);
+    with.plain_temporal.code_piece (image_, band.plan.rows, reference_, depth_, colour_, plain,
+        header, piece.bytes, piece.result);
   } else {
     with.plain.code_piece (image_, plain_codes_, plain, header, piece.bytes, piece.result);
   }
@@ -265,31 +269,32 @@ ViewEncoder::bytes_of (const Band &band)
 std::size_t
 ViewEncoder::pixels_of (const Band &band) const
 {
-  return static_cast<std::size_t> (band.rows.rows) * static_cast<std::size_t> (header_.roi.width);
+  return static_cast<std::size_t> (band.plan.rows.rows) *
+         static_cast<std::size_t> (header_.roi.width);
 }
 
 /* Goes on with a trial whose pieces have been coded. @return false if that was all */
 bool
 ViewEncoder::go_on (Band &band)
 {
-  const bool was_key = band.rows.key;
-  if (band.trial == Trial::kFirst) {
+  const bool was_key = band.plan.rows.key;
+  if (band.plan.trial == Trial::kFirst) {
     band.first_bytes = bytes_of (band);
-    band.trial = Trial::kSecond;
-  } else if (band.trial == Trial::kSecond) {
+    band.plan.trial = Trial::kSecond;
+  } else if (band.plan.trial == Trial::kSecond) {
     const std::size_t bytes = bytes_of (band);
     const std::size_t key_bytes = was_key ? bytes : band.first_bytes;
     const std::size_t delta_bytes = was_key ? band.first_bytes : bytes;
-    reference_choice_.tried (band.rows, delta_bytes, {key_bytes, pixels_of (band)});
-    band.trial = Trial::kAgain;
+    reference_choice_.tried (band.plan.rows, delta_bytes, {key_bytes, pixels_of (band)});
+    band.plan.trial = Trial::kAgain;
     if (was_key == (key_bytes <= delta_bytes))
       return false;
   } else {
     return false;
   }
-  band.rows.key = !was_key;
-  band.fine = was_key;
-  cut (band, pieces_of (band));
+  band.plan.rows.key = !was_key;
+  band.plan.fine = was_key;
+  cut (band, pieces_of (band.plan));
   return true;
 }
 
@@ -319,9 +324,9 @@ ViewEncoder::note_bytes ()
 {
   std::size_t bytes = 0, pixels = 0;
   for (const Band &band : std::span (bands_).first (band_count_)) {
-    if (band.fine && band.trial == Trial::kNone)
-      reference_choice_.coded (band.rows, {bytes_of (band), pixels_of (band)});
-    if (band.rows.key)
+    if (band.plan.fine && band.plan.trial == Trial::kNone)
+      reference_choice_.coded (band.plan.rows, {bytes_of (band), pixels_of (band)});
+    if (band.plan.rows.key)
       continue;
     bytes += bytes_of (band);
     pixels += pixels_of (band);

@@ -115,10 +115,13 @@ private:
    * coded last is what later frame sets refer to, so the way that is expected to be comes second,
    * and the other one once more if it has been. */
   enum class Trial : std::uint8_t { kNone, kFirst, kSecond, kAgain };
-  struct Band {
+  struct Plan { /* of a band */
     RowBand rows;
     bool fine = false; /* pixels are finer than need be, for later frame sets to take them */
     Trial trial = Trial::kNone;
+  };
+  struct Band {
+    Plan plan;
     std::size_t first_bytes = 0; /* of a trial */
     std::vector<Piece> pieces;   /* those behind the first `count` are memory for later */
     std::size_t count = 0;
@@ -128,10 +131,10 @@ private:
   void fill_header (const ConstRangeImage &image, std::uint32_t frame_number);
   void make_empty_slice ();
   void plan_references ();
-  void add_bands (std::span<const RowBand> rows, bool fine, Trial trial);
   void cut_bands ();
   void cut (Band &band, int pieces);
-  [[nodiscard]] int pieces_of (const Band &band) const;
+  void make_room (Band &band, int pieces);
+  [[nodiscard]] int pieces_of (const Plan &plan) const;
   [[nodiscard]] CompactSettings compact_settings (bool fine) const;
   [[nodiscard]] std::size_t pixels_of (const Band &band) const;
   static std::size_t bytes_of (const Band &band);
@@ -156,7 +159,8 @@ private:
   ConstRangeImage image_;
   SliceHeader header_;
   CodingReference reference_;
-  std::vector<RowBand> rows_, fine_, coarse_, both_; /* as planned, and sorted */
+  std::vector<RowBand> rows_, fine_, coarse_, both_; /* what refresh asks for, and sorted */
+  std::vector<Plan> plans_;                          /* from top to bottom */
   std::vector<Band> bands_; /* those behind the first band_count_ are memory for later */
   std::size_t band_count_ = 0;
 };

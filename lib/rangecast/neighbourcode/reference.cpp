@@ -47,6 +47,14 @@ ReferencePlane::is_of (const SliceHeader &header) const
          means_the_same (header);
 }
 
+/* Slices side by side have rows in common. */
+bool
+ReferencePlane::is_written (int line)
+{
+  return std::atomic_ref (written_[static_cast<std::size_t> (line)])
+             .load (std::memory_order_relaxed) != 0;
+}
+
 void
 ReferencePlane::keep (int x, int y, std::span<const std::uint64_t> pixels)
 {
@@ -84,7 +92,7 @@ ReferencePlane::clear (const SliceHeader &slice)
       column + slice.columns > header_.roi.width)
     return;
   for (int i = line; i < line + slice.rows; i++)
-    if (written_[static_cast<std::size_t> (i)])
+    if (is_written (i))
       std::fill_n (row (i) + column, slice.columns, std::uint64_t{0});
 }
 

@@ -31,9 +31,11 @@ public:
   /** It holds the frame set of such a slice, or the other slices of it. */
   [[nodiscard]] bool is_of (const SliceHeader &header) const;
 
-  /** Takes pixels of a row, from column x on. Rows may be written at the same time. */
+  /** Takes pixels of a row, from column x on. Different pixels may be written at the same
+   *  time. */
   void keep (int x, int y, std::span<const std::uint64_t> pixels);
-  /** Pixels of the slice become kNone: it turned out to be damaged. */
+  /** Pixels of the slice become kNone: it turned out to be damaged. Others may be written at the
+   *  same time. */
   void clear (const SliceHeader &slice);
 
   /** kNone outside the ROI. */
@@ -57,6 +59,7 @@ private:
     return pixels_.get () +
            static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width);
   }
+  [[nodiscard]] bool is_written (int line);
   [[nodiscard]] bool means_the_same (const SliceHeader &header) const;
 
   bool held_ = false;

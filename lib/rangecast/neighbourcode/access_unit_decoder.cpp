@@ -1,0 +1,222 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "access_unit.hpp"
+
+#include <algorithm>
+
+#include "slice_place.hpp"
+
+namespace rangecast {
+
+Status
+AccessUnitDecoder::set_rig (const Rig &rig)
+{
+  if (Status s = decoder_.set_rig (rig); !s.ok ())
+    return s;
+  references_ = {}; /* memory, too: views may be others */
+  rig_ = rig;
+  count_ = 0;
+  return {};
+}
+
+void
+AccessUnitDecoder::forget_references ()
+{
+  for (ReferencePair &pair : references_)
+    pair.forget ();
+}
+
+/* Slices of one place: the first sound one counts, the others are copies of it. */
+AccessUnitDecoder::Place
+AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
+    const ConstRangeImage &older, DecoderResult &result, SliceMemory &memory)
+{
+  Place place = Place::kNothing;
+  for (const PlannedSlice &slice : same) {
+    const int id = slice.header.view_id;
+    ReferencePair &pair = references_[id];
+    ReferencePlane *now = slice.header.reference ? pair.now_kept () : nullptr;
+    const ReferencePlane &before = pair.before (slice.header.frame_number);
+    DecodedPixels decoded;
+    if (!slice.too_short &&
+        decoder_.decode (slice.unit, slice.header, {&before, now, &older}, image, decoded, memory)
+            .ok ()) {
+      result.slices++;
+      result.points += decoded.points;
+      result.unknown_pixels += decoded.unknown;
+      return Place::kSound;
+    }
+    result.bad_slices++;
+    if (slice.too_short)
+      continue;
+    place = Place::kDamaged;
+    if (now)
+      now->clear (slice.header);
+  }
+  if (place == Place::kDamaged)
+    fill_from (older, image, place_of (same[0].header));
+  return place;
+}
+
+/* Where slices overlap, the sum of their points is not what is there. Touches only pixels that
+ * came: a few small slices can claim a large image. */
+void
+AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image)
+{
+  for (int y = part.y; y < part.y + part.height; y++)
+    for (int x = part.x; x < part.x + part.width; x++) {
+      const auto i = static_cast<std::size_t> (y) * static_cast<std::size_t> (image.roi.width) +
+                     static_cast<std::size_t> (x);
+      const bool valid = place == Place::kSound && image.depth.at (x, y) != kInvalidDepth;
+      covered.seen_pixels += !covered.seen[i];
+      covered.points += valid;
+      covered.points -= covered.valid[i];
+      covered.seen[i] = true;
+      covered.valid[i] = valid;
+    }
+}
+
+/* Does what all slices of a view need, before any of them is decoded. */
+void
+AccessUnitDecoder::begin_view (
+    std::size_t index, const RangeImage &image, const ConstRangeImage &older)
+{
+  const PlannedView &planned = planned_[index];
+  decoder_.prepare (planned.reference);
+  if (planned.reference.reference)
+    references_[planned.view_id].begin (planned.reference);
+  if (!is_tiled (planned))
+    fill_from (older, image);
+  if (planned.overlaps) {
+    Coverage &covered = covered_[index];
+    covered.seen.assign (area_of (planned.roi), false);
+    covered.valid.assign (area_of (planned.roi), false);
+    covered.seen_pixels = covered.points = 0;
+  }
+}
+
+/* So many jobs have enough slices each that a hostile stream cannot make too many, and threads end
+ * at about the same time. */
+constexpr std::uint64_t kJobsOfView = 32;
+
+/* Of slices that overlap the later replaces the earlier: they are one job. */
+void
+AccessUnitDecoder::add_jobs (std::size_t view)
+{
+  const PlannedView &planned = planned_[view];
+  const std::uint64_t enough = planned.overlaps ? UINT64_MAX : area_of (planned.roi) / kJobsOfView;
+  std::size_t first = planned.first_slice;
+  std::span<const PlannedSlice> rest (&slices_[first], planned.slice_count);
+  std::uint64_t pixels = 0;
+  for (std::size_t count = 0; !rest.empty ();) {
+    const auto same = leading (rest, same_place);
+    rest = rest.subspan (same.size ());
+    count += same.size ();
+    if (!std::ranges::all_of (same, &PlannedSlice::too_short))
+      pixels += area_of (place_of (same[0].header));
+    if (!rest.empty () && pixels < enough)
+      continue;
+    jobs_.push_back ({view, first, count, {}});
+    first += count;
+    pixels = count = 0;
+  }
+}
+
+void
+AccessUnitDecoder::run (
+    Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory)
+{
+  std::span<const PlannedSlice> rest (&slices_[job.first], job.count);
+  while (!rest.empty ()) {
+    const auto same = leading (rest, same_place);
+    const Place place = decode_place (same, image, older, job.result, memory);
+    if (planned_[job.view].overlaps && place != Place::kNothing)
+      cover (covered_[job.view], place, place_of (same[0].header), image);
+    rest = rest.subspan (same.size ());
+  }
+}
+
+/* What the jobs of a view came to. */
+DecoderResult
+AccessUnitDecoder::sum_up (std::size_t index) const
+{
+  const PlannedView &planned = planned_[index];
+  DecoderResult sum;
+  for (const Job &job : jobs_)
+    if (job.view == index)
+      sum += job.result;
+  if (planned.overlaps)
+    sum.points = covered_[index].points;
+  sum.missing_pixels =
+      planned.coded_pixels - (planned.overlaps ? covered_[index].seen_pixels : planned.held_pixels);
+  const SliceHeader &first = planned.reference;
+  sum.raw_bits =
+      sum.points * static_cast<std::uint64_t> (first.depth_bits + 3 * first.colour_bits) +
+      planned.coded_pixels;
+  return sum;
+}
+
+static ConstRangeImage
+image_of (std::span<const RangeImage> images, int view_id)
+{
+  for (const RangeImage &image : images)
+    if (image.view_id == view_id)
+      return image;
+  return {}; /* an empty one: everything becomes invalid */
+}
+
+static bool
+belongs_to (const RangeImage &image, const AccessUnitDecoder::PlannedView &planned)
+{
+  return image.view_id == planned.view_id && image.roi == planned.roi;
+}
+
+Status
+AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
+    std::span<const RangeImage> older)
+{
+  if (!std::ranges::equal (images, views (), belongs_to))
+    return {StatusCode::kBadSize, "decoder: the images are not those of the planned views"};
+  const auto older_of = [&] (std::size_t i) { return image_of (older, planned_[i].view_id); };
+  in_parallel (count_, threads, [&] (std::size_t i) { begin_view (i, images[i], older_of (i)); });
+  jobs_.clear ();
+  for (std::size_t i = 0; i < count_; i++)
+    add_jobs (i);
+  memory_.reserve (workers_for (jobs_.size (), threads));
+  in_parallel (jobs_.size (), threads, [&] (std::size_t i, std::size_t worker) {
+    Job &job = jobs_[i];
+    run (job, images[job.view], older_of (job.view), memory_.of (worker));
+  });
+  for (std::size_t i = 0; i < count_; i++)
+    result += sum_up (i);
+  return {};
+}
+
+void
+fill_from (const ConstRangeImage &older, const RangeImage &image, const Roi &part)
+{
+  const Roi &a = older.roi, &b = image.roi;
+  const int begin = part.x, end = part.x + part.width;
+  const int left = std::clamp (a.x - b.x, begin, end);
+  const int right = std::clamp (a.x + a.width - b.x, left, end);
+  for (int y = part.y; y < part.y + part.height; y++) {
+    std::uint16_t *depth = image.depth.row (y);
+    const int from_y = b.y + y - a.y;
+    if (from_y < 0 || from_y >= a.height || left == right) {
+      std::fill (depth + begin, depth + end, kInvalidDepth);
+      continue;
+    }
+    const int from_x = b.x + left - a.x;
+    std::fill (depth + begin, depth + left, kInvalidDepth);
+    std::copy_n (older.depth.row (from_y) + from_x, right - left, depth + left);
+    std::copy_n (older.colour.row (from_y) + from_x, right - left, image.colour.row (y) + left);
+    std::fill (depth + right, depth + end, kInvalidDepth);
+  }
+}
+
+void
+fill_from (const ConstRangeImage &older, const RangeImage &image)
+{
+  fill_from (older, image, {0, 0, image.roi.width, image.roi.height});
+}
+
+} // namespace rangecast

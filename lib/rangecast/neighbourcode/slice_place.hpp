@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Where slices lie in their ROI. */
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "unit.hpp"
+
+namespace rangecast {
+
+inline bool
+same_place (const SliceHeader &a, const SliceHeader &b)
+{
+  return a.first_row == b.first_row && a.rows == b.rows && a.first_column == b.first_column &&
+         a.columns == b.columns;
+}
+
+inline Roi
+place_of (const SliceHeader &h)
+{
+  return {h.first_column, h.first_row, h.columns, h.rows};
+}
+
+inline std::uint64_t
+area_of (const Roi &roi)
+{
+  return static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
+}
+
+/** The elements at the beginning of `all` that are like its first one. */
+template <typename T, typename Like>
+std::span<const T>
+leading (std::span<const T> all, const Like &like)
+{
+  std::size_t n = 0;
+  while (n < all.size () && like (all[n].header, all[0].header))
+    n++;
+  return all.first (n);
+}
+
+} // namespace rangecast
