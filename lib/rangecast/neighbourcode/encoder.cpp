@@ -46,6 +46,9 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   const bool comparable = same_codes && settings.profile == settings_.profile && settings.temporal;
   if (!same_view) {
     refresh_.reset (view.height, view.id);
+    for (auto *rows : {&rows_, &fine_, &coarse_, &both_})
+      rows->reserve (refresh_.bands ());
+    plans_.reserve (refresh_.bands ());
     motions_.resize (view.width, view.height);
   }
   if (!comparable) {
