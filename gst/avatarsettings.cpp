@@ -25,6 +25,7 @@ enum {
   PROP_CAST_SHADOW,
   PROP_LIGHT_DRIFT,
   PROP_WALL_TEXTURE,
+  PROP_WALL_WARMTH,
   PROP_CHAIR,
 };
 
@@ -120,6 +121,9 @@ AvatarSettings::set_room (guint id, const GValue *value)
     case PROP_WALL_TEXTURE:
       scene.wall_texture = g_value_get_double (value);
       return true;
+    case PROP_WALL_WARMTH:
+      scene.wall_warmth = g_value_get_double (value);
+      return true;
     case PROP_CHAIR:
       scene.chair = g_value_get_boolean (value);
       return true;
@@ -207,6 +211,9 @@ AvatarSettings::get_room (guint id, GValue *value) const
     case PROP_WALL_TEXTURE:
       g_value_set_double (value, scene.wall_texture);
       return true;
+    case PROP_WALL_WARMTH:
+      g_value_set_double (value, scene.wall_warmth);
+      return true;
     case PROP_CHAIR:
       g_value_set_boolean (value, scene.chair);
       return true;
@@ -291,6 +298,8 @@ install_room (const Installer &to)
       "All light swings by this share, within 40 seconds (0 to 0.5, default: 0)", 0, 0.5, 0);
   to.add_double (PROP_WALL_TEXTURE, "wall-texture", "Wall texture",
       "Contrast of the room's texture (0 = plain, to 1, the default)", 0, 1, 1);
+  to.add_double (PROP_WALL_WARMTH, "wall-warmth", "Wall warmth",
+      "Colour of the walls (0, the default: blue-grey, to 1: as wood, skin and hair)", 0, 1, 0);
   to.add_bool (PROP_CHAIR, "chair", "Chair",
       "A chair stands behind the figure, also in the empty room (default: false)");
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "background.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -17,6 +18,7 @@ BackgroundModel::reset (int width, int height)
   width_ = width;
   height_ = height;
   frames_ = 0;
+  depth_noise_ = 0;
   const auto pixels = static_cast<std::size_t> (width) * static_cast<std::size_t> (height);
   pixels_.assign (pixels, {});
   sums_.assign (pixels, {});
@@ -26,7 +28,7 @@ Status
 BackgroundModel::learn (const ConstRangeImage &image)
 {
   const Roi &roi = image.roi;
-  if (roi.x < 0 || roi.y < 0 || roi.x + roi.width > width_ || roi.y + roi.height > height_)
+  if (!covers (roi))
     return {StatusCode::kBadSize, "view " + std::to_string (image.view_id) +
                                       ": the ROI does not lie in the image of the background"};
   for (int y = 0; y < roi.height; y++) {
@@ -64,6 +66,23 @@ BackgroundModel::finish ()
     pixel.depth_spread = sums.depth_n ? std::sqrt (sums.depth_m2 / float (sums.depth_n)) : 0;
     pixel.depth_share = frames_ ? float (sums.depth_n) / float (frames_) : 0;
   }
+  measure_noise ();
+}
+
+void
+BackgroundModel::measure_noise ()
+{
+  constexpr float kSteadyShare = 0.5f;
+  std::vector<float> noise;
+  for (const BackgroundPixel &pixel : pixels_)
+    if (pixel.depth_share >= kSteadyShare && pixel.depth > 0)
+      noise.push_back (pixel.depth_spread / (pixel.depth * pixel.depth));
+  depth_noise_ = 0;
+  if (noise.empty ())
+    return;
+  const auto middle = noise.begin () + static_cast<std::ptrdiff_t> (noise.size () / 2);
+  std::nth_element (noise.begin (), middle, noise.end ());
+  depth_noise_ = *middle;
 }
 
 Status
@@ -119,6 +138,7 @@ load_backgrounds (const std::string &path, std::vector<std::pair<int, Background
       const auto first = reinterpret_cast<const BackgroundPixel *> (pixels.data);
       model.pixels_.assign (first, first + pixels.total ());
       model.frames_ = std::max (1, static_cast<int> (node["frames"]));
+      model.measure_noise ();
       loaded.emplace_back (id, std::move (model));
     }
   } catch (const std::exception &) {

@@ -43,6 +43,16 @@ public:
   /** Makes means and spreads of what was learnt. */
   void finish ();
 
+  /** Whether the ROI lies in the image. */
+  [[nodiscard]] bool covers (const Roi &roi) const
+  {
+    return roi.x >= 0 && roi.y >= 0 && roi.width <= width_ - roi.x && roi.height <= height_ - roi.y;
+  }
+
+  /** How noise of depth grows: its standard deviation at depth z is about this times z squared
+   *  (both in depth units). The median of what was learnt; 0 if no depth was valid. */
+  [[nodiscard]] double depth_noise () const { return depth_noise_; }
+
 private:
   friend Status save_backgrounds (
       const std::string &, const std::vector<std::pair<int, const BackgroundModel *>> &);
@@ -53,7 +63,10 @@ private:
     float colour_m2 = 0, depth_m2 = 0;
     int colour_n = 0, depth_n = 0;
   };
+  void measure_noise ();
+
   int width_ = 0, height_ = 0, frames_ = 0;
+  double depth_noise_ = 0;
   std::vector<BackgroundPixel> pixels_;
   std::vector<Sums> sums_;
 };

@@ -27,8 +27,9 @@ hit_distance (Vec3 from, Vec3 direction, double radius_m)
 
 /** Blue-grey plaster with boards, so that it looks like neither skin nor shirt. */
 static Vec3
-room_colour (Vec3 p, double radius_m, std::uint32_t seed, double contrast)
+room_colour (Vec3 p, double radius_m, const RoomPaint &paint)
 {
+  const auto &[seed, contrast, warmth] = paint;
   const double fine = smooth_noise (p, 0.12, 3, seed + 20);
   const double coarse = smooth_noise (p, 0.5, 2, seed + 30);
   const double light = 1 + contrast * (0.35 * fine + 0.25 * coarse);
@@ -46,12 +47,13 @@ room_colour (Vec3 p, double radius_m, std::uint32_t seed, double contrast)
           (1 << 24);
   const double gap =
       1 - 0.5 * contrast * (smooth_step (0.05, 0.01, board) + smooth_step (0.95, 0.99, board));
-  return light * (contrast * tone + (1 - contrast)) * gap * Vec3{96, 124, 140};
+  return light * (contrast * tone + (1 - contrast)) * gap *
+         (warmth * Vec3{170, 122, 98} + (1 - warmth) * Vec3{96, 124, 140});
 }
 
 void
 draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,
-    std::uint32_t seed, double contrast, ImageView<Rgbx> colour)
+    const RoomPaint &paint, ImageView<Rgbx> colour)
 {
   const auto byte = [] (double v) {
     return static_cast<std::uint8_t> (std::lround (std::clamp (v / 4, 0.0, 255.0)));
@@ -64,7 +66,7 @@ draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radiu
           const Vec3 ray = world_from_camera.rotation * camera.unproject (x + dx, y + dy, 1);
           const Vec3 from = world_from_camera.translation;
           const Vec3 point = from + hit_distance (from, ray, radius_m) * ray;
-          sum = sum + room_colour (point, radius_m, seed, contrast);
+          sum = sum + room_colour (point, radius_m, paint);
         }
       colour.at (x, y) = {byte (sum.x), byte (sum.y), byte (sum.z), 0};
     }

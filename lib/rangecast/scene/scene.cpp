@@ -147,6 +147,8 @@ check_room (const SceneSettings &s)
     return bad_setting ("light-drift", "0 to 0.5");
   if (!(s.wall_texture >= 0 && s.wall_texture <= 1))
     return bad_setting ("wall-texture", "0 to 1");
+  if (!(s.wall_warmth >= 0 && s.wall_warmth <= 1))
+    return bad_setting ("wall-warmth", "0 to 1");
   return {};
 }
 
@@ -277,8 +279,8 @@ Scene::Impl::room_of (CameraState &camera) const
     camera.room.resize (static_cast<std::size_t> (settings.width) * settings.height);
     room.data = camera.room.data ();
     const Intrinsics &lens = rig.views[0].intrinsics;
-    draw_room (
-        lens, camera.world_from_camera, kWallRadius, settings.seed, settings.wall_texture, room);
+    draw_room (lens, camera.world_from_camera, kWallRadius,
+        {settings.seed, settings.wall_texture, settings.wall_warmth}, room);
     camera.room_depth = room_inverse_depth (
         lens, camera.world_from_camera, kWallRadius, settings.width, settings.height);
     if (settings.chair)

@@ -32,6 +32,7 @@ struct SceneSettings {
   double cast_shadow = 0;  ///< share of light that is missing in the figures' shadow, 0 .. 0.9
   double light_drift = 0;  ///< all light swings slowly (40 s) by this share, 0 .. 0.5
   double wall_texture = 1; ///< contrast of the room's texture, 0 = plain .. 1
+  double wall_warmth = 0;  ///< 0 = blue-grey walls .. 1 = as wood, skin and hair
   bool chair = false;      ///< a chair stands behind the figure, also in the empty room
 
   static constexpr int kMaxPersons = 3;
