@@ -23,6 +23,7 @@ const char *const kUsage =
     "  --frames N         with the person, 1.7 seconds apart (default 12)\n"
     "  --room NAME        only this one (default: all)\n"
     "  --depth WHICH      range (exact with noise) or stereo (default: both)\n"
+    "  --fringe N         that property of roiextract, pixels (default 9)\n"
     "  --pictures FOLDER  the last frame of each: picture, truth, what is kept, shadow\n"
     "columns: IoU of the valid pixels that are kept with the true mask (worst frame, mean), mean\n"
     "IoU of the decision, share of shadow pixels kept, pixels kept beside the person a frame,\n"
@@ -79,14 +80,21 @@ write_pictures (const std::string &path, const RoiStage &stage)
     std::fprintf (stderr, "roi_bench: %s: cannot be written\n", path.c_str ());
 }
 
+struct Job {
+  int frames = 12;
+  int fringe = SegmentationSettings ().fringe;
+  std::string pictures, room, depth;
+};
+
 void
-measure (const Room &room, bool stereo, Cue cue, int frames, const std::string &pictures)
+measure (const Room &room, bool stereo, Cue cue, const Job &job)
 {
   static const char *const kCues[] = {"both", "colour", "depth"};
   RoiTrial trial = room.trial;
   trial.stereo = stereo;
   trial.settings.cue = cue;
-  trial.frames = frames;
+  trial.settings.fringe = job.fringe;
+  trial.frames = job.frames;
   RoiStage stage (trial);
   RoiScore score;
   if (const Status s = run_roi_trial (stage, trial, score); !s.ok ()) {
@@ -96,10 +104,11 @@ measure (const Room &room, bool stereo, Cue cue, int frames, const std::string &
   std::printf ("%-18s %-7s %-7s %6.4f %6.4f %6.4f %7.2f %% %7.1f %7.1f %5.0f\n", room.name,
       stereo ? "stereo" : "range", kCues[int (cue)], score.worst_iou, score.mean_iou,
       score.mean_mask_iou, 100.0 * double (score.shadow_kept) / double (score.shadow_pixels + 1),
-      double (score.outside_kept) / frames, double (score.eaten_deep) / frames, score.eaten);
-  if (!pictures.empty ())
+      double (score.outside_kept) / job.frames, double (score.eaten_deep) / job.frames,
+      score.eaten);
+  if (!job.pictures.empty ())
     write_pictures (
-        pictures + "/" + room.name + (stereo ? "-stereo-" : "-range-") + kCues[int (cue)] + ".png",
+        job.pictures + "/" + room.name + (stereo ? "-stereo-" : "-range-") + kCues[int (cue)] + ".png",
         stage);
 }
 
@@ -108,13 +117,13 @@ measure (const Room &room, bool stereo, Cue cue, int frames, const std::string &
 int
 main (int argc, char **argv)
 {
-  int frames = 12;
-  std::string pictures, only, depth;
+  Job job;
   Options options ("roi_bench", kUsage);
-  options.number ("--frames", frames, 1, 1000);
-  options.text ("--pictures", pictures);
-  options.text ("--room", only);
-  options.text ("--depth", depth);
+  options.number ("--frames", job.frames, 1, 1000);
+  options.text ("--pictures", job.pictures);
+  options.text ("--room", job.room);
+  options.text ("--depth", job.depth);
+  options.number ("--fringe", job.fringe, 0, 99);
   if (const auto status = options.parse (argc, argv))
     return *status;
   std::printf ("%-18s %-7s %-7s %6s %6s %6s %9s %7s %7s %5s\n", "room", "depth", "cue", "worst",
@@ -122,8 +131,8 @@ main (int argc, char **argv)
   for (const Room &room : rooms ())
     for (const bool stereo : {false, true})
       for (const Cue cue : {Cue::kBoth, Cue::kColour, Cue::kDepth})
-        if ((only.empty () || only == room.name) &&
-            (depth.empty () || depth == (stereo ? "stereo" : "range")))
-          measure (room, stereo, cue, frames, pictures);
+        if ((job.room.empty () || job.room == room.name) &&
+            (job.depth.empty () || job.depth == (stereo ? "stereo" : "range")))
+          measure (room, stereo, cue, job);
   return 0;
 }

@@ -88,6 +88,7 @@ public:
         return s;
     }
     background_.finish ();
+    learnt_ = background_;
     return {};
   }
 
@@ -115,6 +116,28 @@ public:
     return segmenter_.clear_background (
         image (), background_, scene_->rig ().views[0].depth_unit_m, trial_.settings);
   }
+
+  /** @name segment() in its parts @{ */
+  Status decide ()
+  {
+    return segmenter_.decide (
+        image (), background_, scene_->rig ().views[0].depth_unit_m, trial_.settings);
+  }
+  void adapt (float share)
+  {
+    background_.adapt (image (), bytes (segmenter_.quiet ()), segmenter_.light (), share);
+  }
+  Status clear ()
+  {
+    return segmenter_.clear (
+        image (), background_, scene_->rig ().views[0].depth_unit_m, trial_.settings);
+  }
+  /** @} */
+
+  /** Light of the present picture, as a share of what it was. */
+  void dim (double share) { colour_.convertTo (colour_, -1, share); }
+  /** Of the background as it was learnt. */
+  [[nodiscard]] const float *first_mean (int x, int y) const { return learnt_.row (y)[x].mean; }
 
   void score (RoiScore &score)
   {
@@ -216,7 +239,7 @@ private:
   cv::Size size_;
   std::unique_ptr<Scene> scene_, shadowed_, shadowless_;
   StereoDepth stereo_;
-  BackgroundModel background_;
+  BackgroundModel background_, learnt_;
   Segmenter segmenter_;
   std::mt19937 random_{1};
   cv::Mat colour_, other_, plain_, lit_, depth_, truth_, shadow_, kept_;

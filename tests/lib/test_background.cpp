@@ -221,8 +221,8 @@ TEST (Background, bad_files_are_named)
   std::vector<std::pair<int, BackgroundModel>> loaded;
   EXPECT_EQ (load_backgrounds ("/nowhere.yml", loaded).code (), StatusCode::kNotFound);
   const std::string path = ::testing::TempDir () + "bad-" + std::to_string (getpid ()) + ".yml";
-  for (const char *text : {"", "hello", "%YAML:1.0\n---\nrangecast_background: 2\n",
-           "%YAML:1.0\n---\nrangecast_background: 1\nviews:\n  - id: 0\n"}) {
+  for (const char *text : {"", "hello", "%YAML:1.0\n---\nrangecast_background: 3\n",
+           "%YAML:1.0\n---\nrangecast_background: 2\nviews:\n  - id: 0\n"}) {
     std::ofstream (path) << text;
     const Status status = load_backgrounds (path, loaded);
     EXPECT_EQ (status.code (), StatusCode::kBadData) << text;

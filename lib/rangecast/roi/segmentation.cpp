@@ -18,6 +18,7 @@ constexpr float kConfirmed = 2;
 /* A pixel looks just like the background within so many standard deviations (which are at least
  * kLeastSpread grey levels), and within this share of its brightness. */
 constexpr float kSameFactor = 2.5f, kLeastSpread = 1.5f, kSameShare = 0.08f;
+constexpr float kBurntOut = 250; /* grey levels */
 /* What teaches the background keeps so far from what is kept, pixels. */
 constexpr int kGuard = 15;
 
@@ -25,7 +26,8 @@ constexpr int kGuard = 15;
 struct Limits {
   bool use_colour, use_depth;
   float noise_factor, colour, shadow, highlight;
-  float nearness; /* depth units */
+  float nearness;    /* depth units */
+  float depth_noise; /* BackgroundModel::depth_noise() */
   std::array<float, 3> light;
 };
 
@@ -38,7 +40,12 @@ place_of (std::uint16_t depth, const BackgroundPixel &background, const Limits &
     return Where::kUnknown;
   if (background.depth_share < kKnownShare)
     return Where::kNearer;
-  float noise = std::max (limits.nearness, limits.noise_factor * background.depth_spread);
+  /* Where stereo wavers between two surfaces, their distance is no noise: only what is nearer than
+   * the nearer one is new. */
+  const float sensor = limits.depth_noise * background.depth * background.depth;
+  const float wavers = background.depth - background.nearest + limits.noise_factor * sensor;
+  float noise =
+      std::max (limits.nearness, std::min (limits.noise_factor * background.depth_spread, wavers));
   if (background.depth_share < kSteadyShare)
     noise *= 2; /* learnt from few */
   if (float (depth) < background.depth - noise)
@@ -60,7 +67,9 @@ compare (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
   const float rgb[] = {float (colour.r) + 1, float (colour.g) + 1, float (colour.b) + 1};
   float mean[3], mixed = 0, square = 0, distortion = 0;
   for (int c = 0; c < 3; c++) {
-    mean[c] = std::min (background.mean[c] * limits.light[c], 255.f) + 1;
+    mean[c] = background.mean[c] * limits.light[c] + 1;
+    if (rgb[c] > kBurntOut) /* what was too bright says only that */
+      mean[c] = std::min (mean[c], 256.f);
     mixed += rgb[c] * mean[c];
     square += mean[c] * mean[c];
   }
@@ -131,9 +140,11 @@ private:
 
 } // namespace
 
-/* From every fourth pixel, but not from very dark or burnt out ones, whose ratios say little. */
-void
-Segmenter::estimate_light (const ConstRangeImage &image, const BackgroundModel &background)
+/* From every fourth pixel that is no nearer than the background, but not from very dark or burnt
+ * out ones, whose ratios say little. */
+static void
+estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
+    const Limits &limits, std::array<float, 3> &light)
 {
   RatioPeak ratios[3];
   const auto usable = [] (float level) { return level >= 16 && level <= 240; };
@@ -141,7 +152,8 @@ Segmenter::estimate_light (const ConstRangeImage &image, const BackgroundModel &
     const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
     const Rgbx *colour = image.colour.row (y);
     for (int x = 0; x < image.roi.width; x += 2) {
-      if (behind[x].spread < 0)
+      if (behind[x].spread < 0 || (limits.use_depth && place_of (image.depth.at (x, y), behind[x],
+                                                           limits) == Where::kNearer))
         continue;
       const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
       for (int c = 0; c < 3; c++)
@@ -150,16 +162,22 @@ Segmenter::estimate_light (const ConstRangeImage &image, const BackgroundModel &
     }
   }
   for (int c = 0; c < 3; c++)
-    light_[c] = ratios[c].peak (light_[c]);
+    light[c] = ratios[c].peak (light[c]);
 }
 
 void
 Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &background,
     double depth_unit_m, const SegmentationSettings &settings)
 {
-  const Limits limits = {settings.cue != Cue::kDepth, settings.cue != Cue::kColour,
+  Limits limits = {settings.cue != Cue::kDepth, settings.cue != Cue::kColour,
       float (settings.noise_factor), float (settings.colour_threshold), float (settings.shadow),
-      float (settings.highlight), float (settings.depth_threshold_m / depth_unit_m), light_};
+      float (settings.highlight), float (settings.depth_threshold_m / depth_unit_m),
+      float (background.depth_noise ()), {1, 1, 1}};
+  if (settings.follow_light && limits.use_colour)
+    estimate_light (image, background, limits, light_);
+  else
+    light_ = {1, 1, 1};
+  limits.light = light_;
   for (cv::Mat *m : {&other_, &nearer_, &same_, &calm_})
     m->create (image.roi.height, image.roi.width, CV_8U);
   for (cv::Mat *m : {&ratio_, &tolerance_})
@@ -345,10 +363,6 @@ Segmenter::decide (const ConstRangeImage &image, const BackgroundModel &backgrou
   if (roi.empty ())
     return {};
   try {
-    if (settings.follow_light && settings.cue != Cue::kDepth)
-      estimate_light (image, background);
-    else
-      light_ = {1, 1, 1};
     classify (image, background, depth_unit_m, settings);
     join_cues (settings);
     remove_small (mask_, settings.min_area, settings.max_people);

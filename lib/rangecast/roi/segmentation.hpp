@@ -68,7 +68,6 @@ public:
   [[nodiscard]] const std::array<float, 3> &light () const { return light_; }
 
 private:
-  void estimate_light (const ConstRangeImage &image, const BackgroundModel &background);
   void classify (const ConstRangeImage &image, const BackgroundModel &background,
       double depth_unit_m, const SegmentationSettings &settings);
   void find_same (int reach);
