@@ -19,8 +19,10 @@ constexpr float kConfirmed = 2;
  * kLeastSpread grey levels), and within this share of its brightness. */
 constexpr float kSameFactor = 2.5f, kLeastSpread = 1.5f, kSameShare = 0.08f;
 constexpr float kBurntOut = 250; /* grey levels */
-/* What teaches the background keeps so far from what is kept, pixels. */
-constexpr int kGuard = 15;
+/* What teaches the background and has no depth to prove it keeps so far from what is kept, pixels.
+ */
+constexpr int kGuard = 7;
+constexpr std::uint8_t kPerhaps = 128;
 
 /* Thresholds in the units of the pixels. */
 struct Limits {
@@ -202,7 +204,9 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
       nearer[x] = where == Where::kNearer ? kYes : 0;
       same[x] = alike ? kYes : 0;
       const bool quiet = alike && std::abs (c.brightness - 1) < tolerance[x];
-      calm[x] = where != Where::kNearer && (quiet || !limits.use_colour) ? kYes : 0;
+      calm[x] = where == Where::kNearer || (limits.use_colour && !quiet) ? 0
+                : where == Where::kBackground                            ? kYes
+                                                                         : kPerhaps;
     }
   }
 }
@@ -289,6 +293,9 @@ Segmenter::find_quiet ()
   cv::dilate (mask_, opened_, guard_);
   cv::bitwise_not (opened_, opened_);
   cv::bitwise_and (calm_, opened_, quiet_);
+  cv::compare (calm_, kYes, opened_, cv::CMP_EQ);
+  cv::bitwise_and (opened_, inverse_, opened_);
+  cv::bitwise_or (quiet_, opened_, quiet_);
 }
 
 /* For every depth a number that grows by 128 where neighbours are just too far apart: by 30 mm, or,

@@ -61,8 +61,9 @@ public:
 
   /** What the last decide() found, of its ROI: 255 = kept, whether valid or not. */
   [[nodiscard]] const cv::Mat &mask () const { return mask_; }
-  /** Where the last decide() found nothing that speaks against the background: 255 = its depth and
-   *  its colour, in its light, and well away from what is kept. What may teach the background. */
+  /** Where the last decide() found nothing that speaks against the background: other than 0 = its
+   *  colour, in its light, and either its depth or well away from what is kept. What may teach the
+   *  background. */
   [[nodiscard]] const cv::Mat &quiet () const { return quiet_; }
   /** Brightness of the last picture by channel, as a share of the background's. */
   [[nodiscard]] const std::array<float, 3> &light () const { return light_; }
