@@ -5,6 +5,8 @@
 #include <gst/video/video.h>
 #include <unistd.h>
 
+#include <vector>
+
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -279,6 +281,37 @@ GST_START_TEST (test_colour_camera_without_a_rig_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_pairs_stay_right_where_both_streams_have_holes_and_gaps)
+{
+  Combine c;
+  std::vector<guint> expected;
+  for (guint i = 0; i < 40; i++) {
+    const GstClockTime pts = i * GST_SECOND / 10;
+    const bool has_colour = i % 3 != 1, has_depth = i % 5 != 2;
+    if (has_colour)
+      c.push_colour (pts, static_cast<guint8> (i));
+    else if (i % 2)
+      gst_harness_push_event (c.colour, gst_event_new_gap (pts, GST_SECOND / 10));
+    if (has_depth)
+      c.push_depth (pts, static_cast<guint16> (1000 + i));
+    else if (i % 2)
+      gst_harness_push_event (c.depth, gst_event_new_gap (pts, GST_SECOND / 10));
+    if (has_colour && has_depth)
+      expected.push_back (i);
+  }
+  for (const guint i : expected) {
+    GstBuffer *output = gst_harness_pull (c.colour);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), i * GST_SECOND / 10);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
+      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
+    }
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_streams_of_different_rates_give_the_slower_one_with_the_nearest_partner)
 {
   for (const bool colour_is_fast : {true, false}) {
@@ -302,9 +335,11 @@ GST_START_TEST (test_streams_of_different_rates_give_the_slower_one_with_the_nea
     for (guint i = 0; i < 12; i += 3) {
       GstBuffer *output = gst_harness_pull (c.colour);
       fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), GST_SECOND / 10);
-      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
-      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
+      {
+        gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+        fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
+        fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
+      }
       gst_buffer_unref (output);
     }
     GstCaps *caps = gst_pad_get_current_caps (GST_PAD_PEER (c.colour->sinkpad));
@@ -399,6 +434,7 @@ rangecombine_suite ()
   tcase_add_test (tc, test_colour_camera_of_the_rig_is_registered_into_either_view);
   tcase_add_test (tc, test_calibration_of_another_shape_is_one_error_that_names_the_rig);
   tcase_add_test (tc, test_colour_camera_without_a_rig_is_one_error);
+  tcase_add_test (tc, test_pairs_stay_right_where_both_streams_have_holes_and_gaps);
   tcase_add_test (tc, test_streams_of_different_rates_give_the_slower_one_with_the_nearest_partner);
   tcase_add_test (tc, test_missing_rig_is_one_error_that_names_it);
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);

@@ -4,6 +4,7 @@
 
 #include <opencv2/calib3d.hpp>
 #include <rangecast/registration/registration.hpp>
+#include <rangecast/scene/scene.hpp>
 
 using namespace rangecast;
 using rangecast::testing::Image;
@@ -262,4 +263,41 @@ TEST (Registration, pictures_of_another_size_are_refused)
       StatusCode::kBadSize);
   EXPECT_EQ (
       registration.process (depth.view (), 1e-3, out.view (), image).code (), StatusCode::kBadSize);
+}
+
+TEST (Registration, person_of_the_test_scene_is_where_the_other_camera_sees_it)
+{
+  SceneSettings settings;
+  settings.far_m = 4.5;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (settings, scene).ok ());
+  View d = scene->range_rig ().views[0], c = d;
+  c.id = 1;
+  c.world_from_view = d.world_from_view * Pose{kIdentity3, {settings.baseline_m, 0, 0}};
+  Image<std::uint16_t> depth (320, 240), truth (320, 240), drawn (320, 240);
+  Image<Rgbx> left (320, 240), right (320, 240), out (320, 240);
+  Image<std::uint8_t> mask (320, 240);
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kLeft, 1, false, left.view (), depth.view (), {}).ok ());
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kRight, 1, false, right.view (), truth.view (), mask.view ())
+          .ok ());
+  Registration registration;
+  ASSERT_TRUE (registration.set (d, c, RegisterInto::kColour).ok ());
+  const RangeImage image = {1, {0, 0, 320, 240}, drawn.view (), out.view (), 0};
+  ASSERT_TRUE (registration.process (depth.view (), d.depth_unit_m, right.view (), image).ok ());
+  int person = 0, right_depth = 0, missing = 0, ghosts = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const int z = drawn.view ().at (x, y), t = truth.view ().at (x, y);
+      const bool is_person = mask.view ().at (x, y);
+      person += is_person;
+      missing += is_person && z == 0; /* what the depth camera did not see */
+      right_depth += is_person && z && std::abs (z - t) < 50;
+      ghosts += !is_person && z && z < 15000;
+    }
+  EXPECT_GT (person, 15000);
+  EXPECT_LT (missing, person * 8 / 100);
+  EXPECT_GT (right_depth, (person - missing) * 98 / 100);
+  EXPECT_LT (ghosts, person / 100);
 }
