@@ -27,13 +27,15 @@ constexpr std::uint8_t kPerhaps = 128;
 /* Thresholds in the units of the pixels. */
 struct Limits {
   bool use_colour, use_depth;
+  bool doubt_depth; /* depth is of stereo: it means nothing where there is no texture */
   float noise_factor, colour, shadow, highlight;
   float nearness;    /* depth units */
   float depth_noise; /* BackgroundModel::depth_noise() */
   std::array<float, 3> light;
 };
 
-enum class Where { kUnknown, kBackground, kNearer };
+/* kSomewhere: there is depth where the background never had any. */
+enum class Where { kUnknown, kBackground, kSomewhere, kNearer };
 
 Where
 place_of (std::uint16_t depth, const BackgroundPixel &background, const Limits &limits)
@@ -41,7 +43,7 @@ place_of (std::uint16_t depth, const BackgroundPixel &background, const Limits &
   if (depth == kInvalidDepth)
     return Where::kUnknown;
   if (background.depth_share < kKnownShare)
-    return Where::kNearer;
+    return Where::kSomewhere;
   /* Where stereo wavers between two surfaces, their distance is no noise: only what is nearer than
    * the nearer one is new. */
   const float sensor = limits.depth_noise * background.depth * background.depth;
@@ -104,6 +106,17 @@ has_same_hue (const Comparison &c, const BackgroundPixel &background)
   return c.distortion < chroma * chroma;
 }
 
+/* White without texture, in the picture and in the background. */
+bool
+is_burnt_out (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
+{
+  const std::uint8_t rgb[] = {colour.r, colour.g, colour.b};
+  for (int c = 0; c < 3; c++)
+    if (float (rgb[c]) < kBurntOut || background.mean[c] * limits.light[c] < kBurntOut)
+      return false;
+  return true;
+}
+
 /* A histogram of brightness ratios, from a quarter to four times, that finds the commonest. */
 class RatioPeak {
 public:
@@ -155,7 +168,7 @@ estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
     const Rgbx *colour = image.colour.row (y);
     for (int x = 0; x < image.roi.width; x += 2) {
       if (behind[x].spread < 0 || (limits.use_depth && place_of (image.depth.at (x, y), behind[x],
-                                                           limits) == Where::kNearer))
+                                                           limits) >= Where::kSomewhere))
         continue;
       const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
       for (int c = 0; c < 3; c++)
@@ -172,9 +185,10 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
     double depth_unit_m, const SegmentationSettings &settings)
 {
   Limits limits = {settings.cue != Cue::kDepth, settings.cue != Cue::kColour,
-      float (settings.noise_factor), float (settings.colour_threshold), float (settings.shadow),
-      float (settings.highlight), float (settings.depth_threshold_m / depth_unit_m),
-      float (background.depth_noise ()), {1, 1, 1}};
+      settings.cue == Cue::kBoth && settings.fringe > 1, float (settings.noise_factor),
+      float (settings.colour_threshold), float (settings.shadow), float (settings.highlight),
+      float (settings.depth_threshold_m / depth_unit_m), float (background.depth_noise ()),
+      {1, 1, 1}};
   if (settings.follow_light && limits.use_colour)
     estimate_light (image, background, limits, light_);
   else
@@ -192,8 +206,7 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
                  *calm = calm_.ptr (y);
     auto ratio = ratio_.ptr<float> (y), tolerance = tolerance_.ptr<float> (y);
     for (int x = 0; x < image.roi.width; x++) {
-      const Where where =
-          limits.use_depth ? place_of (depth[x], behind[x], limits) : Where::kUnknown;
+      Where where = limits.use_depth ? place_of (depth[x], behind[x], limits) : Where::kUnknown;
       const bool unseen = behind[x].spread < 0; /* as good as another colour */
       const Comparison c = unseen ? Comparison{} : compare (colour[x], behind[x], limits);
       const bool alike = !unseen && has_same_hue (c, behind[x]);
@@ -201,9 +214,13 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
       ratio[x] = c.brightness;
       tolerance[x] = kSameShare + kSameFactor * c.noise;
       other[x] = limits.use_colour && differs ? kYes : 0;
-      nearer[x] = where == Where::kNearer ? kYes : 0;
       same[x] = alike ? kYes : 0;
       const bool quiet = alike && std::abs (c.brightness - 1) < tolerance[x];
+      /* Stereo finds something now and then where there is no texture; colour knows better. */
+      const bool textureless = limits.doubt_depth && is_burnt_out (colour[x], behind[x], limits);
+      if (where == Where::kSomewhere || (where == Where::kNearer && textureless))
+        where = quiet && limits.use_colour ? Where::kUnknown : Where::kNearer;
+      nearer[x] = where == Where::kNearer ? kYes : 0;
       calm[x] = where == Where::kNearer || (limits.use_colour && !quiet) ? 0
                 : where == Where::kBackground                            ? kYes
                                                                          : kPerhaps;
