@@ -106,15 +106,11 @@ has_same_hue (const Comparison &c, const BackgroundPixel &background)
   return c.distortion < chroma * chroma;
 }
 
-/* White without texture, in the picture and in the background. */
+/* White without texture. */
 bool
-is_burnt_out (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
+is_burnt_out (const BackgroundPixel &background)
 {
-  const std::uint8_t rgb[] = {colour.r, colour.g, colour.b};
-  for (int c = 0; c < 3; c++)
-    if (float (rgb[c]) < kBurntOut || background.mean[c] * limits.light[c] < kBurntOut)
-      return false;
-  return true;
+  return std::ranges::all_of (background.mean, [] (float level) { return level > kBurntOut; });
 }
 
 /* A histogram of brightness ratios, from a quarter to four times, that finds the commonest. */
@@ -217,7 +213,7 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
       same[x] = alike ? kYes : 0;
       const bool quiet = alike && std::abs (c.brightness - 1) < tolerance[x];
       /* Stereo finds something now and then where there is no texture; colour knows better. */
-      const bool textureless = limits.doubt_depth && is_burnt_out (colour[x], behind[x], limits);
+      const bool textureless = limits.doubt_depth && is_burnt_out (behind[x]);
       if (where == Where::kSomewhere || (where == Where::kNearer && textureless))
         where = quiet && limits.use_colour ? Where::kUnknown : Where::kNearer;
       nearer[x] = where == Where::kNearer ? kYes : 0;
