@@ -154,6 +154,8 @@ static void
 begin_learning (ViewState &state, const View &view, int frames)
 {
   state.background.reset (view.width, view.height);
+  state.segmenter = {}; /* the light is that of the new background */
+  state.adapted_ns = 0;
   state.learning_target = frames;
   state.learnt = false;
 }
