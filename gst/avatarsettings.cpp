@@ -20,6 +20,13 @@ enum {
   PROP_RIG_EXPORT,
   PROP_RANGE_PERSON_ONLY,
   PROP_N_THREADS,
+  PROP_PERSONS,
+  PROP_FAR,
+  PROP_CAST_SHADOW,
+  PROP_LIGHT_DRIFT,
+  PROP_WALL_TEXTURE,
+  PROP_WALL_WARMTH,
+  PROP_CHAIR,
 };
 
 static std::string
@@ -91,6 +98,36 @@ AvatarSettings::set (guint id, const GValue *value)
       n_threads = g_value_get_int (value);
       return true;
     default:
+      return set_room (id, value);
+  }
+}
+
+bool
+AvatarSettings::set_room (guint id, const GValue *value)
+{
+  switch (id) {
+    case PROP_PERSONS:
+      scene.persons = g_value_get_int (value);
+      return true;
+    case PROP_FAR:
+      scene.far_m = g_value_get_double (value);
+      return true;
+    case PROP_CAST_SHADOW:
+      scene.cast_shadow = g_value_get_double (value);
+      return true;
+    case PROP_LIGHT_DRIFT:
+      scene.light_drift = g_value_get_double (value);
+      return true;
+    case PROP_WALL_TEXTURE:
+      scene.wall_texture = g_value_get_double (value);
+      return true;
+    case PROP_WALL_WARMTH:
+      scene.wall_warmth = g_value_get_double (value);
+      return true;
+    case PROP_CHAIR:
+      scene.chair = g_value_get_boolean (value);
+      return true;
+    default:
       return false;
   }
 }
@@ -149,6 +186,36 @@ AvatarSettings::get (guint id, GValue *value) const
       return true;
     case PROP_N_THREADS:
       g_value_set_int (value, n_threads);
+      return true;
+    default:
+      return get_room (id, value);
+  }
+}
+
+bool
+AvatarSettings::get_room (guint id, GValue *value) const
+{
+  switch (id) {
+    case PROP_PERSONS:
+      g_value_set_int (value, scene.persons);
+      return true;
+    case PROP_FAR:
+      g_value_set_double (value, scene.far_m);
+      return true;
+    case PROP_CAST_SHADOW:
+      g_value_set_double (value, scene.cast_shadow);
+      return true;
+    case PROP_LIGHT_DRIFT:
+      g_value_set_double (value, scene.light_drift);
+      return true;
+    case PROP_WALL_TEXTURE:
+      g_value_set_double (value, scene.wall_texture);
+      return true;
+    case PROP_WALL_WARMTH:
+      g_value_set_double (value, scene.wall_warmth);
+      return true;
+    case PROP_CHAIR:
+      g_value_set_boolean (value, scene.chair);
       return true;
     default:
       return false;
@@ -215,6 +282,29 @@ install_scene (const Installer &to)
 }
 
 static void
+install_room (const Installer &to)
+{
+  to.add_int (PROP_PERSONS, "persons", "Persons",
+      "Figures; the others stand 0.4 m behind the first, left and right (1 to 3, default: 1)", 1,
+      rangecast::SceneSettings::kMaxPersons, 1);
+  to.add_double (PROP_FAR, "far", "Far",
+      "Farthest depth of range images and rig, metres; from 3.5 on it reaches the walls (1 to 6, "
+      "default: 1.3)",
+      1, 6, 1.3);
+  to.add_double (PROP_CAST_SHADOW, "cast-shadow", "Cast shadow",
+      "Share of light that is missing in the figures' shadow on the room (0 to 0.9, default: 0)", 0,
+      0.9, 0);
+  to.add_double (PROP_LIGHT_DRIFT, "light-drift", "Light drift",
+      "All light swings by this share, within 40 seconds (0 to 0.5, default: 0)", 0, 0.5, 0);
+  to.add_double (PROP_WALL_TEXTURE, "wall-texture", "Wall texture",
+      "Contrast of the room's texture (0 = plain, to 1, the default)", 0, 1, 1);
+  to.add_double (PROP_WALL_WARMTH, "wall-warmth", "Wall warmth",
+      "Colour of the walls (0, the default: blue-grey, to 1: as wood, skin and hair)", 0, 1, 0);
+  to.add_bool (PROP_CHAIR, "chair", "Chair",
+      "A chair stands behind the figure, also in the empty room (default: false)");
+}
+
+static void
 install_model_and_stream (const Installer &to)
 {
   to.add_uint (PROP_EMPTY_FRAMES, "empty-frames", "Empty frames",
@@ -242,5 +332,6 @@ void
 AvatarSettings::install (GObjectClass *klass)
 {
   install_scene ({klass});
+  install_room ({klass});
   install_model_and_stream ({klass});
 }

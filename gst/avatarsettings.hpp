@@ -25,4 +25,8 @@ struct AvatarSettings {
   /** @return false if the id is none of ours */
   bool set (guint id, const GValue *value);
   bool get (guint id, GValue *value) const;
+
+private:
+  bool set_room (guint id, const GValue *value);
+  bool get_room (guint id, GValue *value) const;
 };

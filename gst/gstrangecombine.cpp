@@ -3,8 +3,10 @@
  * SECTION:element-rangecombine
  * @title: rangecombine
  *
- * Makes range images of any depth camera: colour and depth, registered pixel to pixel, become one
- * view. Depth is GRAY16_LE in any unit (default: millimetres).
+ * Makes range images of any depth camera: colour and depth become one view. They may be registered
+ * pixel to pixel, of different size, or of two cameras that stand side by side (see
+ * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16_LE in any unit
+ * (default: millimetres).
  *
  * ## Example launch line
  * |[
@@ -28,11 +30,13 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/registration/registration.hpp>
 #include <string>
 
 #include "recycledbuffers.hpp"
 
 using rangecast::RangeImage;
+using rangecast::RegisterInto;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
@@ -44,6 +48,8 @@ enum {
   PROP_0,
   PROP_RIG,
   PROP_VIEW_ID,
+  PROP_COLOUR_VIEW_ID,
+  PROP_INTO,
   PROP_FOCAL_LENGTH,
   PROP_PRINCIPAL_X,
   PROP_PRINCIPAL_Y,
@@ -62,6 +68,8 @@ static constexpr double kDefaultFocalOfWidth = 0.82;
 struct CombineSettings {
   std::string rig;
   int view_id = 0;
+  int colour_view_id = -1; /* -1: the depth camera gives the colour, too */
+  RegisterInto into = RegisterInto::kDepth;
   double focal_length = 0; /* pixels; 0: kDefaultFocalOfWidth of the width */
   double principal_x = -1; /* pixels; -1: the centre */
   double principal_y = -1;
@@ -81,7 +89,10 @@ struct GstRangeCombinePrivate {
   GstVideoInfo colour, depth;
   bool have_colour = false, have_depth = false;
   bool negotiate = true;
-  View view; /* what the output's caps say */
+  View view;              /* what the output's caps say */
+  bool registered = true; /* pixel to pixel already: nothing to register */
+  rangecast::Registration registration;
+  GstBuffer *straight = nullptr; /* RGBx, the colour picture before it is registered */
   double depth_scale = kDefaultDepthScale;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstBufferPool *pool = nullptr;
@@ -104,6 +115,19 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRangeCombine, gst_range_combine, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (rangecombine, "rangecombine", GST_RANK_NONE, GST_TYPE_RANGE_COMBINE)
 
+#define GST_TYPE_RANGE_COMBINE_INTO (gst_range_combine_into_get_type ())
+static GType
+gst_range_combine_into_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (RegisterInto::kDepth), "The depth camera's: depth stays as measured", "depth"},
+        {int (RegisterInto::kColour), "The colour camera's: colour stays as seen", "colour"}, {}};
+    return g_enum_register_static ("GstRangeCombineInto", values);
+  }();
+  return type;
+}
+
 /* ---- the view ---- */
 
 static std::string
@@ -112,29 +136,23 @@ size_text (int width, int height)
   return std::to_string (width) + "x" + std::to_string (height);
 }
 
+/* A view of the rig at the size of the pictures. */
 static Status
-view_from_rig (const CombineSettings &settings, int width, int height, View &view)
+view_from_rig (
+    const std::string &path, int id, const char *property, int width, int height, View &view)
 {
   rangecast::Rig rig;
-  if (Status s = rangecast::load_rig (settings.rig, rig); !s.ok ())
+  if (Status s = rangecast::load_rig (path, rig); !s.ok ())
     return s;
-  const View *found = rig.find (settings.view_id);
+  const View *found = rig.find (id);
   if (!found)
-    return {StatusCode::kNotFound, settings.rig + ": has no view-id " +
-                                       std::to_string (settings.view_id) +
-                                       ", which property view-id names"};
-  if (found->width != width || found->height != height)
-    return {StatusCode::kBadSize, settings.rig + ": view " + std::to_string (found->id) + " is " +
-                                      size_text (found->width, found->height) +
-                                      ", the pictures are " + size_text (width, height)};
-  if (!found->distortion.empty ())
-    return {StatusCode::kUnsupported,
-        settings.rig + ": view " + std::to_string (found->id) +
-            " has lens distortion; expected pictures without, as most depth cameras give them"};
+    return {StatusCode::kNotFound, path + ": has no view-id " + std::to_string (id) +
+                                       ", which property " + property + " names"};
   view = *found;
   view.right.reset ();
   view.third.reset ();
-  return {};
+  const Status scaled = rangecast::scale_view (view, width, height);
+  return scaled.ok () ? scaled : Status{scaled.code (), path + ": " + scaled.message ()};
 }
 
 static View
@@ -154,12 +172,15 @@ view_from_settings (const CombineSettings &settings, int width, int height)
   return view;
 }
 
+/* The camera that took the depth. */
 static Status
-make_view (const CombineSettings &settings, int width, int height, View &view)
+make_depth_view (const CombineSettings &settings, int width, int height, View &view)
 {
   if (settings.rig.empty ())
     view = view_from_settings (settings, width, height);
-  else if (Status s = view_from_rig (settings, width, height, view); !s.ok ())
+  else if (Status s =
+               view_from_rig (settings.rig, settings.view_id, "view-id", width, height, view);
+           !s.ok ())
     return s;
   if (settings.depth_unit > 0)
     view.depth_unit_m = settings.depth_unit;
@@ -170,12 +191,57 @@ make_view (const CombineSettings &settings, int width, int height, View &view)
   return rangecast::validate ({{view}});
 }
 
+/* The camera that took the colour: one of the rig's own, or the depth camera at another size. */
+static Status
+make_colour_view (
+    const CombineSettings &settings, const View &depth, int width, int height, View &view)
+{
+  if (settings.colour_view_id >= 0 && settings.rig.empty ())
+    return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
+                                   "that says how the cameras stand"};
+  if (settings.colour_view_id >= 0)
+    return view_from_rig (
+        settings.rig, settings.colour_view_id, "colour-view-id", width, height, view);
+  view = depth;
+  const Status scaled = rangecast::scale_view (view, width, height);
+  if (scaled.ok ())
+    return scaled;
+  return {scaled.code (), "pad depth is " + size_text (depth.width, depth.height) +
+                              " but pad colour is " + size_text (width, height) +
+                              "; expected the same shape, or property colour-view-id for a colour "
+                              "camera of its own"};
+}
+
+/* Both cameras, and what comes out of them. */
+static Status
+make_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
+{
+  View depth, colour;
+  if (Status s = make_depth_view (settings, GST_VIDEO_INFO_WIDTH (&priv->depth),
+          GST_VIDEO_INFO_HEIGHT (&priv->depth), depth);
+      !s.ok ())
+    return s;
+  if (Status s = make_colour_view (settings, depth, GST_VIDEO_INFO_WIDTH (&priv->colour),
+          GST_VIDEO_INFO_HEIGHT (&priv->colour), colour);
+      !s.ok ())
+    return s;
+  priv->registered = settings.colour_view_id < 0 && depth.distortion.empty () &&
+                     depth.width == colour.width && depth.height == colour.height;
+  priv->view = depth;
+  if (priv->registered)
+    return {};
+  const Status status = priv->registration.set (depth, colour, settings.into);
+  priv->view = priv->registration.range_view ();
+  return status.ok () ? rangecast::validate ({{priv->view}}) : status;
+}
+
 /* ---- negotiation ---- */
 
 static void
 drop_pool_and_converter (GstRangeCombinePrivate *priv)
 {
   drop_pool (priv->pool);
+  gst_clear_buffer (&priv->straight);
   if (priv->converter)
     gst_video_converter_free (priv->converter);
   priv->converter = nullptr;
@@ -192,35 +258,46 @@ make_converter (GstRangeCombinePrivate *priv)
   if (GST_VIDEO_INFO_FORMAT (&priv->colour) == GST_VIDEO_FORMAT_RGBx)
     priv->rgbx.colorimetry = priv->colour.colorimetry;
   priv->converter = gst_video_converter_new (&priv->colour, &priv->rgbx, nullptr);
+  if (!priv->registered)
+    priv->straight = gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&priv->rgbx), nullptr);
   return priv->converter;
+}
+
+/* How long a frame is: that of the slower stream, for so many pairs there are; how far two may be
+ * apart is half a frame of the faster one, so that each of the slower finds its nearest. */
+static GstClockTime
+frame_duration_of (const GstVideoInfo &info)
+{
+  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
+                        : GST_CLOCK_TIME_NONE;
+}
+
+static const GstVideoInfo &
+slower (const GstRangeCombinePrivate *priv)
+{
+  const GstClockTime colour = frame_duration_of (priv->colour),
+                     depth = frame_duration_of (priv->depth);
+  const bool depth_is =
+      GST_CLOCK_TIME_IS_VALID (depth) && (!GST_CLOCK_TIME_IS_VALID (colour) || depth > colour);
+  return depth_is ? priv->depth : priv->colour;
 }
 
 static GstFlowReturn
 negotiate (GstRangeCombine *self)
 {
   GstRangeCombinePrivate *priv = self->priv;
-  const int width = GST_VIDEO_INFO_WIDTH (&priv->colour);
-  const int height = GST_VIDEO_INFO_HEIGHT (&priv->colour);
-  if (width != GST_VIDEO_INFO_WIDTH (&priv->depth) ||
-      height != GST_VIDEO_INFO_HEIGHT (&priv->depth))
-    return gst_range_flow_return (GST_ELEMENT (self),
-        {StatusCode::kBadSize, "pad depth is " +
-                                   size_text (GST_VIDEO_INFO_WIDTH (&priv->depth),
-                                       GST_VIDEO_INFO_HEIGHT (&priv->depth)) +
-                                   " but pad colour is " + size_text (width, height) +
-                                   "; expected the same size, registered pixel to pixel"});
   CombineSettings settings;
   {
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
   const GstFlowReturn flow =
-      gst_range_flow_return (GST_ELEMENT (self), make_view (settings, width, height, priv->view));
+      gst_range_flow_return (GST_ELEMENT (self), make_views (priv, settings));
   if (flow != GST_FLOW_OK)
     return flow;
   priv->depth_scale = settings.depth_scale;
 
-  const auto info = gstrange::make_info ({{priv->view}}, priv->colour.fps_n, priv->colour.fps_d);
+  const auto info = gstrange::make_info ({{priv->view}}, slower (priv).fps_n, slower (priv).fps_d);
   priv->frame_duration = info.frame_duration ();
   GstCaps *caps = gstrange::make_range_caps (info);
   drop_pool_and_converter (priv);
@@ -268,37 +345,50 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
 
 /* ---- data ---- */
 
-/* Converts straight into the colour plane of the output. */
 static bool
-convert_colour (GstRangeCombinePrivate *priv, GstBuffer *colour, const RangeImage &image)
+convert_colour (
+    GstRangeCombinePrivate *priv, GstBuffer *colour, rangecast::ImageView<rangecast::Rgbx> out)
 {
   GstVideoFrame from, to = {};
   if (!gst_video_frame_map (&from, &priv->colour, colour, GST_MAP_READ))
     return false;
   to.info = priv->rgbx;
-  to.info.stride[0] = static_cast<gint> (image.colour.stride);
-  to.data[0] = image.colour.data;
+  to.info.stride[0] = static_cast<gint> (out.stride);
+  to.data[0] = out.data;
   gst_video_converter_frame (priv->converter, &from, &to);
   gst_video_frame_unmap (&from);
   return true;
 }
 
+/* Depth and colour of one camera, pixel to pixel: straight into the planes of the output. */
 static Status
-convert_depth (GstRangeCombinePrivate *priv, GstBuffer *depth, const RangeImage &image)
+combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
+    rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
-  GstVideoFrame from;
-  if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
-    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps say"};
-  const auto in = rangecast::ImageView<const std::uint16_t>{
-      static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)), image.depth.width,
-      image.depth.height, GST_VIDEO_FRAME_PLANE_STRIDE (&from, 0)};
+  if (!convert_colour (priv, colour, image.colour))
+    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
   const double unit = priv->view.depth_unit_m;
   const auto limit = [unit] (double metres) {
     return static_cast<std::uint16_t> (std::clamp (metres / unit, 1.0, 65535.0));
   };
-  const Status status = rangecast::rescale_depth (in, priv->depth_scale / unit,
-      limit (priv->view.near_m), limit (priv->view.far_m), image.depth);
-  gst_video_frame_unmap (&from);
+  return rangecast::rescale_depth (depth, priv->depth_scale / unit, limit (priv->view.near_m),
+      limit (priv->view.far_m), image.depth);
+}
+
+static Status
+combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
+    rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
+{
+  GstMapInfo map;
+  if (!gst_buffer_map (priv->straight, &map, GST_MAP_READWRITE))
+    return {StatusCode::kNoSpace, "pad colour: no memory"};
+  const rangecast::ImageView<rangecast::Rgbx> straight = {
+      reinterpret_cast<rangecast::Rgbx *> (map.data), GST_VIDEO_INFO_WIDTH (&priv->rgbx),
+      GST_VIDEO_INFO_HEIGHT (&priv->rgbx), GST_VIDEO_INFO_PLANE_STRIDE (&priv->rgbx, 0)};
+  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+  if (convert_colour (priv, colour, straight))
+    status = priv->registration.process (depth, priv->depth_scale, straight, image);
+  gst_buffer_unmap (priv->straight, &map);
   return status;
 }
 
@@ -308,10 +398,17 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  const RangeImage &image = frame.views ()[0];
-  if (!convert_colour (priv, colour, image))
-    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
-  return convert_depth (priv, depth, image);
+  GstVideoFrame from;
+  if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
+    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps say"};
+  const rangecast::ImageView<const std::uint16_t> picture = {
+      static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)),
+      GST_VIDEO_FRAME_WIDTH (&from), GST_VIDEO_FRAME_HEIGHT (&from),
+      GST_VIDEO_FRAME_PLANE_STRIDE (&from, 0)};
+  const auto work = priv->registered ? combine_registered : combine_cameras;
+  const Status status = work (priv, colour, picture, frame.views ()[0]);
+  gst_video_frame_unmap (&from);
+  return status;
 }
 
 static GstFlowReturn
@@ -334,9 +431,9 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
     gst_buffer_unref (output);
     return flow;
   }
-  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (pair.first)
-                                    ? GST_BUFFER_DURATION (pair.first)
-                                    : priv->frame_duration;
+  const GstClockTime duration = GST_CLOCK_TIME_IS_VALID (priv->frame_duration)
+                                    ? priv->frame_duration
+                                    : GST_BUFFER_DURATION (pair.first);
   gstrange::stamp (aggregator, output, gstrange::running_time_of (priv->colour_pad, pair.first),
       duration, capture);
   if (GST_BUFFER_IS_DISCONT (pair.first))
@@ -353,9 +450,11 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
 {
   auto self = GST_RANGE_COMBINE (aggregator);
   GstRangeCombinePrivate *priv = self->priv;
-  GstClockTime duration = GST_CLOCK_TIME_NONE;
-  if (priv->have_colour && priv->colour.fps_n > 0)
-    duration = gst_util_uint64_scale_int (GST_SECOND, priv->colour.fps_d, priv->colour.fps_n);
+  GstClockTime duration = GST_CLOCK_TIME_NONE; /* of the faster stream */
+  if (priv->have_colour)
+    duration = frame_duration_of (priv->colour);
+  if (priv->have_depth)
+    duration = std::min (duration, frame_duration_of (priv->depth));
 
   gstrange::PairMatcher::Pair pair;
   GstFlowReturn flow = priv->matcher->take (duration, pair);
@@ -404,6 +503,12 @@ gst_range_combine_set_property (GObject *object, guint id, const GValue *value, 
     case PROP_VIEW_ID:
       settings.view_id = g_value_get_int (value);
       break;
+    case PROP_COLOUR_VIEW_ID:
+      settings.colour_view_id = g_value_get_int (value);
+      break;
+    case PROP_INTO:
+      settings.into = RegisterInto (g_value_get_enum (value));
+      break;
     case PROP_FOCAL_LENGTH:
       settings.focal_length = g_value_get_double (value);
       break;
@@ -442,6 +547,12 @@ gst_range_combine_get_property (GObject *object, guint id, GValue *value, GParam
       break;
     case PROP_VIEW_ID:
       g_value_set_int (value, settings.view_id);
+      break;
+    case PROP_COLOUR_VIEW_ID:
+      g_value_set_int (value, settings.colour_view_id);
+      break;
+    case PROP_INTO:
+      g_value_set_enum (value, int (settings.into));
       break;
     case PROP_FOCAL_LENGTH:
       g_value_set_double (value, settings.focal_length);
@@ -510,8 +621,20 @@ install_properties (GObjectClass *object_class)
           "focal-length describes)",
           nullptr, ready));
   g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View id", "View-id of the output (0 to 63, default 0)", 0,
-          rangecast::kMaxViews - 1, 0, ready));
+      g_param_spec_int ("view-id", "View id",
+          "View of the depth camera, and of the output unless that is the colour camera's (0 to "
+          "63, "
+          "default 0)",
+          0, rangecast::kMaxViews - 1, 0, ready));
+  g_object_class_install_property (object_class, PROP_COLOUR_VIEW_ID,
+      g_param_spec_int ("colour-view-id", "Colour view id",
+          "View of the rig that is the colour camera, if it stands elsewhere than the depth camera "
+          "(-1 to 63, default -1: it is the same camera)",
+          -1, rangecast::kMaxViews - 1, -1, ready));
+  g_object_class_install_property (object_class, PROP_INTO,
+      g_param_spec_enum ("into", "Into",
+          "Whose view comes out if colour and depth are not registered (default: depth)",
+          GST_TYPE_RANGE_COMBINE_INTO, int (RegisterInto::kDepth), ready));
   install_double (PROP_FOCAL_LENGTH, "focal-length", "Focal length",
       "Without a rig: focal length in pixels (default 0: 0.82 of the width)", 0, 1e6, 0);
   install_double (PROP_PRINCIPAL_X, "principal-x", "Principal point x",
@@ -555,6 +678,8 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
       "Combines colour and depth of a depth camera into range images", "gst-rangecast");
+
+  gst_type_mark_as_plugin_api (GST_TYPE_RANGE_COMBINE_INTO, GstPluginAPIFlags (0));
 
   aggregator_class->start = gst_range_combine_start;
   aggregator_class->stop = gst_range_combine_stop;

@@ -20,6 +20,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
@@ -56,6 +57,10 @@ enum {
   PROP_HIGHLIGHT,
   PROP_MIN_AREA,
   PROP_MAX_HOLE,
+  PROP_MAX_PEOPLE,
+  PROP_FRINGE,
+  PROP_FOLLOW_LIGHT,
+  PROP_ADAPT_TIME,
   PROP_MARGIN,
   PROP_N_THREADS,
   PROP_STATS
@@ -64,6 +69,9 @@ enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
 static guint signals[N_SIGNALS];
 
 static constexpr int kDefaultBackgroundFrames = 30;
+static constexpr double kDefaultAdaptTime = 30; /* seconds */
+/* A pause longer than this teaches no more than this, seconds. */
+static constexpr double kLongestStep = 1;
 static constexpr rangecast::SegmentationSettings kDefaults;
 /* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
  * fits it no more. */
@@ -76,6 +84,7 @@ struct RoiSettings {
   rangecast::SegmentationSettings segmentation;
   int margin = 0;
   int n_threads = 0;
+  double adapt_time_s = kDefaultAdaptTime;
 };
 
 /* What is kept of one view. */
@@ -84,7 +93,8 @@ struct ViewState {
   rangecast::Segmenter segmenter;
   bool learnt = false;
   int learning_target = 0;
-  int settled = 0; /* frames seen before learning began */
+  int settled = 0;        /* frames seen before learning began */
+  guint64 adapted_ns = 0; /* capture time of the last frame that taught the background */
   Roi announced;
   guint64 points_in = 0, points_out = 0; /* of the present frame */
   Roi box;
@@ -144,6 +154,8 @@ static void
 begin_learning (ViewState &state, const View &view, int frames)
 {
   state.background.reset (view.width, view.height);
+  state.segmenter = {}; /* the light is that of the new background */
+  state.adapted_ns = 0;
   state.learning_target = frames;
   state.learnt = false;
 }
@@ -228,6 +240,21 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 
 /* ---- one frame set ---- */
 
+/* Lets the background follow slow change, where nobody is. */
+static void
+adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
+{
+  const guint64 before = state.adapted_ns;
+  state.adapted_ns = image.capture_time_ns;
+  if (adapt_time_s <= 0 || before == 0 || image.capture_time_ns <= before || image.roi.empty ())
+    return;
+  const double passed = std::min (double (image.capture_time_ns - before) * 1e-9, kLongestStep);
+  const cv::Mat &quiet = state.segmenter.quiet ();
+  state.background.adapt (image,
+      {quiet.data, quiet.cols, quiet.rows, static_cast<std::ptrdiff_t> (quiet.step)},
+      state.segmenter.light (), float (1 - std::exp (-passed / adapt_time_s)));
+}
+
 static void
 process_view (
     ViewState &state, const View &view, const RangeImage &image, const RoiSettings &settings)
@@ -243,8 +270,13 @@ process_view (
       state.status = state.background.learn (image);
     return;
   }
-  state.status = state.segmenter.clear_background (
-      image, state.background, view.depth_unit_m, settings.segmentation);
+  state.status =
+      state.segmenter.decide (image, state.background, view.depth_unit_m, settings.segmentation);
+  if (!state.status.ok ())
+    return;
+  adapt_background (state, image, settings.adapt_time_s);
+  state.status =
+      state.segmenter.clear (image, state.background, view.depth_unit_m, settings.segmentation);
   if (!state.status.ok ())
     return;
   state.points_out = rangecast::count_points (image);
@@ -386,6 +418,19 @@ gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
+/* At the end the file gets what the background has become. */
+static gboolean
+gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !self->priv->info.rig.views.empty ()) {
+    const RoiSettings settings = copy_settings (self->priv);
+    if (settings.adapt_time_s > 0)
+      save_when_all_learnt (self, settings.save_background);
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_roi_extract_parent_class)->sink_event (base, event);
+}
+
 /* ---- life ---- */
 
 static gboolean
@@ -461,6 +506,18 @@ gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GP
     case PROP_MAX_HOLE:
       settings.segmentation.max_hole = g_value_get_int (value);
       break;
+    case PROP_MAX_PEOPLE:
+      settings.segmentation.max_people = g_value_get_int (value);
+      break;
+    case PROP_FRINGE:
+      settings.segmentation.fringe = g_value_get_int (value);
+      break;
+    case PROP_FOLLOW_LIGHT:
+      settings.segmentation.follow_light = g_value_get_boolean (value);
+      break;
+    case PROP_ADAPT_TIME:
+      settings.adapt_time_s = g_value_get_double (value);
+      break;
     case PROP_MARGIN:
       settings.margin = g_value_get_int (value);
       break;
@@ -528,6 +585,18 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
     case PROP_MAX_HOLE:
       g_value_set_int (value, settings.segmentation.max_hole);
       break;
+    case PROP_MAX_PEOPLE:
+      g_value_set_int (value, settings.segmentation.max_people);
+      break;
+    case PROP_FRINGE:
+      g_value_set_int (value, settings.segmentation.fringe);
+      break;
+    case PROP_FOLLOW_LIGHT:
+      g_value_set_boolean (value, settings.segmentation.follow_light);
+      break;
+    case PROP_ADAPT_TIME:
+      g_value_set_double (value, settings.adapt_time_s);
+      break;
     case PROP_MARGIN:
       g_value_set_int (value, settings.margin);
       break;
@@ -579,7 +648,7 @@ install_background_properties (GObjectClass *object_class)
   g_object_class_install_property (object_class, PROP_SAVE_BACKGROUND,
       g_param_spec_string ("save-background", "Save background",
           "Write the background to this file (.yml, .yaml, .json or .xml, with .gz if wanted) "
-          "whenever one is learnt (default: none)",
+          "whenever one is learnt, and as it has become at EOS (default: none)",
           nullptr, playing));
 }
 
@@ -625,6 +694,21 @@ install_segmentation_properties (GObjectClass *object_class)
       kDefaults.min_area);
   install_int (PROP_MAX_HOLE, "max-hole", "Maximum hole",
       "Smaller holes are closed, pixels (0 to 1000000, default 100)", 1000000, kDefaults.max_hole);
+  install_int (PROP_MAX_PEOPLE, "max-people", "Maximum people",
+      "Only so many of the largest islands stay (0 to 1000, default 0: all)", 1000,
+      kDefaults.max_people);
+  install_int (PROP_FRINGE, "fringe", "Fringe",
+      "What is nearer but looks like the background beside it must be so wide, pixels (0 to 99, "
+      "default 9; 0: depth is taken at its word, for cameras whose depth ends at the silhouette)",
+      99, kDefaults.fringe);
+  g_object_class_install_property (object_class, PROP_FOLLOW_LIGHT,
+      g_param_spec_boolean ("follow-light", "Follow light",
+          "Undo what exposure, white balance and lamps do to the whole picture (default: true)",
+          kDefaults.follow_light, live));
+  install_double (PROP_ADAPT_TIME, "adapt-time", "Adaptation time",
+      "Time constant with which the background follows slow change where nobody is, seconds (0 to "
+      "100000, default 30; 0: never)",
+      0, 100000, kDefaultAdaptTime);
   install_int (PROP_MARGIN, "margin", "Margin",
       "The ROI is this much larger than what is left, pixels each side (0 to 1000, default 0)",
       1000, 0);
@@ -668,6 +752,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
 
   transform_class->start = gst_roi_extract_start;
   transform_class->stop = gst_roi_extract_stop;
+  transform_class->sink_event = gst_roi_extract_sink_event;
   transform_class->set_caps = gst_roi_extract_set_caps;
   transform_class->transform_ip = gst_roi_extract_transform_ip;
 

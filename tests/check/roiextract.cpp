@@ -3,6 +3,7 @@
 
 #include <glib/gstdio.h>
 
+#include <algorithm>
 #include <vector>
 
 using namespace rangecast;
@@ -322,6 +323,137 @@ GST_START_TEST (test_forgets_the_background_in_null)
 }
 GST_END_TEST;
 
+/* A wall of one grey; boxes of one red stand before it. */
+static GstBuffer *
+boxes (const Rig &rig, GstClockTime pts, int grey, const std::vector<Roi> &people)
+{
+  GstBuffer *buffer = make_frame_set (rig, pts);
+  gst_range_buffer_set_capture_time (buffer, pts + 1);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  const RangeImage &image = frame.views ()[0];
+  for (int y = 0; y < image.roi.height; y++)
+    for (int x = 0; x < image.roi.width; x++) {
+      const bool person = std::ranges::any_of (people, [&] (const Roi &p) {
+        return x >= p.x && x < p.x + p.width && y >= p.y && y < p.y + p.height;
+      });
+      image.depth.at (x, y) = person ? 7000 : 12000;
+      const auto level = static_cast<std::uint8_t> (grey);
+      image.colour.at (x, y) = person ? Rgbx{200, 60, 50, 0} : Rgbx{level, level, level, 0};
+    }
+  return buffer;
+}
+
+GST_START_TEST (test_who_sits_still_stays_and_the_wall_may_change_slowly)
+{
+  const Rig rig = ring_rig (1);
+  /* The wall gets more than twice as bright: only adaptation can know it. */
+  for (const bool adapts : {true, false}) {
+    GstHarness *h = roi_harness (
+        rig, adapts ? "roiextract background-frames=5 follow-light=false adapt-time=2"
+                    : "roiextract background-frames=5 follow-light=false adapt-time=0");
+    const Roi person{100, 90, 60, 80};
+    int i = 0;
+    for (; i < 5; i++)
+      push (h, boxes (rig, i * GST_SECOND / 2, 80, {}));
+    Roi last;
+    for (; i < 100; i++)
+      last = push (h, boxes (rig, i * GST_SECOND / 2, 80 + i, {person}));
+    fail_unless (adapts == (last == person)); /* else the wall is as new as the person */
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_several_people_are_in_the_roi_and_max_people_keeps_the_largest)
+{
+  const Rig rig = ring_rig (1);
+  const std::vector<Roi> people = {{20, 90, 40, 80}, {100, 60, 60, 100}, {260, 100, 20, 40}};
+  const struct {
+    const char *launch;
+    Roi box;
+  } cases[] = {{"roiextract background-frames=1", {20, 60, 260, 110}},
+      {"roiextract background-frames=1 min-area=1000", {20, 60, 140, 110}},
+      {"roiextract background-frames=1 max-people=1", {100, 60, 60, 100}}};
+  for (const auto &c : cases) {
+    GstHarness *h = roi_harness (rig, c.launch);
+    push (h, boxes (rig, 0, 110, {}));
+    fail_unless (push (h, boxes (rig, 1, 110, people)) == c.box);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_background_at_eos_is_the_one_that_it_has_become)
+{
+  const Rig rig = ring_rig (1);
+  gchar *path = g_strdup_printf ("%s/roi-eos-%d.yml.gz", g_get_tmp_dir (), int (getpid ()));
+  gchar *save = g_strdup_printf (
+      "roiextract background-frames=2 follow-light=false adapt-time=1 save-background=%s", path);
+  gchar *load = g_strdup_printf ("roiextract follow-light=false background-file=%s", path);
+  GstHarness *h = roi_harness (rig, save);
+  int i = 0;
+  for (; i < 40; i++)
+    push (h, boxes (rig, i * GST_SECOND / 2, 80 + 2 * i, {}));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  gst_harness_teardown (h);
+  h = roi_harness (rig, load);
+  fail_unless (push (h, boxes (rig, 0, 80 + 2 * i, {})).empty ()); /* twice as bright as at first */
+  gst_harness_teardown (h);
+  g_unlink (path);
+  g_free (path);
+  g_free (save);
+  g_free (load);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *coder = roi_harness (rig, "roiextract background-frames=1 ! neighbourcodeenc");
+  GstHarness *whole =
+      roi_harness (rig, "roiextract background-frames=1 ! neighbourcodeenc ! neighbourcodedec "
+                        "! rangesplit name=s s.depth ! identity");
+  for (int i = 0; i < 4; i++) {
+    GstBuffer *coded = gst_harness_push_and_pull (coder, scene (rig, i * GST_MSECOND, false));
+    fail_unless (gst_buffer_get_size (coded) < 500);
+    gst_buffer_unref (coded);
+    GstBuffer *depth = gst_harness_push_and_pull (whole, scene (rig, i * GST_MSECOND, false));
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (depth), i * GST_MSECOND);
+    GstMapInfo map;
+    gst_buffer_map (depth, &map, GST_MAP_READ);
+    fail_unless (map.size > 0 && std::all_of (map.data, map.data + map.size,
+                                     [] (guint8 byte) { return byte == 0; }));
+    gst_buffer_unmap (depth, &map);
+    gst_buffer_unref (depth);
+  }
+  gst_harness_teardown (coder);
+  gst_harness_teardown (whole);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damaged_background_file_is_one_error_that_says_what_was_expected)
+{
+  gchar *path = g_strdup_printf ("%s/roi-bad-%d.yml", g_get_tmp_dir (), int (getpid ()));
+  fail_unless (
+      g_file_set_contents (path, "%YAML:1.0\n---\nrangecast_background: 1\n", -1, nullptr));
+  gchar *launch = g_strdup_printf ("roiextract background-file=%s", path);
+  GstHarness *h = gst_harness_new_parse (launch);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  gst_harness_set_src_caps (
+      h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find (path) != std::string::npos, "%s", text.c_str ());
+  fail_unless (text.find ("expected") != std::string::npos, "%s", text.c_str ());
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+  g_unlink (path);
+  g_free (path);
+  g_free (launch);
+}
+GST_END_TEST;
+
 static Suite *
 roiextract_suite ()
 {
@@ -343,6 +475,11 @@ roiextract_suite ()
   tcase_add_test (tc, test_new_size_is_learnt_anew_and_same_size_keeps_the_background);
   tcase_add_test (tc, test_stats_count_points);
   tcase_add_test (tc, test_forgets_the_background_in_null);
+  tcase_add_test (tc, test_who_sits_still_stays_and_the_wall_may_change_slowly);
+  tcase_add_test (tc, test_several_people_are_in_the_roi_and_max_people_keeps_the_largest);
+  tcase_add_test (tc, test_background_at_eos_is_the_one_that_it_has_become);
+  tcase_add_test (tc, test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set);
+  tcase_add_test (tc, test_damaged_background_file_is_one_error_that_says_what_was_expected);
   return suite;
 }
 

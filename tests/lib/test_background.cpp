@@ -221,12 +221,95 @@ TEST (Background, bad_files_are_named)
   std::vector<std::pair<int, BackgroundModel>> loaded;
   EXPECT_EQ (load_backgrounds ("/nowhere.yml", loaded).code (), StatusCode::kNotFound);
   const std::string path = ::testing::TempDir () + "bad-" + std::to_string (getpid ()) + ".yml";
-  for (const char *text : {"", "hello", "%YAML:1.0\n---\nrangecast_background: 2\n",
-           "%YAML:1.0\n---\nrangecast_background: 1\nviews:\n  - id: 0\n"}) {
+  for (const char *text : {"", "hello", "%YAML:1.0\n---\nrangecast_background: 3\n",
+           "%YAML:1.0\n---\nrangecast_background: 2\nviews:\n  - id: 0\n"}) {
     std::ofstream (path) << text;
     const Status status = load_backgrounds (path, loaded);
     EXPECT_EQ (status.code (), StatusCode::kBadData) << text;
     EXPECT_TRUE (status.message ().starts_with (path));
   }
   std::filesystem::remove (path);
+}
+
+/* A small background as the text of its file. */
+static std::string
+file_text (const std::string &path)
+{
+  BackgroundModel model;
+  model.reset (3, 2);
+  Image<std::uint16_t> depth (3, 2, 1000);
+  Image<Rgbx> colour (3, 2, Rgbx{50, 60, 70, 0});
+  EXPECT_TRUE (model.learn ({0, {0, 0, 3, 2}, depth.view (), colour.view (), 0}).ok ());
+  model.finish ();
+  EXPECT_TRUE (save_backgrounds (path, {{0, &model}}).ok ());
+  std::ifstream file (path);
+  return {std::istreambuf_iterator<char> (file), {}};
+}
+
+TEST (Background, every_truncated_file_is_refused_or_whole)
+{
+  const std::string path = ::testing::TempDir () + "cut-" + std::to_string (getpid ()) + ".json";
+  const std::string text = file_text (path);
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  int refused = 0;
+  for (std::size_t length = 0; length < text.size (); length += 3) {
+    std::ofstream (path) << text.substr (0, length);
+    const Status status = load_backgrounds (path, loaded);
+    refused += !status.ok ();
+    EXPECT_TRUE (
+        status.ok () || status.message ().find ("expected a background file") != std::string::npos);
+  }
+  std::filesystem::remove (path);
+  EXPECT_GT (refused, static_cast<int> (text.size ()) / 3 - 20);
+}
+
+TEST (Background, numbers_out_of_range_in_a_file_are_refused)
+{
+  const std::string path = ::testing::TempDir () + "odd-" + std::to_string (getpid ()) + ".yml";
+  const auto load = [&path] (const char *number) {
+    std::ofstream (path) << "%YAML:1.0\n---\nrangecast_background: 2\nviews:\n  - id: 0\n"
+                            "    frames: 1\n    pixels: !!opencv-matrix\n      rows: 1\n"
+                            "      cols: 1\n      dt: \"8f\"\n      data: [ 10., 10., 10., 1., "
+                         << number << ", 1., 1., 900. ]\n";
+    std::vector<std::pair<int, BackgroundModel>> loaded;
+    return load_backgrounds (path, loaded).code ();
+  };
+  EXPECT_EQ (load ("1000."), StatusCode::kOk);
+  for (const char *number : {".Nan", ".Inf", "-1.", "1e9"})
+    EXPECT_EQ (load (number), StatusCode::kBadData) << number;
+  std::filesystem::remove (path);
+}
+
+TEST (Background, wall_that_wavers_between_two_depths_does_not_hide_what_is_before_both)
+{
+  BackgroundModel model;
+  model.reset (kWidth, kHeight);
+  for (unsigned i = 0; i < 20; i++) {
+    Frame frame (i);
+    if (i % 2) /* as stereo does at the edge of a cupboard */
+      for (int y = 5; y < 35; y++)
+        for (int x = 15; x < 45; x++)
+          frame.depth.view ().at (x, y) = 12000;
+    ASSERT_TRUE (model.learn (frame.image ()).ok ());
+  }
+  model.finish ();
+  Frame frame (99);
+  frame.put (20, 10, 20, 20, 8000, {120, 125, 110, 0});
+  Segmenter segmenter;
+  ASSERT_TRUE (segmenter.clear_background (frame.image (), model, 1e-4, {}).ok ());
+  EXPECT_EQ (frame.valid (), 400);
+}
+
+TEST (Background, only_as_many_of_the_largest_islands_stay_as_asked_for)
+{
+  for (const int people : {0, 1, 2}) {
+    Frame frame (99);
+    frame.put (2, 5, 14, 20, 12000, {200, 60, 60, 0});
+    frame.put (20, 5, 15, 30, 12000, {200, 60, 60, 0});
+    frame.put (40, 5, 20, 20, 12000, {200, 60, 60, 0});
+    SegmentationSettings settings;
+    settings.max_people = people;
+    segment (frame, settings);
+    EXPECT_EQ (frame.valid (), people == 0 ? 280 + 450 + 400 : people == 1 ? 450 : 850);
+  }
 }

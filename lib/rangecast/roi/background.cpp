@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "background.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
 
 namespace rangecast {
 
-static_assert (sizeof (BackgroundPixel) == 7 * sizeof (float));
+static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
 
-constexpr int kFileVersion = 1;
+constexpr int kFileVersion = 2;
 
 void
 BackgroundModel::reset (int width, int height)
@@ -17,6 +18,7 @@ BackgroundModel::reset (int width, int height)
   width_ = width;
   height_ = height;
   frames_ = 0;
+  depth_noise_ = 0;
   const auto pixels = static_cast<std::size_t> (width) * static_cast<std::size_t> (height);
   pixels_.assign (pixels, {});
   sums_.assign (pixels, {});
@@ -26,7 +28,7 @@ Status
 BackgroundModel::learn (const ConstRangeImage &image)
 {
   const Roi &roi = image.roi;
-  if (roi.x < 0 || roi.y < 0 || roi.x + roi.width > width_ || roi.y + roi.height > height_)
+  if (!covers (roi))
     return {StatusCode::kBadSize, "view " + std::to_string (image.view_id) +
                                       ": the ROI does not lie in the image of the background"};
   for (int y = 0; y < roi.height; y++) {
@@ -44,6 +46,7 @@ BackgroundModel::learn (const ConstRangeImage &image)
         sums.colour_m2 += before * (rgb[c] - pixel.mean[c]);
       }
       if (depth[x] != kInvalidDepth) {
+        pixel.nearest = sums.depth_n ? std::min (pixel.nearest, float (depth[x])) : depth[x];
         const float before = depth[x] - pixel.depth;
         pixel.depth += before / float (++sums.depth_n);
         sums.depth_m2 += before * (depth[x] - pixel.depth);
@@ -64,6 +67,50 @@ BackgroundModel::finish ()
     pixel.depth_spread = sums.depth_n ? std::sqrt (sums.depth_m2 / float (sums.depth_n)) : 0;
     pixel.depth_share = frames_ ? float (sums.depth_n) / float (frames_) : 0;
   }
+  measure_noise ();
+}
+
+void
+BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
+    const std::array<float, 3> &light, float share)
+{
+  const Roi &roi = image.roi;
+  const float to_model[] = {1 / light[0], 1 / light[1], 1 / light[2]};
+  for (int y = 0; y < roi.height; y++) {
+    BackgroundPixel *model =
+        pixels_.data () + static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
+    const std::uint8_t *use = teach.row (y);
+    const Rgbx *colour = image.colour.row (y);
+    const std::uint16_t *depth = image.depth.row (y);
+    for (int x = 0; x < roi.width; x++) {
+      if (!use[x])
+        continue;
+      const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
+      for (int c = 0; c < 3; c++)
+        model[x].mean[c] += share * (std::min (rgb[c] * to_model[c], 255.f) - model[x].mean[c]);
+      if (depth[x] == kInvalidDepth || model[x].depth_share <= 0)
+        continue;
+      const float step = share * (float (depth[x]) - model[x].depth);
+      model[x].depth += step;
+      model[x].nearest += step;
+    }
+  }
+}
+
+void
+BackgroundModel::measure_noise ()
+{
+  constexpr float kSteadyShare = 0.5f;
+  std::vector<float> noise;
+  for (const BackgroundPixel &pixel : pixels_)
+    if (pixel.depth_share >= kSteadyShare && pixel.depth > 0)
+      noise.push_back (pixel.depth_spread / (pixel.depth * pixel.depth));
+  depth_noise_ = 0;
+  if (noise.empty ())
+    return;
+  const auto middle = noise.begin () + static_cast<std::ptrdiff_t> (noise.size () / 2);
+  std::nth_element (noise.begin (), middle, noise.end ());
+  depth_noise_ = *middle;
 }
 
 Status
@@ -77,7 +124,7 @@ save_backgrounds (
     file << "rangecast_background" << kFileVersion;
     file.startWriteStruct ("views", cv::FileNode::SEQ);
     for (const auto &[id, model] : views) {
-      const cv::Mat pixels (model->height_, model->width_, CV_32FC (7),
+      const cv::Mat pixels (model->height_, model->width_, CV_32FC (8),
           const_cast<BackgroundPixel *> (model->pixels_.data ()));
       file.startWriteStruct ("", cv::FileNode::MAP);
       file << "id" << id << "frames" << model->frames_ << "pixels" << pixels;
@@ -92,37 +139,67 @@ save_backgrounds (
   return {};
 }
 
+/* What is in a file may be anything; the segmenter counts on numbers within their ranges. */
+static bool
+is_sound (const BackgroundPixel &p)
+{
+  const auto within = [] (float v, float low, float high) { return v >= low && v <= high; };
+  return within (p.mean[0], 0, 255) && within (p.mean[1], 0, 255) && within (p.mean[2], 0, 255) &&
+         within (p.spread, -1, 255) && within (p.depth, 0, 65535) &&
+         within (p.depth_spread, 0, 65535) && within (p.depth_share, 0, 1) &&
+         within (p.nearest, 0, 65535);
+}
+
+/* One view of the file, or false if it is not what save_backgrounds() writes. */
+bool
+read_background (const cv::FileNode &node, int &id, BackgroundModel &model)
+{
+  cv::Mat pixels;
+  node["pixels"] >> pixels;
+  if (!node["id"].isInt () || !node["frames"].isInt ())
+    return false;
+  id = static_cast<int> (node["id"]);
+  if (id < 0 || id >= kMaxViews || pixels.type () != CV_32FC (8) || pixels.empty () ||
+      !pixels.isContinuous () || pixels.cols > kMaxImageSide || pixels.rows > kMaxImageSide)
+    return false;
+  const auto first = reinterpret_cast<const BackgroundPixel *> (pixels.data);
+  if (!std::all_of (first, first + pixels.total (), is_sound))
+    return false;
+  model.reset (pixels.cols, pixels.rows);
+  model.pixels_.assign (first, first + pixels.total ());
+  model.frames_ = std::max (1, static_cast<int> (node["frames"]));
+  model.measure_noise ();
+  return true;
+}
+
 Status
 load_backgrounds (const std::string &path, std::vector<std::pair<int, BackgroundModel>> &views)
 {
-  const Status bad = {
-      StatusCode::kBadData, path + ": is not a background file (rangecast_background " +
-                                std::to_string (kFileVersion) + ")"};
+  const std::string expected =
+      "expected a background file (rangecast_background " + std::to_string (kFileVersion) + ")";
+  const auto bad = [&] (const std::string &what) {
+    return Status{StatusCode::kBadData, path + ": " + what + "; " + expected};
+  };
   std::error_code error;
   if (!std::filesystem::is_regular_file (path, error))
-    return {StatusCode::kNotFound, path + ": no such file; expected a background file"};
+    return {StatusCode::kNotFound, path + ": no such file; " + expected};
   std::vector<std::pair<int, BackgroundModel>> loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);
     const cv::FileNode version = file["rangecast_background"];
-    if (!file.isOpened () || !version.isInt () || static_cast<int> (version) != kFileVersion)
-      return bad;
+    if (!file.isOpened () || !version.isInt ())
+      return bad ("has no rangecast_background version");
+    if (static_cast<int> (version) != kFileVersion)
+      return bad ("is version " + std::to_string (static_cast<int> (version)));
     for (const cv::FileNode &node : file["views"]) {
-      cv::Mat pixels;
-      node["pixels"] >> pixels;
-      const int id = static_cast<int> (node["id"]);
-      if (pixels.type () != CV_32FC (7) || !pixels.isContinuous () || pixels.empty () || id < 0 ||
-          id >= kMaxViews || loaded.size () >= kMaxViews)
-        return bad;
+      int id = 0;
       BackgroundModel model;
-      model.reset (pixels.cols, pixels.rows);
-      const auto first = reinterpret_cast<const BackgroundPixel *> (pixels.data);
-      model.pixels_.assign (first, first + pixels.total ());
-      model.frames_ = std::max (1, static_cast<int> (node["frames"]));
+      if (loaded.size () >= kMaxViews || !read_background (node, id, model))
+        return bad ("views[" + std::to_string (loaded.size ()) + "] is damaged");
       loaded.emplace_back (id, std::move (model));
     }
   } catch (const std::exception &) {
-    return bad;
+    return bad ("cannot be read");
   }
   views = std::move (loaded);
   return {};

@@ -1,11 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
 #include "../geometry/range_image.hpp"
 #include "../status.hpp"
+
+namespace cv {
+class FileNode;
+}
 
 namespace rangecast {
 
@@ -16,6 +21,7 @@ struct BackgroundPixel {
   float depth = 0;        ///< mean of the valid depths, depth units; 0 = never valid
   float depth_spread = 0; ///< standard deviation of depth, depth units
   float depth_share = 0;  ///< share of the frames in which depth was valid, 0 .. 1
+  float nearest = 0;      ///< least of the valid depths, depth units; 0 = never valid
 };
 
 /** Mean and spread of colour, and of depth where it is valid, of one view's empty scene.
@@ -43,25 +49,47 @@ public:
   /** Makes means and spreads of what was learnt. */
   void finish ();
 
+  /** Follows slow change: moves the means of some pixels towards a picture.
+   *  @param image  its ROI lies in the full image
+   *  @param teach  of the ROI: other than 0 where the picture shows the background
+   *  @param light  the picture's brightness by channel as a share of the model's, which keeps its
+   * own
+   *  @param share  of the way that the means go, 0 .. 1 */
+  void adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
+      const std::array<float, 3> &light, float share);
+
+  /** Whether the ROI lies in the image. */
+  [[nodiscard]] bool covers (const Roi &roi) const
+  {
+    return roi.x >= 0 && roi.y >= 0 && roi.width <= width_ - roi.x && roi.height <= height_ - roi.y;
+  }
+
+  /** How noise of depth grows: its standard deviation at depth z is about this times z squared
+   *  (both in depth units). The median of what was learnt; 0 if no depth was valid. */
+  [[nodiscard]] double depth_noise () const { return depth_noise_; }
+
 private:
   friend Status save_backgrounds (
       const std::string &, const std::vector<std::pair<int, const BackgroundModel *>> &);
-  friend Status load_backgrounds (
-      const std::string &, std::vector<std::pair<int, BackgroundModel>> &);
+  friend bool read_background (const cv::FileNode &, int &id, BackgroundModel &);
 
   struct Sums {
     float colour_m2 = 0, depth_m2 = 0;
     int colour_n = 0, depth_n = 0;
   };
+  void measure_noise ();
+
   int width_ = 0, height_ = 0, frames_ = 0;
+  double depth_noise_ = 0;
   std::vector<BackgroundPixel> pixels_;
   std::vector<Sums> sums_;
 };
 
 /** @name The file form
  *  YAML, JSON or XML (with .gz if wanted) by the file's ending, as cv::FileStorage writes it: for
- *  each view a matrix of width x height x 7 floats, the fields of BackgroundPixel in their order.
- *  Messages begin with the path. @{ */
+ *  each view a matrix of width x height x 8 floats, the fields of BackgroundPixel in their order.
+ *  A version 1 file had 7 floats and is refused. Messages begin with the path and say what was
+ *  expected. @{ */
 Status save_backgrounds (
     const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views);
 Status load_backgrounds (

@@ -60,6 +60,14 @@ Rasteriser::begin (int width, int height)
   inverse_depth_.assign (static_cast<std::size_t> (width) * height, 0);
 }
 
+void
+Rasteriser::begin (int width, int height, const std::vector<float> &inverse_depth)
+{
+  width_ = width;
+  height_ = height;
+  inverse_depth_ = inverse_depth;
+}
+
 /** The mip level whose texels are about as large as pixels. */
 static int
 level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, float area,

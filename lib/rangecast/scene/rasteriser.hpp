@@ -25,6 +25,8 @@ class Rasteriser {
 public:
   /** Starts a picture; allocates only if it is larger than any before. */
   void begin (int width, int height);
+  /** The same, with something there already. @param inverse_depth  1/z, 1/m, row by row */
+  void begin (int width, int height, const std::vector<float> &inverse_depth);
   /** Draws what faces the camera. Texture and vertices belong to the caller. */
   void draw (const std::vector<RasterVertex> &vertices,
       const std::vector<std::array<std::uint32_t, 3>> &triangles, const MipMap &texture,

@@ -10,8 +10,9 @@ namespace rangecast {
 
 static constexpr double kFloor = -1.0, kCeiling = 1.4; ///< metres
 
-static Vec3
-hit_point (Vec3 from, Vec3 direction, double radius_m)
+/** How many times `direction` it is to wall, floor or ceiling. */
+static double
+hit_distance (Vec3 from, Vec3 direction, double radius_m)
 {
   const double a = direction.x * direction.x + direction.z * direction.z;
   const double b = from.x * direction.x + from.z * direction.z;
@@ -21,16 +22,17 @@ hit_point (Vec3 from, Vec3 direction, double radius_m)
     t = std::min (t, (kFloor - from.y) / direction.y);
   else if (direction.y > 0)
     t = std::min (t, (kCeiling - from.y) / direction.y);
-  return from + t * direction;
+  return t;
 }
 
 /** Blue-grey plaster with boards, so that it looks like neither skin nor shirt. */
 static Vec3
-room_colour (Vec3 p, double radius_m, std::uint32_t seed)
+room_colour (Vec3 p, double radius_m, const RoomPaint &paint)
 {
+  const auto &[seed, contrast, warmth] = paint;
   const double fine = smooth_noise (p, 0.12, 3, seed + 20);
   const double coarse = smooth_noise (p, 0.5, 2, seed + 30);
-  const double light = 1 + 0.35 * fine + 0.25 * coarse;
+  const double light = 1 + contrast * (0.35 * fine + 0.25 * coarse);
   if (p.y < kFloor + 1e-6)
     return light * Vec3{104, 108, 100};
   if (p.y > kCeiling - 1e-6)
@@ -43,13 +45,15 @@ room_colour (Vec3 p, double radius_m, std::uint32_t seed)
           double (
               mix64 (static_cast<std::uint64_t> (std::int64_t (std::floor (along)) + seed)) >> 40) /
           (1 << 24);
-  const double gap = 1 - 0.5 * (smooth_step (0.05, 0.01, board) + smooth_step (0.95, 0.99, board));
-  return light * tone * gap * Vec3{96, 124, 140};
+  const double gap =
+      1 - 0.5 * contrast * (smooth_step (0.05, 0.01, board) + smooth_step (0.95, 0.99, board));
+  return light * (contrast * tone + (1 - contrast)) * gap *
+         (warmth * Vec3{170, 122, 98} + (1 - warmth) * Vec3{96, 124, 140});
 }
 
 void
 draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,
-    std::uint32_t seed, ImageView<Rgbx> colour)
+    const RoomPaint &paint, ImageView<Rgbx> colour)
 {
   const auto byte = [] (double v) {
     return static_cast<std::uint8_t> (std::lround (std::clamp (v / 4, 0.0, 255.0)));
@@ -60,11 +64,26 @@ draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radiu
       for (const double dy : {-0.25, 0.25})
         for (const double dx : {-0.25, 0.25}) {
           const Vec3 ray = world_from_camera.rotation * camera.unproject (x + dx, y + dy, 1);
-          sum = sum + room_colour (
-                          hit_point (world_from_camera.translation, ray, radius_m), radius_m, seed);
+          const Vec3 from = world_from_camera.translation;
+          const Vec3 point = from + hit_distance (from, ray, radius_m) * ray;
+          sum = sum + room_colour (point, radius_m, paint);
         }
       colour.at (x, y) = {byte (sum.x), byte (sum.y), byte (sum.z), 0};
     }
+}
+
+std::vector<float>
+room_inverse_depth (
+    const Intrinsics &camera, const Pose &world_from_camera, double radius_m, int width, int height)
+{
+  std::vector<float> inverse;
+  for (int y = 0; y < height; y++)
+    for (int x = 0; x < width; x++) {
+      const Vec3 ray = world_from_camera.rotation * camera.unproject (x, y, 1);
+      inverse.push_back (
+          static_cast<float> (1 / hit_distance (world_from_camera.translation, ray, radius_m)));
+    }
+  return inverse;
 }
 
 } // namespace rangecast

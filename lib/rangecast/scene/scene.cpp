@@ -7,6 +7,7 @@
 #include <cstring>
 #include <opencv2/core/utility.hpp>
 
+#include "furnishing.hpp"
 #include "mesh.hpp"
 #include "model.hpp"
 #include "pattern.hpp"
@@ -66,7 +67,9 @@ private:
   std::vector<std::int16_t> samples_;
 };
 
-/** Where the figure is at a moment. */
+constexpr double kLightPeriod = 40; ///< seconds
+
+/** Where a figure is at a moment. */
 struct FigurePose {
   float sin_yaw, cos_yaw, sin_nod, cos_nod; ///< of the head
   float dx, dz;                             ///< of all, metres
@@ -92,6 +95,18 @@ pose_at (double time_s, double motion)
 struct Direction {
   float x, y, z;
 };
+
+/** The others move as the first did a while ago. */
+FigurePose
+pose_of (int person, double time_s, double motion)
+{
+  constexpr float kPlaces[SceneSettings::kMaxPersons][2] = {
+      {0, 0}, {-0.65f, -0.4f}, {0.65f, -0.4f}};
+  FigurePose pose = pose_at (time_s + 1.3 * person, motion);
+  pose.dx += kPlaces[person][0];
+  pose.dz += kPlaces[person][1];
+  return pose;
+}
 
 /** Nods, then turns, as far as the vertex belongs to the head. */
 Direction
@@ -120,6 +135,24 @@ bad_setting (const char *name, const char *expected)
 }
 
 Status
+check_room (const SceneSettings &s)
+{
+  if (s.persons < 1 || s.persons > SceneSettings::kMaxPersons)
+    return bad_setting ("persons", "1 to 3");
+  if (!(s.far_m >= 1 && s.far_m <= 6))
+    return bad_setting ("far", "1 to 6 metres");
+  if (!(s.cast_shadow >= 0 && s.cast_shadow <= 0.9))
+    return bad_setting ("cast-shadow", "0 to 0.9");
+  if (!(s.light_drift >= 0 && s.light_drift <= 0.5))
+    return bad_setting ("light-drift", "0 to 0.5");
+  if (!(s.wall_texture >= 0 && s.wall_texture <= 1))
+    return bad_setting ("wall-texture", "0 to 1");
+  if (!(s.wall_warmth >= 0 && s.wall_warmth <= 1))
+    return bad_setting ("wall-warmth", "0 to 1");
+  return {};
+}
+
+Status
 check (const SceneSettings &s)
 {
   if (s.views < 1 || s.views > kMaxViews)
@@ -137,7 +170,7 @@ check (const SceneSettings &s)
     return bad_setting ("noise", "0 to 20 grey levels");
   if (!(s.motion >= 0 && s.motion <= 2))
     return bad_setting ("motion", "0 to 2");
-  return {};
+  return check_room (s);
 }
 
 View
@@ -157,29 +190,80 @@ make_view (const SceneSettings &s, int id)
   view.world_from_view.rotation = {cosine, 0, -sine, 0, -1, 0, -sine, 0, -cosine};
   view.world_from_view.translation = {sine * s.distance_m, 0, cosine * s.distance_m};
   view.near_m = 0.45;
-  view.far_m = 1.3;
+  view.far_m = s.far_m;
   return view;
 }
 
 /** One camera: what it keeps from picture to picture. */
 struct CameraState {
   Pose world_from_camera;
-  std::vector<Rgbx> room; ///< the empty picture, once drawn
+  std::vector<Rgbx> room;        ///< the empty picture, once drawn
+  std::vector<float> room_depth; ///< 1/z of it, 1/m
   std::vector<RasterVertex> corners;
   Rasteriser rasteriser;
+  std::unique_ptr<ShadowMap> shadow; ///< its own: cameras are rendered at the same time
 };
+
+/** All light of a picture times a factor. */
+void
+scale_light (ImageView<Rgbx> colour, double factor)
+{
+  std::uint8_t table[256];
+  for (int i = 0; i < 256; i++)
+    table[i] = static_cast<std::uint8_t> (std::lround (std::clamp (i * factor, 0.0, 255.0)));
+  for (int y = 0; y < colour.height; y++)
+    for (int x = 0; x < colour.width; x++) {
+      Rgbx &pixel = colour.at (x, y);
+      pixel = {table[pixel.r], table[pixel.g], table[pixel.b], 0};
+    }
+}
+
+/** A figure as a camera sees it. */
+void
+project (const Mesh &figure, const FigurePose &pose, const Intrinsics &in,
+    const Pose &world_from_camera, std::vector<RasterVertex> &corners)
+{
+  const Pose view_from_world = world_from_camera.inverse ();
+  float r[9];
+  std::copy (view_from_world.rotation.begin (), view_from_world.rotation.end (), r);
+  const auto tx = static_cast<float> (view_from_world.translation.x),
+             ty = static_cast<float> (view_from_world.translation.y),
+             tz = static_cast<float> (view_from_world.translation.z);
+  const auto f = static_cast<float> (in.fx), cx = static_cast<float> (in.cx),
+             cy = static_cast<float> (in.cy);
+  constexpr auto kNeck = static_cast<float> (kNeckHeight);
+  constexpr float kNearest = 0.05f; ///< metres: nothing is drawn in front of that
+
+  corners.resize (figure.vertices.size ());
+  for (std::size_t i = 0; i < figure.vertices.size (); i++) {
+    const MeshVertex &v = figure.vertices[i];
+    Direction p = turned (pose, v.head, {v.x, v.y - kNeck, v.z});
+    p = {p.x + pose.dx, p.y + kNeck, p.z + pose.dz};
+    const Direction n = turned (pose, v.head, {v.nx, v.ny, v.nz});
+    const float z = r[6] * p.x + r[7] * p.y + r[8] * p.z + tz;
+    const float inverse = z > kNearest ? 1 / z : 0;
+    corners[i] = {f * (r[0] * p.x + r[1] * p.y + r[2] * p.z + tx) * inverse + cx,
+        f * (r[3] * p.x + r[4] * p.y + r[5] * p.z + ty) * inverse + cy, inverse, v.u, v.v,
+        light_on (n)};
+  }
+}
 
 } // namespace
 
 struct Scene::Impl {
   SceneSettings settings;
   Rig rig, range_rig;
-  Mesh figure;
+  std::vector<Mesh> figures; ///< one a person, or one model for all
   NoiseTable noise;
   std::vector<CameraState> cameras;
 
+  [[nodiscard]] const Mesh &figure (int person) const
+  {
+    return figures[std::min (static_cast<std::size_t> (person), figures.size () - 1)];
+  }
   [[nodiscard]] ImageView<const Rgbx> room_of (CameraState &camera) const;
-  void project (CameraState &camera, const FigurePose &pose) const;
+  void draw_chair (CameraState &camera, ImageView<Rgbx> room) const;
+  void draw_shadow (CameraState &camera, double time_s, ImageView<Rgbx> colour) const;
   void write_depth (const CameraState &camera, ImageView<std::uint16_t> depth,
       ImageView<std::uint8_t> mask) const;
   Roi bounding_box (const CameraState &camera) const;
@@ -194,39 +278,45 @@ Scene::Impl::room_of (CameraState &camera) const
   if (camera.room.empty ()) {
     camera.room.resize (static_cast<std::size_t> (settings.width) * settings.height);
     room.data = camera.room.data ();
-    draw_room (rig.views[0].intrinsics, camera.world_from_camera, kWallRadius, settings.seed, room);
+    const Intrinsics &lens = rig.views[0].intrinsics;
+    draw_room (lens, camera.world_from_camera, kWallRadius,
+        {settings.seed, settings.wall_texture, settings.wall_warmth}, room);
+    camera.room_depth = room_inverse_depth (
+        lens, camera.world_from_camera, kWallRadius, settings.width, settings.height);
+    if (settings.chair)
+      draw_chair (camera, room);
   }
   room.data = camera.room.data ();
   return room;
 }
 
 void
-Scene::Impl::project (CameraState &camera, const FigurePose &pose) const
+Scene::Impl::draw_chair (CameraState &camera, ImageView<Rgbx> room) const
 {
-  const Pose view_from_world = camera.world_from_camera.inverse ();
-  float r[9];
-  std::copy (view_from_world.rotation.begin (), view_from_world.rotation.end (), r);
-  const auto tx = static_cast<float> (view_from_world.translation.x),
-             ty = static_cast<float> (view_from_world.translation.y),
-             tz = static_cast<float> (view_from_world.translation.z);
-  const Intrinsics &in = rig.views[0].intrinsics;
-  const auto f = static_cast<float> (in.fx), cx = static_cast<float> (in.cx),
-             cy = static_cast<float> (in.cy);
-  constexpr auto kNeck = static_cast<float> (kNeckHeight);
-  constexpr float kNearest = 0.05f; ///< metres: nothing is drawn in front of that
+  const Mesh chair = make_chair (settings.seed);
+  project (
+      chair, pose_at (0, 0), rig.views[0].intrinsics, camera.world_from_camera, camera.corners);
+  camera.rasteriser.begin (settings.width, settings.height, camera.room_depth);
+  camera.rasteriser.draw (camera.corners, chair.triangles, chair.texture, room);
+  camera.room_depth.assign (
+      camera.rasteriser.row (0), camera.rasteriser.row (0) + camera.room_depth.size ());
+}
 
-  camera.corners.resize (figure.vertices.size ());
-  for (std::size_t i = 0; i < figure.vertices.size (); i++) {
-    const MeshVertex &v = figure.vertices[i];
-    Direction p = turned (pose, v.head, {v.x, v.y - kNeck, v.z});
-    p = {p.x + pose.dx, p.y + kNeck, p.z + pose.dz};
-    const Direction n = turned (pose, v.head, {v.nx, v.ny, v.nz});
-    const float z = r[6] * p.x + r[7] * p.y + r[8] * p.z + tz;
-    const float inverse = z > kNearest ? 1 / z : 0;
-    camera.corners[i] = {f * (r[0] * p.x + r[1] * p.y + r[2] * p.z + tx) * inverse + cx,
-        f * (r[3] * p.x + r[4] * p.y + r[5] * p.z + ty) * inverse + cy, inverse, v.u, v.v,
-        light_on (n)};
+void
+Scene::Impl::draw_shadow (CameraState &camera, double time_s, ImageView<Rgbx> colour) const
+{
+  if (!camera.shadow)
+    camera.shadow = std::make_unique<ShadowMap> ();
+  ShadowMap &shadow = *camera.shadow;
+  shadow.begin ();
+  for (int i = 0; i < settings.persons; i++) {
+    project (figure (i), pose_of (i, time_s, settings.motion), shadow.intrinsics (),
+        shadow.world_from_lamp (), camera.corners);
+    shadow.add (camera.corners, figure (i));
   }
+  shadow.end ();
+  shadow.darken (rig.views[0].intrinsics, camera.world_from_camera, camera.room_depth.data (),
+      settings.cast_shadow, colour);
 }
 
 void
@@ -239,6 +329,7 @@ Scene::Impl::write_depth (
              farthest = static_cast<float> (1 / view.far_m);
   for (int y = 0; y < settings.height; y++) {
     const float *inverse = camera.rasteriser.row (y);
+    const float *room = camera.room_depth.data () + static_cast<std::size_t> (y) * settings.width;
     if (!depth.empty ())
       for (int x = 0; x < settings.width; x++) {
         const bool valid = inverse[x] >= farthest && inverse[x] <= nearest;
@@ -247,7 +338,7 @@ Scene::Impl::write_depth (
       }
     if (!mask.empty ())
       for (int x = 0; x < settings.width; x++)
-        mask.row (y)[x] = inverse[x] > 0;
+        mask.row (y)[x] = inverse[x] != room[x];
   }
 }
 
@@ -257,12 +348,13 @@ Scene::Impl::bounding_box (const CameraState &camera) const
   int left = settings.width, right = -1, top = settings.height, bottom = -1;
   for (int y = 0; y < settings.height; y++) {
     const float *row = camera.rasteriser.row (y);
+    const float *room = camera.room_depth.data () + static_cast<std::size_t> (y) * settings.width;
     int first = 0, last = settings.width - 1;
-    while (first < settings.width && row[first] <= 0)
+    while (first < settings.width && row[first] == room[first])
       first++;
     if (first == settings.width)
       continue;
-    while (row[last] <= 0)
+    while (row[last] == room[last])
       last--;
     left = std::min (left, first);
     right = std::max (right, last);
@@ -284,9 +376,10 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
   Impl &impl = *made->impl_;
   impl.settings = settings;
   if (settings.model.empty ())
-    impl.figure = make_figure (settings.seed);
-  else if (Status status =
-               load_model (settings.model, settings.texture, settings.texture_flip, impl.figure);
+    for (int i = 0; i < settings.persons; i++)
+      impl.figures.push_back (make_figure (settings.seed + static_cast<std::uint32_t> (i)));
+  else if (Status status = load_model (settings.model, settings.texture, settings.texture_flip,
+               impl.figures.emplace_back ());
            !status.ok ())
     return status;
   impl.noise.fill (settings.noise_sigma, settings.seed);
@@ -340,12 +433,18 @@ Scene::render (int view_id, SceneCamera which, double time_s, bool empty, ImageV
   const ImageView<const Rgbx> room = impl_->room_of (camera);
   for (int y = 0; y < s.height; y++)
     std::memcpy (colour.row (y), room.row (y), sizeof (Rgbx) * static_cast<std::size_t> (s.width));
-  camera.rasteriser.begin (s.width, s.height);
-  if (!empty) {
-    impl_->project (camera, pose_at (time_s, s.motion));
-    camera.rasteriser.draw (camera.corners, impl_->figure.triangles, impl_->figure.texture, colour);
+  camera.rasteriser.begin (s.width, s.height, camera.room_depth);
+  if (!empty && s.cast_shadow > 0)
+    impl_->draw_shadow (camera, time_s, colour);
+  for (int i = 0; !empty && i < s.persons; i++) {
+    const Mesh &figure = impl_->figure (i);
+    project (figure, pose_of (i, time_s, s.motion), impl_->rig.views[0].intrinsics,
+        camera.world_from_camera, camera.corners);
+    camera.rasteriser.draw (camera.corners, figure.triangles, figure.texture, colour);
   }
   impl_->write_depth (camera, depth, mask);
+  if (s.light_drift > 0)
+    scale_light (colour, 1 + s.light_drift * wave (time_s, kLightPeriod));
   impl_->noise.add (colour, index, time_s);
   return {};
 }

@@ -26,6 +26,16 @@ struct SceneSettings {
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
   std::string texture;     ///< picture for the model; empty: what the model names, or one beside it
   bool texture_flip = false; ///< turn the model's texture upside down
+
+  int persons = 1;    ///< figures, 1 .. kMaxPersons; the others stand 0.4 m behind, left and right
+  double far_m = 1.3; ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls
+  double cast_shadow = 0;  ///< share of light that is missing in the figures' shadow, 0 .. 0.9
+  double light_drift = 0;  ///< all light swings slowly (40 s) by this share, 0 .. 0.5
+  double wall_texture = 1; ///< contrast of the room's texture, 0 = plain .. 1
+  double wall_warmth = 0;  ///< 0 = blue-grey walls .. 1 = as wood, skin and hair
+  bool chair = false;      ///< a chair stands behind the figure, also in the empty room
+
+  static constexpr int kMaxPersons = 3;
 };
 
 enum class SceneCamera {
@@ -47,7 +57,7 @@ public:
   Scene (const Scene &) = delete;
   Scene &operator= (const Scene &) = delete;
 
-  /** Raw rig: each view with its right and third camera; near 0.45 m, far 1.3 m, unit 0.1 mm. */
+  /** Raw rig: each view with its right and third camera; near 0.45 m, far as set, unit 0.1 mm. */
   [[nodiscard]] const Rig &rig () const;
   /** The rig of the exact range images: the left cameras alone. */
   [[nodiscard]] const Rig &range_rig () const;
@@ -56,8 +66,8 @@ public:
    *  @param time_s   moment of the motion, seconds
    *  @param empty    the room without the figure
    *  @param[out] colour  H x W of the rig
-   *  @param[out] depth   H x W, depth units at pixel centres, 0 outside near..far (so on the wall);
-   *                      may be empty
+   *  @param[out] depth   H x W, depth units at pixel centres, 0 outside near..far (so on the wall,
+   *                      unless far reaches it); may be empty
    *  @param[out] mask    H x W, 1 = person, 0 = room; may be empty
    *  @return kNotFound if there is no such view, kBadSize if a picture has another size */
   Status render (int view_id, SceneCamera camera, double time_s, bool empty, ImageView<Rgbx> colour,
