@@ -66,7 +66,11 @@ enum {
   PROP_SPECKLE_WINDOW_SIZE,
   PROP_SPECKLE_RANGE,
   PROP_LEFT_RIGHT_MAX_DIFFERENCE,
+  PROP_PATCH_TOLERANCE,
   PROP_FLYING_PIXEL_STEP,
+  PROP_SILHOUETTE_RADIUS,
+  PROP_GAP_WIDTH,
+  PROP_SEARCH_FAR,
   PROP_REFRESH_INTERVAL,
   PROP_STATS
 };
@@ -505,6 +509,18 @@ gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, G
     case PROP_FLYING_PIXEL_STEP:
       p.core.flying_pixel_step = g_value_get_double (value);
       break;
+    case PROP_PATCH_TOLERANCE:
+      p.core.patch_tolerance = g_value_get_double (value);
+      break;
+    case PROP_SILHOUETTE_RADIUS:
+      p.core.silhouette_radius = g_value_get_int (value);
+      break;
+    case PROP_GAP_WIDTH:
+      p.core.gap_width = g_value_get_int (value);
+      break;
+    case PROP_SEARCH_FAR:
+      p.core.search_far_m = g_value_get_double (value);
+      break;
     case PROP_REFRESH_INTERVAL:
       p.refresh_interval = g_value_get_int (value);
       break;
@@ -579,6 +595,18 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
       break;
     case PROP_FLYING_PIXEL_STEP:
       g_value_set_double (value, p.core.flying_pixel_step);
+      break;
+    case PROP_PATCH_TOLERANCE:
+      g_value_set_double (value, p.core.patch_tolerance);
+      break;
+    case PROP_SILHOUETTE_RADIUS:
+      g_value_set_int (value, p.core.silhouette_radius);
+      break;
+    case PROP_GAP_WIDTH:
+      g_value_set_int (value, p.core.gap_width);
+      break;
+    case PROP_SEARCH_FAR:
+      g_value_set_double (value, p.core.search_far_m);
       break;
     case PROP_REFRESH_INTERVAL:
       g_value_set_int (value, p.refresh_interval);
@@ -668,13 +696,13 @@ install_matching_properties (GObjectClass *c)
       g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgbm-3way)",
           GST_TYPE_STEREO_DEPTH_ALGORITHM, int (m.algorithm), kReady));
   install_int (c, PROP_BLOCK_SIZE, "block-size", "Block size",
-      "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 5 for the others)", 0, 51,
+      "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for the others)", 0, 51,
       m.block_size);
   install_int (c, PROP_UNIQUENESS_RATIO, "uniqueness-ratio", "Uniqueness ratio",
-      "Per cent by which the best match must beat the second (0 to 100, default 15)", 0, 100,
+      "Per cent by which the best match must beat the second (0 to 100, default 5)", 0, 100,
       m.uniqueness_ratio);
   install_int (c, PROP_SPECKLE_WINDOW_SIZE, "speckle-window-size", "Speckle window size",
-      "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 60)", 0,
+      "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 100)", 0,
       100000, m.speckle_window_size);
   install_int (c, PROP_SPECKLE_RANGE, "speckle-range", "Speckle range",
       "Disparity step within a patch, pixels (0 to 1000, default 2)", 0, 1000, m.speckle_range);
@@ -686,6 +714,23 @@ install_matching_properties (GObjectClass *c)
       "Points that fewer than 4 of 8 neighbours follow within this share of their depth are "
       "cleared (0 = off, to 1, default 0.02)",
       0, 1, kDefaults.flying_pixel_step);
+  install_double (c, PROP_PATCH_TOLERANCE, "patch-tolerance", "Patch tolerance",
+      "Points around which both pictures differ by more than this share of the contrast are "
+      "cleared "
+      "(0 = off, to 10, default 1)",
+      0, 10, kDefaults.patch_tolerance);
+  install_int (c, PROP_SILHOUETTE_RADIUS, "silhouette-radius", "Silhouette radius",
+      "Near a silhouette, points whose colour is that of the other side are cleared: pixels around "
+      "that are looked at (0 = off, to 64, default 10)",
+      0, 64, kDefaults.silhouette_radius);
+  install_int (c, PROP_GAP_WIDTH, "gap-width", "Gap width",
+      "Gaps in a surface of one colour up to so many pixels are filled (0 = off, to 1000, default "
+      "12)",
+      0, 1000, kDefaults.gap_width);
+  install_double (c, PROP_SEARCH_FAR, "search-far", "Search far",
+      "What lies beyond far is matched, too, so that it is not taken for something nearer, and "
+      "cleared: up to so many metres (default 0: to infinity; as far: nothing is there)",
+      0, 1e4, kDefaults.search_far_m);
   install_int (c, PROP_REFRESH_INTERVAL, "refresh-interval", "Refresh interval",
       "When downstream wants only a part, one full picture every so many frames (0: always all, to "
       "100000, default 30)",

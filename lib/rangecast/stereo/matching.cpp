@@ -32,7 +32,7 @@ Status
 Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
 {
   const bool bm = s.algorithm == MatchAlgorithm::kBm;
-  const int block = s.block_size > 0 ? s.block_size : bm ? 15 : 5;
+  const int block = s.block_size > 0 ? s.block_size : bm ? 15 : 3;
   if (block % 2 == 0 || (bm && block < 5) || block > 51)
     return {StatusCode::kBadValue, "stereo: block size " + std::to_string (block) +
                                        ", expected an odd number" +
@@ -47,8 +47,7 @@ Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
   try {
     matcher_ = bm ? make_bm (s, block, disparities_) : make_sgbm (s, block, disparities_);
     matcher_->setMinDisparity (min_disparity);
-    matcher_->setSpeckleWindowSize (s.speckle_window_size);
-    matcher_->setSpeckleRange (s.speckle_range);
+    matcher_->setSpeckleWindowSize (0); /* after other filters, see StereoDepth */
     matcher_->setDisp12MaxDiff (s.left_right_max_difference);
   } catch (const cv::Exception &) {
     return {StatusCode::kBadValue, "stereo: OpenCV refuses these settings"};

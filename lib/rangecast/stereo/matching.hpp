@@ -11,9 +11,9 @@ enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way };
 
 struct MatchSettings {
   MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
-  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 5 for the others
-  int uniqueness_ratio = 15;         ///< per cent by which the best match must beat the second
-  int speckle_window_size = 60;      ///< pixels; smaller patches of like disparity go; 0 = off
+  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for the others
+  int uniqueness_ratio = 5;          ///< per cent by which the best match must beat the second
+  int speckle_window_size = 100;     ///< pixels; smaller patches of like disparity go; 0 = off
   int speckle_range = 2;             ///< pixels of disparity within a patch
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
 
@@ -35,6 +35,9 @@ public:
   {
     return min_disparity_ + disparities_ > 0 ? min_disparity_ + disparities_ : 0;
   }
+
+  /** Columns right of a pixel that its match can need: for negative disparities. */
+  [[nodiscard]] int reach_right () const { return min_disparity_ < 0 ? -min_disparity_ : 0; }
 
   /** @param left, right  8 bit grey, the same size, rows agree
    *  @param[out] disparity  CV_16S, 1/16 pixel; below 16 * min_disparity() = no match

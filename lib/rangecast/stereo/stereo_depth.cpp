@@ -37,7 +37,9 @@ StereoDepth::set (const View &view, const StereoSettings &settings)
   const View &range = rectifier_.range_view ();
   const double focal_baseline = range.intrinsics.fx * rectifier_.baseline_m ();
   const double offset = rectifier_.principal_offset ();
-  const int least = static_cast<int> (std::floor (focal_baseline / range.far_m - offset));
+  const double farthest =
+      settings.search_far_m > 0 ? std::max (settings.search_far_m, range.far_m) : INFINITY;
+  const int least = static_cast<int> (std::floor (focal_baseline / farthest - offset));
   const int most = static_cast<int> (std::ceil (focal_baseline / range.near_m - offset));
   if (Status s = matcher_.set (settings.match, least, std::max (most, least + 1)); !s.ok ())
     return {s.code (), "view " + std::to_string (view.id) + ": " + s.message ()};
@@ -64,21 +66,57 @@ StereoDepth::rectify (int camera, ImageView<const Rgbx> picture)
   pictures_[camera] = rectified_[camera];
 }
 
-/* Cuts the window that the ROI's matches lie in. Columns that would lie left of the picture repeat
- * its edge: without them OpenCV matches nothing near the left edge. */
+/* Lays out the window that the ROI's matches lie in. Columns that would lie left or right of the
+ * picture repeat its edge: without them OpenCV matches nothing near the edges. */
 void
-StereoDepth::cut_window (int camera, const RangeImage &image)
+StereoDepth::place_window (const Roi &roi)
 {
-  const Roi &roi = image.roi;
-  const cv::Mat &colour = pictures_[camera];
-  const int left = std::max (0, roi.x - matcher_.reach () - kMargin);
-  const int right = std::min (view_.width, roi.x + roi.width + kMargin);
+  const int before = matcher_.reach () + kMargin, after = matcher_.reach_right () + kMargin;
+  const int left = std::max (0, roi.x - before);
+  const int right = std::min (view_.width, roi.x + roi.width + after);
   const int top = std::max (0, roi.y - kMargin);
   const int bottom = std::min (view_.height, roi.y + roi.height + kMargin);
-  const int missing = std::max (0, matcher_.reach () - (roi.x - left));
-  cv::cvtColor (
-      colour (cv::Rect (left, top, right - left, bottom - top)), grey_, cv::COLOR_RGBA2GRAY);
-  cv::copyMakeBorder (grey_, window_[camera], 0, 0, missing, 0, cv::BORDER_REPLICATE);
+  window_at_ = cv::Rect (left, top, right - left, bottom - top);
+  const int x0 = std::max (0, roi.x - kMargin);
+  core_at_ =
+      cv::Rect (x0, top, std::min (view_.width, roi.x + roi.width + kMargin) - x0, bottom - top);
+  missing_[0] = std::max (0, matcher_.reach () - (roi.x - left));
+  missing_[1] = std::max (0, matcher_.reach_right () - (right - roi.x - roi.width));
+}
+
+void
+StereoDepth::cut_window (int camera)
+{
+  cv::cvtColor (pictures_[camera](window_at_), grey_, cv::COLOR_RGBA2GRAY);
+  cv::copyMakeBorder (grey_, window_[camera], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
+}
+
+/* Takes away what cannot be right of the disparities of the ROI and its margin. */
+void
+StereoDepth::filter_disparities ()
+{
+  const MatchSettings &m = settings_.match;
+  const int least = 16 * matcher_.min_disparity ();
+  const int offset = static_cast<int> (std::lround (16 * rectifier_.principal_offset ()));
+  const cv::Rect in_window (core_at_.x - window_at_.x + missing_[0], core_at_.y - window_at_.y,
+      core_at_.width, core_at_.height);
+  core_disparity_ = raw_disparity_ (in_window);
+  const cv::Mat grey = window_[0](in_window);
+  if (settings_.patch_tolerance > 0)
+    filter_.clear_unlike (grey, window_[1].rowRange (in_window.y, in_window.y + in_window.height),
+        in_window.x, settings_.patch_tolerance, least, core_disparity_);
+  filter_.clear_hidden (least, core_disparity_);
+  constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
+  if (settings_.flying_pixel_step > 0)
+    filter_.clear_flying (settings_.flying_pixel_step, kSupport, offset, least, core_disparity_);
+  if (m.speckle_window_size > 0)
+    cv::filterSpeckles (
+        core_disparity_, least - 16, m.speckle_window_size, 16 * m.speckle_range, specks_);
+  if (settings_.gap_width > 0)
+    filter_.fill_gaps (pictures_[0](core_at_), settings_.gap_width, least, core_disparity_);
+  if (settings_.silhouette_radius > 0)
+    filter_.clear_rims (pictures_[0](core_at_), settings_.silhouette_radius,
+        settings_.flying_pixel_step, offset, least, core_disparity_);
 }
 
 /* OpenCV's disparities of the window to ours of the ROI. */
@@ -86,19 +124,17 @@ void
 StereoDepth::take_disparities (const RangeImage &image)
 {
   const Roi &roi = image.roi;
-  const int right = std::min (view_.width, roi.x + roi.width + kMargin);
-  const int x0 = raw_disparity_.cols - (right - roi.x);
-  const int y0 = roi.y - std::max (0, roi.y - kMargin);
+  const int x0 = roi.x - core_at_.x, y0 = roi.y - core_at_.y;
   const int least = 16 * matcher_.min_disparity ();
   const int offset = static_cast<int> (std::lround (16 * rectifier_.principal_offset ()));
   disparity_.create (roi.height, roi.width, CV_16U);
   for (int y = 0; y < roi.height; y++) {
-    const auto from = raw_disparity_.ptr<std::int16_t> (y0 + y) + x0;
+    const auto from = core_disparity_.ptr<std::int16_t> (y0 + y) + x0;
     auto to = disparity_.ptr<std::uint16_t> (y);
     for (int x = 0; x < roi.width; x++) {
       const int d = from[x] + offset;
-      const bool seen =
-          16 * (roi.x + x) >= from[x]; /* not in the repeated edge of the right picture */
+      const int there = 16 * (roi.x + x) - from[x]; /* not where the right picture is repeated */
+      const bool seen = there >= 0 && there <= 16 * (view_.width - 1);
       to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
@@ -137,8 +173,9 @@ StereoDepth::match (const RangeImage &image)
       static_cast<std::size_t> (image.colour.stride));
   try {
     pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
-    cut_window (0, image);
-    cut_window (1, image);
+    place_window (roi);
+    cut_window (0);
+    cut_window (1);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to cut the pictures"};
   }
@@ -146,15 +183,9 @@ StereoDepth::match (const RangeImage &image)
     changes_.remember ();
   if (Status s = matcher_.match (window_[0], window_[1], raw_disparity_); !s.ok ())
     return s;
+  filter_disparities ();
   take_disparities (image);
-  if (settings_.flying_pixel_step <= 0)
-    return to_depth_.convert (disparity (), image.depth);
-  depth_.create (roi.height, roi.width, CV_16U);
-  if (Status s = to_depth_.convert (disparity (), as_view<std::uint16_t> (depth_)); !s.ok ())
-    return s;
-  constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
-  return remove_flying_pixels (
-      as_view<const std::uint16_t> (depth_), settings_.flying_pixel_step, kSupport, image.depth);
+  return to_depth_.convert (disparity (), image.depth);
 }
 
 } // namespace rangecast

@@ -8,6 +8,7 @@
 
 #include "../options.hpp"
 #include "report.hpp"
+#include "scene.hpp"
 #include "truth.hpp"
 
 using namespace rangecast;
@@ -44,6 +45,8 @@ struct Job {
   int view_id = -1, rounds = 5;
   double focal = 0, baseline = 0, offset = NAN, scale = 1, near_m = 0, far_m = 0;
   bool tune = false;
+  bool scene = false;
+  SceneJob rendered;
 };
 
 void
@@ -62,6 +65,12 @@ add_options (Options &options, Job &job)
   options.number ("--far", job.far_m, 1e-3, 1e5);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.flag ("--tune", job.tune);
+  options.flag ("--scene", job.scene);
+  SceneSettings &s = job.rendered.scene;
+  options.text ("--model", s.model);
+  options.size ("--size", s.width, s.height, 64, 4096);
+  options.number ("--noise", s.noise_sigma, 0.0, 20.0);
+  options.number ("--frames", job.rendered.frames, 1, 1000);
   options.text ("--json", job.json);
 }
 
@@ -69,6 +78,8 @@ add_options (Options &options, Job &job)
 std::string
 complaint (const Job &job)
 {
+  if (job.scene)
+    return {};
   if (job.left.empty () || job.right.empty ())
     return "expected --left and --right";
   if (job.rig.empty () && (job.focal <= 0 || job.baseline <= 0))
@@ -175,7 +186,7 @@ Status
 measure (const Job &job, const Pair &pair)
 {
   std::vector<Row> rows (3);
-  StereoSettings settings;
+  StereoSettings settings = job.rendered.settings;
   const std::pair<MatchAlgorithm, const char *> kOurs[] = {
       {MatchAlgorithm::kSgbm3Way, "stereodepth sgbm-3way"},
       {MatchAlgorithm::kSgbm, "stereodepth sgbm"}, {MatchAlgorithm::kBm, "stereodepth bm"}};
@@ -196,6 +207,13 @@ measure (const Job &job, const Pair &pair)
 Status
 run (const Job &job)
 {
+  if (job.scene) {
+    std::vector<SceneRow> rows;
+    if (Status s = run_scene (job.rendered, rows); !s.ok ())
+      return s;
+    print_scene_rows (rows);
+    return {};
+  }
   Pair pair;
   if (Status s = read_pictures (job, pair); !s.ok ())
     return s;
