@@ -71,12 +71,13 @@ void
 DisparityFilter::clear_hidden (int least, cv::Mat &disparity)
 {
   constexpr int kTolerance = 24; /* 1/16 pixel */
+  constexpr int kBeyond = 2049;  /* columns that a match may lie outside of the part, pixels */
   const int width = disparity.cols;
-  nearest_.resize (std::size_t (width));
+  nearest_.resize (static_cast<std::size_t> (width) + 2 * kBeyond);
   for (int y = 0; y < disparity.rows; y++) {
     auto d = disparity.ptr<std::int16_t> (y);
     std::ranges::fill (nearest_, std::int16_t (least - 16));
-    const auto there = [&] (int x) { return std::clamp (x - ((d[x] + 8) >> 4), 0, width - 1); };
+    const auto there = [&] (int x) { return x + kBeyond - ((d[x] + 8) >> 4); };
     for (int x = 0; x < width; x++)
       if (d[x] >= least)
         nearest_[std::size_t (there (x))] = std::max (nearest_[std::size_t (there (x))], d[x]);

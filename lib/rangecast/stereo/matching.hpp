@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/calib3d.hpp>
+#include <vector>
 
 #include "../status.hpp"
 
@@ -29,6 +30,9 @@ public:
    */
   Status set (const MatchSettings &settings, int min_disparity, int max_disparity);
 
+  /** Other disparities at the same settings. @return kBadValue as set() */
+  Status set_range (int min_disparity, int max_disparity);
+
   [[nodiscard]] int min_disparity () const { return min_disparity_; }
   /** Columns left of a pixel that its match can need. */
   [[nodiscard]] int reach () const
@@ -44,8 +48,15 @@ public:
    *  @return kNoSpace if OpenCV failed */
   Status match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
 
+  /** The same in so many threads, each of which has a part of the rows and some beyond. */
+  Status match_stripes (
+      const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity);
+
 private:
+  MatchSettings settings_;
   cv::Ptr<cv::StereoMatcher> matcher_;
+  std::vector<cv::Ptr<cv::StereoMatcher>> more_; /* one a stripe */
+  std::vector<cv::Mat> stripes_;
   int min_disparity_ = 0, disparities_ = 0;
 };
 

@@ -7,24 +7,10 @@
 #include "../geometry/rig.hpp"
 #include "change_detector.hpp"
 #include "depth.hpp"
-#include "disparity_filter.hpp"
-#include "matching.hpp"
+#include "disparity_finder.hpp"
 #include "rectification.hpp"
 
 namespace rangecast {
-
-struct StereoSettings {
-  MatchSettings match;
-  double patch_tolerance = 1;      ///< share of its contrast that a patch may differ by; 0 = off
-  double flying_pixel_step = 0.02; ///< share of the depth that neighbours may differ; 0 = off
-  int silhouette_radius = 10;      ///< pixels around that say what is beside a silhouette; 0 = off
-  int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
-  /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
-   *  matched so as not to be taken for something nearer. */
-  double search_far_m = 0;
-
-  friend bool operator== (const StereoSettings &, const StereoSettings &) = default;
-};
 
 /** A stereo pair's pictures to a range image: rectifies, matches, filters, converts. Keeps its
  *  memory between frames. */
@@ -69,22 +55,22 @@ public:
 
 private:
   void rectify (int camera, ImageView<const Rgbx> picture);
-  void place_window (const Roi &roi);
-  void cut_window (int camera);
-  void filter_disparities ();
-  void take_disparities (const RangeImage &image);
+  Status find (const RangeImage &image, bool everywhere);
+  void learn_range (const RangeImage &image);
+  [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
   View view_;
   StereoSettings settings_;
   Rectifier rectifier_;
-  Matcher matcher_;
+  DisparityFinder finder_;
   DisparityToDepth to_depth_;
-  DisparityFilter filter_;
   ChangeDetector changes_;
-  cv::Rect window_at_, core_at_; /* of the picture: what is matched; the ROI and its margin */
-  int missing_[2] = {0, 0};      /* columns that the window has beyond it, left and right */
-  cv::Mat pictures_[2];          /* rectified; may be the caller's memory */
-  cv::Mat rectified_[2], grey_, window_[2], raw_disparity_, core_disparity_, disparity_, specks_;
+  cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
+  cv::Mat rectified_[2];
+  std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
+  double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
+  Roi last_roi_;                          /* that was not the whole picture */
+  double seen_share_ = 0;                 /* of the ROI's pixels, the last time */
 };
 
 } // namespace rangecast

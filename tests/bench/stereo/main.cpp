@@ -69,6 +69,7 @@ add_options (Options &options, Job &job)
   SceneSettings &s = job.rendered.scene;
   options.text ("--model", s.model);
   options.size ("--size", s.width, s.height, 64, 4096);
+  options.number ("--distance", s.distance_m, 0.5, 1.2);
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
   options.number ("--frames", job.rendered.frames, 1, 1000);
   options.text ("--json", job.json);

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 using namespace rangecast;
@@ -106,59 +106,130 @@ print_scene_rows (const std::vector<SceneRow> &rows)
         100 * r.off_5cm, r.median_mm, r.rms_px, r.ms);
 }
 
+namespace {
+
+/* Ours on the whole picture or in the person's ROI, whose depths it knows from the picture before.
+ */
+class OursRun {
+public:
+  OursRun (const char *name, const View &view, double focal_baseline, bool roi)
+      : name_ (name), judge_ (view, focal_baseline), roi_ (roi)
+  {
+  }
+  Status set (const View &view, const StereoSettings &settings)
+  {
+    return stereo_.set (view, settings);
+  }
+  Status run (const Shot &shot, bool counts)
+  {
+    depth_.create (shot.depth.size (), CV_16U);
+    colour_.create (shot.depth.size (), CV_8UC4);
+    const Roi whole = {0, 0, depth_.cols, depth_.rows}, &roi = roi_ && ran_ ? shot.box : whole;
+    ran_ = true;
+    const cv::Rect rect (roi.x, roi.y, roi.width, roi.height);
+    depth_.setTo (0);
+    const cv::Mat depth = depth_ (rect), colour = colour_ (rect);
+    const auto begin = std::chrono::steady_clock::now ();
+    const Status status =
+        stereo_.process (view_of<const Rgbx> (shot.left), view_of<const Rgbx> (shot.right),
+            {0, roi, view_of<std::uint16_t> (depth), view_of<Rgbx> (colour), 0});
+    const double ms = ms_since (begin);
+    if (counts) {
+      times_.push_back (ms);
+      judge_.add (shot, depth_);
+    }
+    return status;
+  }
+  SceneRow row () { return judge_.row (name_, times_); }
+  [[nodiscard]] const cv::Mat &depth () const { return depth_; }
+
+private:
+  std::string name_;
+  StereoDepth stereo_;
+  Judge judge_;
+  bool roi_, ran_ = false;
+  cv::Mat depth_, colour_;
+  std::vector<double> times_;
+};
+
+/* OpenCV's 3-way SGBM alone, with the settings that ours gives it, from near to far. */
+class PeerRun {
+public:
+  PeerRun (const View &view, double focal_baseline, const MatchSettings &m)
+      : judge_ (view, focal_baseline), unit_ (view.depth_unit_m), focal_baseline_ (focal_baseline)
+  {
+    const int least = int (focal_baseline / view.far_m),
+              count = (int (focal_baseline / view.near_m) - least + 17) / 16 * 16,
+              block = m.block_size > 0 ? m.block_size : 3, area = block * block;
+    least_ = least;
+    matcher_ = cv::StereoSGBM::create (least, count, block, 8 * area, 32 * area,
+        m.left_right_max_difference, 31, m.uniqueness_ratio, m.speckle_window_size, m.speckle_range,
+        cv::StereoSGBM::MODE_SGBM_3WAY);
+  }
+  void run (const Shot &shot, bool counts)
+  {
+    const auto begin = std::chrono::steady_clock::now ();
+    cv::cvtColor (shot.left, left_, cv::COLOR_RGBA2GRAY);
+    cv::cvtColor (shot.right, right_, cv::COLOR_RGBA2GRAY);
+    matcher_->compute (left_, right_, raw_);
+    const double ms = ms_since (begin);
+    if (!counts)
+      return;
+    times_.push_back (ms);
+    depth_.create (raw_.size (), CV_16U);
+    for (int y = 0; y < raw_.rows; y++)
+      for (int x = 0; x < raw_.cols; x++) {
+        const int d = raw_.at<std::int16_t> (y, x);
+        depth_.at<std::uint16_t> (y, x) =
+            d >= 16 * least_ && d > 0
+                ? std::uint16_t (std::lround (focal_baseline_ * 16 / d / unit_))
+                : 0;
+      }
+    judge_.add (shot, depth_);
+  }
+  SceneRow row () { return judge_.row ("OpenCV SGBM 3-way, whole picture", times_); }
+
+private:
+  Judge judge_;
+  double unit_, focal_baseline_;
+  int least_;
+  cv::Ptr<cv::StereoSGBM> matcher_;
+  cv::Mat left_, right_, raw_, depth_;
+  std::vector<double> times_;
+};
+
+} // namespace
+
 Status
 run_scene (const SceneJob &job, std::vector<SceneRow> &rows)
 {
   std::unique_ptr<Scene> scene;
   if (Status s = Scene::create (job.scene, scene); !s.ok ())
     return s;
-  std::vector<Shot> shots (std::size_t (job.frames));
+  std::vector<Shot> shots (std::size_t (job.frames) + 1);
   for (std::size_t i = 0; i < shots.size (); i++)
-    if (Status s = render (*scene, job.scene, 0.04 * double (i) + double (i / 3), shots[i]);
-        !s.ok ())
+    if (Status s = render (*scene, job.scene, 0.04 * double (i), shots[i]); !s.ok ())
       return s;
-  View view = scene->rig ().views[0];
-  StereoDepth stereo;
-  if (Status s = stereo.set (view, job.settings); !s.ok ())
+  const View &view = scene->rig ().views[0];
+  const double focal_baseline = view.intrinsics.fx * job.scene.baseline_m;
+  OursRun whole ("stereodepth, whole picture", view, focal_baseline, false),
+      roi ("stereodepth, person's ROI", view, focal_baseline, true);
+  PeerRun peer (view, focal_baseline, job.settings.match);
+  if (Status s = whole.set (view, job.settings); !s.ok ())
     return s;
-  Judge ours (view, view.intrinsics.fx * job.scene.baseline_m);
-  std::vector<double> times;
-  cv::Mat depth (shots[0].depth.size (), CV_16U), colour (depth.size (), CV_8UC4);
-  for (const Shot &shot : shots)
-    for (int round = 0; round < job.rounds; round++) {
-      const auto begin = std::chrono::steady_clock::now ();
-      if (Status s =
-              stereo.process (view_of<const Rgbx> (shot.left), view_of<const Rgbx> (shot.right),
-                  {0, {0, 0, depth.cols, depth.rows}, view_of<std::uint16_t> (depth),
-                      view_of<Rgbx> (colour), 0});
-          !s.ok ())
+  if (Status s = roi.set (view, job.settings); !s.ok ())
+    return s;
+  for (const Shot &shot : shots) {
+    const bool counts = &shot != &shots[0];
+    peer.run (shot, counts);
+    for (OursRun *ours : {&whole, &roi})
+      if (Status s = ours->run (shot, counts); !s.ok ())
         return s;
-      times.push_back (ms_since (begin));
-      if (!round)
-        ours.add (shot, depth);
-      if (!round && std::getenv ("F4PNG") && &shot == &shots[0]) {
-        cv::Mat o;
-        depth.convertTo (o, CV_8U, 1 / 40.);
-        cv::imwrite ("/tmp/f4-scene.png", o);
-        shot.depth.convertTo (o, CV_8U, 1 / 40.);
-        cv::imwrite ("/tmp/f4-truth.png", o);
-        cv::imwrite ("/tmp/f4-left.png", shot.left);
-        cv::Mat e (depth.size (), CV_8UC3, cv::Scalar::all (0));
-        for (int y = 0; y < e.rows; y++)
-          for (int x = 0; x < e.cols; x++) {
-            int z = depth.at<ushort> (y, x), t = shot.depth.at<ushort> (y, x);
-            auto &p = e.at<cv::Vec3b> (y, x);
-            if (z && (!t || std::abs (z - t) > 500))
-              p = {0, 0, 255};
-            else if (z)
-              p = {90, 90, 90};
-            else if (t)
-              p = {255, 0, 0};
-          }
-        cv::imwrite ("/tmp/f4-err.png", e);
-      }
-    }
-  rows.push_back (ours.row ("stereodepth", times));
+  }
+  std::printf ("person's ROI: %.0f %% of the picture, person: %.0f %%\n",
+      100.0 * shots[0].box.width * shots[0].box.height / shots[0].depth.total (),
+      100.0 * cv::countNonZero (shots[0].mask) / double (shots[0].mask.total ()));
+  rows = {whole.row (), roi.row (), peer.row ()};
   return {};
 }
 
