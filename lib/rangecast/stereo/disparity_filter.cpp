@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <opencv2/core/hal/intrin.hpp>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace rangecast {
@@ -24,6 +25,13 @@ grey_at (const std::uint8_t *row, int x16, int width)
 {
   const int x = std::clamp (x16 >> 4, 0, width - 1), f = x16 & 15;
   return (row[x] * (16 - f) + row[std::min (x + 1, width - 1)] * f + 8) >> 4;
+}
+
+/* What cv::parallel_for_ wants to hear: as many pieces as threads; it has as many as cores. */
+double
+n_stripes (int n_threads)
+{
+  return n_threads > 0 ? n_threads : cv::getNumThreads ();
 }
 
 } // namespace
@@ -209,25 +217,34 @@ DisparityFilter::clear_rims (
   sample (colour, disparity, radius);
   cv::erode (disparity, lowest_, around);
   cv::dilate (disparity, highest_, around);
-  for (int y = 0; y < disparity.rows; y++) {
-    auto to = disparity.ptr<std::int16_t> (y);
-    const auto lowest = lowest_.ptr<std::int16_t> (y), highest = highest_.ptr<std::int16_t> (y);
-    const auto pixels = colour.ptr<cv::Vec4b> (y);
-    for (int x = 0; x < disparity.cols; x++) {
-      const bool valid = to[x] >= least;
-      if (valid ? lowest[x] >= to[x] - std::max (16, (to[x] + offset) * share >> 16)
-                : highest[x] < least)
-        continue; /* a surface, or nothing near */
-      const int d = valid ? to[x] : likely (pixels[x], x, y, radius, least);
-      if (d < least)
-        continue;
-      const int most = std::max (16, (d + offset) * share >> 16);
-      const Votes votes = vote (pixels[x], x, y, d, radius, most, least);
-      if (valid && votes.far + votes.none > votes.same)
-        to[x] = static_cast<std::int16_t> (least - 16);
-      else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
-        to[x] = static_cast<std::int16_t> (d);
-    }
+  const auto work = [&] (const cv::Range &rows) {
+    for (int y = rows.start; y < rows.end; y++)
+      clear_rims_of_row (colour, y, radius, share, offset, least, disparity);
+  };
+  cv::parallel_for_ (cv::Range (0, disparity.rows), work, n_stripes (n_threads_));
+}
+
+void
+DisparityFilter::clear_rims_of_row (const cv::Mat &colour, int y, int radius, int share, int offset,
+    int least, cv::Mat &disparity) const
+{
+  auto to = disparity.ptr<std::int16_t> (y);
+  const auto lowest = lowest_.ptr<std::int16_t> (y), highest = highest_.ptr<std::int16_t> (y);
+  const auto pixels = colour.ptr<cv::Vec4b> (y);
+  for (int x = 0; x < disparity.cols; x++) {
+    const bool valid = to[x] >= least;
+    if (valid ? lowest[x] >= to[x] - std::max (16, (to[x] + offset) * share >> 16)
+              : highest[x] < least)
+      continue; /* a surface, or nothing near */
+    const int d = valid ? to[x] : likely (pixels[x], x, y, radius, least);
+    if (d < least)
+      continue;
+    const int most = std::max (16, (d + offset) * share >> 16);
+    const Votes votes = vote (pixels[x], x, y, d, radius, most, least);
+    if (valid && votes.far + votes.none > votes.same)
+      to[x] = static_cast<std::int16_t> (least - 16);
+    else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
+      to[x] = static_cast<std::int16_t> (d);
   }
 }
 
@@ -271,12 +288,18 @@ fill_line (const cv::Vec4b *colour, std::size_t colour_step, std::int16_t *dispa
 void
 DisparityFilter::fill_gaps (const cv::Mat &colour, int width, int least, cv::Mat &disparity)
 {
-  for (int y = 0; y < disparity.rows; y++)
-    fill_line (colour.ptr<cv::Vec4b> (y), 1, disparity.ptr<std::int16_t> (y), 1, disparity.cols,
-        width, least);
-  for (int x = 0; x < disparity.cols; x++)
-    fill_line (colour.ptr<cv::Vec4b> (0) + x, colour.step / sizeof (cv::Vec4b),
-        disparity.ptr<std::int16_t> (0) + x, disparity.step1 (), disparity.rows, width, least);
+  const auto rows = [&] (const cv::Range &range) {
+    for (int y = range.start; y < range.end; y++)
+      fill_line (colour.ptr<cv::Vec4b> (y), 1, disparity.ptr<std::int16_t> (y), 1, disparity.cols,
+          width, least);
+  };
+  const auto columns = [&] (const cv::Range &range) {
+    for (int x = range.start; x < range.end; x++)
+      fill_line (colour.ptr<cv::Vec4b> (0) + x, colour.step / sizeof (cv::Vec4b),
+          disparity.ptr<std::int16_t> (0) + x, disparity.step1 (), disparity.rows, width, least);
+  };
+  cv::parallel_for_ (cv::Range (0, disparity.rows), rows, n_stripes (n_threads_));
+  cv::parallel_for_ (cv::Range (0, disparity.cols), columns, n_stripes (n_threads_));
 }
 
 } // namespace rangecast

@@ -12,6 +12,9 @@ namespace rangecast {
  *  disparities' size. Keeps its memory between pictures. */
 class DisparityFilter {
 public:
+  /** Threads for what takes long; 0 = as many as there are cores. */
+  void set_threads (int n_threads) { n_threads_ = n_threads; }
+
   /** Clears pixels whose surroundings look otherwise in the right picture than in the left one: of
    *  7 x 7 pixels, those with a disparity differ on average, after the mean difference is taken off
    *  (cameras may be of different brightness), by more than `tolerance` of the patch's contrast and
@@ -50,10 +53,12 @@ private:
   void for_window (const cv::Vec4b &own, int x, int y, int radius, const Count &count) const;
   [[nodiscard]] Votes vote (
       const cv::Vec4b &own, int x, int y, int d, int radius, int most, int least) const;
+  void clear_rims_of_row (const cv::Mat &colour, int y, int radius, int share, int offset,
+      int least, cv::Mat &disparity) const;
   [[nodiscard]] int likely (const cv::Vec4b &own, int x, int y, int radius, int least) const;
 
   cv::Mat samples_[4]; /* CV_16S: three colours and disparity at half the size, padded by pad_ */
-  int pad_ = 0;
+  int pad_ = 0, n_threads_ = 0;
   cv::Mat difference_, contrast_, valid_, blurred_, count_, means_, copy_, lowest_, highest_;
   std::vector<std::int16_t> nearest_;
 };

@@ -18,6 +18,7 @@ DisparityFinder::set (
 {
   pair_ = pair;
   settings_ = settings;
+  filter_.set_threads (settings.n_threads);
   const double farthest =
       settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
   least_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
