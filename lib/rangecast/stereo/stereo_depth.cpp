@@ -26,7 +26,7 @@ as_view (const cv::Mat &mat)
 } // namespace
 
 Status
-StereoDepth::set (const View &view, const StereoSettings &settings)
+StereoDepth::set (const View &view, const StereoSettings &settings, bool with_third)
 {
   if (Status s = rectifier_.set (view); !s.ok ())
     return s;
@@ -35,6 +35,10 @@ StereoDepth::set (const View &view, const StereoSettings &settings)
       range.intrinsics.fx * rectifier_.baseline_m (), rectifier_.principal_offset ()};
   if (Status s = finder_.set (pair, settings, range.near_m, range.far_m); !s.ok ())
     return {s.code (), "view " + std::to_string (view.id) + ": " + s.message ()};
+  with_third_ = with_third;
+  if (with_third)
+    if (Status s = third_.set (view, range, pair.focal_baseline, settings); !s.ok ())
+      return s;
   view_ = view;
   settings_ = settings;
   changes_.forget ();
@@ -62,14 +66,18 @@ StereoDepth::disparity () const
 }
 
 Status
-StereoDepth::take (ImageView<const Rgbx> left, ImageView<const Rgbx> right)
+StereoDepth::take (
+    ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third)
 {
-  for (const auto &picture : {left, right})
+  has_third_ = with_third_ && !third.empty ();
+  for (const auto &picture : {left, right, has_third_ ? third : left})
     if (picture.width != view_.width || picture.height != view_.height)
       return {StatusCode::kBadSize, "stereo: a picture does not have the view's size"};
   try {
     rectify (0, left);
     rectify (1, right);
+    if (has_third_)
+      third_.take (as_mat (left), as_mat (third));
     changes_.look (pictures_[0]);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};
@@ -136,8 +144,13 @@ StereoDepth::is_suspect (const RangeImage &image) const
 Status
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
-  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, everywhere ? 0 : near_now_m_,
-      everywhere ? 0 : far_now_m_);
+  const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
+  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m);
+  if (status.ok () && has_third_) {
+    status = third_.find (image.roi, near_m, far_m);
+    if (status.ok ())
+      fuse_disparities (finder_.disparity (), third_.disparity (), third_.precision ());
+  }
   if (status.ok ())
     status = to_depth_.convert (disparity (), image.depth);
   return status;

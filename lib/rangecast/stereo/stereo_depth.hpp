@@ -9,6 +9,7 @@
 #include "depth.hpp"
 #include "disparity_finder.hpp"
 #include "rectification.hpp"
+#include "third_pair.hpp"
 
 namespace rangecast {
 
@@ -17,7 +18,8 @@ namespace rangecast {
 class StereoDepth {
 public:
   /** @param view  a raw view with a right camera; its near and far set the disparity range */
-  Status set (const View &view, const StereoSettings &settings);
+  /** @param with_third  the view's third camera takes part: take() gets its pictures */
+  Status set (const View &view, const StereoSettings &settings, bool with_third = false);
 
   /** The view of the range images. */
   [[nodiscard]] const View &range_view () const { return rectifier_.range_view (); }
@@ -27,8 +29,10 @@ public:
 
   /** Takes and rectifies both pictures. Their memory must stay until match() is done.
    *  @param left, right  of the view's size
+   *  @param third        the same; empty if there is none, then this pair goes without
    *  @return kBadSize if a picture has another size */
-  Status take (ImageView<const Rgbx> left, ImageView<const Rgbx> right);
+  Status take (
+      ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third = {});
 
   /** Whether anything outside of the ROI has changed in the left picture since the last one that
    *  was matched as a whole (ChangeDetector). */
@@ -42,9 +46,10 @@ public:
    *  @return kBadSize if the ROI is not in the view */
   Status match (const RangeImage &image);
 
-  Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image)
+  Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image,
+      ImageView<const Rgbx> third = {})
   {
-    const Status status = take (left, right);
+    const Status status = take (left, right, third);
     return status.ok () ? match (image) : status;
   }
   /** @} */
@@ -63,6 +68,8 @@ private:
   StereoSettings settings_;
   Rectifier rectifier_;
   DisparityFinder finder_;
+  ThirdPair third_;
+  bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */

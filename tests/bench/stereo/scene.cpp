@@ -112,13 +112,13 @@ namespace {
  */
 class OursRun {
 public:
-  OursRun (const char *name, const View &view, double focal_baseline, bool roi)
-      : name_ (name), judge_ (view, focal_baseline), roi_ (roi)
+  OursRun (const char *name, const View &view, double focal_baseline, bool roi, bool third)
+      : name_ (name), judge_ (view, focal_baseline), roi_ (roi), third_ (third)
   {
   }
   Status set (const View &view, const StereoSettings &settings)
   {
-    return stereo_.set (view, settings);
+    return stereo_.set (view, settings, third_);
   }
   Status run (const Shot &shot, bool counts)
   {
@@ -132,7 +132,8 @@ public:
     const auto begin = std::chrono::steady_clock::now ();
     const Status status =
         stereo_.process (view_of<const Rgbx> (shot.left), view_of<const Rgbx> (shot.right),
-            {0, roi, view_of<std::uint16_t> (depth), view_of<Rgbx> (colour), 0});
+            {0, roi, view_of<std::uint16_t> (depth), view_of<Rgbx> (colour), 0},
+            third_ ? view_of<const Rgbx> (shot.third) : ImageView<const Rgbx>{});
     const double ms = ms_since (begin);
     if (counts) {
       times_.push_back (ms);
@@ -147,7 +148,7 @@ private:
   std::string name_;
   StereoDepth stereo_;
   Judge judge_;
-  bool roi_, ran_ = false;
+  bool roi_, third_, ran_ = false;
   cv::Mat depth_, colour_;
   std::vector<double> times_;
 };
@@ -212,24 +213,28 @@ run_scene (const SceneJob &job, std::vector<SceneRow> &rows)
       return s;
   const View &view = scene->rig ().views[0];
   const double focal_baseline = view.intrinsics.fx * job.scene.baseline_m;
-  OursRun whole ("stereodepth, whole picture", view, focal_baseline, false),
-      roi ("stereodepth, person's ROI", view, focal_baseline, true);
+  OursRun whole ("stereodepth, whole picture", view, focal_baseline, false, false),
+      roi ("stereodepth, person's ROI", view, focal_baseline, true, false),
+      whole3 ("stereodepth, third camera, whole picture", view, focal_baseline, false, true),
+      roi3 ("stereodepth, third camera, person's ROI", view, focal_baseline, true, true);
   PeerRun peer (view, focal_baseline, job.settings.match);
-  if (Status s = whole.set (view, job.settings); !s.ok ())
-    return s;
-  if (Status s = roi.set (view, job.settings); !s.ok ())
-    return s;
+  const std::vector<OursRun *> all = {&whole, &roi, &whole3, &roi3};
+  for (OursRun *ours : all)
+    if (Status s = ours->set (view, job.settings); !s.ok ())
+      return s;
   for (const Shot &shot : shots) {
     const bool counts = &shot != &shots[0];
     peer.run (shot, counts);
-    for (OursRun *ours : {&whole, &roi})
+    for (OursRun *ours : all)
       if (Status s = ours->run (shot, counts); !s.ok ())
         return s;
   }
   std::printf ("person's ROI: %.0f %% of the picture, person: %.0f %%\n",
       100.0 * shots[0].box.width * shots[0].box.height / shots[0].depth.total (),
       100.0 * cv::countNonZero (shots[0].mask) / double (shots[0].mask.total ()));
-  rows = {whole.row (), roi.row (), peer.row ()};
+  for (OursRun *ours : all)
+    rows.push_back (ours->row ());
+  rows.push_back (peer.row ());
   return {};
 }
 
