@@ -19,6 +19,7 @@ struct StereoSettings {
   /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
    *  matched so as not to be taken for something nearer. */
   double search_far_m = 0;
+  double steady = 0; ///< 0 (off) to 1: how much depth is held still where nothing moves
   int n_threads = 0; ///< that match one pair; 0 = as many as there are cores
 
   friend bool operator== (const StereoSettings &, const StereoSettings &) = default;
@@ -55,6 +56,10 @@ public:
   {
     return 16 * pair_.focal_baseline / depth_m;
   }
+
+  /** Disparities to look for, pixels: of the pictures as they are. */
+  [[nodiscard]] int least () const { return least_; }
+  [[nodiscard]] int most () const { return most_; }
 
 private:
   Status choose_range (double near_m, double far_m);

@@ -41,6 +41,10 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
       return s;
   view_ = view;
   settings_ = settings;
+  mirror_.reset ();
+  if (settings.steady > 0)
+    steady_.set (
+        view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
   changes_.forget ();
   near_now_m_ = far_now_m_ = 0;
   last_roi_ = {};
@@ -156,6 +160,18 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   return status;
 }
 
+void
+StereoDepth::check_mirror ()
+{
+  if (mirror_.decided ())
+    return;
+  try {
+    mirror_.look (pictures_[0], pictures_[1], finder_.least (), finder_.most ());
+  } catch (const cv::Exception &) {
+    mirror_.reset (); /* too small a picture to say */
+  }
+}
+
 Status
 StereoDepth::match (const RangeImage &image)
 {
@@ -171,14 +187,19 @@ StereoDepth::match (const RangeImage &image)
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to cut the pictures"};
   }
   const bool whole = roi.width == view_.width && roi.height == view_.height;
-  if (whole)
+  if (whole) {
     changes_.remember ();
+    check_mirror ();
+  }
   const bool everywhere = whole || near_now_m_ <= 0;
   Status status = find (image, everywhere);
   if (status.ok () && !everywhere && is_suspect (image))
     status = find (image, true);
-  if (status.ok ())
-    learn_range (image);
+  if (!status.ok ())
+    return status;
+  learn_range (image);
+  if (settings_.steady > 0)
+    steady_.apply (image);
   return status;
 }
 

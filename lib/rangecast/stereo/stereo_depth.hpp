@@ -8,7 +8,9 @@
 #include "change_detector.hpp"
 #include "depth.hpp"
 #include "disparity_finder.hpp"
+#include "mirror_check.hpp"
 #include "rectification.hpp"
+#include "steady_filter.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {
@@ -54,6 +56,17 @@ public:
   }
   /** @} */
 
+  /** Whether left and right look exchanged (MirrorCheck): known after the first whole pictures. */
+  [[nodiscard]] bool looks_mirrored () const { return mirror_.mirrored (); }
+
+  /** What was held still is not compared with what comes: after a gap in the stream. */
+  void forget ()
+  {
+    changes_.forget ();
+    steady_.forget ();
+    near_now_m_ = far_now_m_ = 0;
+  }
+
   /** The disparities of the last picture, 1/16 pixel with equal principal points, 0 = no match; of
    *  its ROI. */
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
@@ -61,6 +74,7 @@ public:
 private:
   void rectify (int camera, ImageView<const Rgbx> picture);
   Status find (const RangeImage &image, bool everywhere);
+  void check_mirror ();
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
@@ -72,6 +86,8 @@ private:
   bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
+  MirrorCheck mirror_;
+  SteadyFilter steady_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
   cv::Mat rectified_[2];
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
