@@ -9,7 +9,11 @@
  *
  * An element downstream can tell which part of the picture it wants with a custom upstream event
  * `GstRangeRoi` (view-id, x, y, width, height: uint); roiextract does. Then only that part is
- * matched, but for one full picture every #GstStereoDepth:refresh-interval frames.
+ * matched, at the depths where its surfaces were, but for one full picture every
+ * #GstStereoDepth:refresh-interval frames.
+ *
+ * A third camera on the request pad `third`, beside or above the left one, fills in what the right
+ * one does not see. It needs a rig file that has it.
  *
  * ## Example launch line
  * |[
@@ -66,8 +70,14 @@ enum {
   PROP_SPECKLE_WINDOW_SIZE,
   PROP_SPECKLE_RANGE,
   PROP_LEFT_RIGHT_MAX_DIFFERENCE,
+  PROP_PATCH_TOLERANCE,
   PROP_FLYING_PIXEL_STEP,
+  PROP_SILHOUETTE_RADIUS,
+  PROP_GAP_WIDTH,
+  PROP_SEARCH_FAR,
   PROP_REFRESH_INTERVAL,
+  PROP_STEADY,
+  PROP_N_THREADS,
   PROP_STATS
 };
 
@@ -89,16 +99,17 @@ struct GstStereoDepthPrivate {
   std::mutex lock; /* guards what follows; never held across a push, event or message */
   StereoProperties properties;
   Roi wanted; /* of the last GstRangeRoi event; empty: everything */
-  guint64 frames = 0, restricted_frames = 0;
+  guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0;
   GstClockTime match_time = 0;
 
   /* streaming thread only */
   GstAggregatorPad *pads[2] = {nullptr, nullptr}; /* left, right; owned by the element */
   std::unique_ptr<gstrange::PairMatcher> matcher;
-  GstVideoInfo info[2];
-  bool have_info[2] = {false, false};
-  bool negotiate = true;
-  PictureReader readers[2];
+  gstrange::PairMatcher::Pair pair; /* waits for the third camera's picture; may be empty */
+  GstVideoInfo info[3];             /* left, right, third */
+  bool have_info[3] = {false, false, false};
+  bool negotiate = true, said_mirrored = false;
+  PictureReader readers[3];
   rangecast::StereoDepth core;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstBufferPool *pool = nullptr;
@@ -114,6 +125,8 @@ static GstStaticPadTemplate left_template = GST_STATIC_PAD_TEMPLATE ("left", GST
     GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
 static GstStaticPadTemplate right_template = GST_STATIC_PAD_TEMPLATE ("right", GST_PAD_SINK,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
+static GstStaticPadTemplate third_template = GST_STATIC_PAD_TEMPLATE ("third", GST_PAD_SINK,
+    GST_PAD_REQUEST, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 
@@ -208,11 +221,15 @@ make_view (const StereoProperties &p, int width, int height, View &view)
 static Status
 configure_core (GstStereoDepthPrivate *priv)
 {
-  const GstVideoInfo &left = priv->info[0], &right = priv->info[1];
-  if (left.width != right.width || left.height != right.height)
-    return {StatusCode::kBadSize, "pad right is " + size_text (right.width, right.height) +
-                                      " but pad left is " + size_text (left.width, left.height) +
-                                      "; expected the same size"};
+  static constexpr const char *kNames[] = {"left", "right", "third"};
+  const GstVideoInfo &left = priv->info[0];
+  for (int i = 1; i < 3; i++)
+    if (const GstVideoInfo &other = priv->info[i];
+        priv->have_info[i] && (left.width != other.width || left.height != other.height))
+      return {StatusCode::kBadSize, std::string ("pad ") + kNames[i] + " is " +
+                                        size_text (other.width, other.height) +
+                                        " but pad left is " + size_text (left.width, left.height) +
+                                        "; expected the same size"};
   StereoProperties properties;
   {
     std::lock_guard guard (priv->lock);
@@ -222,10 +239,15 @@ configure_core (GstStereoDepthPrivate *priv)
   View view;
   if (Status s = make_view (properties, left.width, left.height, view); !s.ok ())
     return s;
-  if (Status s = priv->core.set (view, properties.core); !s.ok ())
+  if (priv->have_info[2] && !view.third)
+    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
+                                   "rig with a file that has one in view " +
+                                       std::to_string (view.id)};
+  if (Status s = priv->core.set (view, properties.core, priv->have_info[2]); !s.ok ())
     return s;
-  for (int i = 0; i < 2; i++)
-    if (!priv->readers[i].set (priv->info[i]))
+  priv->said_mirrored = false;
+  for (int i = 0; i < 3; i++)
+    if (priv->have_info[i] && !priv->readers[i].set (priv->info[i]))
       return {StatusCode::kUnsupported, "cannot convert the pictures to RGBx"};
   return {};
 }
@@ -262,7 +284,7 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    const int side = pad == priv->pads[0] ? 0 : 1;
+    const int side = pad == priv->pads[0] ? 0 : pad == priv->pads[1] ? 1 : 2;
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
     if (!gst_video_info_from_caps (&priv->info[side], caps)) {
@@ -333,10 +355,13 @@ next_roi (GstStereoDepthPrivate *priv)
 }
 
 static Status
-match_pictures (GstStereoDepthPrivate *priv, GstBuffer *output, GstClockTime capture)
+match_pictures (
+    GstStereoDepthPrivate *priv, bool with_third, GstBuffer *output, GstClockTime capture)
 {
   const GstClockTime begin = gst_util_get_timestamp ();
-  if (Status s = priv->core.take (priv->readers[0].view (), priv->readers[1].view ()); !s.ok ())
+  if (Status s = priv->core.take (priv->readers[0].view (), priv->readers[1].view (),
+          with_third ? priv->readers[2].view () : ImageView<const Rgbx>{});
+      !s.ok ())
     return s;
   const Roi roi = next_roi (priv);
   if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, capture); !s.ok ())
@@ -347,30 +372,51 @@ match_pictures (GstStereoDepthPrivate *priv, GstBuffer *output, GstClockTime cap
   const Status status = priv->core.match (frame.views ()[0]);
   std::lock_guard guard (priv->lock);
   priv->frames++;
+  priv->third_frames += with_third;
   priv->match_time += gst_util_get_timestamp () - begin;
   return status;
 }
 
+/* @param third  may be null */
 static Status
-match_pair (GstStereoDepthPrivate *priv, const gstrange::PairMatcher::Pair &pair, GstBuffer *output,
-    GstClockTime capture)
+match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output, GstClockTime capture)
 {
-  if (!priv->readers[0].open (pair.first))
-    return {StatusCode::kBadData, "pad left: a buffer is smaller than its caps say"};
-  if (!priv->readers[1].open (pair.second)) {
-    priv->readers[0].close ();
-    return {StatusCode::kBadData, "pad right: a buffer is smaller than its caps say"};
-  }
-  const Status status = match_pictures (priv, output, capture);
-  priv->readers[0].close ();
-  priv->readers[1].close ();
+  static constexpr const char *kNames[] = {"left", "right", "third"};
+  GstBuffer *buffers[] = {priv->pair.first, priv->pair.second, third};
+  Status status;
+  int n = 0;
+  for (; n < 3 && buffers[n] && status.ok (); n++)
+    if (!priv->readers[n].open (buffers[n])) {
+      status = {StatusCode::kBadData,
+          std::string ("pad ") + kNames[n] + ": a buffer is smaller than its caps say"};
+      break;
+    }
+  if (status.ok ())
+    status = match_pictures (priv, third != nullptr, output, capture);
+  while (n-- > 0)
+    priv->readers[n].close ();
   return status;
 }
 
-static GstFlowReturn
-push_pair (GstStereoDepth *self, const gstrange::PairMatcher::Pair &pair)
+/* One warning a stream: the depth of exchanged cameras is nonsense, but no frame is wrong. */
+static void
+warn_if_mirrored (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
+  if (priv->said_mirrored || !priv->core.looks_mirrored ())
+    return;
+  priv->said_mirrored = true;
+  GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+      ("The left and right cameras seem to be exchanged: swap what is linked to pads left and "
+       "right"),
+      ("hardly anything matches; with the pictures exchanged, much does"));
+}
+
+static GstFlowReturn
+push_pair (GstStereoDepth *self, GstBuffer *third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  const gstrange::PairMatcher::Pair &pair = priv->pair;
   auto aggregator = GST_AGGREGATOR (self);
   GstBuffer *output = nullptr;
   GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
@@ -378,11 +424,12 @@ push_pair (GstStereoDepth *self, const gstrange::PairMatcher::Pair &pair)
     return flow;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const GstClockTime capture = gstrange::capture_time_of (priv->pads[0], pair.first, live);
-  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, pair, output, capture));
+  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, third, output, capture));
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;
   }
+  warn_if_mirrored (self);
   const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (pair.first)
                                     ? GST_BUFFER_DURATION (pair.first)
                                     : priv->frame_duration;
@@ -393,32 +440,97 @@ push_pair (GstStereoDepth *self, const gstrange::PairMatcher::Pair &pair)
   return gst_aggregator_finish_buffer (aggregator, output);
 }
 
+/* The third camera's picture for the pair that waits: none (null) if it is lost or its stream has
+ * ended, for depth of two cameras is better than none.
+ * @return GST_AGGREGATOR_FLOW_NEED_DATA while it may still come */
 static GstFlowReturn
-gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean)
+take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, GstBuffer **third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
+  if (!pad)
+    return GST_FLOW_OK;
+  const auto sink = GST_AGGREGATOR_PAD (pad);
+  const GstClockTime left = gstrange::running_time_of (priv->pads[0], priv->pair.first);
+  const GstClockTime tolerance = GST_CLOCK_TIME_IS_VALID (frame_duration) ? frame_duration / 2 : 0;
+  GstFlowReturn flow = GST_FLOW_OK;
+  while (true) {
+    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (sink);
+    if (!buffer) {
+      flow =
+          gst_aggregator_pad_is_eos (sink) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+      break;
+    }
+    const GstClockTime time = gstrange::running_time_of (sink, buffer);
+    const bool gap = gstrange::is_gap (buffer);
+    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (left);
+    const GstClockTime last =
+        timed && gap ? gstrange::gap_end (time, buffer, tolerance) : time + tolerance;
+    gst_buffer_unref (buffer);
+    if (timed && (time > left + tolerance || (gap && last >= left)))
+      break;
+    if (!gap && (!timed || last >= left)) {
+      *third = gst_aggregator_pad_pop_buffer (sink);
+      break;
+    }
+    gst_aggregator_pad_drop_buffer (sink);
+    std::lock_guard guard (priv->lock);
+    priv->dropped_third += !gap;
+  }
+  gst_object_unref (pad);
+  return flow;
+}
+
+static void
+forget_pair (GstStereoDepthPrivate *priv)
+{
+  gst_clear_buffer (&priv->pair.first);
+  gst_clear_buffer (&priv->pair.second);
+}
+
+static GstFlowReturn
+gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   if (priv->have_info[0] && priv->info[0].fps_n > 0)
     duration = gst_util_uint64_scale_int (GST_SECOND, priv->info[0].fps_d, priv->info[0].fps_n);
-  gstrange::PairMatcher::Pair pair;
-  GstFlowReturn flow = priv->matcher->take (duration, pair);
-  if (flow != GST_FLOW_OK)
+  if (!priv->pair.first)
+    if (const GstFlowReturn flow = priv->matcher->take (duration, priv->pair); flow != GST_FLOW_OK)
+      return flow;
+  GstBuffer *third = nullptr;
+  if (const GstFlowReturn flow = take_third (self, duration, timeout, &third); flow != GST_FLOW_OK)
     return flow;
-  if (priv->negotiate)
-    flow = negotiate (self);
+  GstFlowReturn flow = priv->negotiate ? negotiate (self) : GST_FLOW_OK;
   if (flow == GST_FLOW_OK)
-    flow = push_pair (self, pair);
-  gst_buffer_unref (pair.first);
-  gst_buffer_unref (pair.second);
+    flow = push_pair (self, third);
+  gst_clear_buffer (&third);
+  forget_pair (priv);
   return flow;
 }
 
 static GstFlowReturn
 gst_stereo_depth_flush (GstAggregator *aggregator)
 {
-  GST_STEREO_DEPTH (aggregator)->priv->since_refresh = 0;
+  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  priv->since_refresh = 0;
+  priv->core.forget ();
+  forget_pair (priv);
   return GST_FLOW_OK;
+}
+
+static GstAggregatorPad *
+gst_stereo_depth_create_new_pad (
+    GstAggregator *aggregator, GstPadTemplate *pad_template, const gchar *, const GstCaps *)
+{
+  GstPad *there = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third");
+  if (there) {
+    gst_object_unref (there);
+    return nullptr;
+  }
+  return GST_AGGREGATOR_PAD (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", "third", "direction",
+      GST_PAD_SINK, "template", pad_template, nullptr));
 }
 
 /* ---- life ---- */
@@ -427,11 +539,12 @@ static gboolean
 gst_stereo_depth_start (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  priv->have_info[0] = priv->have_info[1] = false;
+  for (bool &have : priv->have_info)
+    have = false;
   priv->negotiate = true;
   priv->matcher->reset ();
   std::lock_guard guard (priv->lock);
-  priv->frames = priv->restricted_frames = 0;
+  priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
   priv->match_time = 0;
   priv->wanted = {};
   return TRUE;
@@ -442,6 +555,7 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   drop_pool (priv->pool);
+  forget_pair (priv);
   for (PictureReader &reader : priv->readers)
     reader.reset ();
   return TRUE;
@@ -505,8 +619,26 @@ gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, G
     case PROP_FLYING_PIXEL_STEP:
       p.core.flying_pixel_step = g_value_get_double (value);
       break;
+    case PROP_PATCH_TOLERANCE:
+      p.core.patch_tolerance = g_value_get_double (value);
+      break;
+    case PROP_SILHOUETTE_RADIUS:
+      p.core.silhouette_radius = g_value_get_int (value);
+      break;
+    case PROP_GAP_WIDTH:
+      p.core.gap_width = g_value_get_int (value);
+      break;
+    case PROP_SEARCH_FAR:
+      p.core.search_far_m = g_value_get_double (value);
+      break;
     case PROP_REFRESH_INTERVAL:
       p.refresh_interval = g_value_get_int (value);
+      break;
+    case PROP_STEADY:
+      p.core.steady = g_value_get_double (value);
+      break;
+    case PROP_N_THREADS:
+      p.core.n_threads = g_value_get_int (value);
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -580,8 +712,26 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
     case PROP_FLYING_PIXEL_STEP:
       g_value_set_double (value, p.core.flying_pixel_step);
       break;
+    case PROP_PATCH_TOLERANCE:
+      g_value_set_double (value, p.core.patch_tolerance);
+      break;
+    case PROP_SILHOUETTE_RADIUS:
+      g_value_set_int (value, p.core.silhouette_radius);
+      break;
+    case PROP_GAP_WIDTH:
+      g_value_set_int (value, p.core.gap_width);
+      break;
+    case PROP_SEARCH_FAR:
+      g_value_set_double (value, p.core.search_far_m);
+      break;
     case PROP_REFRESH_INTERVAL:
       g_value_set_int (value, p.refresh_interval);
+      break;
+    case PROP_STEADY:
+      g_value_set_double (value, p.core.steady);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, p.core.n_threads);
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
@@ -668,13 +818,13 @@ install_matching_properties (GObjectClass *c)
       g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgbm-3way)",
           GST_TYPE_STEREO_DEPTH_ALGORITHM, int (m.algorithm), kReady));
   install_int (c, PROP_BLOCK_SIZE, "block-size", "Block size",
-      "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 5 for the others)", 0, 51,
+      "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for the others)", 0, 51,
       m.block_size);
   install_int (c, PROP_UNIQUENESS_RATIO, "uniqueness-ratio", "Uniqueness ratio",
-      "Per cent by which the best match must beat the second (0 to 100, default 15)", 0, 100,
+      "Per cent by which the best match must beat the second (0 to 100, default 5)", 0, 100,
       m.uniqueness_ratio);
   install_int (c, PROP_SPECKLE_WINDOW_SIZE, "speckle-window-size", "Speckle window size",
-      "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 60)", 0,
+      "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 100)", 0,
       100000, m.speckle_window_size);
   install_int (c, PROP_SPECKLE_RANGE, "speckle-range", "Speckle range",
       "Disparity step within a patch, pixels (0 to 1000, default 2)", 0, 1000, m.speckle_range);
@@ -686,10 +836,34 @@ install_matching_properties (GObjectClass *c)
       "Points that fewer than 4 of 8 neighbours follow within this share of their depth are "
       "cleared (0 = off, to 1, default 0.02)",
       0, 1, kDefaults.flying_pixel_step);
+  install_double (c, PROP_PATCH_TOLERANCE, "patch-tolerance", "Patch tolerance",
+      "Points around which both pictures differ by more than this share of the contrast are "
+      "cleared "
+      "(0 = off, to 10, default 1)",
+      0, 10, kDefaults.patch_tolerance);
+  install_int (c, PROP_SILHOUETTE_RADIUS, "silhouette-radius", "Silhouette radius",
+      "Near a silhouette, points whose colour is that of the other side are cleared: pixels around "
+      "that are looked at (0 = off, to 64, default 10)",
+      0, 64, kDefaults.silhouette_radius);
+  install_int (c, PROP_GAP_WIDTH, "gap-width", "Gap width",
+      "Gaps in a surface of one colour up to so many pixels are filled (0 = off, to 1000, default "
+      "12)",
+      0, 1000, kDefaults.gap_width);
+  install_double (c, PROP_SEARCH_FAR, "search-far", "Search far",
+      "What lies beyond far is matched, too, so that it is not taken for something nearer, and "
+      "cleared: up to so many metres (default 0: to infinity; as far: nothing is there)",
+      0, 1e4, kDefaults.search_far_m);
   install_int (c, PROP_REFRESH_INTERVAL, "refresh-interval", "Refresh interval",
       "When downstream wants only a part, one full picture every so many frames (0: always all, to "
       "100000, default 30)",
       0, 100000, kDefaultRefreshInterval);
+  install_double (c, PROP_STEADY, "steady", "Steady",
+      "Hold depth still where nothing moves: each new depth counts 1 - 0.9 of this (0 = off, to 1, "
+      "default 0)",
+      0, 1, kDefaults.steady);
+  install_int (c, PROP_N_THREADS, "n-threads", "Threads",
+      "Threads that match one pair (0, the default: one a core; to 64)", 0, 64,
+      kDefaults.n_threads);
 }
 
 static void
@@ -706,16 +880,16 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   install_matching_properties (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, restricted-frames, dropped-left, dropped-right, "
-          "match-time "
-          "(ns)",
+          "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
+          "dropped-right, dropped-third, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
-  for (GstStaticPadTemplate *pad_template : {&left_template, &right_template, &src_template})
+  for (GstStaticPadTemplate *pad_template :
+      {&left_template, &right_template, &third_template, &src_template})
     gst_element_class_add_static_pad_template_with_gtype (
         element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Stereo depth", "Filter/Video",
-      "Makes range images of a stereo pair of cameras", "gst-rangecast");
+      "Makes range images of a stereo pair of cameras, or of three cameras", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_STEREO_DEPTH_ALGORITHM, GstPluginAPIFlags (0));
 
   aggregator_class->start = gst_stereo_depth_start;
@@ -724,6 +898,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->sink_event = gst_stereo_depth_sink_event;
   aggregator_class->src_event = gst_stereo_depth_src_event;
   aggregator_class->update_src_caps = gst_stereo_depth_update_src_caps;
+  aggregator_class->create_new_pad = gst_stereo_depth_create_new_pad;
   aggregator_class->clip = gstrange::clip_to_segment;
   aggregator_class->aggregate = gst_stereo_depth_aggregate;
 

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "matching.hpp"
 
+#include <algorithm>
+#include <atomic>
+#include <opencv2/core/utility.hpp>
 #include <string>
 
 namespace rangecast {
@@ -28,15 +31,42 @@ make_sgbm (const MatchSettings &s, int block_size, int disparities)
       0, disparities, block_size, 8 * area, 32 * area, 0, 31, s.uniqueness_ratio, 0, 0, mode);
 }
 
+static int
+block_of (const MatchSettings &s)
+{
+  return s.block_size > 0 ? s.block_size : s.algorithm == MatchAlgorithm::kBm ? 15 : 3;
+}
+
+static cv::Ptr<cv::StereoMatcher>
+make (const MatchSettings &s, int min_disparity, int disparities)
+{
+  const cv::Ptr<cv::StereoMatcher> matcher = s.algorithm == MatchAlgorithm::kBm
+                                                 ? make_bm (s, block_of (s), disparities)
+                                                 : make_sgbm (s, block_of (s), disparities);
+  matcher->setMinDisparity (min_disparity);
+  matcher->setSpeckleWindowSize (0); /* after other filters, see DisparityFinder */
+  matcher->setDisp12MaxDiff (s.left_right_max_difference);
+  return matcher;
+}
+
 Status
 Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
 {
   const bool bm = s.algorithm == MatchAlgorithm::kBm;
-  const int block = s.block_size > 0 ? s.block_size : bm ? 15 : 5;
+  const int block = block_of (s);
   if (block % 2 == 0 || (bm && block < 5) || block > 51)
     return {StatusCode::kBadValue, "stereo: block size " + std::to_string (block) +
                                        ", expected an odd number" +
                                        (bm ? " from 5 to 51" : " up to 51")};
+  settings_ = s;
+  matcher_.release ();
+  more_.clear ();
+  return set_range (min_disparity, max_disparity);
+}
+
+Status
+Matcher::set_range (int min_disparity, int max_disparity)
+{
   if (max_disparity <= min_disparity || max_disparity > kMaxDisparity ||
       min_disparity < -kMaxDisparity)
     return {StatusCode::kBadValue, "stereo: disparities " + std::to_string (min_disparity) +
@@ -45,11 +75,14 @@ Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
   min_disparity_ = min_disparity;
   disparities_ = (max_disparity - min_disparity + 1 + 15) / 16 * 16;
   try {
-    matcher_ = bm ? make_bm (s, block, disparities_) : make_sgbm (s, block, disparities_);
-    matcher_->setMinDisparity (min_disparity);
-    matcher_->setSpeckleWindowSize (s.speckle_window_size);
-    matcher_->setSpeckleRange (s.speckle_range);
-    matcher_->setDisp12MaxDiff (s.left_right_max_difference);
+    if (!matcher_)
+      matcher_ = make (settings_, min_disparity_, disparities_);
+    more_.push_back (matcher_);
+    for (const auto &matcher : more_) {
+      matcher->setMinDisparity (min_disparity_);
+      matcher->setNumDisparities (disparities_);
+    }
+    more_.pop_back ();
   } catch (const cv::Exception &) {
     return {StatusCode::kBadValue, "stereo: OpenCV refuses these settings"};
   }
@@ -65,6 +98,41 @@ Matcher::match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity)
     return {StatusCode::kNoSpace,
         "stereo: OpenCV's matcher failed; is the block larger than the picture?"};
   }
+  return {};
+}
+
+Status
+Matcher::match_stripes (
+    const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity)
+{
+  constexpr int kOverlap = 16; /* rows, at least: the ways of SGM come to rest in so many */
+  const int n = std::clamp (left.rows / (4 * kOverlap), 1, n_threads);
+  const int overlap = std::max (kOverlap, block_of (settings_));
+  while (static_cast<int> (more_.size ()) < n)
+    more_.push_back (make (settings_, min_disparity_, disparities_));
+  stripes_.resize (more_.size ());
+  disparity.create (left.size (), CV_16S);
+  std::atomic<bool> failed = false;
+  const auto work = [&] (const cv::Range &range) {
+    for (int i = range.start; i < range.end; i++) {
+      const cv::Range rows (left.rows * i / n, left.rows * (i + 1) / n);
+      const cv::Range wide (
+          std::max (0, rows.start - overlap), std::min (left.rows, rows.end + overlap));
+      const auto k = static_cast<std::size_t> (i);
+      try {
+        more_[k]->compute (left.rowRange (wide), right.rowRange (wide), stripes_[k]);
+        stripes_[k]
+            .rowRange (rows.start - wide.start, rows.end - wide.start)
+            .copyTo (disparity.rowRange (rows));
+      } catch (const cv::Exception &) {
+        failed = true;
+      }
+    }
+  };
+  cv::parallel_for_ (cv::Range (0, n), work, n);
+  if (failed)
+    return {StatusCode::kNoSpace,
+        "stereo: OpenCV's matcher failed; is the block larger than a stripe of the picture?"};
   return {};
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/calib3d.hpp>
+#include <vector>
 
 #include "../status.hpp"
 
@@ -11,9 +12,9 @@ enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way };
 
 struct MatchSettings {
   MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
-  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 5 for the others
-  int uniqueness_ratio = 15;         ///< per cent by which the best match must beat the second
-  int speckle_window_size = 60;      ///< pixels; smaller patches of like disparity go; 0 = off
+  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for the others
+  int uniqueness_ratio = 5;          ///< per cent by which the best match must beat the second
+  int speckle_window_size = 100;     ///< pixels; smaller patches of like disparity go; 0 = off
   int speckle_range = 2;             ///< pixels of disparity within a patch
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
 
@@ -29,6 +30,9 @@ public:
    */
   Status set (const MatchSettings &settings, int min_disparity, int max_disparity);
 
+  /** Other disparities at the same settings. @return kBadValue as set() */
+  Status set_range (int min_disparity, int max_disparity);
+
   [[nodiscard]] int min_disparity () const { return min_disparity_; }
   /** Columns left of a pixel that its match can need. */
   [[nodiscard]] int reach () const
@@ -36,13 +40,23 @@ public:
     return min_disparity_ + disparities_ > 0 ? min_disparity_ + disparities_ : 0;
   }
 
+  /** Columns right of a pixel that its match can need: for negative disparities. */
+  [[nodiscard]] int reach_right () const { return min_disparity_ < 0 ? -min_disparity_ : 0; }
+
   /** @param left, right  8 bit grey, the same size, rows agree
    *  @param[out] disparity  CV_16S, 1/16 pixel; below 16 * min_disparity() = no match
    *  @return kNoSpace if OpenCV failed */
   Status match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
 
+  /** The same in so many threads, each of which has a part of the rows and some beyond. */
+  Status match_stripes (
+      const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity);
+
 private:
+  MatchSettings settings_;
   cv::Ptr<cv::StereoMatcher> matcher_;
+  std::vector<cv::Ptr<cv::StereoMatcher>> more_; /* one a stripe */
+  std::vector<cv::Mat> stripes_;
   int min_disparity_ = 0, disparities_ = 0;
 };
 

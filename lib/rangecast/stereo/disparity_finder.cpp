@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "disparity_finder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rangecast {
+
+/* Rows and columns around the ROI that matching looks at, so that its edge is as good as its
+ * middle. */
+constexpr int kMargin = 8;
+
+Status
+DisparityFinder::set (
+    const PairGeometry &pair, const StereoSettings &settings, double near_m, double far_m)
+{
+  pair_ = pair;
+  settings_ = settings;
+  filter_.set_threads (settings.n_threads);
+  const double farthest =
+      settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
+  least_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
+  most_ = static_cast<int> (std::ceil (pair.focal_baseline / near_m - pair.offset));
+  most_ = std::max (most_, least_ + 1);
+  far_ = static_cast<int> (std::ceil (16 * (pair.focal_baseline / far_m - pair.offset)));
+  background_.forget ();
+  if (Status s = all_.set (settings.match, least_, most_); !s.ok ())
+    return s;
+  if (all_.reach () >= pair.width)
+    return {StatusCode::kBadValue, "near = " + std::to_string (near_m) +
+                                       " m needs disparities of " + std::to_string (all_.reach ()) +
+                                       " pixels, more than the picture is wide"};
+  return some_.set (settings.match, least_, most_);
+}
+
+/* The matcher for a part of the depths. Its number of disparities is a multiple of 16: what is left
+ * over goes to the near side. */
+Status
+DisparityFinder::choose_range (double near_m, double far_m)
+{
+  matcher_ = &all_;
+  if (!(near_m > 0) || !(far_m > near_m))
+    return {};
+  const int low = std::max (
+      least_, static_cast<int> (std::floor (pair_.focal_baseline / far_m - pair_.offset)));
+  const int high =
+      std::min (most_, static_cast<int> (std::ceil (pair_.focal_baseline / near_m - pair_.offset)));
+  if ((high - low + 16) / 16 >= (most_ - least_ + 16) / 16)
+    return {};
+  matcher_ = &some_;
+  return some_.set_range (low, std::max (high, low + 1));
+}
+
+/* Lays out the window that the ROI's matches lie in. Columns that would lie left or right of the
+ * picture repeat its edge: without them OpenCV matches nothing near the edges. */
+void
+DisparityFinder::place_window (const Roi &roi)
+{
+  const int reach = matcher_->reach (), reach_right = matcher_->reach_right ();
+  const int top = std::max (0, roi.y - kMargin);
+  const int bottom = std::min (pair_.height, roi.y + roi.height + kMargin);
+  const int x0 = std::max (0, roi.x - kMargin),
+            x1 = std::min (pair_.width, roi.x + roi.width + kMargin);
+  core_at_ = cv::Rect (x0, top, x1 - x0, bottom - top);
+  const int left = std::max (0, x0 - reach), right = std::min (pair_.width, x1 + reach_right);
+  window_at_ = cv::Rect (left, top, right - left, bottom - top);
+  missing_[0] = reach - (x0 - left);
+  missing_[1] = reach_right - (right - x1);
+}
+
+void
+DisparityFinder::cut_window (int camera, const cv::Mat &picture)
+{
+  cv::cvtColor (picture (window_at_), grey_, cv::COLOR_RGBA2GRAY);
+  cv::copyMakeBorder (grey_, window_[camera], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
+}
+
+/* OpenCV splits a picture among all cores by itself, but not within a parallel loop: so one thread
+ * is a loop of one. Some threads get stripes, which overlap so that no seam is seen. */
+Status
+DisparityFinder::match ()
+{
+  const int cores = cv::getNumThreads (), wanted = settings_.n_threads;
+  if (wanted == 0 || wanted >= std::max (cores, 2))
+    return matcher_->match (window_[0], window_[1], raw_);
+  if (wanted == 1) {
+    Status status;
+    cv::parallel_for_ (cv::Range (0, 1),
+        [&] (const cv::Range &) { status = matcher_->match (window_[0], window_[1], raw_); });
+    return status;
+  }
+  return matcher_->match_stripes (window_[0], window_[1], wanted, raw_);
+}
+
+/* Takes away what cannot be right of the disparities of the ROI and its margin. */
+void
+DisparityFinder::filter (const cv::Mat &left)
+{
+  const MatchSettings &m = settings_.match;
+  const int least = 16 * least_;
+  const int offset = static_cast<int> (std::lround (16 * pair_.offset));
+  const cv::Rect in_window (core_at_.x - window_at_.x + missing_[0], core_at_.y - window_at_.y,
+      core_at_.width, core_at_.height);
+  core_ = raw_ (in_window);
+  const cv::Mat grey = window_[0](in_window), colour = left (core_at_);
+  if (matcher_ != &all_) {
+    const int found = 16 * matcher_->min_disparity ();
+    if (background_.empty ())
+      core_.setTo (least - 16, core_ < found);
+    else
+      background_.restore (grey, window_[1], in_window.x, core_at_.tl (), found, least - 16, core_);
+  }
+  if (settings_.patch_tolerance > 0)
+    filter_.clear_unlike (grey, window_[1], in_window.x, settings_.patch_tolerance, least, core_);
+  filter_.clear_hidden (least, core_);
+  constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
+  if (settings_.flying_pixel_step > 0)
+    filter_.clear_flying (settings_.flying_pixel_step, kSupport, offset, least, core_);
+  if (m.speckle_window_size > 0)
+    cv::filterSpeckles (core_, least - 16, m.speckle_window_size, 16 * m.speckle_range, specks_);
+  if (settings_.gap_width > 0)
+    filter_.fill_gaps (colour, settings_.gap_width, least, core_);
+  if (settings_.silhouette_radius > 0)
+    filter_.clear_rims (
+        colour, settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, core_);
+  if (matcher_ == &all_ && core_.cols == pair_.width && core_.rows == pair_.height)
+    background_.remember (grey, core_, least, far_);
+}
+
+/* OpenCV's disparities of the window to ours of the ROI. */
+void
+DisparityFinder::take (const Roi &roi)
+{
+  const int x0 = roi.x - core_at_.x, y0 = roi.y - core_at_.y;
+  const int least = 16 * least_;
+  const int offset = static_cast<int> (std::lround (16 * pair_.offset));
+  disparity_.create (roi.height, roi.width, CV_16U);
+  for (int y = 0; y < roi.height; y++) {
+    const auto from = core_.ptr<std::int16_t> (y0 + y) + x0;
+    auto to = disparity_.ptr<std::uint16_t> (y);
+    for (int x = 0; x < roi.width; x++) {
+      const int d = from[x] + offset;
+      const int there = 16 * (roi.x + x) - from[x]; /* not where the right picture is repeated */
+      const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
+      to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
+    }
+  }
+}
+
+Status
+DisparityFinder::find (
+    const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m)
+{
+  if (Status s = choose_range (near_m, far_m); !s.ok ())
+    return s;
+  try {
+    place_window (roi);
+    cut_window (0, left);
+    cut_window (1, right);
+    if (Status s = match (); !s.ok ())
+      return s;
+    filter (left);
+  } catch (const cv::Exception &) {
+    return {StatusCode::kNoSpace, "stereo: OpenCV failed to match the pictures"};
+  }
+  take (roi);
+  return {};
+}
+
+} // namespace rangecast

@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "matchers.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+
+using namespace rangecast;
+
+namespace bench {
+namespace {
+
+double
+median_ms (int rounds, const std::function<void ()> &work)
+{
+  std::vector<double> times;
+  for (int i = 0; i < rounds; i++) {
+    const auto begin = std::chrono::steady_clock::now ();
+    work ();
+    times.push_back (
+        std::chrono::duration<double, std::milli> (std::chrono::steady_clock::now () - begin)
+            .count ());
+  }
+  std::ranges::nth_element (times, times.begin () + rounds / 2);
+  return times[std::size_t (rounds) / 2];
+}
+
+/* @param disparity  CV_32F, NaN = none */
+Row
+judge (const std::string &name, const cv::Mat &disparity, const cv::Mat &truth, double ms)
+{
+  std::vector<double> errors;
+  int known = 0, found = 0, bad1 = 0, bad2 = 0;
+  for (int y = 0; y < disparity.rows; y++)
+    for (int x = 0; x < disparity.cols; x++) {
+      const float d = disparity.at<float> (y, x), t = truth.empty () ? 0 : truth.at<float> (y, x);
+      known += truth.empty () || t > 0;
+      if (std::isnan (d) || (!truth.empty () && t <= 0))
+        continue;
+      found++;
+      if (truth.empty ())
+        continue;
+      errors.push_back (std::abs (d - t));
+      bad1 += errors.back () > 1;
+      bad2 += errors.back () > 2;
+    }
+  Row row{name, double (found) / std::max (1, known), 0, 0, 0, ms};
+  if (!errors.empty ()) {
+    std::ranges::nth_element (errors, errors.begin () + std::ptrdiff_t (errors.size () / 2));
+    row.bad1 = bad1 / double (errors.size ());
+    row.bad2 = bad2 / double (errors.size ());
+    row.median_px = errors[errors.size () / 2];
+  }
+  return row;
+}
+
+ImageView<const Rgbx>
+view_of (const cv::Mat &m)
+{
+  return {reinterpret_cast<const Rgbx *> (m.data), m.cols, m.rows, std::ptrdiff_t (m.step)};
+}
+
+/* What OpenCV's matchers are set to. */
+struct PeerSettings {
+  int block_size, p1, p2, uniqueness, speckle_window, speckle_range;
+  int prefilter_cap = 31, left_right = 1;
+};
+
+cv::Ptr<cv::StereoSGBM>
+make_sgbm (const Pair &pair, const PeerSettings &s, int mode)
+{
+  const int area = s.block_size * s.block_size;
+  return cv::StereoSGBM::create (pair.least, pair.count, s.block_size, s.p1 * area, s.p2 * area,
+      s.left_right, s.prefilter_cap, s.uniqueness, s.speckle_window, s.speckle_range, mode);
+}
+
+Row
+run_opencv (const Pair &pair, cv::StereoMatcher &matcher, const std::string &name, int rounds,
+    bool widened = false)
+{
+  const int missing = widened ? std::max (0, pair.least + pair.count) : 0;
+  cv::Mat greys[2], raw;
+  const double ms = median_ms (rounds, [&] {
+    for (int i = 0; i < 2; i++)
+      if (missing)
+        cv::copyMakeBorder (pair.greys[i], greys[i], 0, 0, missing, 0, cv::BORDER_REPLICATE);
+    matcher.compute (missing ? greys[0] : pair.greys[0], missing ? greys[1] : pair.greys[1], raw);
+  });
+  cv::Mat disparity (pair.greys[0].size (), CV_32F, cv::Scalar (NAN));
+  for (int y = 0; y < disparity.rows; y++)
+    for (int x = 0; x < disparity.cols; x++)
+      if (const int d = raw.at<std::int16_t> (y, x + missing);
+          d >= 16 * pair.least && d <= 16 * x + 16 * pair.count * !missing)
+        disparity.at<float> (y, x) = float (d) / 16;
+  return judge (name, disparity, pair.truth, ms);
+}
+
+/* Found with --tune on aloe and motorcycle; uniqueness and speckle as in OpenCV's own stereo_match
+ * sample. */
+constexpr PeerSettings kTuned = {5, 8, 32, 10, 100, 2, 63};
+
+} // namespace
+
+Status
+prepare (Pair &pair)
+{
+  Rectifier rectifier;
+  if (Status s = rectifier.set (pair.view); !s.ok ())
+    return s;
+  const View &range = rectifier.range_view ();
+  pair.focal_baseline = range.intrinsics.fx * rectifier.baseline_m ();
+  pair.offset = rectifier.principal_offset ();
+  pair.least = int (std::floor (pair.focal_baseline / range.far_m - pair.offset));
+  const int most = int (std::ceil (pair.focal_baseline / range.near_m - pair.offset));
+  pair.count = (most - pair.least + 1 + 15) / 16 * 16;
+  for (int i = 0; i < 2; i++) {
+    cv::Mat rectified;
+    rectifier.rectify (i, i ? pair.right : pair.left, rectified);
+    cv::cvtColor (rectified, pair.greys[i], cv::COLOR_RGBA2GRAY);
+  }
+  return {};
+}
+
+Status
+run_ours (
+    const Pair &pair, const StereoSettings &settings, const std::string &name, int rounds, Row &row)
+{
+  StereoDepth stereo;
+  if (Status s = stereo.set (pair.view, settings); !s.ok ())
+    return s;
+  const cv::Size size = pair.left.size ();
+  cv::Mat depth (size, CV_16U), colour (size, CV_8UC4), disparity (size, CV_32F, cv::Scalar (NAN));
+  const RangeImage image = {pair.view.id, {0, 0, size.width, size.height},
+      {depth.ptr<std::uint16_t> (), size.width, size.height, std::ptrdiff_t (depth.step)},
+      {reinterpret_cast<Rgbx *> (colour.data), size.width, size.height,
+          std::ptrdiff_t (colour.step)},
+      0};
+  Status status;
+  const double ms = median_ms (
+      rounds, [&] { status = stereo.process (view_of (pair.left), view_of (pair.right), image); });
+  if (!status.ok ())
+    return status;
+  for (int y = 0; y < size.height; y++)
+    for (int x = 0; x < size.width; x++)
+      if (depth.at<std::uint16_t> (y, x)) /* finer than depth units are */
+        disparity.at<float> (y, x) = float (stereo.disparity ().at (x, y) / 16.0 - pair.offset);
+  row = judge (name, disparity, pair.truth, ms);
+  return {};
+}
+
+std::vector<Row>
+run_peers (const Pair &pair, int rounds)
+{
+  std::vector<Row> rows;
+  const auto threeway = make_sgbm (pair, kTuned, cv::StereoSGBM::MODE_SGBM_3WAY);
+  rows.push_back (run_opencv (pair, *threeway, "OpenCV SGBM 3-way", rounds));
+  rows.push_back (run_opencv (pair, *threeway, "OpenCV SGBM 3-way, widened", rounds, true));
+  const auto sgbm = make_sgbm (pair, kTuned, cv::StereoSGBM::MODE_SGBM);
+  rows.push_back (run_opencv (pair, *sgbm, "OpenCV SGBM", rounds));
+  const auto bm = cv::StereoBM::create (pair.count, 15);
+  bm->setMinDisparity (pair.least);
+  bm->setDisp12MaxDiff (kTuned.left_right);
+  bm->setSpeckleWindowSize (kTuned.speckle_window);
+  bm->setSpeckleRange (kTuned.speckle_range);
+  rows.push_back (run_opencv (pair, *bm, "OpenCV BM", rounds));
+  return rows;
+}
+
+std::vector<Row>
+run_grid (const Pair &pair, bool widened)
+{
+  std::vector<Row> rows;
+  for (int block : {3, 5, 7})
+    for (const auto &[p1, p2] : {std::pair{4, 32}, {8, 32}, {8, 96}})
+      for (int uniqueness : {0, 5, 10, 15})
+        for (const auto &[window, range] : {std::pair{100, 2}, {200, 1}})
+          for (int cap : {31, 63}) {
+            const PeerSettings s = {block, p1, p2, uniqueness, window, range, cap};
+            char name[120];
+            std::snprintf (name, sizeof name,
+                "block %d P1 %d P2 %d unique %d speckle %d/%d cap %d%s", block, p1, p2, uniqueness,
+                window, range, cap, widened ? " widened" : "");
+            const auto matcher = make_sgbm (pair, s, cv::StereoSGBM::MODE_SGBM_3WAY);
+            rows.push_back (run_opencv (pair, *matcher, name, 1, widened));
+          }
+  return rows;
+}
+
+} // namespace bench
