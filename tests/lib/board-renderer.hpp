@@ -101,18 +101,16 @@ public:
   {
     if (!draw_board (board, kSquarePx, texture_).ok ())
       std::abort ();
-    const int width = t.camera.width * kRays, height = t.camera.height * kRays;
     std::vector<cv::Point2d> pixels, rays;
-    for (int y = 0; y < height; y++)
-      for (int x = 0; x < width; x++)
-        pixels.emplace_back ((x + 0.5) / kRays - 0.5, (y + 0.5) / kRays - 0.5);
+    for (int y = 0; y <= t.camera.height; y++)
+      for (int x = 0; x <= t.camera.width; x++)
+        pixels.emplace_back (x - 0.5, y - 0.5);
     const auto &l = t.lens;
     const cv::Matx33d k (l[0], 0, l[2], 0, l[1], l[3], 0, 0, 1);
-    const std::vector<double> d (l.begin () + 4, l.end ());
-    cv::undistortPoints (pixels, rays, k, d, cv::noArray (), cv::noArray (),
-        {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-12});
+    cv::undistortPoints (pixels, rays, k, std::vector<double> (l.begin () + 4, l.end ()),
+        cv::noArray (), cv::noArray (), {cv::TermCriteria::COUNT, 20, 0});
     for (const cv::Point2d &r : rays)
-      rays_.push_back ({float (r.x), float (r.y)});
+      rays_.emplace_back (float (r.x), float (r.y));
   }
 
   /** @param noise  standard deviation of the sensor's noise, grey levels */
@@ -121,46 +119,68 @@ public:
     const int width = true_.camera.width, height = true_.camera.height;
     std::vector<std::uint8_t> picture (std::size_t (width) * height);
     std::normal_distribution<float> sensor (0, float (noise));
-    const Pose board_from_camera = camera_from_board.inverse ();
+    const Ray rays (camera_from_board.inverse (), board_.square_m);
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++) {
-        float sum = 0;
-        for (int j = 0; j < kRays; j++)
-          for (int i = 0; i < kRays; i++)
-            sum += look (board_from_camera,
-                rays_[(std::size_t (y) * kRays + j) * width * kRays + x * kRays + i], y);
-        const float grey = sum / (kRays * kRays) + (noise > 0 ? sensor (random) : 0);
+        const cv::Point2f *upper = &rays_[std::size_t (y) * (width + 1) + x];
+        const cv::Point2f *lower = upper + width + 1;
+        const float wall = 90 + 40.F * float (y) / float (height);
+        float grey = look (rays, 0.25F * (upper[0] + upper[1] + lower[0] + lower[1]), wall, 1);
+        if (grey != wall) {
+          grey = 0;
+          for (int j = 0; j < kRays; j++)
+            for (int i = 0; i < kRays; i++) {
+              const float a = (i + 0.5F) / kRays, b = (j + 0.5F) / kRays;
+              const cv::Point2f ray = (1 - b) * ((1 - a) * upper[0] + a * upper[1]) +
+                                      b * ((1 - a) * lower[0] + a * lower[1]);
+              grey += look (rays, ray, wall, 0) / (kRays * kRays);
+            }
+        }
+        grey += noise > 0 ? sensor (random) : 0;
         picture[std::size_t (y) * width + x] = std::uint8_t (std::clamp (grey + 0.5F, 0.F, 255.F));
       }
     return picture;
   }
 
 private:
+  /* Where rays meet the board: a homography from rays to the texture's pixels. */
   struct Ray {
-    float x, y;
+    Ray (const Pose &board_from_camera, double square_m)
+    {
+      const Mat3 &r = board_from_camera.rotation;
+      const Vec3 &t = board_from_camera.translation;
+      /* p = t + s d with s = -t.z / d.z; texture = (p / square + 2) * kSquarePx */
+      for (int i = 0; i < 3; i++) {
+        w[i] = float (r[6 + i]);
+        u[i] = float (((t.x * r[6 + i] - t.z * r[i]) / square_m + 2 * r[6 + i]) * kSquarePx);
+        v[i] = float (((t.y * r[6 + i] - t.z * r[3 + i]) / square_m + 2 * r[6 + i]) * kSquarePx);
+      }
+      sign = t.z < 0 ? 1.F : -1.F;
+    }
+    float u[3], v[3], w[3], sign;
   };
 
-  /* Grey level where a ray ends: on the board 30 .. 220, beside it a wall with a gradient. */
-  [[nodiscard]] float look (const Pose &board_from_camera, Ray ray, int y) const
+  /* Grey level where a ray ends: on the board 30 .. 220, beside it the wall. */
+  [[nodiscard]] float look (const Ray &r, cv::Point2f d, float wall, int margin_squares) const
   {
-    const float wall = 90 + 40.F * float (y) / float (true_.camera.height);
-    const Vec3 d = board_from_camera.rotation * Vec3{ray.x, ray.y, 1};
-    const double s = -board_from_camera.translation.z / d.z;
-    if (!(s > 0))
+    const float w = r.w[0] * d.x + r.w[1] * d.y + r.w[2];
+    if (!(w * r.sign > 1e-6F))
       return wall;
-    const Vec3 p = board_from_camera.translation + s * d;
+    const float u = (r.u[0] * d.x + r.u[1] * d.y + r.u[2]) / w;
+    const float v = (r.v[0] * d.x + r.v[1] * d.y + r.v[2]) / w;
     const int width = (board_.columns + 3) * kSquarePx, height = (board_.rows + 3) * kSquarePx;
-    const double u = (p.x / board_.square_m + 2) * kSquarePx;
-    const double v = (p.y / board_.square_m + 2) * kSquarePx;
-    if (!(u >= 0 && v >= 0 && u < width && v < height))
+    const auto margin = float (margin_squares * kSquarePx / 2);
+    if (!(u >= -margin && v >= -margin && u < float (width) + margin && v < float (height) + margin))
       return wall;
+    if (margin_squares > 0)
+      return -1; /* near enough to look more closely */
     return 30 + 190.F / 255 * float (texture_[std::size_t (v) * width + std::size_t (u)]);
   }
 
   TrueCamera true_;
   BoardSpec board_;
   std::vector<std::uint8_t> texture_;
-  std::vector<Ray> rays_;
+  std::vector<cv::Point2f> rays_; // through the corners of pixels
 };
 
 } // namespace rangecast::testing

@@ -205,6 +205,17 @@ validate (const BoardSpec &board)
 struct BoardDetector::Charuco {
   cv::Ptr<cv::aruco::CharucoBoard> board;
   cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create ();
+  double marker_share = 0.75; /* marker by square */
+
+  /* The side of the smallest square, judged by its marker. */
+  [[nodiscard]] double square_px (const std::vector<std::vector<cv::Point2f>> &markers) const
+  {
+    double smallest = 1e9;
+    for (const auto &m : markers)
+      for (int i = 0; i < 4; i++)
+        smallest = std::min (smallest, cv::norm (m[i] - m[(i + 1) % 4]));
+    return smallest / marker_share;
+  }
 
   void detect (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
   {
@@ -215,6 +226,13 @@ struct BoardDetector::Charuco {
       return;
     cv::Mat points, ids;
     cv::aruco::interpolateCornersCharuco (markers, marker_ids, picture, board, points, ids);
+    if (points.rows == 0)
+      return;
+    /* OpenCV stops at a tenth of a pixel. The window ends before the markers. */
+    const double margin = 0.4 * (1 - marker_share);
+    const int half = std::clamp (int (margin * square_px (markers)), 2, 11);
+    cv::cornerSubPix (picture, points, {half, half}, {-1, -1},
+        {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 0.001});
     for (int i = 0; i < points.rows; i++) {
       const cv::Point2f p = points.at<cv::Point2f> (i);
       corners.push_back ({ids.at<int> (i), p.x, p.y});
@@ -236,6 +254,7 @@ BoardDetector::set (const BoardSpec &board)
   if (board.kind == BoardKind::kCharuco) {
     charuco_ = std::make_unique<Charuco> ();
     charuco_->board = charuco_board (board);
+    charuco_->marker_share = marker_of (board) / board.square_m;
   }
   return {};
 }
