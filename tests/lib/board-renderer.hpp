@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Boards before cameras that are known exactly: as pictures, or as the corners that would be seen. */
+/* Boards before cameras that are known exactly: as pictures, or as the corners that would be seen.
+ */
 #pragma once
 
 #include <algorithm>
@@ -58,8 +59,8 @@ random_board (const TrueCamera &t, const BoardSpec &board, double distance_m, do
   std::uniform_real_distribution<double> unit (-1, 1);
   const double u = t.lens[2] + spread * unit (random) * t.camera.width / 2;
   const double v = t.lens[3] + spread * unit (random) * t.camera.height / 2;
-  Pose middle = rotation_about ({unit (random), unit (random), 0.3 * unit (random)},
-      tilt_deg * kDegree * unit (random));
+  Pose middle = rotation_about (
+      {unit (random), unit (random), 0.3 * unit (random)}, tilt_deg * kDegree * unit (random));
   middle.translation = intrinsics_of (t.lens).unproject (u, v, distance_m);
   const Vec3 far_corner = board.corner (board.corner_count () - 1);
   return middle * Pose{kIdentity3, -0.5 * far_corner};
@@ -114,7 +115,8 @@ public:
   }
 
   /** @param noise  standard deviation of the sensor's noise, grey levels */
-  std::vector<std::uint8_t> render (const Pose &camera_from_board, double noise, std::mt19937 &random)
+  std::vector<std::uint8_t> render (
+      const Pose &camera_from_board, double noise, std::mt19937 &random)
   {
     const int width = true_.camera.width, height = true_.camera.height;
     std::vector<std::uint8_t> picture (std::size_t (width) * height);
@@ -170,7 +172,8 @@ private:
     const float v = (r.v[0] * d.x + r.v[1] * d.y + r.v[2]) / w;
     const int width = (board_.columns + 3) * kSquarePx, height = (board_.rows + 3) * kSquarePx;
     const auto margin = float (margin_squares * kSquarePx / 2);
-    if (!(u >= -margin && v >= -margin && u < float (width) + margin && v < float (height) + margin))
+    if (!(u >= -margin && v >= -margin && u < float (width) + margin &&
+            v < float (height) + margin))
       return wall;
     if (margin_squares > 0)
       return -1; /* near enough to look more closely */

@@ -38,8 +38,8 @@ pairs ()
           continue; /* there is no tenth pair */
         const cv::Mat m = cv::imread (path, cv::IMREAD_GRAYSCALE);
         Sighting sighting{camera, {}};
-        const Status status = detector.detect (
-            {m.data, m.cols, m.rows, std::ptrdiff_t (m.step)}, sighting.corners);
+        const Status status =
+            detector.detect ({m.data, m.cols, m.rows, std::ptrdiff_t (m.step)}, sighting.corners);
         EXPECT_TRUE (status.ok ()) << status.message ();
         if (!sighting.corners.empty ())
           frame.sightings.push_back (std::move (sighting));
@@ -103,8 +103,9 @@ TEST (CalibrationReal, stereo_error_is_no_larger_than_opencvs_on_the_same_corner
   ASSERT_EQ (result.pairs.size (), 1U);
   const double held = opencv_stereo_rms (pairs (), cv::CALIB_FIX_INTRINSIC);
   const double free = opencv_stereo_rms (pairs (), cv::CALIB_USE_INTRINSIC_GUESS);
-  std::printf ("rms: ours %.5f px, cv::stereoCalibrate %.5f px (lenses held), %.5f px (free); median "
-               "|dy| %.3f px, baseline %.5f m\n",
+  std::printf (
+      "rms: ours %.5f px, cv::stereoCalibrate %.5f px (lenses held), %.5f px (free); median "
+      "|dy| %.3f px, baseline %.5f m\n",
       result.pairs[0].rms_px, held, free, result.pairs[0].row_error_px, result.pairs[0].distance_m);
   EXPECT_LE (result.pairs[0].rms_px, held);
   EXPECT_LE (result.pairs[0].rms_px, free + 1e-6);

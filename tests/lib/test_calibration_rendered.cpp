@@ -43,12 +43,12 @@ render_frames (const std::vector<TrueCamera> &views, const BoardSpec &board, int
   for (int f = 0; f < frames; f++) {
     const TrueCamera &near = views[f % views.size ()];
     std::uniform_real_distribution<double> distance (0.45, 1.1);
-    const Pose world_from_board = near.world_from_camera *
-                                  random_board (near, board, distance (random), 0.7, 40, random);
+    const Pose world_from_board =
+        near.world_from_camera * random_board (near, board, distance (random), 0.7, 40, random);
     CalibrationFrame frame;
     for (std::size_t i = 0; i < views.size (); i++) {
-      const auto picture = renderers[i].render (
-          views[i].world_from_camera.inverse () * world_from_board, 2, random);
+      const auto picture =
+          renderers[i].render (views[i].world_from_camera.inverse () * world_from_board, 2, random);
       Sighting sighting{int (i), {}};
       EXPECT_TRUE (
           detector.detect ({picture.data (), kWidth, kHeight, kWidth}, sighting.corners).ok ());
@@ -69,8 +69,9 @@ expect_poses (const std::vector<TrueCamera> &views, const CalibrationResult &res
         result.rig.views[0].world_from_view.inverse () * result.rig.views[i].world_from_view;
     const double angle = angle_between (truth, found);
     const double shift_mm = 1000 * norm (truth.translation - found.translation);
-    std::printf ("camera %zu: %d frames, rms %.3f px, rotation error %.4f degrees, translation error "
-                 "%.3f mm, focal length error %.2f px\n",
+    std::printf (
+        "camera %zu: %d frames, rms %.3f px, rotation error %.4f degrees, translation error "
+        "%.3f mm, focal length error %.2f px\n",
         i, result.cameras[i].frames, result.cameras[i].rms_px, angle, shift_mm,
         result.rig.views[i].intrinsics.fx - views[i].lens[0]);
     EXPECT_LT (angle, 0.1);

@@ -117,25 +117,32 @@ bring_into_order (const cv::Mat &picture, std::vector<cv::Point2f> &c, int colum
 }
 
 bool
-search (const cv::Mat &picture, const BoardSpec &board, std::vector<cv::Point2f> &corners)
+search (const cv::Mat &picture, const BoardSpec &board, bool thorough,
+    std::vector<cv::Point2f> &corners)
 {
-  return cv::findChessboardCorners (picture, {board.columns, board.rows}, corners,
-      cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
+  const cv::Size size (board.columns, board.rows);
+  const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+  if (cv::findChessboardCorners (picture, size, corners, flags))
+    return true;
+  /* Local thresholds help in uneven light, and take up to a second where half a board is seen. */
+  return thorough &&
+         cv::findChessboardCorners (picture, size, corners, flags | cv::CALIB_CB_ADAPTIVE_THRESH);
 }
 
 bool
-find_chessboard (const cv::Mat &picture, const BoardSpec &board, std::vector<cv::Point2f> &corners)
+find_chessboard (const cv::Mat &picture, const BoardSpec &board, bool thorough,
+    std::vector<cv::Point2f> &corners)
 {
   const double scale = double (kSearchSide) / std::max (picture.cols, picture.rows);
   bool found = false;
   if (scale < 1) {
     cv::Mat small;
     cv::resize (picture, small, {}, scale, scale, cv::INTER_AREA);
-    found = search (small, board, corners);
+    found = search (small, board, thorough, corners);
     for (cv::Point2f &c : corners)
       c = (c + cv::Point2f (0.5F, 0.5F)) / float (scale) - cv::Point2f (0.5F, 0.5F);
   }
-  if (!found && !search (picture, board, corners))
+  if (!found && !search (picture, board, thorough, corners))
     return false;
   if (corners.size () != std::size_t (board.corner_count ()))
     return false;
@@ -181,10 +188,11 @@ validate (const BoardSpec &board)
     return bad_board (
         "columns is " + std::to_string (board.columns) + "; expected 3 to 32 inner corners");
   if (board.rows < 3 || board.rows > 32)
-    return bad_board ("rows is " + std::to_string (board.rows) + "; expected 3 to 32 inner corners");
+    return bad_board (
+        "rows is " + std::to_string (board.rows) + "; expected 3 to 32 inner corners");
   if (!(board.square_m >= 1e-4 && board.square_m <= 10))
-    return bad_board ("square size is " + std::to_string (board.square_m) +
-                      " m; expected 0.0001 to 10");
+    return bad_board (
+        "square size is " + std::to_string (board.square_m) + " m; expected 0.0001 to 10");
   if (board.kind == BoardKind::kChessboard)
     return {};
   if (!(board.marker_m >= 0 && board.marker_m < board.square_m))
@@ -245,11 +253,12 @@ BoardDetector::BoardDetector () = default;
 BoardDetector::~BoardDetector () = default;
 
 Status
-BoardDetector::set (const BoardSpec &board)
+BoardDetector::set (const BoardSpec &board, bool thorough)
 {
   if (Status s = validate (board); !s.ok ())
     return s;
   board_ = board;
+  thorough_ = thorough;
   charuco_.reset ();
   if (board.kind == BoardKind::kCharuco) {
     charuco_ = std::make_unique<Charuco> ();
@@ -273,7 +282,7 @@ BoardDetector::detect (ImageView<const std::uint8_t> picture, std::vector<BoardC
       return {};
     }
     std::vector<cv::Point2f> found;
-    if (find_chessboard (as_mat (picture), board_, found))
+    if (find_chessboard (as_mat (picture), board_, thorough_, found))
       for (std::size_t i = 0; i < found.size (); i++)
         corners.push_back ({int (i), found[i].x, found[i].y});
   } catch (const std::exception &e) {
@@ -293,8 +302,10 @@ edge_width_px (ImageView<const std::uint8_t> picture, const std::vector<BoardCor
     const BoardCorner &c = corners[i];
     const BoardCorner &next = corners[i + 1 < corners.size () ? i + 1 : i - 1];
     const int radius = std::clamp (int (0.3 * std::hypot (next.x - c.x, next.y - c.y)), 3, 20);
-    const int x0 = std::max (1, int (c.x) - radius), x1 = std::min (picture.width - 2, int (c.x) + radius);
-    const int y0 = std::max (1, int (c.y) - radius), y1 = std::min (picture.height - 2, int (c.y) + radius);
+    const int x0 = std::max (1, int (c.x) - radius),
+              x1 = std::min (picture.width - 2, int (c.x) + radius);
+    const int y0 = std::max (1, int (c.y) - radius),
+              y1 = std::min (picture.height - 2, int (c.y) + radius);
     int darkest = 255, brightest = 0;
     double steepest = 0;
     for (int y = y0; y <= y1; y++)

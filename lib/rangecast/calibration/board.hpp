@@ -62,7 +62,9 @@ public:
   BoardDetector (const BoardDetector &) = delete;
   BoardDetector &operator= (const BoardDetector &) = delete;
 
-  Status set (const BoardSpec &board);
+  /** @param thorough  look again, more slowly, where no chessboard is found: for pictures that are
+   *  few, not for live ones */
+  Status set (const BoardSpec &board, bool thorough = false);
   [[nodiscard]] const BoardSpec &board () const { return board_; }
 
   /** @param picture  grey levels
@@ -74,12 +76,14 @@ private:
   struct Charuco;
 
   BoardSpec board_;
+  bool thorough_ = false;
   std::unique_ptr<Charuco> charuco_;
 };
 
 /** Width of the edges at the corners, pixels: about 2 in a sharp picture; contrast over steepest
  *  slope, the median of all corners. 0 without corners. */
-double edge_width_px (ImageView<const std::uint8_t> picture, const std::vector<BoardCorner> &corners);
+double edge_width_px (
+    ImageView<const std::uint8_t> picture, const std::vector<BoardCorner> &corners);
 
 /** A picture of the board to print or to render: white margin of one square all round.
  *  @param square_px  pixels of a square, 8 .. 512

@@ -51,7 +51,7 @@ struct CornerError {
     ceres::AngleAxisRotatePoint (camera, first, seen);
     for (int i = 0; i < 3; i++)
       seen[i] += camera[3 + i];
-    if (!(seen[2] > T (1e-6)))
+    if (!(seen[2] > T (kNearestM)))
       return false; /* behind the camera: not a solution */
     project (lens, seen, residual);
     residual[0] -= T (x);
@@ -78,9 +78,8 @@ public:
       for (const Sighting &sighting : frames[f].sightings) {
         used[sighting.camera] = true;
         for (const BoardCorner &c : sighting.corners)
-          problem_.AddResidualBlock (
-              new ceres::AutoDiffCostFunction<CornerError, 2, 12, 6, 6> (
-                  new CornerError{board.corner (c.id), c.x, c.y}),
+          problem_.AddResidualBlock (new ceres::AutoDiffCostFunction<CornerError, 2, 12, 6, 6> (
+                                         new CornerError{board.corner (c.id), c.x, c.y}),
               settings_.robust_px > 0 ? new ceres::HuberLoss (settings_.robust_px) : nullptr,
               lenses_[sighting.camera].data (), cameras_[sighting.camera].data (),
               boards_[f].data ());
@@ -147,8 +146,9 @@ adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &fram
     Adjustment adjustment (bundle, settings);
     adjustment.add (board, frames);
     if (!adjustment.solve ())
-      return {StatusCode::kBadValue, "no poses of the cameras fit all boards; expected cameras that "
-                                     "take their pictures at the same time, and boards held still"};
+      return {StatusCode::kBadValue,
+          "no poses of the cameras fit all boards; expected cameras that "
+          "take their pictures at the same time, and boards held still"};
     adjustment.get (bundle);
   } catch (const std::exception &e) {
     return {StatusCode::kBadValue, std::string ("bundle adjustment: ") + e.what ()};

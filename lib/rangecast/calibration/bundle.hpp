@@ -19,7 +19,8 @@ struct BundleSettings {
 };
 
 /** Moves lenses, cameras and boards so that the corners fall where they were seen (Ceres).
- *  @param frames  as many as bundle.first_from_board; those without sightings stay as they are
+ *  @param frames  as many as bundle.first_from_board; those without sightings stay as they are;
+ *  no corner may be behind its camera to begin with
  *  @return kBadValue if there is no solution; bundle is then unspecified */
 Status adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &frames,
     const BundleSettings &settings, Bundle &bundle);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 
 namespace rangecast {
@@ -66,6 +67,8 @@ reprojection_rms (const LensParameters &lens, const Pose &camera_from_board, con
   double sum = 0;
   for (const BoardCorner &corner : corners) {
     const Vec3 p = camera_from_board * board.corner (corner.id);
+    if (!(p.z > kNearestM))
+      return std::numeric_limits<double>::infinity ();
     const double point[3] = {p.x, p.y, p.z};
     double pixel[2];
     project (lens.data (), point, pixel);
@@ -115,7 +118,8 @@ calibrate_lens (const CalibrationCamera &camera, int index,
     return {StatusCode::kBadValue, text_of (camera) + ": cannot be calibrated from " +
                                        std::to_string (image.size ()) + " frames: " + e.what ()};
   }
-  result.lens = {k.at<double> (0, 0), k.at<double> (1, 1), k.at<double> (0, 2), k.at<double> (1, 2)};
+  result.lens = {
+      k.at<double> (0, 0), k.at<double> (1, 1), k.at<double> (0, 2), k.at<double> (1, 2)};
   for (int i = 0; i < int (model); i++)
     result.lens[4 + i] = d.at<double> (i);
   for (std::size_t i = 0; i < rvecs.size (); i++)
@@ -131,15 +135,15 @@ check_lens (const CalibrationCamera &camera, const LensParameters &lens, double 
   const auto [fx, fy, cx, cy] = intrinsics_of (lens);
   if (!std::ranges::all_of (lens, [] (double v) { return std::isfinite (v); }) || fx <= 0 ||
       fy <= 0 || fx > 1e5 || fy > 1e5)
-    return {StatusCode::kBadValue, text_of (camera) +
-                                       ": no camera fits these boards (focal length " + number (fx) +
-                                       " pixels); expected tilted boards all over the picture"};
+    return {StatusCode::kBadValue,
+        text_of (camera) + ": no camera fits these boards (focal length " + number (fx) +
+            " pixels); expected tilted boards all over the picture"};
   if (cx < 0 || cy < 0 || cx >= camera.width || cy >= camera.height)
-    return {StatusCode::kBadValue, text_of (camera) + ": principal point " + number (cx) + ", " +
-                                       number (cy) +
-                                       " is not in the picture; expected tilted boards all over it"};
-  const double corner = std::hypot (
-      std::max (cx, camera.width - 1 - cx), std::max (cy, camera.height - 1 - cy));
+    return {StatusCode::kBadValue,
+        text_of (camera) + ": principal point " + number (cx) + ", " + number (cy) +
+            " is not in the picture; expected tilted boards all over it"};
+  const double corner =
+      std::hypot (std::max (cx, camera.width - 1 - cx), std::max (cy, camera.height - 1 - cy));
   const double fold = fold_px (lens, corner);
   if (fold < reach_px)
     return {StatusCode::kBadValue,

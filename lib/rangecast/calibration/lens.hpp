@@ -37,8 +37,11 @@ project (const T *lens, const T *p, T *pixel)
   pixel[1] = lens[1] * yd + lens[3];
 }
 
+/** Nothing nearer is in front of a camera, metres. */
+inline constexpr double kNearestM = 1e-6;
+
 /** Square root of the mean square distance of corners from where the board's corners should be,
- *  pixels. */
+ *  pixels; infinite if one of them is behind the camera. */
 [[nodiscard]] double reprojection_rms (const LensParameters &lens, const Pose &camera_from_board,
     const BoardSpec &board, const std::vector<BoardCorner> &corners);
 

@@ -16,8 +16,7 @@ struct CommonCorners {
 };
 
 CommonCorners
-common_corners (
-    const std::vector<CalibrationFrame> &frames, const BoardSpec &board, int a, int b)
+common_corners (const std::vector<CalibrationFrame> &frames, const BoardSpec &board, int a, int b)
 {
   CommonCorners common;
   for (const CalibrationFrame &frame : frames) {
@@ -60,9 +59,9 @@ link_cameras (const std::vector<CalibrationCamera> &cameras,
         cv::CALIB_FIX_INTRINSIC | cv::CALIB_RATIONAL_MODEL,
         {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-9});
   } catch (const std::exception &problem) {
-    return {StatusCode::kBadValue, text_of (camera) + " and " + text_of (cameras[link.b]) +
-                                       ": no pose fits the boards that both saw: " +
-                                       problem.what ()};
+    return {
+        StatusCode::kBadValue, text_of (camera) + " and " + text_of (cameras[link.b]) +
+                                   ": no pose fits the boards that both saw: " + problem.what ()};
   }
   link.b_from_a = pose_from_opencv (r, t);
   return {};
@@ -70,8 +69,7 @@ link_cameras (const std::vector<CalibrationCamera> &cameras,
 
 /* The next camera without a pose: the one with most frames in common with one that has. */
 CameraLink
-strongest_link (
-    const std::vector<CalibrationFrame> &frames, const std::vector<bool> &placed)
+strongest_link (const std::vector<CalibrationFrame> &frames, const std::vector<bool> &placed)
 {
   CameraLink best;
   for (int a = 0; a < int (placed.size ()); a++)
@@ -112,7 +110,8 @@ Status
 check_linked (
     const std::vector<CalibrationCamera> &cameras, const std::vector<CalibrationFrame> &frames)
 {
-  const std::vector<int> groups = linked_groups (int (cameras.size ()), frames, kFewestSharedFrames);
+  const std::vector<int> groups =
+      linked_groups (int (cameras.size ()), frames, kFewestSharedFrames);
   const int count = cameras.empty () ? 0 : *std::ranges::max_element (groups) + 1;
   if (count <= 1)
     return {};

@@ -27,7 +27,7 @@ Status chain_cameras (const std::vector<CalibrationCamera> &cameras,
     const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links);
 
 /** @return kNotFound that names the groups of cameras that share no boards */
-Status check_linked (const std::vector<CalibrationCamera> &cameras,
-    const std::vector<CalibrationFrame> &frames);
+Status check_linked (
+    const std::vector<CalibrationCamera> &cameras, const std::vector<CalibrationFrame> &frames);
 
 } // namespace rangecast

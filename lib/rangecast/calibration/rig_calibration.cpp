@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace rangecast {
@@ -68,7 +69,8 @@ private:
   Status check_pairs () const;
   Status report ();
   Status make_rig ();
-  bool drop_outliers ();
+  Status drop_outliers (double limit_px, bool &any);
+  double outlier_limit () const;
   double sighting_rms (std::size_t frame, const Sighting &sighting) const;
   double reach (int camera) const;
   double row_error (int left, int right) const;
@@ -95,15 +97,15 @@ Calibration::check_counts () const
     const auto count = std::ranges::count_if (
         frames_, [&] (const CalibrationFrame &frame) { return frame.find (int (i)) != nullptr; });
     if (count == 0)
-      return {StatusCode::kNotFound,
-          text_of (cameras_[i]) + ": no board was found; expected " +
-              std::to_string (settings_.board.columns) + "x" +
-              std::to_string (settings_.board.rows) + " inner corners, whole and sharp, in at least " +
-              std::to_string (settings_.min_frames) + " frames"};
+      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": no board was found; expected " +
+                                         std::to_string (settings_.board.columns) + "x" +
+                                         std::to_string (settings_.board.rows) +
+                                         " inner corners, whole and sharp, in at least " +
+                                         std::to_string (settings_.min_frames) + " frames"};
     if (count < settings_.min_frames)
-      return {StatusCode::kNotFound,
-          text_of (cameras_[i]) + ": the board was found in " + std::to_string (count) +
-              " frames; expected at least " + std::to_string (settings_.min_frames)};
+      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": the board was found in " +
+                                         std::to_string (count) + " frames; expected at least " +
+                                         std::to_string (settings_.min_frames)};
   }
   return {};
 }
@@ -141,27 +143,38 @@ Calibration::sighting_rms (std::size_t frame, const Sighting &sighting) const
       sighting.corners);
 }
 
-/* @return whether any went */
-bool
-Calibration::drop_outliers ()
+double
+Calibration::outlier_limit () const
 {
   std::vector<double> errors;
   for (std::size_t f = 0; f < frames_.size (); f++)
     for (const Sighting &sighting : frames_[f].sightings)
       errors.push_back (sighting_rms (f, sighting));
   if (errors.empty ())
-    return false;
+    return kOutlierPx;
   std::ranges::nth_element (errors, errors.begin () + errors.size () / 2);
-  const double limit = std::max (kOutlierFactor * errors[errors.size () / 2], kOutlierPx);
+  return std::max (kOutlierFactor * errors[errors.size () / 2], kOutlierPx);
+}
+
+/* @param[out] any  whether one went
+ * @return what check_counts() and check_linked() say of the rest */
+Status
+Calibration::drop_outliers (double limit_px, bool &any)
+{
   const std::size_t before = result_.dropped.size ();
   for (std::size_t f = 0; f < frames_.size (); f++)
     std::erase_if (frames_[f].sightings, [&] (const Sighting &sighting) {
       const double rms = sighting_rms (f, sighting);
-      if (rms > limit)
+      const bool fits = rms <= limit_px;
+      if (!fits)
         result_.dropped.push_back ({int (f), sighting.camera, rms});
-      return rms > limit;
+      return !fits;
     });
-  return result_.dropped.size () > before;
+  any = result_.dropped.size () > before;
+  if (!any)
+    return {};
+  const Status s = check_counts ();
+  return s.ok () && cameras_.size () > 1 ? check_linked (cameras_, frames_) : s;
 }
 
 /* A loss that forgives outliers finds them; without them, plain squares are the best estimate. */
@@ -169,12 +182,13 @@ Status
 Calibration::adjust ()
 {
   BundleSettings bundle{settings_.distortion, true, kRobustPx};
-  Status s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
-  for (int round = 0; s.ok () && round < kOutlierRounds && drop_outliers (); round++) {
-    if (s = check_counts (); s.ok () && cameras_.size () > 1)
-      s = check_linked (cameras_, frames_);
+  bool dropped = false;
+  Status s = drop_outliers (std::numeric_limits<double>::max (), dropped); /* behind a camera */
+  dropped = true;
+  for (int round = 0; s.ok () && dropped && round < kOutlierRounds; round++) {
+    s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
     if (s.ok ())
-      s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
+      s = drop_outliers (outlier_limit (), dropped);
   }
   bundle.robust_px = 0;
   if (s.ok ())
@@ -202,8 +216,8 @@ Calibration::check_pairs () const
     char text[64];
     std::snprintf (text, sizeof text, "%.4f m", norm (c));
     if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
-      return bad ("view " + std::to_string (cameras_[left].view_id) + ": " +
-                  cameras_[left].name + " and " + cameras_[right].name + " stand " + text +
+      return bad ("view " + std::to_string (cameras_[left].view_id) + ": " + cameras_[left].name +
+                  " and " + cameras_[right].name + " stand " + text +
                   " apart, but not side by side; expected a left and a right camera");
     if (c.x < 0)
       return bad ("view " + std::to_string (cameras_[left].view_id) +
@@ -360,10 +374,9 @@ Calibration::make_rig ()
       view.depth_unit_m = view.far_m / 65000; /* as stereodepth does */
     for (const CameraRole role : {CameraRole::kRight, CameraRole::kThird})
       if (const int other = find_camera (cameras_, view.id, role); other >= 0)
-        (role == CameraRole::kRight ? view.right : view.third) =
-            PartnerCamera{intrinsics_of (bundle_.lenses[other]),
-                distortion_of (bundle_.lenses[other], settings_.distortion),
-                between (int (i), other)};
+        (role == CameraRole::kRight ? view.right : view.third) = PartnerCamera{
+            intrinsics_of (bundle_.lenses[other]),
+            distortion_of (bundle_.lenses[other], settings_.distortion), between (int (i), other)};
     result_.rig.views.push_back (std::move (view));
   }
   std::ranges::sort (result_.rig.views, {}, &View::id);
@@ -382,7 +395,8 @@ check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &b
   for (std::size_t i = 0; i < cameras.size (); i++) {
     const CalibrationCamera &camera = cameras[i];
     if (camera.view_id < 0 || camera.view_id >= kMaxViews)
-      return bad (text_of (camera) + ": expected a view from 0 to " + std::to_string (kMaxViews - 1));
+      return bad (
+          text_of (camera) + ": expected a view from 0 to " + std::to_string (kMaxViews - 1));
     if (camera.width < 1 || camera.height < 1 || camera.width > kMaxImageSide ||
         camera.height > kMaxImageSide)
       return {StatusCode::kBadSize, text_of (camera) + ": has no pictures of a size from 1x1 to " +
@@ -395,11 +409,11 @@ check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &b
     if (left < 0)
       return bad (text_of (camera) + ": its view has no left camera; expected one");
     if (cameras[left].width != camera.width || cameras[left].height != camera.height)
-      return {StatusCode::kBadSize,
-          text_of (camera) + " is " + std::to_string (camera.width) + "x" +
-              std::to_string (camera.height) + "; expected the size of " + text_of (cameras[left]) +
-              ", " + std::to_string (cameras[left].width) + "x" +
-              std::to_string (cameras[left].height)};
+      return {StatusCode::kBadSize, text_of (camera) + " is " + std::to_string (camera.width) +
+                                        "x" + std::to_string (camera.height) +
+                                        "; expected the size of " + text_of (cameras[left]) + ", " +
+                                        std::to_string (cameras[left].width) + "x" +
+                                        std::to_string (cameras[left].height)};
   }
   if (cameras.size () > 1 && board.is_ambiguous ())
     return bad ("board of " + std::to_string (board.columns) + "x" + std::to_string (board.rows) +

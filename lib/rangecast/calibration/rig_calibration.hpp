@@ -17,8 +17,8 @@ struct CalibrationSettings {
 
 struct CameraReport {
   int camera = 0;
-  int frames = 0;    ///< used
-  double rms_px = 0; ///< reprojection error in the end
+  int frames = 0;          ///< used
+  double rms_px = 0;       ///< reprojection error in the end
   double alone_rms_px = 0; ///< of cv::calibrateCamera with this camera alone
 };
 

@@ -10,13 +10,13 @@
 namespace rangecast {
 namespace {
 
-constexpr double kNewPlace = 0.1;             // see BoardPlace
-constexpr double kTiltSeen = 0.2;             // sine of an angle
-constexpr double kSizeRatio = 1.25;           // of the largest to the smallest board
-constexpr double kMotionShare = 0.003;        // of the picture's width, between two frames
+constexpr double kNewPlace = 0.1;      // see BoardPlace
+constexpr double kTiltSeen = 0.2;      // sine of an angle
+constexpr double kSizeRatio = 1.25;    // of the largest to the smallest board
+constexpr double kMotionShare = 0.003; // of the picture's width, between two frames
 constexpr std::uint64_t kMotionNs = 1'000'000'000;
 constexpr double kBlurredPx = 6, kBlurredShare = 0.004; // the larger of both, of the width
-constexpr int kFewLinks = 8;                  // two cameras with fewer common frames want more
+constexpr int kFewLinks = 8; // two cameras with fewer common frames want more
 
 /* The board's normal in a camera with a focal length as long as the picture is wide. */
 bool
@@ -28,7 +28,7 @@ guess_normal (const std::vector<cv::Point3d> &object, const std::vector<cv::Poin
   cv::Vec3d rvec, tvec;
   cv::Matx33d r;
   try {
-    if (!cv::solvePnP (object, image, k, cv::noArray (), rvec, tvec, false, cv::SOLVEPNP_IPPE))
+    if (!cv::solvePnP (object, image, k, cv::noArray (), rvec, tvec))
       return false;
     cv::Rodrigues (rvec, r);
   } catch (const std::exception &) {
@@ -37,7 +37,7 @@ guess_normal (const std::vector<cv::Point3d> &object, const std::vector<cv::Poin
   normal = {r (0, 2), r (1, 2), r (2, 2)};
   if (normal[2] < 0)
     normal = -normal; /* away from the camera, whichever way the board's z axis points */
-  return true;
+  return std::isfinite (normal[0]) && std::isfinite (normal[1]);
 }
 
 double
@@ -93,15 +93,14 @@ CameraCoverage::share () const
 std::vector<std::string>
 CameraCoverage::missing () const
 {
-  static constexpr const char *kAcross[kColumns] = {
-      "left", "middle left", "middle right", "right"};
+  static constexpr const char *kAcross[kColumns] = {"left", "middle left", "middle right", "right"};
   static constexpr const char *kDown[kRows] = {"top", "middle", "bottom"};
   std::vector<std::string> list;
   for (int row = 0; row < kRows; row++)
     for (int column = 0; column < kColumns; column++)
       if (!cells[row * kColumns + column])
-        list.push_back (std::string ("board at the ") + kDown[row] + " " + kAcross[column] +
-                        " of the picture");
+        list.push_back (
+            std::string ("board at the ") + kDown[row] + " " + kAcross[column] + " of the picture");
   if (!tilted_left)
     list.emplace_back ("left end of the board turned away");
   if (!tilted_right)
@@ -269,8 +268,8 @@ FrameSelector::offer (const std::vector<CalibrationCamera> &cameras, Calibration
 
   Places places;
   for (const Sighting &s : frame.sightings)
-    places.emplace_back (s.camera, place_board (board_, s.corners, cameras[s.camera].width,
-                                       cameras[s.camera].height));
+    places.emplace_back (s.camera,
+        place_board (board_, s.corners, cameras[s.camera].width, cameras[s.camera].height));
   if (settings_.all)
     return take (std::move (frame), std::move (places));
   if (moving)

@@ -26,8 +26,8 @@ struct BoardPlace {
 struct CameraCoverage {
   static constexpr int kColumns = 4, kRows = 3;
 
-  int frames = 0;                              ///< taken frames with a board in this picture
-  std::array<bool, kColumns * kRows> cells{};  ///< cells of the picture that held a corner, by rows
+  int frames = 0;                             ///< taken frames with a board in this picture
+  std::array<bool, kColumns * kRows> cells{}; ///< cells of the picture that held a corner, by rows
   bool tilted_left = false, tilted_right = false, tilted_up = false, tilted_down = false;
   bool distances = false; ///< boards of clearly different size
 

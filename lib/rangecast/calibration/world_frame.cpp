@@ -45,7 +45,8 @@ mean (std::span<const Vec3> points)
 }
 
 /* The point with the least sum of squared distances from the optical axes; the middle of the boards
- * where the axes do not say it: they are parallel, or meet behind a camera or far beyond all boards.
+ * where the axes do not say it: they are parallel, or meet behind a camera or far beyond all
+ * boards.
  */
 Vec3
 looked_at (std::span<const Pose> cameras, Vec3 middle)
@@ -78,8 +79,8 @@ looked_at (std::span<const Pose> cameras, Vec3 middle)
 } // namespace
 
 Pose
-place_world (WorldFrame frame, std::span<const Pose> first_from_camera, std::span<const Vec3> boards,
-    const Pose &first_from_board)
+place_world (WorldFrame frame, std::span<const Pose> first_from_camera,
+    std::span<const Vec3> boards, const Pose &first_from_board)
 {
   const Vec3 first = first_from_camera[0].translation;
   if (frame == WorldFrame::kFirstView)

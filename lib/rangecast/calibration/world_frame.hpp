@@ -12,8 +12,8 @@ enum class WorldFrame {
   kCentre, ///< origin where the cameras look, y up as the cameras have it on average, the first one
            ///< on the +z side
   kFirstView, ///< origin in the first camera, which looks along -z
-  kBoard,     ///< origin in the middle of a board, y its normal on the cameras' side (a board on the
-              ///< floor), z towards the first camera
+  kBoard, ///< origin in the middle of a board, y its normal on the cameras' side (a board on the
+          ///< floor), z towards the first camera
 };
 
 /** @param first_from_camera  poses of the views' own cameras in the first one's frame, the first
