@@ -292,6 +292,24 @@ BoardDetector::detect (ImageView<const std::uint8_t> picture, std::vector<BoardC
   return {};
 }
 
+Status
+BoardDetector::detect (
+    ImageView<const Rgbx> picture, std::vector<BoardCorner> &corners, double &edge_width)
+{
+  grey_.resize (std::size_t (picture.width) * picture.height);
+  for (int y = 0; y < picture.height; y++)
+    for (int x = 0; x < picture.width; x++) {
+      const Rgbx &p = picture.at (x, y);
+      grey_[std::size_t (y) * picture.width + x] =
+          std::uint8_t ((77 * p.r + 150 * p.g + 29 * p.b + 128) >> 8); /* BT.601 */
+    }
+  const ImageView<const std::uint8_t> grey{
+      grey_.data (), picture.width, picture.height, picture.width};
+  Status s = detect (grey, corners);
+  edge_width = edge_width_px (grey, corners);
+  return s;
+}
+
 double
 edge_width_px (ImageView<const std::uint8_t> picture, const std::vector<BoardCorner> &corners)
 {

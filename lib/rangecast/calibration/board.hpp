@@ -72,12 +72,17 @@ public:
    *  if there is no board. A chessboard gives all or none, ChArUco at least 6. */
   Status detect (ImageView<const std::uint8_t> picture, std::vector<BoardCorner> &corners);
 
+  /** The same for a colour picture, with edge_width_px() of what was found. */
+  Status detect (
+      ImageView<const Rgbx> picture, std::vector<BoardCorner> &corners, double &edge_width);
+
 private:
   struct Charuco;
 
   BoardSpec board_;
   bool thorough_ = false;
   std::unique_ptr<Charuco> charuco_;
+  std::vector<std::uint8_t> grey_;
 };
 
 /** Width of the edges at the corners, pixels: about 2 in a sharp picture; contrast over steepest

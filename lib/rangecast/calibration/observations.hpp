@@ -24,6 +24,8 @@ struct CalibrationCamera {
   int view_id = 0;  ///< 0 .. kMaxViews - 1
   CameraRole role = CameraRole::kLeft;
   int width = 0, height = 0; ///< pixels
+
+  friend bool operator== (const CalibrationCamera &, const CalibrationCamera &) = default;
 };
 
 /** "sink_1 (view 0, right)" */

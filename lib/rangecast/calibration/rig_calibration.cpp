@@ -431,6 +431,13 @@ calibrate_rig (const std::vector<CalibrationCamera> &cameras, std::vector<Calibr
     return s;
   if (settings.min_frames < 3)
     return bad ("min-frames is " + std::to_string (settings.min_frames) + "; expected at least 3");
+  for (const CalibrationFrame &frame : frames)
+    for (const Sighting &sighting : frame.sightings)
+      if (sighting.camera < 0 || sighting.camera >= int (cameras.size ()) ||
+          std::ranges::any_of (sighting.corners, [&] (const BoardCorner &c) {
+            return c.id < 0 || c.id >= settings.board.corner_count ();
+          }))
+        return bad ("a frame has a camera or a corner that does not exist");
   try {
     return Calibration (cameras, frames, settings, result).run ();
   } catch (const std::exception &e) {
