@@ -51,6 +51,10 @@ mean (std::span<const Vec3> points)
 Vec3
 looked_at (std::span<const Pose> cameras, Vec3 middle)
 {
+  if (cameras.size () == 1) {
+    const Vec3 axis = column (cameras[0], 2), at = cameras[0].translation;
+    return at + dot (axis, middle - at) * axis;
+  }
   cv::Matx33d a = cv::Matx33d::zeros ();
   cv::Vec3d b (0, 0, 0);
   double farthest = 0;
