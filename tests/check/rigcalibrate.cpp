@@ -177,7 +177,7 @@ GST_START_TEST (test_boards_in_two_cameras_become_a_rig_file_at_eos)
   fail_unless (std::abs (number (pair, "distance") - 0.1) < 0.003);
   fail_unless (number (pair, "row-error") >= 0 && number (pair, "row-error") < 0.5);
   guint frames = 0;
-  fail_unless (gst_structure_get_uint (pair, "frames", &frames) && frames >= 11);
+  fail_unless (gst_structure_get_uint (pair, "frames", &frames) && frames >= 9);
 
   Rig rig;
   fail_unless (load_rig (location, rig).ok ());
