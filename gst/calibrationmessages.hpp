@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <rangecast/calibration/session.hpp>
+
+/* The element messages of rigcalibrate; field by field in docs/elements/rigcalibrate.md. Any
+ * thread, without locks. */
+
+/* One rigcalibrate-board a camera that had a picture. */
+void post_board (GstElement *element, const rangecast::CalibrationSession &session, int camera,
+    guint64 frame, GstClockTime running_time);
+/* One rigcalibrate-coverage a camera. */
+void post_coverage (GstElement *element, const rangecast::CalibrationSession &session);
+/* @param location  null: no file was written */
+void post_result (GstElement *element, const rangecast::CalibrationSession &session,
+    const rangecast::CalibrationResult &result, const char *location);

@@ -1,0 +1,850 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rigcalibrate
+ * @title: rigcalibrate
+ *
+ * Calibrates any number of cameras from pictures of a chessboard or ChArUco board: each camera,
+ * each stereo pair, and where all of them stand. Picks the frames itself, says by element messages
+ * which camera saw the board and what is still missing, and writes the rig file that all elements
+ * read, at EOS or on the action signal #GstRigCalibrate::calibrate.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 -m rigcalibrate name=c location=rig.yaml columns=9 rows=6 square-size=0.025
+ * sink_0::view=0 sink_1::view=0 sink_1::role=right ! videoconvert ! autovideosink
+ * multifilesrc location=left%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_0
+ * multifilesrc location=right%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_1
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrigcalibrate.h"
+
+#include "backgroundjobs.hpp"
+#include "calibrationmessages.hpp"
+#include "calibrationpad.hpp"
+#include "calibrationsettings.hpp"
+#include "picturereader.hpp"
+#include "recycledbuffers.hpp"
+
+#include <algorithm>
+#include <gstrange/gstrangepairing.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <rangecast/geometry/rig.hpp>
+
+using rangecast::CalibrationCamera;
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::TileLayout;
+
+GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
+#define GST_CAT_DEFAULT gst_rig_calibrate_debug
+
+enum { PROP_STATS = kCalibrationLast };
+enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
+static guint signals[LAST_SIGNAL];
+
+static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
+/* Pictures that come faster are a film, not photographs; per second. */
+static constexpr int kFastestPhotographs = 2;
+
+struct Camera {
+  GstRigCalibratePad *pad;
+  GstVideoInfo info; /* streaming thread */
+  bool has_info = false;
+  PictureReader reader; /* jobs */
+  GstVideoInfo reader_info;
+  bool reader_set = false;
+
+  explicit Camera (GstRigCalibratePad *p)
+      : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))), info{}, reader_info{}
+  {
+  }
+  ~Camera () { gst_object_unref (pad); }
+  [[nodiscard]] GstAggregatorPad *aggregator_pad () const { return GST_AGGREGATOR_PAD (pad); }
+};
+using Cameras = std::vector<std::shared_ptr<Camera>>;
+
+/* Pictures of one moment on their way to the board detector. */
+struct FrameSet {
+  Cameras cameras;
+  std::vector<CalibrationCamera> described;
+  std::vector<GstVideoInfo> infos;
+  std::vector<GstBuffer *> buffers; /* by camera; null where there is none */
+  GstClockTime capture = 0, running = GST_CLOCK_TIME_NONE;
+  guint64 number = 0;
+  std::optional<rangecast::SessionSettings> begin; /* with the first one */
+  int tile_width = 0;
+  bool auto_finish = false;
+
+  FrameSet () = default;
+  FrameSet (const FrameSet &) = delete;
+  ~FrameSet ()
+  {
+    for (GstBuffer *buffer : buffers)
+      if (buffer)
+        gst_buffer_unref (buffer);
+  }
+};
+
+struct GstRigCalibratePrivate {
+  std::mutex lock; /* guards what follows; never held across a push, message or job */
+  CalibrationProperties properties;
+  Cameras cameras;
+  guint64 examined = 0, taken = 0, skipped = 0, dropped = 0;
+  GstBuffer *still = nullptr; /* drawn and not pushed yet */
+  TileLayout still_layout;
+  GstClockTime still_capture = 0;
+  Status failure;        /* of what a job did last */
+  bool finished = false; /* calibrated, and nothing more is wanted */
+  bool stale = true;     /* frames were taken since the last calibration */
+
+  BackgroundJobs jobs; /* in which the board is looked for and all is calibrated */
+
+  /* jobs only, and while there are none */
+  rangecast::CalibrationSession session;
+  RecycledBytes stills;
+
+  /* streaming thread only */
+  bool begin = true;
+  guint64 sets = 0;
+  TileLayout layout; /* of the caps */
+};
+
+struct _GstRigCalibrate {
+  GstAggregator parent;
+  GstRigCalibratePrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK,
+    GST_PAD_REQUEST, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("RGBx")));
+
+static void gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer data);
+
+G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR,
+    G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
+GST_ELEMENT_REGISTER_DEFINE (rigcalibrate, "rigcalibrate", GST_RANK_NONE, GST_TYPE_RIG_CALIBRATE)
+
+static Cameras
+current_cameras (GstRigCalibrate *self)
+{
+  std::lock_guard guard (self->priv->lock);
+  return self->priv->cameras;
+}
+
+static CalibrationProperties
+current_properties (GstRigCalibrate *self)
+{
+  std::lock_guard guard (self->priv->lock);
+  return self->priv->properties;
+}
+
+static std::string
+size_text (const GstVideoInfo &info)
+{
+  return std::to_string (info.width) + "x" + std::to_string (info.height);
+}
+
+/* ---- jobs ---- */
+
+/* From frames to the rig file and the result message. */
+static Status
+calibrate (GstRigCalibrate *self)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  const std::string location = current_properties (self).location;
+  rangecast::CalibrationResult result;
+  Status status = {StatusCode::kNotFound, "there were no pictures to calibrate from"};
+  if (!priv->session.cameras ().empty ())
+    status = priv->session.calibrate (result);
+  if (status.ok () && !location.empty ())
+    status = rangecast::save_rig (location, result.rig);
+  if (status.ok ()) {
+    for (const std::string &warning : result.warnings)
+      gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadValue, warning});
+    post_result (
+        GST_ELEMENT (self), priv->session, result, location.empty () ? nullptr : location.c_str ());
+  }
+  std::lock_guard guard (priv->lock);
+  priv->stale = !status.ok ();
+  return status;
+}
+
+/* The pictures of a frame set as the core sees them; unmapped when it goes. */
+class MappedPictures {
+public:
+  explicit MappedPictures (FrameSet &set) : views (set.cameras.size ())
+  {
+    for (std::size_t i = 0; i < set.cameras.size () && status.ok (); i++)
+      if (set.buffers[i])
+        open (set, i);
+  }
+  ~MappedPictures ()
+  {
+    for (Camera *camera : open_)
+      camera->reader.close ();
+  }
+  MappedPictures (const MappedPictures &) = delete;
+
+  std::vector<rangecast::ImageView<const rangecast::Rgbx>> views;
+  Status status;
+
+private:
+  void open (FrameSet &set, std::size_t i)
+  {
+    Camera &camera = *set.cameras[i];
+    if (!camera.reader_set || !gst_video_info_is_equal (&camera.reader_info, &set.infos[i])) {
+      camera.reader_info = set.infos[i];
+      camera.reader_set = camera.reader.set (set.infos[i]);
+    }
+    if (!camera.reader_set)
+      status = {StatusCode::kUnsupported,
+          "pad " + set.described[i].name + ": cannot convert the pictures to RGBx"};
+    else if (!camera.reader.open (set.buffers[i]))
+      status = {StatusCode::kBadData,
+          "pad " + set.described[i].name + ": a buffer is smaller than its caps say"};
+    else {
+      open_.push_back (&camera);
+      views[i] = camera.reader.view ();
+    }
+  }
+
+  std::vector<Camera *> open_;
+};
+
+/* Draws what was found, for the streaming thread to push. */
+static void
+draw_still (GstRigCalibrate *self, const FrameSet &set, const MappedPictures &pictures)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  const TileLayout layout = rangecast::lay_out (set.described, set.tile_width);
+  const gsize size = gsize (layout.width ()) * layout.height () * 4;
+  GstBuffer *still = priv->stills.acquire (GST_ELEMENT (self), size, "the still picture");
+  GstMapInfo map;
+  if (!still)
+    return;
+  if (gst_buffer_map (still, &map, GST_MAP_WRITE)) {
+    priv->session.draw (
+        pictures.views, {reinterpret_cast<rangecast::Rgbx *> (map.data), layout.width (),
+                            layout.height (), layout.width () * 4});
+    gst_buffer_unmap (still, &map);
+  }
+  std::lock_guard guard (priv->lock);
+  gst_clear_buffer (&priv->still);
+  priv->still = still;
+  priv->still_layout = layout;
+  priv->still_capture = set.capture;
+}
+
+static Status
+examine (GstRigCalibrate *self, FrameSet &set)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  if (set.begin)
+    if (Status s = priv->session.set (*set.begin); !s.ok ())
+      return s;
+  const MappedPictures pictures (set);
+  if (!pictures.status.ok ())
+    return pictures.status;
+  if (Status s = priv->session.examine (set.described, pictures.views, set.capture); !s.ok ())
+    return s;
+  const bool taken = priv->session.verdict () == rangecast::FrameVerdict::kTaken;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->examined++;
+    priv->taken += taken;
+    priv->stale |= taken;
+  }
+  draw_still (self, set, pictures);
+  for (std::size_t i = 0; i < set.buffers.size (); i++)
+    if (set.buffers[i])
+      post_board (GST_ELEMENT (self), priv->session, int (i), set.number, set.running);
+  if (taken)
+    post_coverage (GST_ELEMENT (self), priv->session);
+  return {};
+}
+
+static void
+examine_job (GstRigCalibrate *self, FrameSet &set)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  Status status = examine (self, set);
+  bool finished = false;
+  if (status.ok () && set.auto_finish && priv->session.complete ()) {
+    const Status calibrated = calibrate (self);
+    finished = calibrated.ok ();
+    gst_range_post_warning (GST_ELEMENT (self), calibrated);
+  }
+  std::lock_guard guard (priv->lock);
+  priv->failure = std::move (status);
+  priv->finished |= finished;
+}
+
+/* ---- action signals, from any thread ---- */
+
+static void
+gst_rig_calibrate_calibrate (GstRigCalibrate *self)
+{
+  self->priv->jobs.post ([self] { gst_range_post_warning (GST_ELEMENT (self), calibrate (self)); });
+}
+
+static void
+gst_rig_calibrate_reset (GstRigCalibrate *self)
+{
+  self->priv->jobs.post ([self] {
+    self->priv->session.clear ();
+    std::lock_guard guard (self->priv->lock);
+    self->priv->examined = self->priv->taken = 0;
+    self->priv->stale = true;
+  });
+}
+
+/* ---- pictures of one moment ---- */
+
+struct Front {
+  std::size_t camera;
+  GstBuffer *buffer; /* a reference of ours */
+  GstClockTime capture, running;
+};
+
+/* The oldest picture of every pad; unrefs them when it goes. */
+class Fronts {
+public:
+  Fronts (const Cameras &cameras, bool live)
+  {
+    for (std::size_t i = 0; i < cameras.size (); i++) {
+      GstAggregatorPad *pad = cameras[i]->aggregator_pad ();
+      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
+      if (buffer)
+        list.push_back ({i, buffer, gstrange::capture_time_of (pad, buffer, live),
+            gstrange::running_time_of (pad, buffer)});
+      else
+        (gst_aggregator_pad_is_eos (pad) ? ended : missing)++;
+    }
+  }
+  ~Fronts ()
+  {
+    for (const Front &front : list)
+      gst_buffer_unref (front.buffer);
+  }
+  Fronts (const Fronts &) = delete;
+
+  std::vector<Front> list;
+  int missing = 0, ended = 0;
+};
+
+static GstClockTime
+tolerance_of (const Cameras &cameras, GstClockTime max_skew)
+{
+  if (max_skew > 0)
+    return max_skew;
+  GstClockTime shortest = GST_CLOCK_TIME_NONE;
+  for (const auto &camera : cameras)
+    if (camera->has_info && camera->info.fps_n > 0)
+      shortest = std::min (
+          shortest, gst_util_uint64_scale_int (GST_SECOND, camera->info.fps_d, camera->info.fps_n));
+  return GST_CLOCK_TIME_IS_VALID (shortest) ? shortest / 2 : kDefaultTolerance;
+}
+
+/* Drops gaps, and pictures too old to be of the moment of the newest, and all while a camera has
+ * not begun. @return whether any went */
+static bool
+drop_unmatched (
+    GstRigCalibrate *self, const Cameras &cameras, const Fronts &fronts, GstClockTime tolerance)
+{
+  GstClockTime latest = 0;
+  for (const Front &front : fronts.list)
+    if (!gstrange::is_gap (front.buffer))
+      latest = std::max (latest, front.capture);
+  const bool early =
+      std::ranges::any_of (cameras, [] (const auto &camera) { return !camera->has_info; });
+  bool any = false;
+  for (const Front &front : fronts.list) {
+    const bool gap = gstrange::is_gap (front.buffer);
+    if (!gap && !early && latest - front.capture <= tolerance)
+      continue;
+    gst_aggregator_pad_drop_buffer (cameras[front.camera]->aggregator_pad ());
+    any = true;
+    std::lock_guard guard (self->priv->lock);
+    self->priv->dropped += !gap;
+  }
+  return any;
+}
+
+/* Takes what waits on all pads. */
+static std::shared_ptr<FrameSet>
+take (GstRigCalibrate *self, const Cameras &cameras, const Fronts &fronts)
+{
+  auto set = std::make_shared<FrameSet> ();
+  set->cameras = cameras;
+  set->buffers.resize (cameras.size ());
+  set->number = self->priv->sets++;
+  for (const auto &camera : cameras) {
+    CalibrationCamera described = calibration_camera (camera->pad);
+    described.width = camera->info.width;
+    described.height = camera->info.height;
+    set->described.push_back (std::move (described));
+    set->infos.push_back (camera->info);
+  }
+  for (const Front &front : fronts.list) {
+    set->buffers[front.camera] =
+        gst_aggregator_pad_pop_buffer (cameras[front.camera]->aggregator_pad ());
+    set->capture = std::max (set->capture, front.capture);
+    set->running = std::min (set->running, front.running); /* NONE is the greatest number */
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (set->running))
+    set->capture = set->number * 2 * GST_SECOND; /* says nothing about motion */
+  return set;
+}
+
+/* ---- output ---- */
+
+static GstFlowReturn
+gst_rig_calibrate_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+{
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with each picture, see push_still() */
+}
+
+/* Pushes what was drawn last, with the time at which it goes: live, it was drawn of older pictures.
+ */
+static GstFlowReturn
+push_still (GstRigCalibrate *self, GstClockTime running)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  auto aggregator = GST_AGGREGATOR (self);
+  GstBuffer *still;
+  TileLayout layout;
+  GstClockTime capture;
+  {
+    std::lock_guard guard (priv->lock);
+    still = priv->still;
+    priv->still = nullptr;
+    layout = priv->still_layout;
+    capture = priv->still_capture;
+  }
+  if (!still)
+    return GST_FLOW_OK;
+  if (!gst_pad_is_linked (aggregator->srcpad)) { /* nobody looks */
+    gst_buffer_unref (still);
+    return GST_FLOW_OK;
+  }
+  if (layout.width () != priv->layout.width () || layout.height () != priv->layout.height ()) {
+    GstVideoInfo info;
+    gst_video_info_set_format (
+        &info, GST_VIDEO_FORMAT_RGBx, guint (layout.width ()), guint (layout.height ()));
+    GstCaps *caps = gst_video_info_to_caps (&info);
+    gst_aggregator_set_src_caps (aggregator, caps);
+    gst_caps_unref (caps);
+    priv->layout = layout;
+  }
+  gstrange::stamp (aggregator, still, running, GST_CLOCK_TIME_NONE, capture);
+  return gst_aggregator_finish_buffer (aggregator, still);
+}
+
+/* ---- streaming ---- */
+
+/* What the first pictures say: whether the cameras make up views, and what to keep. */
+static Status
+begin (GstRigCalibrate *self, FrameSet &set, const CalibrationProperties &p, bool live)
+{
+  if (Status s = rangecast::check_cameras (set.described, p.core.board); !s.ok ())
+    return s;
+  bool film = live;
+  for (const GstVideoInfo &info : set.infos)
+    film |= info.fps_n > kFastestPhotographs * std::max (info.fps_d, 1);
+  rangecast::SessionSettings settings;
+  settings.calibration = p.core;
+  settings.selection.max_frames = p.max_frames;
+  settings.selection.all = p.selection == CalibrationSelection::kAll ||
+                           (p.selection == CalibrationSelection::kAuto && !film);
+  settings.thorough = !film;
+  set.begin = settings;
+  self->priv->begin = false;
+  return {};
+}
+
+/* Live, pictures that come while the last ones are looked at go unseen; else they wait. */
+static GstFlowReturn
+hand_over (GstRigCalibrate *self, std::shared_ptr<FrameSet> set, bool live)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  const CalibrationProperties p = current_properties (self);
+  const GstClockTime running = set->running;
+  if (live && !priv->jobs.idle ()) {
+    std::lock_guard guard (priv->lock);
+    priv->skipped++;
+    return GST_FLOW_OK;
+  }
+  if (priv->begin)
+    if (Status s = begin (self, *set, p, live); !s.ok ())
+      return gst_range_flow_return (GST_ELEMENT (self), s);
+  set->tile_width = p.tile_width;
+  set->auto_finish = p.auto_finish;
+  priv->jobs.post ([self, set] { examine_job (self, *set); });
+  set.reset ();
+  if (!live)
+    priv->jobs.wait_until_idle ();
+  Status failure;
+  {
+    std::lock_guard guard (priv->lock);
+    failure = priv->failure;
+  }
+  const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), failure);
+  return flow == GST_FLOW_OK ? push_still (self, running) : flow;
+}
+
+/* A camera of which nothing is known yet, or null. */
+static const Camera *
+without_caps (const Cameras &cameras)
+{
+  const auto found = std::ranges::find_if (cameras, [] (const auto &c) { return !c->has_info; });
+  return found == cameras.end () ? nullptr : found->get ();
+}
+
+/* Why there is nothing to calibrate from, if so. */
+static Status
+nothing_came (GstRigCalibrate *self, const Cameras &cameras)
+{
+  if (self->priv->sets > 0)
+    return {};
+  if (const Camera *camera = without_caps (cameras))
+    return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
+                                       ": no pictures came; expected some on every pad"};
+  return {StatusCode::kNotFound,
+      "no pictures of the same time came on all pads; expected capture times that differ by less "
+      "than half a frame, or by max-skew"};
+}
+
+/* All pads have ended: calibrates, unless that was done already. */
+static GstFlowReturn
+finish (GstRigCalibrate *self, const Cameras &cameras)
+{
+  GstRigCalibratePrivate *priv = self->priv;
+  priv->jobs.wait_until_idle ();
+  Status status;
+  bool stale;
+  {
+    std::lock_guard guard (priv->lock);
+    status = priv->failure;
+    stale = priv->stale;
+  }
+  if (status.ok ())
+    status = nothing_came (self, cameras);
+  if (status.ok () && stale) {
+    const auto outcome = std::make_shared<Status> ();
+    priv->jobs.post ([self, outcome] { *outcome = calibrate (self); });
+    priv->jobs.wait_until_idle ();
+    status = *outcome;
+  }
+  const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
+  return flow == GST_FLOW_OK ? GST_FLOW_EOS : flow;
+}
+
+static GstFlowReturn
+gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
+{
+  auto self = GST_RIG_CALIBRATE (aggregator);
+  GstRigCalibratePrivate *priv = self->priv;
+  {
+    std::lock_guard guard (priv->lock);
+    if (priv->finished)
+      return GST_FLOW_EOS;
+  }
+  const Cameras cameras = current_cameras (self);
+  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  const Fronts fronts (cameras, live);
+  if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
+    return finish (self, cameras);
+  if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime tolerance = tolerance_of (cameras, current_properties (self).max_skew);
+  if (drop_unmatched (self, cameras, fronts, tolerance))
+    return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
+  return hand_over (self, take (self, cameras, fronts), live);
+}
+
+/* The deadline for a camera that is late counts from the oldest picture that waits. */
+static GstClockTime
+gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
+{
+  GstClockTime oldest = GST_CLOCK_TIME_NONE;
+  const Fronts fronts (current_cameras (GST_RIG_CALIBRATE (aggregator)), true);
+  for (const Front &front : fronts.list)
+    oldest = std::min (oldest, front.running);
+  return oldest;
+}
+
+/* Corners of two sizes do not make one camera. */
+static Status
+take_caps (GstRigCalibrate *self, Camera &camera, GstCaps *caps)
+{
+  const std::string name = calibration_camera (camera.pad).name;
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return {StatusCode::kUnsupported, "pad " + name + ": these are not the caps of pictures"};
+  bool begun;
+  {
+    std::lock_guard guard (self->priv->lock);
+    begun = self->priv->examined > 0;
+  }
+  if (begun && camera.has_info &&
+      (info.width != camera.info.width || info.height != camera.info.height))
+    return {StatusCode::kBadSize, "pad " + name + ": pictures changed from " +
+                                      size_text (camera.info) + " to " + size_text (info) +
+                                      "; expected one size throughout a calibration"};
+  camera.info = info;
+  camera.has_info = true;
+  return {};
+}
+
+static gboolean
+gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  auto self = GST_RIG_CALIBRATE (aggregator);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    gst_event_parse_caps (event, &caps);
+    for (const auto &camera : current_cameras (self))
+      if (camera->aggregator_pad () == pad && gst_range_flow_return (GST_ELEMENT (self),
+                                                  take_caps (self, *camera, caps)) != GST_FLOW_OK) {
+        gst_event_unref (event);
+        return FALSE;
+      }
+  }
+  return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
+}
+
+/* ---- request pads ---- */
+
+static GstPad *
+gst_rig_calibrate_request_new_pad (
+    GstElement *element, GstPadTemplate *pad_template, const gchar *name, const GstCaps *caps)
+{
+  auto self = GST_RIG_CALIBRATE (element);
+  GstPad *pad = GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)
+                    ->request_new_pad (element, pad_template, name, caps);
+  if (!pad)
+    return nullptr;
+  unsigned number = 0;
+  if (sscanf (GST_PAD_NAME (pad), "sink_%u", &number) == 1)
+    set_default_view (
+        GST_RIG_CALIBRATE_PAD (pad), int (std::min<unsigned> (number, rangecast::kMaxViews - 1)));
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->cameras.push_back (std::make_shared<Camera> (GST_RIG_CALIBRATE_PAD (pad)));
+  }
+  gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
+  return pad;
+}
+
+/* A camera that goes takes all frames with it: their numbers of cameras would be wrong. */
+static void
+gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
+{
+  auto self = GST_RIG_CALIBRATE (element);
+  {
+    std::lock_guard guard (self->priv->lock);
+    std::erase_if (self->priv->cameras,
+        [&] (const auto &camera) { return GST_PAD (camera->aggregator_pad ()) == pad; });
+  }
+  gst_rig_calibrate_reset (self);
+  gst_child_proxy_child_removed (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
+  GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->release_pad (element, pad);
+}
+
+static GObject *
+gst_rig_calibrate_get_child_by_index (GstChildProxy *proxy, guint index)
+{
+  const Cameras cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
+  return index < cameras.size () ? G_OBJECT (gst_object_ref (cameras[index]->pad)) : nullptr;
+}
+
+static guint
+gst_rig_calibrate_get_children_count (GstChildProxy *proxy)
+{
+  return guint (current_cameras (GST_RIG_CALIBRATE (proxy)).size ());
+}
+
+static void
+gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer)
+{
+  auto proxy = static_cast<GstChildProxyInterface *> (iface);
+  proxy->get_child_by_index = gst_rig_calibrate_get_child_by_index;
+  proxy->get_children_count = gst_rig_calibrate_get_children_count;
+}
+
+/* ---- life ---- */
+
+/* What can be known to be wrong before minutes of work are lost. */
+static Status
+check_location (const std::string &location)
+{
+  if (location.empty ())
+    return {};
+  const auto ends_with = [&] (const char *end) {
+    return g_str_has_suffix (location.c_str (), end) != FALSE;
+  };
+  if (!ends_with (".yaml") && !ends_with (".yml") && !ends_with (".json"))
+    return {StatusCode::kBadValue,
+        location + ": expected a file name that ends in .yaml, .yml or .json"};
+  gchar *folder = g_path_get_dirname (location.c_str ());
+  const bool there = g_file_test (folder, G_FILE_TEST_IS_DIR);
+  g_free (folder);
+  if (!there)
+    return {StatusCode::kNotFound, location + ": its folder does not exist"};
+  return {};
+}
+
+static gboolean
+gst_rig_calibrate_start (GstAggregator *aggregator)
+{
+  auto self = GST_RIG_CALIBRATE (aggregator);
+  GstRigCalibratePrivate *priv = self->priv;
+  const CalibrationProperties p = current_properties (self);
+  rangecast::SessionSettings settings;
+  settings.calibration = p.core;
+  settings.selection.max_frames = p.max_frames;
+  Status status = check_location (p.location);
+  if (status.ok ())
+    status = priv->session.set (settings);
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->begin = true;
+  priv->sets = 0;
+  priv->layout = {};
+  {
+    std::lock_guard guard (priv->lock);
+    priv->examined = priv->taken = priv->skipped = priv->dropped = 0;
+    priv->failure = {};
+    priv->finished = false;
+    priv->stale = true;
+    for (const auto &camera : priv->cameras)
+      camera->has_info = false;
+  }
+  priv->jobs.start ();
+  return TRUE;
+}
+
+static gboolean
+gst_rig_calibrate_stop (GstAggregator *aggregator)
+{
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (aggregator)->priv;
+  priv->jobs.stop ();
+  priv->session.clear ();
+  for (const auto &camera : current_cameras (GST_RIG_CALIBRATE (aggregator))) {
+    camera->reader.reset ();
+    camera->reader_set = false;
+  }
+  GstBuffer *still;
+  {
+    std::lock_guard guard (priv->lock);
+    still = priv->still;
+    priv->still = nullptr;
+  }
+  gst_clear_buffer (&still);
+  priv->stills.drop ();
+  return TRUE;
+}
+
+static void
+gst_rig_calibrate_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (object)->priv;
+  std::lock_guard guard (priv->lock);
+  if (!set_calibration_property (priv->properties, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rig_calibrate_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (object)->priv;
+  std::lock_guard guard (priv->lock);
+  if (id == PROP_STATS)
+    g_value_take_boxed (
+        value, gst_structure_new ("application/x-rigcalibrate-stats", "examined", G_TYPE_UINT64,
+                   priv->examined, "taken", G_TYPE_UINT64, priv->taken, "skipped", G_TYPE_UINT64,
+                   priv->skipped, "dropped", G_TYPE_UINT64, priv->dropped, nullptr));
+  else if (!get_calibration_property (priv->properties, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rig_calibrate_finalize (GObject *object)
+{
+  delete GST_RIG_CALIBRATE (object)->priv;
+  G_OBJECT_CLASS (gst_rig_calibrate_parent_class)->finalize (object);
+}
+
+static void
+gst_rig_calibrate_init (GstRigCalibrate *self)
+{
+  self->priv = new GstRigCalibratePrivate;
+}
+
+static void
+install_signals (GstRigCalibrateClass *klass)
+{
+  /**
+   * GstRigCalibrate::calibrate:
+   *
+   * Calibrates from the frames so far, in the background; ends in a rigcalibrate-result message or
+   * a warning. The stream goes on.
+   */
+  signals[SIGNAL_CALIBRATE] = g_signal_new_class_handler ("calibrate", G_TYPE_FROM_CLASS (klass),
+      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_calibrate),
+      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
+  /**
+   * GstRigCalibrate::reset:
+   *
+   * Forgets all frames.
+   */
+  signals[SIGNAL_RESET] = g_signal_new_class_handler ("reset", G_TYPE_FROM_CLASS (klass),
+      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_reset),
+      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
+}
+
+static void
+gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
+
+  object_class->set_property = gst_rig_calibrate_set_property;
+  object_class->get_property = gst_rig_calibrate_get_property;
+  object_class->finalize = gst_rig_calibrate_finalize;
+  install_calibration_properties (object_class);
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters of moments since start: examined, taken, skipped (live, while busy), and "
+          "pictures dropped (no partner)",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_signals (klass);
+
+  gst_element_class_add_static_pad_template_with_gtype (
+      element_class, &sink_template, GST_TYPE_RIG_CALIBRATE_PAD);
+  gst_element_class_add_static_pad_template_with_gtype (
+      element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_set_static_metadata (element_class, "Rig calibration", "Analyzer/Video",
+      "Calibrates cameras and their poses from pictures of a board", "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
+
+  element_class->request_new_pad = gst_rig_calibrate_request_new_pad;
+  element_class->release_pad = gst_rig_calibrate_release_pad;
+
+  aggregator_class->start = gst_rig_calibrate_start;
+  aggregator_class->stop = gst_rig_calibrate_stop;
+  aggregator_class->sink_event = gst_rig_calibrate_sink_event;
+  aggregator_class->update_src_caps = gst_rig_calibrate_update_src_caps;
+  aggregator_class->get_next_time = gst_rig_calibrate_get_next_time;
+  aggregator_class->clip = gstrange::clip_to_segment;
+  aggregator_class->aggregate = gst_rig_calibrate_aggregate;
+
+  GST_DEBUG_CATEGORY_INIT (gst_rig_calibrate_debug, "rigcalibrate", 0, "Rig calibration");
+}

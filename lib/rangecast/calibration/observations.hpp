@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "board.hpp"
+
+namespace rangecast {
+
+/** What a camera is to its view. */
+enum class CameraRole {
+  kLeft,  ///< the view's own camera; every view has one
+  kRight, ///< the second camera of a stereo pair, on the left camera's +x side
+  kThird, ///< a further camera beside it
+};
+
+[[nodiscard]] std::string_view role_name (CameraRole role);
+
+/** A camera that is to be calibrated. */
+struct CalibrationCamera {
+  std::string name; ///< for messages, e.g. the pad's
+  int view_id = 0;  ///< 0 .. kMaxViews - 1
+  CameraRole role = CameraRole::kLeft;
+  int width = 0, height = 0; ///< pixels
+
+  friend bool operator== (const CalibrationCamera &, const CalibrationCamera &) = default;
+};
+
+/** "sink_1 (view 0, right)" */
+[[nodiscard]] std::string text_of (const CalibrationCamera &camera);
+
+/** The board in one camera's picture. */
+struct Sighting {
+  int camera = 0; ///< index into the list of cameras
+  std::vector<BoardCorner> corners;
+};
+
+/** The board at one moment, in the pictures of all cameras that saw it. */
+struct CalibrationFrame {
+  std::vector<Sighting> sightings; ///< at most one a camera
+
+  [[nodiscard]] const Sighting *find (int camera) const;
+};
+
+/** Number of frames in which both cameras saw the board, and at least 4 corners of it in common. */
+[[nodiscard]] int shared_frames (const std::vector<CalibrationFrame> &frames, int a, int b);
+
+/** Which cameras hang together, directly or through others.
+ *  @param fewest_shared  frames that two cameras must share to count as linked
+ *  @return for each camera the number of its group, 0 for the first camera's */
+[[nodiscard]] std::vector<int> linked_groups (
+    int cameras, const std::vector<CalibrationFrame> &frames, int fewest_shared);
+
+} // namespace rangecast

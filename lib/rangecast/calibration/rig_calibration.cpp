@@ -1,0 +1,448 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rig_calibration.hpp"
+
+#include "opencv_types.hpp"
+#include "pose_chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace rangecast {
+namespace {
+
+/* A board whose error is larger than so many times the median of all, and than so many pixels, is
+ * left out: it was moving, or its corners are not where they were taken to be. */
+constexpr double kOutlierFactor = 4, kOutlierPx = 0.6;
+constexpr int kOutlierRounds = 3;
+constexpr double kRobustPx = 1;
+/* A larger error than that is not a calibration, pixels. */
+constexpr double kWorstRmsPx = 5;
+
+Status
+bad (const std::string &what)
+{
+  return {StatusCode::kBadValue, what};
+}
+
+int
+find_camera (const std::vector<CalibrationCamera> &cameras, int view_id, CameraRole role)
+{
+  for (std::size_t i = 0; i < cameras.size (); i++)
+    if (cameras[i].view_id == view_id && cameras[i].role == role)
+      return int (i);
+  return -1;
+}
+
+/* The calibration as it goes. */
+class Calibration {
+public:
+  Calibration (const std::vector<CalibrationCamera> &cameras, std::vector<CalibrationFrame> &frames,
+      const CalibrationSettings &settings, CalibrationResult &result)
+      : cameras_ (cameras), frames_ (frames), settings_ (settings), result_ (result)
+  {
+  }
+
+  Status run ()
+  {
+    Status s = check_counts ();
+    if (s.ok () && cameras_.size () > 1)
+      s = check_linked (cameras_, frames_);
+    if (s.ok ())
+      s = calibrate_lenses ();
+    if (s.ok ())
+      s = chain_cameras (cameras_, frames_, settings_.board, lenses_, bundle_, links_);
+    if (s.ok ())
+      s = adjust ();
+    if (s.ok ())
+      s = check_pairs ();
+    if (s.ok ())
+      s = report ();
+    return s.ok () ? make_rig () : s;
+  }
+
+private:
+  Status check_counts () const;
+  Status calibrate_lenses ();
+  Status adjust ();
+  Status check_pairs () const;
+  Status report ();
+  Status make_rig ();
+  Status drop_outliers (double limit_px, bool &any);
+  double outlier_limit () const;
+  double sighting_rms (std::size_t frame, const Sighting &sighting) const;
+  double reach (int camera) const;
+  double row_error (int left, int right) const;
+  PairReport pair_report (int a, int b) const;
+  Pose world_from_first () const;
+  Pose between (int a, int b) const
+  {
+    return bundle_.camera_from_first[b] * bundle_.camera_from_first[a].inverse ();
+  }
+
+  const std::vector<CalibrationCamera> &cameras_;
+  std::vector<CalibrationFrame> &frames_;
+  const CalibrationSettings &settings_;
+  CalibrationResult &result_;
+  std::vector<LensCalibration> lenses_;
+  std::vector<CameraLink> links_;
+  Bundle bundle_;
+};
+
+Status
+Calibration::check_counts () const
+{
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const auto count = std::ranges::count_if (
+        frames_, [&] (const CalibrationFrame &frame) { return frame.find (int (i)) != nullptr; });
+    if (count == 0)
+      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": no board was found; expected " +
+                                         std::to_string (settings_.board.columns) + "x" +
+                                         std::to_string (settings_.board.rows) +
+                                         " inner corners, whole and sharp, in at least " +
+                                         std::to_string (settings_.min_frames) + " frames"};
+    if (count < settings_.min_frames)
+      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": the board was found in " +
+                                         std::to_string (count) + " frames; expected at least " +
+                                         std::to_string (settings_.min_frames)};
+  }
+  return {};
+}
+
+/* Farthest corner from the principal point, pixels. */
+double
+Calibration::reach (int camera) const
+{
+  const LensParameters &lens = bundle_.lenses[camera];
+  double farthest = 0;
+  for (const CalibrationFrame &frame : frames_)
+    if (const Sighting *sighting = frame.find (camera))
+      for (const BoardCorner &c : sighting->corners)
+        farthest = std::max (farthest, std::hypot (c.x - lens[2], c.y - lens[3]));
+  return farthest;
+}
+
+Status
+Calibration::calibrate_lenses ()
+{
+  lenses_.resize (cameras_.size ());
+  for (std::size_t i = 0; i < cameras_.size (); i++)
+    if (Status s = calibrate_lens (
+            cameras_[i], int (i), frames_, settings_.board, settings_.distortion, lenses_[i]);
+        !s.ok ())
+      return s;
+  return {};
+}
+
+double
+Calibration::sighting_rms (std::size_t frame, const Sighting &sighting) const
+{
+  return reprojection_rms (bundle_.lenses[sighting.camera],
+      bundle_.camera_from_first[sighting.camera] * bundle_.first_from_board[frame], settings_.board,
+      sighting.corners);
+}
+
+double
+Calibration::outlier_limit () const
+{
+  std::vector<double> errors;
+  for (std::size_t f = 0; f < frames_.size (); f++)
+    for (const Sighting &sighting : frames_[f].sightings)
+      errors.push_back (sighting_rms (f, sighting));
+  if (errors.empty ())
+    return kOutlierPx;
+  std::ranges::nth_element (errors, errors.begin () + errors.size () / 2);
+  return std::max (kOutlierFactor * errors[errors.size () / 2], kOutlierPx);
+}
+
+/* @param[out] any  whether one went
+ * @return what check_counts() and check_linked() say of the rest */
+Status
+Calibration::drop_outliers (double limit_px, bool &any)
+{
+  const std::size_t before = result_.dropped.size ();
+  for (std::size_t f = 0; f < frames_.size (); f++)
+    std::erase_if (frames_[f].sightings, [&] (const Sighting &sighting) {
+      const double rms = sighting_rms (f, sighting);
+      const bool fits = rms <= limit_px;
+      if (!fits)
+        result_.dropped.push_back ({int (f), sighting.camera, rms});
+      return !fits;
+    });
+  any = result_.dropped.size () > before;
+  if (!any)
+    return {};
+  const Status s = check_counts ();
+  return s.ok () && cameras_.size () > 1 ? check_linked (cameras_, frames_) : s;
+}
+
+/* A loss that forgives outliers finds them; without them, plain squares are the best estimate. */
+Status
+Calibration::adjust ()
+{
+  BundleSettings bundle{settings_.distortion, true, kRobustPx};
+  bool dropped = false;
+  Status s = drop_outliers (std::numeric_limits<double>::max (), dropped); /* behind a camera */
+  dropped = true;
+  for (int round = 0; s.ok () && dropped && round < kOutlierRounds; round++) {
+    s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
+    if (s.ok ())
+      s = drop_outliers (outlier_limit (), dropped);
+  }
+  bundle.robust_px = 0;
+  if (s.ok ())
+    s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
+  for (std::size_t i = 0; s.ok () && i < cameras_.size (); i++) {
+    std::string warning;
+    s = check_lens (cameras_[i], bundle_.lenses[i], reach (int (i)), warning);
+    if (!warning.empty ())
+      result_.warnings.push_back (warning);
+  }
+  return s;
+}
+
+/* The right camera stands on the left one's +x side. */
+Status
+Calibration::check_pairs () const
+{
+  for (std::size_t left = 0; left < cameras_.size (); left++) {
+    if (cameras_[left].role != CameraRole::kLeft)
+      continue;
+    const int right = find_camera (cameras_, cameras_[left].view_id, CameraRole::kRight);
+    if (right < 0)
+      continue;
+    const Vec3 c = between (int (left), right).inverse ().translation;
+    char text[64];
+    std::snprintf (text, sizeof text, "%.4f m", norm (c));
+    if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
+      return bad ("view " + std::to_string (cameras_[left].view_id) + ": " + cameras_[left].name +
+                  " and " + cameras_[right].name + " stand " + text +
+                  " apart, but not side by side; expected a left and a right camera");
+    if (c.x < 0)
+      return bad ("view " + std::to_string (cameras_[left].view_id) +
+                  ": left and right cameras are swapped: " + cameras_[right].name +
+                  " (right) stands " + text + " to the left of " + cameras_[left].name +
+                  " (left); swap the two");
+  }
+  return {};
+}
+
+/* Median difference of the rows in which a corner falls once the pair is rectified, pixels. */
+double
+Calibration::row_error (int left, int right) const
+{
+  const Pose right_from_left = between (left, right);
+  const LensParameters &l = bundle_.lenses[left], &r = bundle_.lenses[right];
+  const Vec3 t = right_from_left.translation;
+  cv::Mat r1, r2, p1, p2, q;
+  std::vector<double> errors;
+  cv::stereoRectify (camera_matrix (l), coefficients (l), camera_matrix (r), coefficients (r),
+      {cameras_[left].width, cameras_[left].height}, opencv_matrix (right_from_left.rotation),
+      cv::Vec3d (t.x, t.y, t.z), r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0);
+  for (const CalibrationFrame &frame : frames_) {
+    const Sighting *a = frame.find (left), *b = frame.find (right);
+    if (!a || !b)
+      continue;
+    std::vector<cv::Point2d> in[2], out[2];
+    for (const BoardCorner &c : a->corners) {
+      const auto other = std::ranges::find (b->corners, c.id, &BoardCorner::id);
+      if (other == b->corners.end ())
+        continue;
+      in[0].emplace_back (c.x, c.y);
+      in[1].emplace_back (other->x, other->y);
+    }
+    if (in[0].empty ())
+      continue;
+    cv::undistortPoints (in[0], out[0], camera_matrix (l), coefficients (l), r1, p1);
+    cv::undistortPoints (in[1], out[1], camera_matrix (r), coefficients (r), r2, p2);
+    for (std::size_t i = 0; i < out[0].size (); i++)
+      errors.push_back (std::abs (out[0][i].y - out[1][i].y));
+  }
+  if (errors.empty ())
+    return -1;
+  std::ranges::nth_element (errors, errors.begin () + errors.size () / 2);
+  return errors[errors.size () / 2];
+}
+
+PairReport
+Calibration::pair_report (int a, int b) const
+{
+  PairReport pair{a, b, 0, 0, norm (between (a, b).translation), -1};
+  double squares = 0;
+  std::size_t corners = 0;
+  for (std::size_t f = 0; f < frames_.size (); f++) {
+    const Sighting *first = frames_[f].find (a), *second = frames_[f].find (b);
+    if (!first || !second)
+      continue;
+    pair.frames++;
+    for (const Sighting *s : {first, second}) {
+      squares += std::pow (sighting_rms (f, *s), 2) * double (s->corners.size ());
+      corners += s->corners.size ();
+    }
+  }
+  pair.rms_px = corners ? std::sqrt (squares / double (corners)) : 0;
+  if (cameras_[a].view_id == cameras_[b].view_id && cameras_[a].role == CameraRole::kLeft &&
+      cameras_[b].role == CameraRole::kRight)
+    pair.row_error_px = row_error (a, b);
+  return pair;
+}
+
+Status
+Calibration::report ()
+{
+  std::vector<double> squares (cameras_.size ());
+  std::vector<std::size_t> corners (cameras_.size ());
+  for (std::size_t i = 0; i < cameras_.size (); i++)
+    result_.cameras.push_back ({int (i), 0, 0, lenses_[i].rms_px});
+  for (std::size_t f = 0; f < frames_.size (); f++) {
+    result_.frames += !frames_[f].sightings.empty ();
+    for (const Sighting &s : frames_[f].sightings) {
+      squares[s.camera] += std::pow (sighting_rms (f, s), 2) * double (s.corners.size ());
+      corners[s.camera] += s.corners.size ();
+      result_.cameras[s.camera].frames++;
+    }
+  }
+  for (std::size_t i = 0; i < cameras_.size (); i++)
+    result_.cameras[i].rms_px = std::sqrt (squares[i] / double (corners[i]));
+  result_.rms_px = std::sqrt (std::reduce (squares.begin (), squares.end ()) /
+                              double (std::reduce (corners.begin (), corners.end ())));
+  if (!(result_.rms_px <= kWorstRmsPx))
+    return bad ("reprojection error is " + std::to_string (result_.rms_px) +
+                " pixels; expected less than " + std::to_string (int (kWorstRmsPx)) +
+                ": do columns, rows and the board agree?");
+  for (int a = 0; a < int (cameras_.size ()); a++)
+    for (int b = 0; b < int (cameras_.size ()); b++) {
+      const bool stereo = cameras_[a].view_id == cameras_[b].view_id &&
+                          cameras_[a].role == CameraRole::kLeft &&
+                          cameras_[b].role != CameraRole::kLeft;
+      const bool linked = cameras_[a].view_id != cameras_[b].view_id &&
+                          std::ranges::any_of (links_,
+                              [&] (const CameraLink &link) { return link.a == a && link.b == b; });
+      if (stereo || linked)
+        result_.pairs.push_back (pair_report (a, b));
+    }
+  return {};
+}
+
+Pose
+Calibration::world_from_first () const
+{
+  const BoardSpec &board = settings_.board;
+  const Vec3 middle = board.corner (board.corner_count () - 1);
+  std::vector<Pose> views;
+  std::vector<Vec3> boards;
+  Pose first_board;
+  for (std::size_t i = 0; i < cameras_.size (); i++)
+    if (cameras_[i].role == CameraRole::kLeft)
+      views.push_back (bundle_.camera_from_first[i].inverse ());
+  for (std::size_t f = 0; f < frames_.size (); f++)
+    if (!frames_[f].sightings.empty ()) {
+      boards.push_back (bundle_.first_from_board[f] * (0.5 * middle));
+      if (boards.size () == 1) {
+        first_board = bundle_.first_from_board[f];
+        first_board.translation = boards[0];
+      }
+    }
+  /* place_world() thinks in the first view's own camera; camera 0 may be another one. */
+  const Pose reference = views[0].inverse ();
+  for (Pose &view : views)
+    view = reference * view;
+  for (Vec3 &b : boards)
+    b = reference * b;
+  return place_world (settings_.world, views, boards, reference * first_board) * reference;
+}
+
+Status
+Calibration::make_rig ()
+{
+  const Pose world = world_from_first ();
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    if (cameras_[i].role != CameraRole::kLeft)
+      continue;
+    View view;
+    view.id = cameras_[i].view_id;
+    view.name = "view " + std::to_string (view.id);
+    view.width = cameras_[i].width;
+    view.height = cameras_[i].height;
+    view.intrinsics = intrinsics_of (bundle_.lenses[i]);
+    view.distortion = distortion_of (bundle_.lenses[i], settings_.distortion);
+    view.world_from_view = world * bundle_.camera_from_first[i].inverse ();
+    view.near_m = settings_.near_m;
+    view.far_m = settings_.far_m;
+    if (view.far_m >= 65535 * view.depth_unit_m)
+      view.depth_unit_m = view.far_m / 65000; /* as stereodepth does */
+    for (const CameraRole role : {CameraRole::kRight, CameraRole::kThird})
+      if (const int other = find_camera (cameras_, view.id, role); other >= 0)
+        (role == CameraRole::kRight ? view.right : view.third) = PartnerCamera{
+            intrinsics_of (bundle_.lenses[other]),
+            distortion_of (bundle_.lenses[other], settings_.distortion), between (int (i), other)};
+    result_.rig.views.push_back (std::move (view));
+  }
+  std::ranges::sort (result_.rig.views, {}, &View::id);
+  return validate (result_.rig);
+}
+
+} // namespace
+
+Status
+check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &board)
+{
+  if (Status s = validate (board); !s.ok ())
+    return s;
+  if (cameras.empty ())
+    return {StatusCode::kNotFound, "no cameras; expected at least one"};
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    const CalibrationCamera &camera = cameras[i];
+    if (camera.view_id < 0 || camera.view_id >= kMaxViews)
+      return bad (
+          text_of (camera) + ": expected a view from 0 to " + std::to_string (kMaxViews - 1));
+    if (camera.width < 1 || camera.height < 1 || camera.width > kMaxImageSide ||
+        camera.height > kMaxImageSide)
+      return {StatusCode::kBadSize, text_of (camera) + ": has no pictures of a size from 1x1 to " +
+                                        std::to_string (kMaxImageSide)};
+    if (const int same = find_camera (cameras, camera.view_id, camera.role); same != int (i))
+      return bad (cameras[same].name + " and " + camera.name + " are both the " +
+                  std::string (role_name (camera.role)) + " camera of view " +
+                  std::to_string (camera.view_id) + "; expected one");
+    const int left = find_camera (cameras, camera.view_id, CameraRole::kLeft);
+    if (left < 0)
+      return bad (text_of (camera) + ": its view has no left camera; expected one");
+    if (cameras[left].width != camera.width || cameras[left].height != camera.height)
+      return {StatusCode::kBadSize, text_of (camera) + " is " + std::to_string (camera.width) +
+                                        "x" + std::to_string (camera.height) +
+                                        "; expected the size of " + text_of (cameras[left]) + ", " +
+                                        std::to_string (cameras[left].width) + "x" +
+                                        std::to_string (cameras[left].height)};
+  }
+  if (cameras.size () > 1 && board.is_ambiguous ())
+    return bad ("board of " + std::to_string (board.columns) + "x" + std::to_string (board.rows) +
+                " inner corners looks the same upside down, so that cameras cannot agree on it; "
+                "expected an odd and an even number, or a ChArUco board");
+  return {};
+}
+
+Status
+calibrate_rig (const std::vector<CalibrationCamera> &cameras, std::vector<CalibrationFrame> frames,
+    const CalibrationSettings &settings, CalibrationResult &result)
+{
+  result = {};
+  if (Status s = check_cameras (cameras, settings.board); !s.ok ())
+    return s;
+  if (settings.min_frames < 3)
+    return bad ("min-frames is " + std::to_string (settings.min_frames) + "; expected at least 3");
+  for (const CalibrationFrame &frame : frames)
+    for (const Sighting &sighting : frame.sightings)
+      if (sighting.camera < 0 || sighting.camera >= int (cameras.size ()) ||
+          std::ranges::any_of (sighting.corners, [&] (const BoardCorner &c) {
+            return c.id < 0 || c.id >= settings.board.corner_count ();
+          }))
+        return bad ("a frame has a camera or a corner that does not exist");
+  try {
+    return Calibration (cameras, frames, settings, result).run ();
+  } catch (const std::exception &e) {
+    return bad (std::string ("calibration: ") + e.what ());
+  }
+}
+
+} // namespace rangecast

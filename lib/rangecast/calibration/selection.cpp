@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rangecast {
+namespace {
+
+constexpr double kNewPlace = 0.1;      // see BoardPlace
+constexpr double kTiltSeen = 0.2;      // sine of an angle
+constexpr double kSizeRatio = 1.25;    // of the largest to the smallest board
+constexpr double kMotionShare = 0.003; // of the picture's width, between two frames
+constexpr std::uint64_t kMotionNs = 1'000'000'000;
+constexpr double kBlurredPx = 6, kBlurredShare = 0.004; // the larger of both, of the width
+constexpr int kFewLinks = 8; // two cameras with fewer common frames want more
+
+/* The board's normal in a camera with a focal length as long as the picture is wide. */
+bool
+guess_normal (const std::vector<cv::Point3d> &object, const std::vector<cv::Point2d> &image,
+    int width, int height, cv::Vec3d &normal)
+{
+  const double f = std::max (width, height);
+  const cv::Matx33d k (f, 0, (width - 1) / 2.0, 0, f, (height - 1) / 2.0, 0, 0, 1);
+  cv::Vec3d rvec, tvec;
+  cv::Matx33d r;
+  try {
+    if (!cv::solvePnP (object, image, k, cv::noArray (), rvec, tvec))
+      return false;
+    cv::Rodrigues (rvec, r);
+  } catch (const std::exception &) {
+    return false;
+  }
+  normal = {r (0, 2), r (1, 2), r (2, 2)};
+  if (normal[2] < 0)
+    normal = -normal; /* away from the camera, whichever way the board's z axis points */
+  return std::isfinite (normal[0]) && std::isfinite (normal[1]);
+}
+
+double
+distance (const BoardPlace &a, const BoardPlace &b)
+{
+  /* Tilts count half: a tenth of the picture is as good as 12 degrees. */
+  return std::sqrt ((a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y) +
+                    (a.size - b.size) * (a.size - b.size) +
+                    0.25 * (a.tilt_x - b.tilt_x) * (a.tilt_x - b.tilt_x) +
+                    0.25 * (a.tilt_y - b.tilt_y) * (a.tilt_y - b.tilt_y));
+}
+
+} // namespace
+
+BoardPlace
+place_board (const BoardSpec &board, const std::vector<BoardCorner> &corners, int width, int height)
+{
+  BoardPlace place;
+  if (corners.size () < 4 || width <= 0 || height <= 0)
+    return place;
+  std::vector<cv::Point3d> object;
+  std::vector<cv::Point2d> image;
+  std::vector<cv::Point2f> points;
+  for (const BoardCorner &c : corners) {
+    const Vec3 p = board.corner (c.id);
+    object.emplace_back (p.x, p.y, p.z);
+    image.emplace_back (c.x, c.y);
+    points.emplace_back (float (c.x), float (c.y));
+    place.x += c.x / width / double (corners.size ());
+    place.y += c.y / height / double (corners.size ());
+  }
+  std::vector<cv::Point2f> hull;
+  cv::convexHull (points, hull);
+  place.size = std::sqrt (cv::contourArea (hull) / (double (width) * height));
+  /* The normal n points away; where the board's right end is farther, n leans to the left. */
+  if (cv::Vec3d normal; guess_normal (object, image, width, height, normal)) {
+    place.tilt_x = -normal[0];
+    place.tilt_y = -normal[1];
+  }
+  return place;
+}
+
+/* ---- coverage ---- */
+
+double
+CameraCoverage::share () const
+{
+  const auto seen = std::ranges::count (cells, true) + tilted_left + tilted_right + tilted_up +
+                    tilted_down + distances;
+  return double (seen) / (cells.size () + 5);
+}
+
+std::vector<std::string>
+CameraCoverage::missing () const
+{
+  static constexpr const char *kAcross[kColumns] = {"left", "middle left", "middle right", "right"};
+  static constexpr const char *kDown[kRows] = {"top", "middle", "bottom"};
+  std::vector<std::string> list;
+  for (int row = 0; row < kRows; row++)
+    for (int column = 0; column < kColumns; column++)
+      if (!cells[row * kColumns + column])
+        list.push_back (
+            std::string ("board at the ") + kDown[row] + " " + kAcross[column] + " of the picture");
+  if (!tilted_left)
+    list.emplace_back ("left end of the board turned away");
+  if (!tilted_right)
+    list.emplace_back ("right end of the board turned away");
+  if (!tilted_up)
+    list.emplace_back ("upper end of the board turned away");
+  if (!tilted_down)
+    list.emplace_back ("lower end of the board turned away");
+  if (!distances)
+    list.emplace_back ("board nearer or farther");
+  return list;
+}
+
+CameraCoverage
+FrameSelector::coverage (const CalibrationCamera &camera, int index) const
+{
+  CameraCoverage c;
+  double smallest = std::numeric_limits<double>::max (), largest = 0;
+  for (std::size_t f = 0; f < frames_.size (); f++) {
+    const Sighting *sighting = frames_[f].find (index);
+    if (!sighting)
+      continue;
+    c.frames++;
+    for (const BoardCorner &corner : sighting->corners) {
+      const int column = std::clamp (int (corner.x * c.kColumns / camera.width), 0, c.kColumns - 1);
+      const int row = std::clamp (int (corner.y * c.kRows / camera.height), 0, c.kRows - 1);
+      c.cells[row * c.kColumns + column] = true;
+    }
+    for (const auto &[other, place] : places_[f])
+      if (other == index) {
+        c.tilted_left |= place.tilt_x < -kTiltSeen;
+        c.tilted_right |= place.tilt_x > kTiltSeen;
+        c.tilted_up |= place.tilt_y < -kTiltSeen;
+        c.tilted_down |= place.tilt_y > kTiltSeen;
+        smallest = std::min (smallest, place.size);
+        largest = std::max (largest, place.size);
+      }
+  }
+  c.distances = largest > kSizeRatio * smallest;
+  return c;
+}
+
+/* ---- selection ---- */
+
+std::string_view
+verdict_name (FrameVerdict verdict)
+{
+  switch (verdict) {
+    case FrameVerdict::kTaken:
+      return "taken";
+    case FrameVerdict::kNoBoard:
+      return "no-board";
+    case FrameVerdict::kMoving:
+      return "moving";
+    case FrameVerdict::kBlurred:
+      return "blurred";
+    case FrameVerdict::kSimilar:
+      return "similar";
+  }
+  return "";
+}
+
+void
+FrameSelector::set (const BoardSpec &board, const SelectionSettings &settings)
+{
+  board_ = board;
+  settings_ = settings;
+  clear ();
+}
+
+void
+FrameSelector::clear ()
+{
+  frames_.clear ();
+  places_.clear ();
+  last_ = {};
+  have_last_ = false;
+}
+
+/* A camera that sees the board now and did not before does not know whether it moves. */
+bool
+FrameSelector::is_moving (
+    const std::vector<CalibrationCamera> &cameras, const CalibrationFrame &frame) const
+{
+  for (const Sighting &sighting : frame.sightings) {
+    const Sighting *before = last_.find (sighting.camera);
+    if (!before)
+      return true;
+    double moved = 0;
+    int common = 0;
+    for (const BoardCorner &corner : sighting.corners) {
+      const auto old = std::ranges::find (before->corners, corner.id, &BoardCorner::id);
+      if (old == before->corners.end ())
+        continue;
+      moved += std::hypot (corner.x - old->x, corner.y - old->y);
+      common++;
+    }
+    if (common == 0 || moved / common > kMotionShare * cameras[sighting.camera].width)
+      return true;
+  }
+  return false;
+}
+
+/* Of the camera for which the frame is most unlike all other frames, but `except`. */
+double
+FrameSelector::difference (const Places &places, std::size_t except) const
+{
+  double most = 0;
+  for (const auto &[camera, place] : places) {
+    double least = std::numeric_limits<double>::max ();
+    for (std::size_t f = 0; f < places_.size (); f++)
+      if (f != except)
+        for (const auto &[other, old] : places_[f])
+          if (other == camera)
+            least = std::min (least, distance (place, old));
+    most = std::max (most, least);
+  }
+  return most;
+}
+
+bool
+FrameSelector::links_are_few (const CalibrationFrame &frame) const
+{
+  for (const Sighting &a : frame.sightings)
+    for (const Sighting &b : frame.sightings)
+      if (a.camera < b.camera && shared_frames (frames_, a.camera, b.camera) < kFewLinks)
+        return true;
+  return false;
+}
+
+/* When there are enough, the frame most like others makes room, or the new one is it. */
+FrameVerdict
+FrameSelector::take (CalibrationFrame frame, Places places)
+{
+  if (int (frames_.size ()) < settings_.max_frames) {
+    frames_.push_back (std::move (frame));
+    places_.push_back (std::move (places));
+    return FrameVerdict::kTaken;
+  }
+  std::size_t dullest = 0;
+  double least = std::numeric_limits<double>::max ();
+  for (std::size_t f = 0; f < places_.size (); f++)
+    if (const double d = difference (places_[f], f); d < least) {
+      least = d;
+      dullest = f;
+    }
+  if (difference (places, dullest) <= least)
+    return FrameVerdict::kSimilar;
+  frames_[dullest] = std::move (frame);
+  places_[dullest] = std::move (places);
+  return FrameVerdict::kTaken;
+}
+
+FrameVerdict
+FrameSelector::offer (const std::vector<CalibrationCamera> &cameras, CalibrationFrame frame,
+    const std::vector<double> &edge_widths, std::uint64_t time_ns)
+{
+  const bool soon = have_last_ && time_ns - last_time_ns_ < kMotionNs;
+  const bool moving = soon && is_moving (cameras, frame);
+  last_ = frame;
+  last_time_ns_ = time_ns;
+  have_last_ = true;
+  if (frame.sightings.empty ())
+    return FrameVerdict::kNoBoard;
+
+  Places places;
+  for (const Sighting &s : frame.sightings)
+    places.emplace_back (s.camera,
+        place_board (board_, s.corners, cameras[s.camera].width, cameras[s.camera].height));
+  if (settings_.all)
+    return take (std::move (frame), std::move (places));
+  if (moving)
+    return FrameVerdict::kMoving;
+  for (std::size_t i = 0; i < edge_widths.size () && i < frame.sightings.size (); i++)
+    if (edge_widths[i] >
+        std::max (kBlurredPx, kBlurredShare * cameras[frame.sightings[i].camera].width))
+      return FrameVerdict::kBlurred;
+  const double wanted = links_are_few (frame) ? kNewPlace / 2 : kNewPlace;
+  if (!frames_.empty () && difference (places, std::numeric_limits<std::size_t>::max ()) < wanted)
+    return FrameVerdict::kSimilar;
+  return take (std::move (frame), std::move (places));
+}
+
+} // namespace rangecast

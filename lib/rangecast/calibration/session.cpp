@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "session.hpp"
+
+#include "../parallel.hpp"
+#include "pose_chain.hpp"
+
+#include <algorithm>
+#include <ranges>
+
+namespace rangecast {
+
+Status
+CalibrationSession::set (const SessionSettings &settings)
+{
+  if (Status s = validate (settings.calibration.board); !s.ok ())
+    return s;
+  const CalibrationSettings &c = settings.calibration;
+  if (!(c.near_m > 0 && c.near_m < c.far_m))
+    return {StatusCode::kBadValue, "near is " + std::to_string (c.near_m) + " m and far is " +
+                                       std::to_string (c.far_m) + " m; expected 0 < near < far"};
+  if (settings.selection.max_frames < c.min_frames)
+    return {StatusCode::kBadValue,
+        "max-frames is " + std::to_string (settings.selection.max_frames) +
+            "; expected at least min-frames, " + std::to_string (c.min_frames)};
+  settings_ = settings;
+  eyes_.clear ();
+  cameras_.clear ();
+  selector_.set (settings.calibration.board, settings.selection);
+  verdict_ = FrameVerdict::kNoBoard;
+  return {};
+}
+
+void
+CalibrationSession::clear ()
+{
+  selector_.clear ();
+  eyes_.clear ();
+  cameras_.clear ();
+  verdict_ = FrameVerdict::kNoBoard;
+}
+
+Status
+CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
+    std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns)
+{
+  if (!std::ranges::equal (cameras_, cameras | std::views::take (cameras_.size ())))
+    clear (); /* one went, or became another */
+  cameras_ = cameras;
+  while (eyes_.size () < cameras.size ()) {
+    eyes_.push_back (std::make_unique<Eye> ());
+    if (Status s = eyes_.back ()->detector.set (settings_.calibration.board, settings_.thorough);
+        !s.ok ())
+      return s;
+  }
+  in_parallel (cameras.size (), 0, [&] (std::size_t i) {
+    Eye &eye = *eyes_[i];
+    eye.corners.clear ();
+    eye.status = {};
+    if (!pictures[i].empty ())
+      eye.status = eye.detector.detect (pictures[i], eye.corners, eye.edge_width);
+  });
+  CalibrationFrame frame;
+  std::vector<double> edge_widths;
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    if (!eyes_[i]->status.ok ())
+      return eyes_[i]->status;
+    if (eyes_[i]->corners.empty ())
+      continue;
+    frame.sightings.push_back ({int (i), eyes_[i]->corners});
+    edge_widths.push_back (eyes_[i]->edge_width);
+  }
+  verdict_ = selector_.offer (cameras, std::move (frame), edge_widths, time_ns);
+  return {};
+}
+
+std::vector<int>
+CalibrationSession::groups () const
+{
+  return linked_groups (int (cameras_.size ()), selector_.frames (), kFewestSharedFrames);
+}
+
+bool
+CalibrationSession::complete () const
+{
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const CameraCoverage c = coverage (int (i));
+    if (!c.complete () || c.frames < settings_.calibration.min_frames)
+      return false;
+  }
+  return !cameras_.empty () && std::ranges::count (groups (), 0) == int (cameras_.size ());
+}
+
+void
+CalibrationSession::draw (
+    std::span<const ImageView<const Rgbx>> pictures, ImageView<Rgbx> out) const
+{
+  if (cameras_.empty ())
+    return;
+  const int columns = lay_out (cameras_, 2).columns;
+  const TileLayout layout = lay_out (cameras_, out.width / columns);
+  if (layout.width () > out.width || layout.height () > out.height)
+    return;
+  for (int i = 0; i < layout.columns * layout.rows; i++) {
+    TileContents contents;
+    if (i < int (cameras_.size ())) {
+      contents.picture = pictures[i];
+      contents.corners = eyes_[i]->corners;
+      contents.columns = settings_.calibration.board.columns;
+      contents.coverage = coverage (i);
+      contents.taken = verdict_ == FrameVerdict::kTaken && !eyes_[i]->corners.empty ();
+    }
+    draw_tile (contents,
+        out.crop (i % layout.columns * layout.tile_width, i / layout.columns * layout.tile_height,
+            layout.tile_width, layout.tile_height));
+  }
+}
+
+Status
+CalibrationSession::calibrate (CalibrationResult &result) const
+{
+  return calibrate_rig (cameras_, selector_.frames (), settings_.calibration, result);
+}
+
+} // namespace rangecast

@@ -1,0 +1,152 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Calibrates cameras from pictures of a chessboard or ChArUco board, from files or live: a rig file.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+
+usage () {
+  cat <<'END'
+usage: calibrate.sh --left WHAT [--right WHAT] [--third WHAT] [--left WHAT ...] --out RIG [options]
+  --left WHAT     the camera of a view, or the left one of its stereo pair. Each --left begins a view: 0, 1, ...
+  --right WHAT    the right camera of that view's stereo pair
+  --third WHAT    its third camera
+  --out FILE      rig file to write: .yaml or .json
+WHAT is one of
+  'left%02d.jpg'  pictures (.jpg, .png, .bmp) by number; those that all cameras have are used
+  'left*.png'     pictures in order; all cameras must have as many
+  left.mp4        a film
+  'v4l2src device=/dev/video0 ! image/jpeg ! jpegdec'   a live camera, as gst-launch-1.0 takes it
+the board
+  --board KIND    chessboard (default) or charuco
+  --columns N     inner corners across, one less than squares (default 9)
+  --rows N        inner corners down (default 6)
+  --square M      side of a square, metres (default 0.025)
+  --marker M      charuco: side of a marker, metres (default: 3/4 of a square)
+  --dictionary D  charuco: the markers' dictionary (default 4x4-50)
+the result
+  --distortion D  none, four, five (default) or eight coefficients
+  --world W       centre (default), first-view or board: see docs/elements/rigcalibrate.md
+  --near M --far M  depths of interest, metres (default 0.3 and 3)
+  --min-frames N  frames in which each camera must have seen the board (default 8)
+  --stills DIR    also leave the pictures with the corners found there, as PNG
+  --window        also show them
+  --auto-finish   end by itself when the board was everywhere (live; Ctrl-C ends, too, and calibrates)
+END
+}
+
+roles=() views=() whats=() out= properties=() stills= window=
+view=-1
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --left | --right | --third)
+      [ "$1" != --left ] || view=$((view + 1))
+      [ $view -ge 0 ] || die "$1: expected a --left before it, which begins the view"
+      [ -n "${2:-}" ] || die "$1: expected pictures, a film or a source"
+      roles+=("${1#--}") views+=("$view") whats+=("$2"); shift ;;
+    --out) out=${2:-}; shift ;;
+    --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | --min-frames)
+      properties+=("${1#--}=${2:-}"); shift ;;
+    --square) properties+=("square-size=${2:-}"); shift ;;
+    --marker) properties+=("marker-size=${2:-}"); shift ;;
+    --stills) stills=${2:-}; shift ;;
+    --window) window=1 ;;
+    --auto-finish) properties+=(auto-finish=true) ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; die "unknown option '$1'" ;;
+  esac
+  shift || { echo "calibrate.sh: the last option lacks its value" >&2; exit 2; }
+done
+[ ${#whats[@]} -gt 0 ] && [ -n "$out" ] || { usage >&2; die "expected at least --left and --out"; }
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+
+# Prints "KEY FILE" for every picture of a pattern: its number, or its place in the order.
+list_pictures () {
+  local pattern=$1 file number before after count=0
+  if [[ "$pattern" =~ ^([^%]*)%0?[0-9]*d([^%]*)$ ]]; then
+    before=${BASH_REMATCH[1]} after=${BASH_REMATCH[2]}
+    for file in "$before"*"$after"; do
+      number=${file#"$before"}
+      number=${number%"$after"}
+      [[ "$number" =~ ^[0-9]+$ ]] || continue
+      # shellcheck disable=SC2059 # the pattern is a format
+      [ "$(printf "$pattern" "$((10#$number))")" != "$file" ] || echo "$((10#$number)) $file"
+    done | sort -n
+  else
+    compgen -G "$pattern" | sort -V | while read -r file; do
+      echo "$count $file"
+      count=$((count + 1))
+    done
+  fi
+}
+
+is_source () { # a launch string: has a link, or begins with an element's name
+  [[ "$1" == *!* ]] || { [ ! -e "$1" ] && gst-inspect-1.0 --exists "${1%% *}" 2>/dev/null; }
+}
+is_pattern () { ! is_source "$1" && [[ "$1" == *[%*?]* ]]; }
+
+# Pictures that all cameras have, numbered anew: multifilesrc stops at a gap.
+common=
+for what in "${whats[@]}"; do
+  is_pattern "$what" || continue
+  list_pictures "$what" >"$folder/list"
+  [ -s "$folder/list" ] || die "no pictures '$what'"
+  cut -d ' ' -f 1 "$folder/list" | sort >"$folder/keys"
+  if [ -z "$common" ]; then
+    common=$folder/common
+    cp "$folder/keys" "$common"
+  else
+    if [[ "$what" != *%* ]] && ! cmp -s "$common" "$folder/keys"; then
+      die "'$what': $(wc -l <"$folder/keys") pictures; expected as many as of the other cameras, $(wc -l <"$common")"
+    fi
+    comm -12 "$common" "$folder/keys" >"$folder/both"
+    mv "$folder/both" "$common"
+  fi
+done
+if [ -n "$common" ]; then
+  [ -s "$common" ] || die "no number is in the pictures of all cameras"
+  sort -n -o "$common" "$common"
+fi
+
+# Sets `source` to the elements that play a camera.
+describe_source () { # camera's number, WHAT
+  local name=$1 what=$2 type key file count=0
+  if is_source "$what"; then
+    eval "source=($what)"
+    source+=(! videoconvert ! queue leaky=downstream max-size-buffers=2)
+  elif is_pattern "$what"; then
+    case "${what##*.}" in
+      jpg | jpeg | JPG | JPEG) type=image/jpeg ;;
+      png | PNG) type=image/png ;;
+      bmp | BMP) type=image/bmp ;;
+      *) die "'$what': expected .jpg, .png or .bmp pictures" ;;
+    esac
+    while read -r key file; do
+      grep -qx "$key" "$common" || continue
+      ln -s "$(realpath "$file")" "$folder/$name-$(printf %05d $count)"
+      count=$((count + 1))
+    done < <(list_pictures "$what")
+    source=(multifilesrc "location=$folder/$name-%05d" "caps=$type,framerate=1/1" ! decodebin ! videoconvert ! queue)
+  else
+    [ -f "$what" ] || die "no file, pictures or source '$what'"
+    source=(filesrc "location=$what" ! decodebin ! videoconvert ! queue)
+  fi
+}
+
+pads=() sources=()
+for i in "${!whats[@]}"; do
+  describe_source "$i" "${whats[i]}"
+  pads+=("sink_$i::view=${views[i]}" "sink_$i::role=${roles[i]}")
+  sources+=("${source[@]}" ! "c.sink_$i")
+done
+sink=(fakesink sync=false)
+[ -z "$window" ] || sink=(videoconvert ! autovideosink sync=false)
+if [ -n "$stills" ]; then
+  mkdir -p "$stills"
+  sink=(tee name=t ! queue ! "${sink[@]}" t. ! queue ! videoconvert ! pngenc ! multifilesink "location=$stills/still-%05d.png")
+fi
+
+# The element's messages are lines of gst-launch-1.0 -m; the report makes them readable.
+python3 "$(dirname "$0")/calibration-report.py" gst-launch-1.0 -e -m rigcalibrate name=c "location=$out" \
+  "${properties[@]}" "${pads[@]}" ! "${sink[@]}" "${sources[@]}"

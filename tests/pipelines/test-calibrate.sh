@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# calibrate.sh: from pictures of boards to a rig file that other elements read.
+
+boards=/usr/share/doc/opencv-doc/examples/data
+need_boards () { [ -f "$boards/left01.jpg" ] || skip "no opencv-doc"; }
+
+test_thirteen_pairs_become_a_rig_that_stereodepth_reads () {
+  need_boards
+  "$pipelines/calibrate.sh" --left "$boards/left%02d.jpg" --right "$boards/right%02d.jpg" --columns 9 --rows 6 \
+    --square 0.025 --near 0.2 --far 1 --out rig.yaml --stills stills >report.txt
+  grep -q "all: 13 frames, reprojection error 0.2" report.txt || fail "$(tail -n 5 report.txt)"
+  expect_file stills/still-00012.png 10000
+  gst-launch-1.0 -q stereodepth name=d rig=rig.yaml ! plyenc ! filesink location=cloud.ply \
+    filesrc location="$boards/left01.jpg" ! jpegdec ! d.left filesrc location="$boards/right01.jpg" ! jpegdec ! d.right
+  expect_file cloud.ply 100000
+}
+
+test_pictures_in_order_do_as_well_as_numbered_ones () {
+  need_boards
+  cp "$boards"/left0[1-9].jpg "$boards"/right0[1-9].jpg .
+  "$pipelines/calibrate.sh" --left 'left0*.jpg' --right 'right0?.jpg' --out rig.json >report.txt
+  grep -q "all: 9 frames" report.txt || fail "$(tail -n 5 report.txt)"
+  rm right05.jpg
+  expect_error "8 pictures; expected as many as of the other cameras, 9" \
+    "$pipelines/calibrate.sh" --left 'left0*.jpg' --right 'right0*.jpg' --out rig.json
+  "$pipelines/calibrate.sh" --left 'left%02d.jpg' --right 'right%02d.jpg' --out rig.json >report.txt
+  grep -q "all: 8 frames" report.txt || fail "$(tail -n 5 report.txt)"
+}
+
+test_swapped_pictures_are_one_error () {
+  need_boards
+  expect_error "left and right cameras are swapped" \
+    "$pipelines/calibrate.sh" --left "$boards/right%02d.jpg" --right "$boards/left%02d.jpg" --out rig.yaml
+  [ ! -e rig.yaml ] || fail "a rig was written"
+}
+
+test_live_cameras_without_a_board_are_one_error () {
+  expect_error "sink_0 (view 0, left): no board was found" "$pipelines/calibrate.sh" \
+    --left 'videotestsrc is-live=true num-buffers=10' --left 'videotestsrc is-live=true num-buffers=10' --out rig.yaml
+}
+
+test_bad_arguments_are_named () {
+  expect_error "no pictures 'nothing%d.png'" "$pipelines/calibrate.sh" --left nothing%d.png --out rig.yaml
+  expect_error "no file, pictures or source 'nothing.mp4'" "$pipelines/calibrate.sh" --left nothing.mp4 --out rig.yaml
+  expect_error "expected a --left before it" "$pipelines/calibrate.sh" --right a%d.png --out rig.yaml
+  expect_error "expected at least --left and --out" "$pipelines/calibrate.sh" --left a%d.png
+  expect_error "its folder does not exist" "$pipelines/calibrate.sh" --left videotestsrc --out nowhere/rig.yaml
+}
