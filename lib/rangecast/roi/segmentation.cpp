@@ -259,9 +259,9 @@ Segmenter::join_cues (const SegmentationSettings &settings)
     cv::bitwise_or (other_, nearer_, mask_);
     return;
   }
-  if (kernel_.rows != settings.fringe)
-    kernel_ =
-        cv::getStructuringElement (cv::MORPH_RECT, cv::Size (settings.fringe, settings.fringe));
+  const int side = settings.fringe | 1; /* an even kernel would move things by half a pixel */
+  if (kernel_.rows != side)
+    kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it goes on into the thing */
