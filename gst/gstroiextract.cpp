@@ -70,6 +70,8 @@ static guint signals[N_SIGNALS];
 
 static constexpr int kDefaultBackgroundFrames = 30;
 static constexpr double kDefaultAdaptTime = 30; /* seconds */
+/* It is taught no more often than this, which nobody sees and saves time, seconds. */
+static constexpr double kShortestStep = 0.2;
 /* A pause longer than this teaches no more than this, seconds. */
 static constexpr double kLongestStep = 1;
 static constexpr rangecast::SegmentationSettings kDefaults;
@@ -244,15 +246,18 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 static void
 adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
 {
-  const guint64 before = state.adapted_ns;
-  state.adapted_ns = image.capture_time_ns;
-  if (adapt_time_s <= 0 || before == 0 || image.capture_time_ns <= before || image.roi.empty ())
+  const guint64 now = image.capture_time_ns;
+  if (state.adapted_ns == 0 || now < state.adapted_ns)
+    state.adapted_ns = now;
+  const double passed = double (now - state.adapted_ns) * 1e-9;
+  if (adapt_time_s <= 0 || passed < kShortestStep || image.roi.empty ())
     return;
-  const double passed = std::min (double (image.capture_time_ns - before) * 1e-9, kLongestStep);
+  state.adapted_ns = now;
   const cv::Mat &quiet = state.segmenter.quiet ();
   state.background.adapt (image,
       {quiet.data, quiet.cols, quiet.rows, static_cast<std::ptrdiff_t> (quiet.step)},
-      state.segmenter.light (), float (1 - std::exp (-passed / adapt_time_s)));
+      state.segmenter.light (),
+      float (1 - std::exp (-std::min (passed, kLongestStep) / adapt_time_s)));
 }
 
 static void
