@@ -70,6 +70,8 @@ static guint signals[N_SIGNALS];
 
 static constexpr int kDefaultBackgroundFrames = 30;
 static constexpr double kDefaultAdaptTime = 30; /* seconds */
+/* It is taught no more often than this, which nobody sees and saves time, seconds. */
+static constexpr double kShortestStep = 0.2;
 /* A pause longer than this teaches no more than this, seconds. */
 static constexpr double kLongestStep = 1;
 static constexpr rangecast::SegmentationSettings kDefaults;
@@ -244,15 +246,18 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 static void
 adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
 {
-  const guint64 before = state.adapted_ns;
-  state.adapted_ns = image.capture_time_ns;
-  if (adapt_time_s <= 0 || before == 0 || image.capture_time_ns <= before || image.roi.empty ())
+  const guint64 now = image.capture_time_ns;
+  if (state.adapted_ns == 0 || now < state.adapted_ns)
+    state.adapted_ns = now;
+  const double passed = double (now - state.adapted_ns) * 1e-9;
+  if (adapt_time_s <= 0 || passed < kShortestStep || image.roi.empty ())
     return;
-  const double passed = std::min (double (image.capture_time_ns - before) * 1e-9, kLongestStep);
+  state.adapted_ns = now;
   const cv::Mat &quiet = state.segmenter.quiet ();
   state.background.adapt (image,
       {quiet.data, quiet.cols, quiet.rows, static_cast<std::ptrdiff_t> (quiet.step)},
-      state.segmenter.light (), float (1 - std::exp (-passed / adapt_time_s)));
+      state.segmenter.light (),
+      float (1 - std::exp (-std::min (passed, kLongestStep) / adapt_time_s)));
 }
 
 static void
@@ -459,6 +464,48 @@ gst_roi_extract_capture_background (GstRoiExtract *self)
   self->priv->relearn = true;
 }
 
+static bool
+set_segmentation (rangecast::SegmentationSettings &settings, guint id, const GValue *value)
+{
+  switch (id) {
+    case PROP_CUE:
+      settings.cue = rangecast::Cue (g_value_get_enum (value));
+      return true;
+    case PROP_NOISE_FACTOR:
+      settings.noise_factor = g_value_get_double (value);
+      return true;
+    case PROP_DEPTH_THRESHOLD:
+      settings.depth_threshold_m = g_value_get_double (value);
+      return true;
+    case PROP_COLOUR_THRESHOLD:
+      settings.colour_threshold = g_value_get_double (value);
+      return true;
+    case PROP_SHADOW:
+      settings.shadow = g_value_get_double (value);
+      return true;
+    case PROP_HIGHLIGHT:
+      settings.highlight = g_value_get_double (value);
+      return true;
+    case PROP_MIN_AREA:
+      settings.min_area = g_value_get_int (value);
+      return true;
+    case PROP_MAX_HOLE:
+      settings.max_hole = g_value_get_int (value);
+      return true;
+    case PROP_MAX_PEOPLE:
+      settings.max_people = g_value_get_int (value);
+      return true;
+    case PROP_FRINGE:
+      settings.fringe = g_value_get_int (value);
+      return true;
+    case PROP_FOLLOW_LIGHT:
+      settings.follow_light = g_value_get_boolean (value);
+      return true;
+    default:
+      return false;
+  }
+}
+
 static void
 gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
@@ -482,39 +529,6 @@ gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GP
     case PROP_SAVE_BACKGROUND:
       settings.save_background = text ();
       break;
-    case PROP_CUE:
-      settings.segmentation.cue = rangecast::Cue (g_value_get_enum (value));
-      break;
-    case PROP_NOISE_FACTOR:
-      settings.segmentation.noise_factor = g_value_get_double (value);
-      break;
-    case PROP_DEPTH_THRESHOLD:
-      settings.segmentation.depth_threshold_m = g_value_get_double (value);
-      break;
-    case PROP_COLOUR_THRESHOLD:
-      settings.segmentation.colour_threshold = g_value_get_double (value);
-      break;
-    case PROP_SHADOW:
-      settings.segmentation.shadow = g_value_get_double (value);
-      break;
-    case PROP_HIGHLIGHT:
-      settings.segmentation.highlight = g_value_get_double (value);
-      break;
-    case PROP_MIN_AREA:
-      settings.segmentation.min_area = g_value_get_int (value);
-      break;
-    case PROP_MAX_HOLE:
-      settings.segmentation.max_hole = g_value_get_int (value);
-      break;
-    case PROP_MAX_PEOPLE:
-      settings.segmentation.max_people = g_value_get_int (value);
-      break;
-    case PROP_FRINGE:
-      settings.segmentation.fringe = g_value_get_int (value);
-      break;
-    case PROP_FOLLOW_LIGHT:
-      settings.segmentation.follow_light = g_value_get_boolean (value);
-      break;
     case PROP_ADAPT_TIME:
       settings.adapt_time_s = g_value_get_double (value);
       break;
@@ -525,7 +539,8 @@ gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GP
       settings.n_threads = g_value_get_int (value);
       break;
     default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+      if (!set_segmentation (settings.segmentation, id, value))
+        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
 }
 
@@ -537,6 +552,48 @@ make_stats (const GstRoiExtractPrivate *priv)
       "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64, priv->points_out,
       "roi-x", G_TYPE_INT, roi.x, "roi-y", G_TYPE_INT, roi.y, "roi-width", G_TYPE_INT, roi.width,
       "roi-height", G_TYPE_INT, roi.height, nullptr);
+}
+
+static bool
+get_segmentation (const rangecast::SegmentationSettings &settings, guint id, GValue *value)
+{
+  switch (id) {
+    case PROP_CUE:
+      g_value_set_enum (value, int (settings.cue));
+      return true;
+    case PROP_NOISE_FACTOR:
+      g_value_set_double (value, settings.noise_factor);
+      return true;
+    case PROP_DEPTH_THRESHOLD:
+      g_value_set_double (value, settings.depth_threshold_m);
+      return true;
+    case PROP_COLOUR_THRESHOLD:
+      g_value_set_double (value, settings.colour_threshold);
+      return true;
+    case PROP_SHADOW:
+      g_value_set_double (value, settings.shadow);
+      return true;
+    case PROP_HIGHLIGHT:
+      g_value_set_double (value, settings.highlight);
+      return true;
+    case PROP_MIN_AREA:
+      g_value_set_int (value, settings.min_area);
+      return true;
+    case PROP_MAX_HOLE:
+      g_value_set_int (value, settings.max_hole);
+      return true;
+    case PROP_MAX_PEOPLE:
+      g_value_set_int (value, settings.max_people);
+      return true;
+    case PROP_FRINGE:
+      g_value_set_int (value, settings.fringe);
+      return true;
+    case PROP_FOLLOW_LIGHT:
+      g_value_set_boolean (value, settings.follow_light);
+      return true;
+    default:
+      return false;
+  }
 }
 
 static void
@@ -561,39 +618,6 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
     case PROP_SAVE_BACKGROUND:
       set_text (settings.save_background);
       break;
-    case PROP_CUE:
-      g_value_set_enum (value, int (settings.segmentation.cue));
-      break;
-    case PROP_NOISE_FACTOR:
-      g_value_set_double (value, settings.segmentation.noise_factor);
-      break;
-    case PROP_DEPTH_THRESHOLD:
-      g_value_set_double (value, settings.segmentation.depth_threshold_m);
-      break;
-    case PROP_COLOUR_THRESHOLD:
-      g_value_set_double (value, settings.segmentation.colour_threshold);
-      break;
-    case PROP_SHADOW:
-      g_value_set_double (value, settings.segmentation.shadow);
-      break;
-    case PROP_HIGHLIGHT:
-      g_value_set_double (value, settings.segmentation.highlight);
-      break;
-    case PROP_MIN_AREA:
-      g_value_set_int (value, settings.segmentation.min_area);
-      break;
-    case PROP_MAX_HOLE:
-      g_value_set_int (value, settings.segmentation.max_hole);
-      break;
-    case PROP_MAX_PEOPLE:
-      g_value_set_int (value, settings.segmentation.max_people);
-      break;
-    case PROP_FRINGE:
-      g_value_set_int (value, settings.segmentation.fringe);
-      break;
-    case PROP_FOLLOW_LIGHT:
-      g_value_set_boolean (value, settings.segmentation.follow_light);
-      break;
     case PROP_ADAPT_TIME:
       g_value_set_double (value, settings.adapt_time_s);
       break;
@@ -607,7 +631,8 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
       g_value_take_boxed (value, make_stats (priv));
       break;
     default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+      if (!get_segmentation (settings.segmentation, id, value))
+        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
 }
 
@@ -662,11 +687,6 @@ install_segmentation_properties (GObjectClass *object_class)
     g_object_class_install_property (object_class, id,
         g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, live));
   };
-  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                               int maximum, int fallback) {
-    g_object_class_install_property (
-        object_class, id, g_param_spec_int (name, nick, blurb, 0, maximum, fallback, live));
-  };
   g_object_class_install_property (object_class, PROP_CUE,
       g_param_spec_enum ("cue", "Cue", "What speaks for a pixel (default: both)",
           GST_TYPE_ROI_EXTRACT_CUE, int (rangecast::Cue::kBoth), live));
@@ -689,6 +709,26 @@ install_segmentation_properties (GObjectClass *object_class)
       "A pixel brighter than this share of the background is no change of light (1 to 10, default "
       "1.35)",
       1, 10, kDefaults.highlight);
+  g_object_class_install_property (object_class, PROP_FOLLOW_LIGHT,
+      g_param_spec_boolean ("follow-light", "Follow light",
+          "Undo what exposure, white balance and lamps do to the whole picture (default: true)",
+          kDefaults.follow_light, live));
+  install_double (PROP_ADAPT_TIME, "adapt-time", "Adaptation time",
+      "Time constant with which the background follows slow change where nobody is, seconds (0 to "
+      "100000, default 30; 0: never)",
+      0, 100000, kDefaultAdaptTime);
+}
+
+static void
+install_region_properties (GObjectClass *object_class)
+{
+  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                               int maximum, int fallback) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_int (name, nick, blurb, 0, maximum, fallback, live));
+  };
   install_int (PROP_MIN_AREA, "min-area", "Minimum area",
       "Smaller islands are cleared, pixels (0 to 1000000, default 150)", 1000000,
       kDefaults.min_area);
@@ -701,14 +741,6 @@ install_segmentation_properties (GObjectClass *object_class)
       "What is nearer but looks like the background beside it must be so wide, pixels (0 to 99, "
       "default 9; 0: depth is taken at its word, for cameras whose depth ends at the silhouette)",
       99, kDefaults.fringe);
-  g_object_class_install_property (object_class, PROP_FOLLOW_LIGHT,
-      g_param_spec_boolean ("follow-light", "Follow light",
-          "Undo what exposure, white balance and lamps do to the whole picture (default: true)",
-          kDefaults.follow_light, live));
-  install_double (PROP_ADAPT_TIME, "adapt-time", "Adaptation time",
-      "Time constant with which the background follows slow change where nobody is, seconds (0 to "
-      "100000, default 30; 0: never)",
-      0, 100000, kDefaultAdaptTime);
   install_int (PROP_MARGIN, "margin", "Margin",
       "The ROI is this much larger than what is left, pixels each side (0 to 1000, default 0)",
       1000, 0);
@@ -728,6 +760,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   object_class->finalize = gst_roi_extract_finalize;
   install_background_properties (object_class);
   install_segmentation_properties (object_class);
+  install_region_properties (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, points-in, points-out; and the last ROI of the first view",

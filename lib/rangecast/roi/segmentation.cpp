@@ -151,18 +151,19 @@ private:
 
 } // namespace
 
-/* From every fourth pixel that is no nearer than the background, but not from very dark or burnt
+/* From every sixteenth pixel that is no nearer than the background, but not from very dark or burnt
  * out ones, whose ratios say little. */
 static void
 estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
     const Limits &limits, std::array<float, 3> &light)
 {
+  constexpr int kLightStep = 4;
   RatioPeak ratios[3];
   const auto usable = [] (float level) { return level >= 16 && level <= 240; };
-  for (int y = 0; y < image.roi.height; y += 2) {
+  for (int y = 0; y < image.roi.height; y += kLightStep) {
     const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
     const Rgbx *colour = image.colour.row (y);
-    for (int x = 0; x < image.roi.width; x += 2) {
+    for (int x = 0; x < image.roi.width; x += kLightStep) {
       if (behind[x].spread < 0 || (limits.use_depth && place_of (image.depth.at (x, y), behind[x],
                                                            limits) >= Where::kSomewhere))
         continue;
@@ -204,7 +205,8 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
     for (int x = 0; x < image.roi.width; x++) {
       Where where = limits.use_depth ? place_of (depth[x], behind[x], limits) : Where::kUnknown;
       const bool unseen = behind[x].spread < 0; /* as good as another colour */
-      const Comparison c = unseen ? Comparison{} : compare (colour[x], behind[x], limits);
+      const Comparison c =
+          unseen || !limits.use_colour ? Comparison{} : compare (colour[x], behind[x], limits);
       const bool alike = !unseen && has_same_hue (c, behind[x]);
       const bool differs = unseen || is_other (c, behind[x], where == Where::kBackground, limits);
       ratio[x] = c.brightness;
@@ -259,9 +261,9 @@ Segmenter::join_cues (const SegmentationSettings &settings)
     cv::bitwise_or (other_, nearer_, mask_);
     return;
   }
-  if (kernel_.rows != settings.fringe)
-    kernel_ =
-        cv::getStructuringElement (cv::MORPH_RECT, cv::Size (settings.fringe, settings.fringe));
+  const int side = settings.fringe | 1; /* an even kernel would move things by half a pixel */
+  if (kernel_.rows != side)
+    kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it goes on into the thing */
