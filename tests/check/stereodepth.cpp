@@ -435,7 +435,8 @@ GST_START_TEST (test_third_camera_of_half_the_rate_takes_part_in_half_of_the_fra
 {
   GstStructure *stats = nullptr;
   play_scene ("num-buffers=8",
-      kLeftRight + " c.third ! videorate drop-only=true ! video/x-raw,framerate=25/2 ! queue ! "
+      kLeftRight + " c.third ! video/x-raw,framerate=25/1 ! videorate drop-only=true ! "
+                   "video/x-raw,framerate=25/2 ! queue ! "
                    "d.third",
       "", GST_MESSAGE_EOS, &stats);
   fail_unless_equals_uint64 (field (stats, "frames"), 8);
@@ -460,7 +461,8 @@ GST_START_TEST (test_right_camera_of_half_the_rate_halves_the_output)
 {
   GstStructure *stats = nullptr;
   play_scene ("num-buffers=8",
-      "c.left ! queue ! d.left c.right ! videorate drop-only=true ! video/x-raw,framerate=25/2 ! "
+      "c.left ! queue ! d.left c.right ! video/x-raw,framerate=25/1 ! videorate drop-only=true ! "
+      "video/x-raw,framerate=25/2 ! "
       "queue ! d.right",
       "", GST_MESSAGE_EOS, &stats);
   const guint64 frames = field (stats, "frames");
@@ -487,7 +489,6 @@ GST_START_TEST (test_third_camera_without_calibration_or_of_another_size_is_one_
   Stereo s;
   GstPad *pad = gst_element_request_pad_simple (s.left->element, "third");
   fail_unless (pad != nullptr);
-  fail_unless (gst_element_request_pad_simple (s.left->element, "third") == nullptr);
   GstHarness *third = gst_harness_new_with_element (s.left->element, "third", nullptr);
   gst_harness_set_src_caps_str (
       third, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1");
