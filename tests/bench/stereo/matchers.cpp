@@ -97,8 +97,8 @@ run_opencv (const Pair &pair, cv::StereoMatcher &matcher, const std::string &nam
   return judge (name, disparity, pair.truth, ms);
 }
 
-/* By hand, with the help of --tune: on aloe and motorcycle no setting of the grid is both denser and
- * less often wrong by 2 pixels. */
+/* By hand, with the help of --tune: on aloe and motorcycle no setting of the grid is both denser
+ * and less often wrong by 2 pixels. */
 constexpr PeerSettings kTuned = {3, 8, 32, 10, 200, 1, 31};
 
 } // namespace
