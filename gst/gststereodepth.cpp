@@ -648,10 +648,14 @@ gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, G
 static GstStructure *
 make_stats (const GstStereoDepthPrivate *priv)
 {
-  return gst_structure_new ("application/x-stereodepth-stats", "frames", G_TYPE_UINT64,
-      priv->frames, "restricted-frames", G_TYPE_UINT64, priv->restricted_frames, "dropped-left",
-      G_TYPE_UINT64, priv->matcher->dropped_first (), "dropped-right", G_TYPE_UINT64,
-      priv->matcher->dropped_second (), "match-time", G_TYPE_UINT64, priv->match_time, nullptr);
+  return gst_structure_new ("application/x-stereodepth-stats",          //
+      "frames", G_TYPE_UINT64, priv->frames,                            //
+      "restricted-frames", G_TYPE_UINT64, priv->restricted_frames,      //
+      "third-frames", G_TYPE_UINT64, priv->third_frames,                //
+      "dropped-left", G_TYPE_UINT64, priv->matcher->dropped_first (),   //
+      "dropped-right", G_TYPE_UINT64, priv->matcher->dropped_second (), //
+      "dropped-third", G_TYPE_UINT64, priv->dropped_third,              //
+      "match-time", G_TYPE_UINT64, priv->match_time, nullptr);
 }
 
 static void

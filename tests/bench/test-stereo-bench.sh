@@ -187,3 +187,23 @@ test_bad_files_are_named () {
   refuse 1 "nowhere/out.json" "${pair[@]}" "${known[@]}" --json nowhere/out.json
   refuse 1 "near" "${pair[@]}" "${known[@]}" --near 0.01 --far 3
 }
+
+# Our depth beside OpenCV's own; `widened`: with its pictures widened to the left as ours are.
+test_ours_is_denser_and_better_than_opencv_on_motorcycle () {
+  need_data stereo_motorcycle/motorcycle_disp.npz
+  local m=$data/stereo_motorcycle
+  stereo_bench --left "$m/motorcycle_left.png" --right "$m/motorcycle_right.png" --ground-truth "$m/motorcycle_disp.npz" \
+    --focal-length 994.978 --baseline 0.193001 --doffs 31.086 "${quick[@]}" --json out.json >/dev/null
+  check_json out.json '(of["stereodepth sgbm-3way"]["density"] > of["OpenCV SGBM 3-way"]["density"] + 0.03 and
+    of["stereodepth sgbm-3way"]["bad2"] < of["OpenCV SGBM 3-way"]["bad2"] - 0.01 and
+    of["stereodepth sgbm-3way"]["bad2"] < of["OpenCV SGBM 3-way, widened"]["bad2"] - 0.01)' motorcycle
+}
+
+test_scene_is_rendered_and_matched_whole_and_in_part () {
+  stereo_bench --scene --frames 2 >table.txt
+  for row in "stereodepth, whole picture" "stereodepth, person's ROI" "stereodepth, third camera, whole picture" "OpenCV SGBM 3-way, whole picture"; do
+    grep -q "^$row  " table.txt || fail "$row is not in the table: $(cat table.txt)"
+  done
+  refuse 2 "--scene" --scene --left left.png
+  refuse 1 "nowhere.glb" --scene --model nowhere.glb
+}

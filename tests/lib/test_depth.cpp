@@ -2,6 +2,7 @@
 /* Rectification, matching and depth: the way from a stereo pair to a range image. */
 #include "test-support.hpp"
 
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <rangecast/scene/scene.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
@@ -71,16 +72,79 @@ TEST (Depth, is_focal_length_times_baseline_over_disparity)
   EXPECT_EQ (convert.convert (disparity.view (), other.view ()).code (), StatusCode::kBadSize);
 }
 
-TEST (Depth, pixel_in_the_air_is_cleared_and_an_edge_stays)
+TEST (DisparityFilter, pixel_in_the_air_is_cleared_and_an_edge_stays)
 {
-  Image<std::uint16_t> in (6, 5), out (6, 5);
-  for (int y = 0; y < 5; y++)
-    for (int x = 0; x < 3; x++)
-      in.view ().at (x, y) = 8000;
-  in.view ().at (4, 2) = 9000;
-  ASSERT_TRUE (remove_flying_pixels (in.view (), 0.02, 4, out.view ()).ok ());
-  EXPECT_EQ (out.view ().at (4, 2), 0);
-  EXPECT_EQ (out.view ().at (2, 2), 8000);
+  cv::Mat disparity (5, 6, CV_16S, cv::Scalar (-16));
+  disparity.colRange (0, 3).setTo (640);
+  disparity.at<std::int16_t> (2, 4) = 560;
+  DisparityFilter ().clear_flying (0.02, 4, 0, 0, disparity);
+  EXPECT_LT (disparity.at<std::int16_t> (2, 4), 0);
+  EXPECT_EQ (disparity.at<std::int16_t> (2, 2), 640);
+}
+
+TEST (DisparityFilter, what_the_right_camera_cannot_see_is_cleared)
+{
+  cv::Mat disparity (1, 60, CV_16S, cv::Scalar (16 * 5)); /* a wall */
+  disparity.colRange (40, 50).setTo (16 * 20);            /* lands on columns 20 to 29 */
+  DisparityFilter ().clear_hidden (0, disparity);
+  for (int x = 0; x < 60; x++)
+    EXPECT_EQ (disparity.at<std::int16_t> (0, x) < 0, x >= 25 && x < 35) << x;
+}
+
+TEST (DisparityFilter, gap_in_one_surface_is_filled_and_one_between_two_is_not)
+{
+  cv::Mat disparity (1, 40, CV_16S, cv::Scalar (320));
+  cv::Mat colour (1, 40, CV_8UC4, cv::Scalar (90, 100, 110, 0));
+  disparity.colRange (5, 10).setTo (-16);
+  disparity.colRange (20, 40).setTo (400); /* a step of 5 pixels */
+  disparity.colRange (18, 22).setTo (-16);
+  disparity.colRange (30, 34).setTo (-16);
+  colour.colRange (31, 33).setTo (cv::Scalar (200, 10, 10, 0)); /* something else is there */
+  DisparityFilter ().fill_gaps (colour, 12, 0, disparity);
+  for (int x = 0; x < 40; x++)
+    EXPECT_EQ (disparity.at<std::int16_t> (0, x) < 0, (x >= 18 && x < 22) || (x >= 30 && x < 34))
+        << x;
+}
+
+TEST (DisparityFilter, rim_of_the_walls_colour_is_cleared)
+{
+  cv::Mat disparity (40, 60, CV_16S, cv::Scalar (160));
+  cv::Mat colour (40, 60, CV_8UC4, cv::Scalar (40, 40, 40, 0));
+  colour.colRange (30, 60).setTo (cv::Scalar (200, 180, 160, 0));
+  disparity.colRange (27, 60).setTo (480); /* what is near has grown by 3 columns */
+  DisparityFilter ().clear_rims (colour, 10, 0.02, 0, 0, disparity);
+  for (int x = 0; x < 60; x++)
+    EXPECT_EQ (disparity.at<std::int16_t> (20, x), x < 27 ? 160 : x < 30 ? -16 : 480) << x;
+}
+
+TEST (DisparityFilter, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is_not)
+{
+  cv::Mat left (40, 80, CV_8U), right (40, 80, CV_8U);
+  cv::randu (left, 0, 255);
+  cv::randu (right, 0, 255);
+  for (int y = 0; y < 40; y++)
+    for (int x = 40; x < 80; x++) /* seen 10 pixels further left, and darker */
+      right.at<std::uint8_t> (y, x - 10) = std::uint8_t (left.at<std::uint8_t> (y, x) * 7 / 8);
+  cv::Mat disparity (40, 80, CV_16S, cv::Scalar (160));
+  DisparityFilter ().clear_unlike (left, right, 0, 1, 0, disparity);
+  EXPECT_LT (cv::countNonZero (disparity.colRange (15, 35) >= 0), 40 * 20 / 10);
+  EXPECT_GT (cv::countNonZero (disparity.colRange (45, 75) >= 0), 40 * 30 * 95 / 100);
+}
+
+TEST (ThirdPair, opinions_that_agree_are_weighed_and_those_that_do_not_are_counted)
+{
+  cv::Mat a (9, 9, CV_16U, cv::Scalar (320)), b (9, 9, CV_16U, cv::Scalar (328));
+  a.at<std::uint16_t> (4, 4) = 0;
+  a.at<std::uint16_t> (4, 6) = 900; /* alone with that */
+  b.at<std::uint16_t> (2, 2) = 0;
+  fuse_disparities (a, b, 1);
+  EXPECT_EQ (a.at<std::uint16_t> (0, 0), 324);
+  EXPECT_EQ (a.at<std::uint16_t> (4, 4), 328);
+  EXPECT_EQ (a.at<std::uint16_t> (2, 2), 320);
+  EXPECT_EQ (a.at<std::uint16_t> (4, 6), 328);
+  cv::Mat c (9, 9, CV_16U, cv::Scalar (320)), d (9, 9, CV_16U, cv::Scalar (900));
+  fuse_disparities (c, d, 1);
+  EXPECT_EQ (c.at<std::uint16_t> (4, 4), 0) << "nobody knows";
 }
 
 TEST (Matching, every_algorithm_finds_the_disparity_of_displaced_dots)
@@ -204,6 +268,44 @@ TEST (Rectification, swapped_vertical_and_single_cameras_are_named)
   EXPECT_NE (rectifier.set (view).message ().find ("above"), std::string::npos);
   view.right.reset ();
   EXPECT_EQ (rectifier.set (view).code (), StatusCode::kNotFound);
+}
+
+TEST (Rectification, third_camera_may_stand_anywhere_beside_and_turned)
+{
+  SceneSettings scene_settings;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (scene_settings, scene).ok ());
+  const View &view = scene->rig ().views[0];
+  Image<Rgbx> left (320, 240), right (320, 240);
+  Image<std::uint16_t> truth (320, 240);
+  ASSERT_TRUE (
+      scene->render (0, SceneCamera::kLeft, 0, false, left.view (), truth.view (), {}).ok ());
+  ASSERT_TRUE (scene->render (0, SceneCamera::kRight, 0, false, right.view (), {}, {}).ok ());
+  /* The right camera as the third one, its picture and its axes turned by half a turn. */
+  Image<Rgbx> turned (320, 240);
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      turned.view ().at (x, y) = right.view ().at (319 - x, 239 - y);
+  View odd = view;
+  odd.third = *view.right;
+  odd.third->partner_from_left.rotation = {-1, 0, 0, 0, -1, 0, 0, 0, 1};
+  odd.third->partner_from_left.translation = {0.1, 0, 0};
+  ThirdPair pair;
+  ASSERT_TRUE (pair.set (odd, scene->range_rig ().views[0], 32, {}).ok ());
+  const auto mat = [] (Image<Rgbx> &image) {
+    return cv::Mat (240, 320, CV_8UC4, image.view ().data, std::size_t (image.view ().stride));
+  };
+  pair.take (mat (left), mat (turned));
+  ASSERT_TRUE (pair.find ({0, 0, 320, 240}, 0, 0).ok ());
+  int person = 0, right_ones = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      if (const int t = truth.view ().at (x, y)) {
+        person++;
+        right_ones +=
+            std::abs (pair.disparity ().at<std::uint16_t> (y, x) / 16.0 - 320000.0 / t) < 1;
+      }
+  EXPECT_GT (right_ones, person * 0.95);
 }
 
 TEST (Rectification, near_that_needs_more_disparity_than_there_is_picture_is_named)

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 namespace rangecast {
 
@@ -36,26 +35,6 @@ DisparityToDepth::convert (
     for (int x = 0; x < depth.width; x++)
       to[x] = depths_[from[x]];
   }
-  return {};
-}
-
-Status
-remove_flying_pixels (ImageView<const std::uint16_t> in, double max_step, int min_support,
-    ImageView<std::uint16_t> out)
-{
-  if (!in.same_size (out))
-    return {StatusCode::kBadSize, "flying pixels: input and output differ in size"};
-  for (int y = 0; y < in.height; y++)
-    for (int x = 0; x < in.width; x++) {
-      const int depth = in.at (x, y), step = static_cast<int> (depth * max_step);
-      int support = 0;
-      for (int v = std::max (0, y - 1); depth && v <= std::min (in.height - 1, y + 1); v++)
-        for (int u = std::max (0, x - 1); u <= std::min (in.width - 1, x + 1); u++) {
-          const int other = in.at (u, v);
-          support += (u != x || v != y) && other != 0 && std::abs (other - depth) <= step;
-        }
-      out.at (x, y) = support >= min_support ? static_cast<std::uint16_t> (depth) : kInvalidDepth;
-    }
   return {};
 }
 

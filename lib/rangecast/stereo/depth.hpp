@@ -26,12 +26,4 @@ private:
   std::vector<std::uint16_t> depths_; /* by disparity */
 };
 
-/** Clears points that hang in the air: valid pixels of whose eight neighbours fewer than
- *  `min_support` are valid and within `max_step` (a share of the depth).
- *  @param in       H x W depth
- *  @param[out] out H x W, another image
- *  @return kBadSize if the images differ in size. Reentrant. */
-Status remove_flying_pixels (ImageView<const std::uint16_t> in, double max_step, int min_support,
-    ImageView<std::uint16_t> out);
-
 } // namespace rangecast

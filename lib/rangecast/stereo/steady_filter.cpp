@@ -7,7 +7,7 @@
 namespace rangecast {
 
 constexpr int kBlock = 8;
-constexpr float kDrift = 0.1f;    /* pixels of disparity */
+constexpr float kDrift = 0.15f;   /* pixels of disparity, in two pictures running */
 constexpr float kJump = 1.0f;     /* the same, of one pixel */
 constexpr float kMostNoise = 6.f; /* grey levels: more is motion */
 
@@ -55,7 +55,7 @@ SteadyFilter::look_at_block (const RangeImage &image, int bx, int by, Block &blo
     }
   }
   block.change = change / static_cast<float> (std::max (1, (x1 - x0) * (y1 - y0)));
-  block.drift = drift / static_cast<float> (std::max (8, n));
+  block.drift = drift / static_cast<float> (std::max (16, n));
 }
 
 /* How much blocks change where nothing moves: the quarter of all that changes least. */
@@ -78,20 +78,20 @@ SteadyFilter::average (const RangeImage &image)
     std::uint16_t *depth = image.depth.row (y - roi.y) - roi.x;
     auto held = held_.ptr<float> (y), grey = grey_.ptr<float> (y);
     for (int x = roi.x; x < roi.x + roi.width; x++) {
-      bool moves = false;
+      bool moves = blocks_[static_cast<std::size_t> (y / kBlock * columns_ + x / kBlock)].drifts;
       for (int by = std::max (0, y / kBlock - 1); by <= std::min (rows_ - 1, y / kBlock + 1); by++)
         for (int bx = std::max (0, x / kBlock - 1); bx <= std::min (columns_ - 1, x / kBlock + 1);
              bx++)
-          moves |= blocks_[static_cast<std::size_t> (by * columns_ + bx)].moves != 0;
+          moves |= blocks_[static_cast<std::size_t> (by * columns_ + bx)].moves;
       const float g = grey_of (colour[x]), z = depth[x];
       grey[x] += (moves ? 1 : weight_) * (g - grey[x]);
       if (moves)
         held[x] = z;
       if (z <= 0 || moves)
         continue;
-      const bool same =
-          held[x] > 0 && std::abs (focal_baseline_ * (held[x] - z)) <= kJump * held[x] * z;
-      held[x] = same ? held[x] + weight_ * (z - held[x]) : z;
+      /* What jumps for one picture where all else is still is wrong, and counts as a step. */
+      const float most = kJump * z * z / focal_baseline_;
+      held[x] = held[x] > 0 ? held[x] + weight_ * std::clamp (z - held[x], -most, most) : z;
       depth[x] = static_cast<std::uint16_t> (std::lround (held[x]));
     }
   }
@@ -103,7 +103,7 @@ SteadyFilter::apply (const RangeImage &image)
   const Roi &roi = image.roi;
   changes_.clear ();
   for (Block &block : blocks_)
-    block = {};
+    block = {0, 0, block.drift, false, false};
   const auto each = [&] (auto &&work) {
     for (int by = roi.y / kBlock; by <= (roi.y + roi.height - 1) / kBlock; by++)
       for (int bx = roi.x / kBlock; bx <= (roi.x + roi.width - 1) / kBlock; bx++)
@@ -115,7 +115,11 @@ SteadyFilter::apply (const RangeImage &image)
   });
   const float most = 1 + 1.5f * noise ();
   each ([&] (int, int, Block &block) {
-    block.moves = block.change > most || std::abs (block.drift) > kDrift;
+    const float both = block.drift * block.drift_before > 0
+                           ? std::min (std::abs (block.drift), std::abs (block.drift_before))
+                           : 0;
+    block.moves = block.change > most;
+    block.drifts = both > kDrift;
   });
   average (image);
 }

@@ -10,8 +10,9 @@
 namespace rangecast {
 
 /** Holds depth still where nothing moves: each pixel's depth is a running mean. Blocks of 8 x 8
- *  pixels whose colours change by more than noise, or whose depth drifts by more than a tenth of a
- *  pixel of disparity on average, begin anew, and so do those beside them: nothing trails. */
+ *  pixels whose colours change by more than noise, and those beside them, begin anew, and so do
+ *  blocks whose depth drifts to one side, by more than 0.15 pixel of disparity on average in two
+ *  pictures running: nothing trails. */
 class SteadyFilter {
 public:
   /** @param width, height  of the view, pixels
@@ -25,9 +26,10 @@ public:
 
 private:
   struct Block {
-    float change = 0; /* grey levels, mean of the absolute differences */
-    float drift = 0;  /* pixels of disparity, mean of the differences */
-    std::uint8_t moves = 0;
+    float change = 0;       /* grey levels, mean of the absolute differences */
+    float drift = 0;        /* pixels of disparity, mean of the differences */
+    float drift_before = 0; /* in the picture before */
+    bool moves = false, drifts = false;
   };
   void look_at_block (const RangeImage &image, int bx, int by, Block &block) const;
   [[nodiscard]] float noise ();

@@ -20,6 +20,8 @@ const char *const kUsage =
     "usage: stereo_bench --left FILE --right FILE [--ground-truth FILE] [--scale S]\n"
     "                    (--rig FILE --view-id N | --focal-length PX --baseline M [--doffs PX])\n"
     "                    [--near M] [--far M] [--rounds N] [--tune] [--json FILE]\n"
+    "       stereo_bench --scene [--model FILE] [--size WxH] [--distance M] [--noise LEVELS]\n"
+    "                    [--frames N]\n"
     "Matches a pair of pictures as stereodepth does by default, and with OpenCV's BM, SGBM and\n"
     "3-way SGBM in the same run. Prints, for the pixels whose truth is known: density, the share\n"
     "that has a disparity; and of those bad-1.0 and bad-2.0, the shares further off than 1 and 2\n"
@@ -38,6 +40,21 @@ const char *const kUsage =
     "                       disparities up to a quarter of the width)\n"
     "  --rounds N           times are medians of so many (default 5)\n"
     "  --tune               also run OpenCV's 3-way SGBM at a grid of settings, print its best\n"
+    "  --scene              render pictures instead, of one person in a room, and match them "
+    "whole,\n"
+    "                       in the person's ROI alone, and with a third camera; prints the share "
+    "of\n"
+    "                       the person that has depth, the share of valid pixels more than 5 cm "
+    "from\n"
+    "                       the true surface, and errors, beside OpenCV at the same settings\n"
+    "  --model FILE         glTF or OBJ model to render (default: the built-in figure)\n"
+    "  --size WxH           (default 320x240)\n"
+    "  --distance M         from the cameras, 0.5 to 1.2 (default 0.8; at 1.1 the person's ROI is "
+    "a\n"
+    "                       quarter of the picture)\n"
+    "  --noise LEVELS       standard deviation of sensor noise, grey levels (default 1.5)\n"
+    "  --frames N           that are measured (default 20)\n"
+    "  --threads N          of ours (default 0: one a core)\n"
     "  --json FILE          write rows: matcher, density, bad1, bad2 (0 to 1), median_px, ms\n";
 
 struct Job {
@@ -72,6 +89,7 @@ add_options (Options &options, Job &job)
   options.number ("--distance", s.distance_m, 0.5, 1.2);
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
   options.number ("--frames", job.rendered.frames, 1, 1000);
+  options.number ("--threads", job.rendered.settings.n_threads, 0, 64);
   options.text ("--json", job.json);
 }
 
@@ -80,7 +98,10 @@ std::string
 complaint (const Job &job)
 {
   if (job.scene)
-    return {};
+    return job.left.empty () && job.right.empty () && job.json.empty ()
+               ? ""
+               : "--scene renders its pictures and prints a table; expected no --left, --right, "
+                 "--json";
   if (job.left.empty () || job.right.empty ())
     return "expected --left and --right";
   if (job.rig.empty () && (job.focal <= 0 || job.baseline <= 0))
@@ -236,6 +257,7 @@ main (int argc, char **argv)
 {
   cv::utils::logging::setLogLevel (cv::utils::logging::LOG_LEVEL_SILENT);
   Job job;
+  job.rendered.scene.noise_sigma = 1.5;
   Options options ("stereo_bench", kUsage);
   add_options (options, job);
   if (const auto status = options.parse (argc, argv))

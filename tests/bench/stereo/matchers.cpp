@@ -97,9 +97,9 @@ run_opencv (const Pair &pair, cv::StereoMatcher &matcher, const std::string &nam
   return judge (name, disparity, pair.truth, ms);
 }
 
-/* Found with --tune on aloe and motorcycle; uniqueness and speckle as in OpenCV's own stereo_match
- * sample. */
-constexpr PeerSettings kTuned = {5, 8, 32, 10, 100, 2, 63};
+/* By hand, with the help of --tune: on aloe and motorcycle no setting of the grid is both denser
+ * and less often wrong by 2 pixels. */
+constexpr PeerSettings kTuned = {3, 8, 32, 10, 200, 1, 31};
 
 } // namespace
 

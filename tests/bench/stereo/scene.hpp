@@ -21,7 +21,7 @@ struct SceneRow {
 
 struct SceneJob {
   rangecast::SceneSettings scene; ///< one view is matched
-  int frames = 6, rounds = 3;
+  int frames = 20;
   rangecast::StereoSettings settings;
 };
 
