@@ -46,3 +46,14 @@ test_bad_arguments_are_named () {
   expect_error "expected at least --left and --out" "$pipelines/calibrate.sh" --left a%d.png
   expect_error "its folder does not exist" "$pipelines/calibrate.sh" --left videotestsrc --out nowhere/rig.yaml
 }
+
+test_board_is_drawn_in_its_true_size () {
+  "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" board.svg columns=9 rows=6 square-size=0.02
+  grep -q 'width="240.0000mm" height="180.0000mm"' board.svg || fail "$(head -n 1 board.svg)"
+  # 10 x 7 squares, half of them black; a square is 256 units
+  [ "$(grep -c 'width="256" height="256"/>' board.svg)" = 35 ] || fail "$(wc -l board.svg)"
+  "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" charuco.svg board=charuco
+  expect_file charuco.svg 10000
+  expect_error "columns is 99" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg columns=99
+  expect_error "'rows'" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg rows
+}
