@@ -104,7 +104,8 @@ Concealment::lay_out (
     if (Status s = gstrange::add_view (buffer, view.view_id, roi, view.capture_time_ns); !s.ok ())
       return s;
     there |= std::uint64_t{1} << view.view_id;
-    came_[std::size_t (view.view_id)] = now_;
+    if (!skips_) /* or its time is that of a jump, which may be damage */
+      came_[std::size_t (view.view_id)] = now_;
   }
   for (const RangeImage &image : older)
     if (!(there >> image.view_id & 1) && is_soon_after (now_, came_[std::size_t (image.view_id)]))

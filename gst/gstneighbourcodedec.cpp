@@ -192,13 +192,7 @@ count_frame (GstNeighbourCodeDecPrivate *priv, const DecoderResult &result, gsiz
   std::lock_guard guard (priv->lock);
   priv->frames++;
   priv->coded_bytes += size;
-  DecoderResult &totals = priv->totals;
-  totals.slices += result.slices;
-  totals.bad_slices += result.bad_slices;
-  totals.missing_pixels += result.missing_pixels;
-  totals.points += result.points;
-  totals.raw_bits += result.raw_bits;
-  totals.unknown_pixels += result.unknown_pixels;
+  priv->totals += result;
 }
 
 /* Losses linger where frame sets refer to one another, so upstream is asked for a new beginning. */

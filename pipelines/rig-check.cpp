@@ -200,6 +200,23 @@ struct Outlook {
 
 constexpr double kFieldDeg = 45;
 
+/* Elements make room for all pixels of a rig, and with partners there may be more than a rig can
+ * have. What is drawn does not depend on how many there are. */
+static View
+with_few_pixels (View view)
+{
+  const auto shrink = [] (int &size, double &f, double &c) {
+    constexpr int kMost = 1024;
+    const double scale = double (std::min (size, kMost)) / size;
+    size = std::min (size, kMost);
+    f *= scale;
+    c = (c + 0.5) * scale - 0.5;
+  };
+  shrink (view.width, view.intrinsics.fx, view.intrinsics.cx);
+  shrink (view.height, view.intrinsics.fy, view.intrinsics.cy);
+  return view;
+}
+
 /* All cameras and what is near before them fill most of the picture. striprender turns about where
  * the axes meet, which for a single pair is nowhere in particular, so what it looks at is moved. */
 static Outlook
@@ -303,7 +320,7 @@ check_rig (const Options &options)
   const rangecast::SceneFrame scene = rangecast::scene_frame (rig);
   Rig drawn;
   for (const Camera &camera : cameras)
-    drawn.views.push_back (camera.view);
+    drawn.views.push_back (with_few_pixels (camera.view));
   std::printf ("views: %zu, which look at about %.3f %.3f %.3f m\n\n", rig.views.size (),
       scene.target.x, scene.target.y, scene.target.z);
   print_cameras (cameras, scene.target);

@@ -12,7 +12,8 @@
 
 namespace rangecast {
 
-/** How many of n jobs in_parallel() runs at a time, at most.
+/** How many of n jobs in_parallel() runs at a time, at most. The number of cores is OpenCV's, which
+ *  anybody may set at any time: who makes room for workers hands their number on, as `threads`.
  *  @param threads  at a time; 0 = number of cores */
 inline std::size_t
 workers_for (std::size_t n, int threads)

@@ -132,6 +132,20 @@ GST_START_TEST (test_damaged_time_of_one_frame_set_does_not_end_concealment_but_
 }
 GST_END_TEST;
 
+GST_START_TEST (test_damaged_time_does_not_end_the_second_for_which_a_view_may_stay)
+{
+  const Rig rig = ring_rig (2);
+  const Units units = encoded_units (rig, make_frame_set (rig));
+  for (const GstClockTime damaged : {700 * kStep, 3 * kStep}) {
+    GstHarness *h = decoder (rig);
+    const Pixels whole = show (h, units, 50 * kStep);
+    show (h, units, damaged, true);
+    fail_unless (show (h, of_view (units, 1), 52 * kStep, true) == whole);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_new_caps_keep_the_picture_where_the_views_are_alike)
 {
   const Rig rig = ring_rig (1);
@@ -175,6 +189,7 @@ concealment_suite (void)
   tcase_add_test (tc, test_region_that_shrinks_where_most_came_is_that_of_the_frame_set);
   tcase_add_test (
       tc, test_damaged_time_of_one_frame_set_does_not_end_concealment_but_a_new_time_does);
+  tcase_add_test (tc, test_damaged_time_does_not_end_the_second_for_which_a_view_may_stay);
   tcase_add_test (tc, test_new_caps_keep_the_picture_where_the_views_are_alike);
   tcase_add_test (tc, test_flush_ends_concealment);
   return s;

@@ -131,6 +131,15 @@ TEST (RateControl, wrong_guess_costs_less_than_a_second)
   }
 }
 
+/* Caps may name a frame rate of 2^31 - 1, whose interval is 0 ns. */
+TEST (RateControl, interval_of_0_is_as_good_as_no_guess)
+{
+  Stream stream;
+  stream.settings.interval_s = 0;
+  stream.play (8);
+  stream.expect_on_target (101);
+}
+
 TEST (RateControl, thresholds_hardly_move_in_the_steady_state)
 {
   for (double slope : {0.3, 0.6, 1.2}) {

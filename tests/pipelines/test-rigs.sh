@@ -119,3 +119,15 @@ test_cameras_are_drawn () {
   expect_file rig.png 3000
   expect_error "nowhere/rig.png" "$pipelines/rig-check.sh" rig.yaml --png nowhere/rig.png
 }
+
+# 8 pairs of 8.4 megapixels are a rig, 16 cameras of such are not.
+test_cameras_of_a_rig_with_many_pixels_are_drawn () {
+  need_gl
+  local id
+  middlebury 994.978
+  sed -i "s/^width=.*/width=4000/; s/^height=.*/height=2100/" calib.txt
+  rig-convert middlebury calib.txt rig.yaml
+  for id in {1..7}; do rig-convert middlebury calib.txt rig.yaml --view-id "$id" --append; done
+  "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
+  expect_file rig.png 1000
+}

@@ -181,8 +181,9 @@ AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, Deco
   jobs_.clear ();
   for (std::size_t i = 0; i < count_; i++)
     add_jobs (i);
-  memory_.reserve (workers_for (jobs_.size (), threads));
-  in_parallel (jobs_.size (), threads, [&] (std::size_t i, std::size_t worker) {
+  const std::size_t workers = workers_for (jobs_.size (), threads);
+  memory_.reserve (workers);
+  in_parallel (jobs_.size (), static_cast<int> (workers), [&] (std::size_t i, std::size_t worker) {
     Job &job = jobs_[i];
     run (job, images[job.view], older_of (job.view), memory_.of (worker));
   });

@@ -98,10 +98,12 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
   for (const RangeImage &image : images)
     add_jobs (views_[image.view_id]);
   do {
-    memory_.reserve (workers_for (jobs_.size (), threads));
-    in_parallel (jobs_.size (), threads, [&] (std::size_t i, std::size_t worker) {
-      jobs_[i].view->code (jobs_[i].piece, memory_.of (worker));
-    });
+    const std::size_t workers = workers_for (jobs_.size (), threads);
+    memory_.reserve (workers);
+    in_parallel (
+        jobs_.size (), static_cast<int> (workers), [&] (std::size_t i, std::size_t worker) {
+          jobs_[i].view->code (jobs_[i].piece, memory_.of (worker));
+        });
     jobs_.clear ();
     for (const RangeImage &image : images)
       if (ViewEncoder &view = views_[image.view_id]; !view.finish ())

@@ -117,7 +117,7 @@ RateControl::configure (const RateSettings &wanted)
     a_ = std::log (settings.bits_per_point);
     b_ = kFirstSlope;
     fill_ = 0.6;
-    interval_s_ = settings.interval_s;
+    interval_s_ = settings.interval_s > 0 ? settings.interval_s : RateSettings ().interval_s;
     return;
   }
   /* The same thresholds have another x now: a means the bits at x = 0. */

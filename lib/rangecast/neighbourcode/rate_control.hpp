@@ -20,7 +20,7 @@ struct RateSettings {
   Thresholds best;              ///< never below
   Thresholds worst;             ///< never above, where `best` is not
   double bits_per_point = 8;    ///< a guess for the first frame set, at `best`
-  double interval_s = 1.0 / 30; ///< a guess, of frame sets
+  double interval_s = 1.0 / 30; ///< a guess, of frame sets; 0: the default
 
   friend bool operator== (const RateSettings &, const RateSettings &) = default;
 };
