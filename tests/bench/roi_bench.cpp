@@ -107,8 +107,8 @@ measure (const Room &room, bool stereo, Cue cue, const Job &job)
       double (score.outside_kept) / job.frames, double (score.eaten_deep) / job.frames,
       score.eaten);
   if (!job.pictures.empty ())
-    write_pictures (
-        job.pictures + "/" + room.name + (stereo ? "-stereo-" : "-range-") + kCues[int (cue)] + ".png",
+    write_pictures (job.pictures + "/" + room.name + (stereo ? "-stereo-" : "-range-") +
+                        kCues[int (cue)] + ".png",
         stage);
 }
 

@@ -70,9 +70,6 @@ public:
     clean.light_drift = 0;
     if (Status s = Scene::create (clean, shadowed_); !s.ok ())
       return s;
-    clean.cast_shadow = 0;
-    if (Status s = Scene::create (clean, shadowless_); !s.ok ())
-      return s;
     if (Status s = Scene::create (trial_.scene, scene_); !s.ok ())
       return s;
     background_.reset (size_.width, size_.height);
@@ -224,8 +221,8 @@ private:
   {
     (void)shadowed_->render (
         trial_.view, SceneCamera::kLeft, time_s_, empty_, rgbx (plain_), {}, {});
-    (void)shadowless_->render (
-        trial_.view, SceneCamera::kLeft, time_s_, empty_, rgbx (lit_), {}, {});
+    (void)shadowed_->render (trial_.view, SceneCamera::kLeft, time_s_, true, rgbx (lit_), {},
+        {}); /* nobody, no shadow */
     shadow_.create (size_, CV_8U);
     for (int y = 0; y < size_.height; y++)
       for (int x = 0; x < size_.width; x++) {
@@ -237,7 +234,7 @@ private:
 
   RoiTrial trial_;
   cv::Size size_;
-  std::unique_ptr<Scene> scene_, shadowed_, shadowless_;
+  std::unique_ptr<Scene> scene_, shadowed_;
   StereoDepth stereo_;
   BackgroundModel background_, learnt_;
   Segmenter segmenter_;

@@ -364,3 +364,91 @@ TEST (Scene, test_scanned_head_faces_the_first_view)
   EXPECT_LT (nearest_row, 130);
   EXPECT_GT (back.view ().at (160, nearest_row), front.view ().at (160, nearest_row));
 }
+
+TEST (Scene, test_far_reaches_the_walls_and_a_chair_stands_before_them)
+{
+  SceneSettings settings;
+  settings.far_m = 4.5;
+  settings.noise_sigma = 0;
+  Picture bare, furnished;
+  render (*make_scene (settings), 0, SceneCamera::kLeft, 0, bare, true);
+  settings.chair = true;
+  render (*make_scene (settings), 0, SceneCamera::kLeft, 0, furnished, true);
+  int nearer = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      EXPECT_GT (bare.depth.view ().at (x, y), 20000);
+      EXPECT_EQ (furnished.mask.view ().at (x, y), 0);
+      nearer += furnished.depth.view ().at (x, y) + 5000 < bare.depth.view ().at (x, y);
+    }
+  EXPECT_NEAR (bare.depth.view ().at (160, 20), 30000, 100); /* 0.8 m before and 2.2 m behind 0 */
+  EXPECT_GT (nearer, 3000);
+}
+
+TEST (Scene, test_shadow_darkens_the_room_and_neither_depth_nor_person)
+{
+  SceneSettings settings;
+  settings.far_m = 4.5;
+  settings.noise_sigma = 0;
+  Picture lit, dark;
+  render (*make_scene (settings), 0, SceneCamera::kLeft, 1, lit);
+  settings.cast_shadow = 0.5;
+  render (*make_scene (settings), 0, SceneCamera::kLeft, 1, dark);
+  int darker = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const int before = lit.colour.view ().at (x, y).r, after = dark.colour.view ().at (x, y).r;
+      EXPECT_EQ (lit.depth.view ().at (x, y), dark.depth.view ().at (x, y));
+      EXPECT_TRUE (before == after || !lit.mask.view ().at (x, y));
+      EXPECT_LE (after, before);
+      darker += after < before * 6 / 10;
+    }
+  EXPECT_GT (darker, 3000);
+}
+
+TEST (Scene, test_light_drifts_by_its_share_and_back)
+{
+  SceneSettings settings;
+  settings.noise_sigma = 0;
+  settings.light_drift = 0.2;
+  const auto scene = make_scene (settings);
+  const auto level = [&] (double time_s) {
+    Picture picture;
+    render (*scene, 0, SceneCamera::kLeft, time_s, picture, true);
+    return double (picture.colour.view ().at (100, 60).g);
+  };
+  EXPECT_NEAR (level (10) / level (0), 1.2, 0.02);
+  EXPECT_NEAR (level (30) / level (0), 0.8, 0.02);
+  EXPECT_EQ (level (20), level (0));
+}
+
+TEST (Scene, test_three_persons_are_three_islands)
+{
+  SceneSettings settings;
+  settings.persons = 3;
+  settings.distance_m = 1.2;
+  Picture picture;
+  render (*make_scene (settings), 0, SceneCamera::kLeft, 0, picture);
+  int islands = 0; /* in a row through the chests */
+  for (int x = 1; x < 320; x++)
+    islands += picture.mask.view ().at (x, 150) && !picture.mask.view ().at (x - 1, 150);
+  EXPECT_EQ (islands + (picture.mask.view ().at (0, 150) != 0), 3);
+}
+
+TEST (Scene, test_room_settings_out_of_range_are_named)
+{
+  const auto refuse = [] (auto change, const char *name) {
+    SceneSettings settings;
+    change (settings);
+    std::unique_ptr<Scene> scene;
+    const Status status = Scene::create (settings, scene);
+    EXPECT_EQ (status.code (), StatusCode::kBadValue);
+    EXPECT_NE (status.message ().find (name), std::string::npos);
+  };
+  refuse ([] (SceneSettings &s) { s.persons = 4; }, "persons");
+  refuse ([] (SceneSettings &s) { s.far_m = 0.5; }, "far");
+  refuse ([] (SceneSettings &s) { s.cast_shadow = 1; }, "cast-shadow");
+  refuse ([] (SceneSettings &s) { s.light_drift = -1; }, "light-drift");
+  refuse ([] (SceneSettings &s) { s.wall_texture = 2; }, "wall-texture");
+  refuse ([] (SceneSettings &s) { s.wall_warmth = 2; }, "wall-warmth");
+}
