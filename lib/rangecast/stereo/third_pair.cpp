@@ -197,7 +197,7 @@ fuse_disparities (cv::Mat &disparity, const cv::Mat &other, double precision, cv
   const double weight = precision * precision / (1 + precision * precision);
   disparity.copyTo (mine);
   for (int y = 0; y < disparity.rows; y++) {
-    const auto a = mine.ptr<std::uint16_t> (y), b = other.ptr<std::uint16_t> (y);
+    const std::uint16_t *a = mine.ptr<std::uint16_t> (y), *b = other.ptr<std::uint16_t> (y);
     auto to = disparity.ptr<std::uint16_t> (y);
     for (int x = 0; x < disparity.cols; x++) {
       if (!b[x] || !a[x]) {
