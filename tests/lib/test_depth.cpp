@@ -137,13 +137,14 @@ TEST (ThirdPair, opinions_that_agree_are_weighed_and_those_that_do_not_are_count
   a.at<std::uint16_t> (4, 4) = 0;
   a.at<std::uint16_t> (4, 6) = 900; /* alone with that */
   b.at<std::uint16_t> (2, 2) = 0;
-  fuse_disparities (a, b, 1);
+  cv::Mat memory;
+  fuse_disparities (a, b, 1, memory);
   EXPECT_EQ (a.at<std::uint16_t> (0, 0), 324);
   EXPECT_EQ (a.at<std::uint16_t> (4, 4), 328);
   EXPECT_EQ (a.at<std::uint16_t> (2, 2), 320);
   EXPECT_EQ (a.at<std::uint16_t> (4, 6), 328);
   cv::Mat c (9, 9, CV_16U, cv::Scalar (320)), d (9, 9, CV_16U, cv::Scalar (900));
-  fuse_disparities (c, d, 1);
+  fuse_disparities (c, d, 1, memory);
   EXPECT_EQ (c.at<std::uint16_t> (4, 4), 0) << "nobody knows";
 }
 

@@ -177,7 +177,7 @@ DisparityFilter::vote (
     const cv::Vec4b &own, int x, int y, int d, int radius, int most, int least) const
 {
   const cv::v_int16x8 low = cv::v_setall_s16 (static_cast<short> (d - most)),
-                      high = cv::v_setall_s16 (static_cast<short> (d + most)),
+                      high = cv::v_setall_s16 (static_cast<short> (std::min (d + most, 32767))),
                       valid = cv::v_setall_s16 (static_cast<short> (least));
   cv::v_int16x8 same = cv::v_setzero_s16 (), near = same, far = same, none = same;
   for_window (own, x, y, radius, [&] (const cv::v_int16x8 &weight, const cv::v_int16x8 &depth) {

@@ -77,12 +77,13 @@ Matcher::set_range (int min_disparity, int max_disparity)
   try {
     if (!matcher_)
       matcher_ = make (settings_, min_disparity_, disparities_);
-    more_.push_back (matcher_);
-    for (const auto &matcher : more_) {
-      matcher->setMinDisparity (min_disparity_);
-      matcher->setNumDisparities (disparities_);
-    }
-    more_.pop_back ();
+    const auto limit = [this] (cv::StereoMatcher &matcher) {
+      matcher.setMinDisparity (min_disparity_);
+      matcher.setNumDisparities (disparities_);
+    };
+    limit (*matcher_);
+    for (const auto &matcher : more_)
+      limit (*matcher);
   } catch (const cv::Exception &) {
     return {StatusCode::kBadValue, "stereo: OpenCV refuses these settings"};
   }

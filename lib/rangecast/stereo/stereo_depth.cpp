@@ -153,7 +153,8 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   if (status.ok () && has_third_) {
     status = third_.find (image.roi, near_m, far_m);
     if (status.ok ())
-      fuse_disparities (finder_.disparity (), third_.disparity (), third_.precision ());
+      fuse_disparities (
+          finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
   }
   if (status.ok ())
     status = to_depth_.convert (disparity (), image.depth);

@@ -89,7 +89,7 @@ private:
   MirrorCheck mirror_;
   SteadyFilter steady_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
-  cv::Mat rectified_[2];
+  cv::Mat rectified_[2], before_fusion_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
   Roi last_roi_;                          /* that was not the whole picture */

@@ -191,13 +191,13 @@ support (const cv::Mat &of, int x, int y, int d)
 }
 
 void
-fuse_disparities (cv::Mat &disparity, const cv::Mat &other, double precision)
+fuse_disparities (cv::Mat &disparity, const cv::Mat &other, double precision, cv::Mat &mine)
 {
   constexpr int kAgree = 16, kOneSurface = 48; /* 1/16 pixel */
   const double weight = precision * precision / (1 + precision * precision);
-  const cv::Mat mine = disparity.clone ();
+  disparity.copyTo (mine);
   for (int y = 0; y < disparity.rows; y++) {
-    const auto a = mine.ptr<std::uint16_t> (y), b = other.ptr<std::uint16_t> (y);
+    const std::uint16_t *a = mine.ptr<std::uint16_t> (y), *b = other.ptr<std::uint16_t> (y);
     auto to = disparity.ptr<std::uint16_t> (y);
     for (int x = 0; x < disparity.cols; x++) {
       if (!b[x] || !a[x]) {

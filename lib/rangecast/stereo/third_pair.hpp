@@ -53,7 +53,7 @@ private:
  *  pixel; the one there is where there is but one; the one that more of the neighbours in the other
  *  share where they contradict each other, or none if neither is much better.
  *  @param[in,out] disparity  CV_16U, 1/16 pixel, 0 = none; @param other  the same
- *  @param precision  of the other, times this one's */
-void fuse_disparities (cv::Mat &disparity, const cv::Mat &other, double precision);
+ *  @param precision  of the other, times this one's; @param memory  keep it for the next call */
+void fuse_disparities (cv::Mat &disparity, const cv::Mat &other, double precision, cv::Mat &memory);
 
 } // namespace rangecast
