@@ -96,8 +96,7 @@ encode_all (const EncoderSettings &settings, int threads)
                      .encode (images_of (pictures, time_of (frame)), std::uint32_t (frame), threads,
                          set.result)
                      .ok ());
-    for (std::size_t i = 0; i < encoder.parts (); i++)
-      set.bytes.insert (set.bytes.end (), encoder.part (i).begin (), encoder.part (i).end ());
+    set.bytes = encoder.bytes ();
     EXPECT_EQ (set.bytes.size (), encoder.size ());
   }
   return coded;
@@ -226,10 +225,14 @@ void
 spoil (Units &units, const Units &others, int kind, std::mt19937 &random)
 {
   const auto any = [&] (std::size_t n) { return random () % n; };
-  if (kind & 1) /* bits are damaged */
+  if (kind & 1) /* bits are damaged, in the header as often as behind it */
     for (auto &unit : units)
-      if (any (4) == 0)
-        unit[kSliceHeaderSize + any (unit.size () - kSliceHeaderSize)] ^= 1 << any (8);
+      if (any (4) == 0) {
+        const bool in_header = any (2) == 0;
+        const std::size_t begin = in_header ? kUnitHeaderSize : kSliceHeaderSize;
+        const std::size_t end = in_header ? kSliceHeaderSize : unit.size ();
+        unit[begin + any (end - begin)] ^= 1 << any (8);
+      }
   if (kind & 2) /* lost */
     std::erase_if (units, [&] (const auto &) { return any (5) == 0; });
   if (kind & 4) { /* come twice, whole or damaged */
