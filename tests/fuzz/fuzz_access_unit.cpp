@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Any bytes as access units that follow one another, through one decoder: planned, and decoded into
- * images of exactly the planned size. The first byte is a sum of Option; each access unit is one
- * byte that is a sum of How, two of size, units. */
+ * images of exactly the planned size; by one thread with all that the CPU can do, and by three with
+ * code for every CPU, which must come to the same. The first byte is a sum of Option; each access
+ * unit is one byte that is a sum of How, two of size, units. */
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -92,6 +93,8 @@ same (const DecoderResult &a, const DecoderResult &b)
 
 /* A decoder, what it made of an access unit, and of the one before. */
 struct Player {
+  CpuLevel cpu;
+  int threads;
   AccessUnitDecoder decoder;
   DecoderResult result;
   Pictures pictures, last;
@@ -105,7 +108,9 @@ struct Player {
     pictures.make (decoder.views ());
     const std::span<const RangeImage> older = last.images;
     std::vector<RangeImage> shown (older.begin (), conceal ? older.end () : older.begin ());
-    expect (decoder.decode (pictures.images, 1, result, shown).ok ());
+    limit_cpu (cpu); /* here, as memory of threads is made when one first needs it */
+    expect (decoder.decode (pictures.images, threads, result, shown).ok ());
+    limit_cpu (CpuLevel::kAvx2);
     check (conceal);
   }
 
@@ -128,11 +133,9 @@ struct Player {
 };
 
 static Player *
-make_player (bool every_cpu)
+make_player (CpuLevel cpu, int threads)
 {
-  limit_cpu (every_cpu ? CpuLevel::kScalar : CpuLevel::kAvx2);
-  auto made = new Player;
-  limit_cpu (CpuLevel::kAvx2);
+  auto made = new Player{cpu, threads, {}, {}, {}, {}};
   expect (made->decoder.set_rig (two_views ()).ok ());
   return made;
 }
@@ -176,7 +179,8 @@ collect_rig (Bytes access_unit)
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
 {
-  static Player &player = *make_player (false), &other = *make_player (true);
+  static Player &player = *make_player (CpuLevel::kAvx2, 1),
+                &other = *make_player (CpuLevel::kScalar, 3);
   if (size == 0)
     return 0;
   const int options = data[0];
