@@ -322,6 +322,17 @@ GST_START_TEST (test_forgets_the_background_in_null)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract");
+  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
+  fail_unless (out != nullptr);
+  gst_buffer_unref (out);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 roiextract_suite ()
 {
@@ -343,6 +354,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_new_size_is_learnt_anew_and_same_size_keeps_the_background);
   tcase_add_test (tc, test_stats_count_points);
   tcase_add_test (tc, test_forgets_the_background_in_null);
+  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 
