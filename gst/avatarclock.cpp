@@ -64,10 +64,20 @@ AvatarClock::next ()
 }
 
 /* The first tick that is still to come; the last one is not taken twice, should the clock be set
- * back or run slower than this. */
+ * back or run slower than this. A sink that waits for a picture's time, which is a period of
+ * latency behind its tick, gives the thread back just after the next tick: that one is taken late.
+ */
 guint64
-AvatarClock::next_tick (GstClockTime now) const
+AvatarClock::next_tick (GstClockTime now, GstClockTime base)
 {
+  if (last_tick_ != kNone) {
+    const GstClockTime following = time_of (last_tick_ + 1);
+    std::lock_guard guard (lock_);
+    if (!paused_since_tick_ && following >= base && following < now &&
+        now - following < time_of (1) / 2)
+      return last_tick_ + 1;
+  }
+  now = MAX (now, base);
   guint64 tick = gst_util_uint64_scale (now, guint64 (fps_n_), GST_SECOND * guint64 (fps_d_));
   while (time_of (tick) < now || tick == last_tick_)
     tick++;
@@ -87,7 +97,7 @@ AvatarClock::wait (GstElement *element, AvatarMoment &moment)
   if (!clock) /* outside of a pipeline */
     clock = gst_system_clock_obtain ();
   const GstClockTime base = gst_element_get_base_time (element);
-  const guint64 tick = next_tick (MAX (gst_clock_get_time (clock), base));
+  const guint64 tick = next_tick (gst_clock_get_time (clock), base);
   moment.capture_time = time_of (tick);
   moment.pts = moment.capture_time - base;
   moment.duration = time_of (tick + 1) - moment.capture_time;

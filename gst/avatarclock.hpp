@@ -27,7 +27,8 @@ public:
   bool set_rate (int fps_n, int fps_d);
   /** The frame after the last one, at once. */
   AvatarMoment next ();
-  /** Waits for the next multiple of the frame period. Those that have passed are skipped.
+  /** Waits for the next multiple of the frame period. Those that have passed are skipped, but the
+   *  one after the last is taken until half a period behind it.
    *  @return false if woken before it came: look why, and call again */
   bool wait (GstElement *element, AvatarMoment &moment);
 
@@ -49,7 +50,7 @@ private:
   static constexpr guint64 kNone = G_MAXUINT64;
 
   [[nodiscard]] GstClockTime time_of (guint64 frame) const;
-  [[nodiscard]] guint64 next_tick (GstClockTime now) const;
+  [[nodiscard]] guint64 next_tick (GstClockTime now, GstClockTime base);
   bool wait_until (GstClock *clock, GstClockTime time);
   void take_tick (guint64 tick, AvatarMoment &moment);
 

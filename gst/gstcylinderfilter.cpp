@@ -23,6 +23,8 @@
 #include <mutex>
 #include <rangecast/cylinder/cylinder_filter.hpp>
 
+#include "controlledvalues.hpp"
+
 GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
 
@@ -124,10 +126,7 @@ static void
 gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
-  const GstClockTime time =
-      gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
-  if (GST_CLOCK_TIME_IS_VALID (time))
-    gst_object_sync_values (GST_OBJECT (base), time);
+  sync_controlled_values (base, buffer);
   std::unique_lock guard (priv->lock);
   const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
   guard.unlock ();

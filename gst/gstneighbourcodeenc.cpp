@@ -33,6 +33,7 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
+#include "controlledvalues.hpp"
 #include "keyunitrequests.hpp"
 #include "neighbourcoderate.hpp"
 #include "recycledbuffers.hpp"
@@ -304,10 +305,7 @@ static GstFlowReturn
 encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  if (GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (input)))
-    gst_object_sync_values (
-        GST_OBJECT (self), gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment,
-                               GST_FORMAT_TIME, GST_BUFFER_PTS (input)));
+  sync_controlled_values (GST_BASE_TRANSFORM (self), input);
   FrameSettings settings;
   {
     std::lock_guard guard (priv->lock);

@@ -33,6 +33,8 @@
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
+#include "controlledvalues.hpp"
+
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
 using rangecast::Roi;
@@ -410,9 +412,7 @@ static GstFlowReturn
 gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
   auto self = GST_ROI_EXTRACT (base);
-  if (GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (buffer)))
-    gst_object_sync_values (GST_OBJECT (self),
-        gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)));
+  sync_controlled_values (base, buffer);
   const RoiSettings settings = copy_settings (self->priv);
   if (self->priv->relearn.exchange (false))
     relearn_all (self, settings.background_frames);

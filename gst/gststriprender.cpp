@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "camerapainter.hpp"
+#include "controlledvalues.hpp"
 #include "strippainter.hpp"
 #include "stripsettings.hpp"
 
@@ -393,9 +394,7 @@ gst_strip_render_transform (GstBaseTransform *base, GstBuffer *in, GstBuffer *ou
 {
   auto self = GST_STRIP_RENDER (base);
   const GstClockTime pts = GST_BUFFER_PTS (in);
-  if (GST_CLOCK_TIME_IS_VALID (pts))
-    gst_object_sync_values (
-        GST_OBJECT (self), gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, pts));
+  sync_controlled_values (base, in);
   gstrange::RangeFrameMap frame (in, GST_MAP_READ);
   const GstFlowReturn flow =
       gst_range_flow_return (GST_ELEMENT (self), check_frame (self->priv, frame));

@@ -333,6 +333,23 @@ check_rig (const Options &options)
   return good;
 }
 
+/* What is wrong with the options, or nullptr. Angles and distances are those that striprender
+ * takes. */
+static const char *
+complaint_of (const Options &o)
+{
+  const auto is_within = [] (double x, double least, double most) {
+    return x >= least && x <= most; /* NaN is not */
+  };
+  if (!o.paths || o.paths[1])
+    return "expected one rig file";
+  if (!is_within (o.width, 1, 8192) || !is_within (o.height, 1, 8192))
+    return "--width and --height: expected 1 to 8192 pixels";
+  if (!is_within (o.azimuth_deg, -360, 360) || !is_within (o.elevation_deg, -89, 89))
+    return "--azimuth and --elevation: expected -360 to 360 and -89 to 89 degrees";
+  return is_within (o.distance_m, 0, 1000) ? nullptr : "--distance: expected 0 to 1000 metres";
+}
+
 static bool
 parse_arguments (int *argc, char ***argv, Options &options)
 {
@@ -355,8 +372,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
   bool parsed = g_option_context_parse (context, argc, argv, &error);
   if (!parsed) {
     g_printerr ("rig-check: %s\n", error->message);
-  } else if (!options.paths || options.paths[1] || options.width < 1 || options.height < 1) {
-    g_printerr ("rig-check: expected one rig file, and a picture of at least 1x1; see --help\n");
+  } else if (const char *complaint = complaint_of (options)) {
+    g_printerr ("rig-check: %s; see --help\n", complaint);
     parsed = false;
   }
   g_clear_error (&error);

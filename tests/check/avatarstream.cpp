@@ -129,6 +129,22 @@ GST_START_TEST (test_late_live_frames_are_skipped_with_discont)
 }
 GST_END_TEST;
 
+/* A sink that waits for the time of a picture gives the thread back a period after its tick. */
+GST_START_TEST (test_tick_that_passed_just_now_is_not_skipped)
+{
+  GstHarness *h = make_harness (TRUE);
+  gst_harness_play (h);
+  for (guint64 i = 0; i < 3; i++) {
+    fail_unless (gst_harness_wait_for_clock_id_waits (h, 1, 10));
+    gst_harness_set_time (h, (i + 1) * kFrame + GST_MSECOND);
+    fail_unless (gst_harness_crank_single_clock_wait (h));
+    expect_buffer (h, i * kFrame, i == 0);
+  }
+  fail_unless_equals_uint64 (stat (h->element, "skipped"), 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_ticks_while_paused_are_no_skipped_ones)
 {
   GstHarness *h = make_harness (TRUE);
@@ -576,6 +592,7 @@ avatarstream_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_live_frames_come_when_the_clock_says_so);
   tcase_add_test (tc, test_late_live_frames_are_skipped_with_discont);
+  tcase_add_test (tc, test_tick_that_passed_just_now_is_not_skipped);
   tcase_add_test (tc, test_ticks_while_paused_are_no_skipped_ones);
   tcase_add_test (tc, test_ticks_without_a_linked_pad_are_no_skipped_ones);
   tcase_add_test (tc, test_eos_event_ends_a_live_stream_that_waits);

@@ -296,6 +296,17 @@ GST_START_TEST (test_adds_no_latency)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = harness_for (rig);
+  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
+  fail_unless (out != nullptr);
+  gst_buffer_unref (out);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 cylinderfilter_suite ()
 {
@@ -315,6 +326,7 @@ cylinderfilter_suite ()
   tcase_add_test (tc, test_caps_without_rig_are_refused_with_an_error);
   tcase_add_test (tc, test_goes_through_all_states_twice_and_flushes);
   tcase_add_test (tc, test_adds_no_latency);
+  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 

@@ -584,6 +584,17 @@ GST_START_TEST (test_bitrate_counts_the_first_frame_sets)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = encoder (rig);
+  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
+  fail_unless (out != nullptr);
+  gst_buffer_unref (out);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodeenc_suite ()
 {
@@ -615,6 +626,7 @@ neighbourcodeenc_suite ()
       tc, test_all_headers_make_parser_and_payloader_repeat_the_rig_with_the_key_frame_set);
   tcase_add_test (tc, test_a_controller_may_set_what_costs_no_new_tables);
   tcase_add_test (tc, test_bitrate_counts_the_first_frame_sets);
+  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 

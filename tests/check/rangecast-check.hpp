@@ -99,6 +99,18 @@ next_message_text (GstBus *bus, GstMessageType type)
   return text;
 }
 
+/** Begins a segment behind `start`, as a seek to between two frames does, and pushes a frame set of
+ *  `start`, which has no stream time then: controlled properties must stay, without a warning. */
+inline GstBuffer *
+push_before_the_segment (GstHarness *h, const Rig &rig, GstClockTime start)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = segment.position = start + 1;
+  fail_unless (gst_harness_push_event (h, gst_event_new_segment (&segment)));
+  return gst_harness_push_and_pull (h, make_frame_set (rig, start));
+}
+
 /** Plays a pipeline until EOS, which must come before any error and within 20 s, and stops it. */
 inline void
 play_to_the_end (GstElement *pipeline)

@@ -454,6 +454,17 @@ GST_START_TEST (test_damaged_background_file_is_one_error_that_says_what_was_exp
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract");
+  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
+  fail_unless (out != nullptr);
+  gst_buffer_unref (out);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 roiextract_suite ()
 {
@@ -480,6 +491,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_background_at_eos_is_the_one_that_it_has_become);
   tcase_add_test (tc, test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set);
   tcase_add_test (tc, test_damaged_background_file_is_one_error_that_says_what_was_expected);
+  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 

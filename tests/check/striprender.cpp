@@ -584,6 +584,19 @@ GST_START_TEST (test_new_rig_and_states_twice)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig);
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
+  fail_unless (out != nullptr);
+  gst_buffer_unref (out);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 striprender_suite ()
 {
@@ -608,6 +621,7 @@ striprender_suite ()
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
   tcase_add_test (tc, test_keeps_pts_and_capture_time_and_counts);
   tcase_add_test (tc, test_new_rig_and_states_twice);
+  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 

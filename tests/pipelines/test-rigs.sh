@@ -103,6 +103,9 @@ test_what_is_no_calibration_is_named () {
   expect_error "socket" rig-convert luxonis calib.json rig.yaml
   [ ! -e rig.yaml ] || fail "a rig was written all the same"
   expect_error "nowhere.yaml" rig-check nowhere.yaml
+  expect_error "-89 to 89 degrees" rig-check nowhere.yaml --elevation 300
+  expect_error "1 to 8192 pixels" rig-check nowhere.yaml --width 99999
+  expect_error "1000 metres" rig-check nowhere.yaml --distance nan
 }
 
 test_factory_calibration_becomes_a_rig () {

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/base/gstbasetransform.h>
+
+/** Gives controlled properties their values of the buffer's time. A buffer without PTS or outside
+ *  the segment, as the first after a seek to between two frames, has no stream time: values stay.
+ */
+inline void
+sync_controlled_values (GstBaseTransform *base, GstBuffer *buffer)
+{
+  const GstClockTime time =
+      gst_segment_to_stream_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  if (GST_CLOCK_TIME_IS_VALID (time))
+    gst_object_sync_values (GST_OBJECT (base), time);
+}
