@@ -165,7 +165,8 @@ read_settings (const std::string &text, EncoderSettings &settings)
         !expected.empty ())
       return expected;
   }
-  return validate (settings).message ();
+  const std::string wrong = validate (settings).message (); /* "encoder: WHAT, expected RANGE" */
+  return wrong.empty () ? "" : "values in range: " + wrong.substr (wrong.find (": ") + 2);
 }
 
 Status
