@@ -55,6 +55,7 @@ struct Camera {
   GstRigCalibratePad *pad;
   GstVideoInfo info; /* streaming thread */
   bool has_info = false;
+  bool refused = false; /* the caps that it has now; the error was posted */
   PictureReader reader; /* jobs */
   GstVideoInfo reader_info;
   bool reader_set = false;
@@ -556,6 +557,8 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
       return GST_FLOW_EOS;
   }
   const Cameras cameras = current_cameras (self);
+  if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
+    return GST_FLOW_ERROR;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const Fronts fronts (cameras, live);
   if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
@@ -609,12 +612,16 @@ gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
-    for (const auto &camera : current_cameras (self))
-      if (camera->aggregator_pad () == pad && gst_range_flow_return (GST_ELEMENT (self),
-                                                  take_caps (self, *camera, caps)) != GST_FLOW_OK) {
+    for (const auto &camera : current_cameras (self)) {
+      if (camera->aggregator_pad () != pad)
+        continue;
+      camera->refused = gst_range_flow_return (
+                            GST_ELEMENT (self), take_caps (self, *camera, caps)) != GST_FLOW_OK;
+      if (camera->refused) {
         gst_event_unref (event);
         return FALSE;
       }
+    }
   }
   return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
 }
@@ -724,7 +731,7 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
     priv->finished = false;
     priv->stale = true;
     for (const auto &camera : priv->cameras)
-      camera->has_info = false;
+      camera->has_info = camera->refused = false;
   }
   priv->jobs.start ();
   return TRUE;
