@@ -255,6 +255,16 @@ value_of (const Values &values, const char *name, std::size_t count)
   return found->second;
 }
 
+static int
+side_of (const Values &values, const char *name)
+{
+  const double side = value_of (values, name, 1)[0];
+  if (!(side >= 1 && side <= rangecast::kMaxImageSide))
+    throw BadInput{std::string (name) + ": expected 1 to " +
+                   std::to_string (rangecast::kMaxImageSide) + " pixels"};
+  return int (side);
+}
+
 /* Rectified pairs; the baseline is in millimetres, disparities lie between vmin and vmax, or below
  * ndisp. */
 static View
@@ -263,8 +273,8 @@ read_middlebury (const std::vector<std::string> &paths, const Options &)
   const Values values = read_values (paths[0]);
   const auto left = value_of (values, "cam0", 9), right = value_of (values, "cam1", 9);
   View view;
-  view.width = int (value_of (values, "width", 1)[0]);
-  view.height = int (value_of (values, "height", 1)[0]);
+  view.width = side_of (values, "width");
+  view.height = side_of (values, "height");
   view.intrinsics = {left[0], left[4], left[2], left[5]};
   PartnerCamera partner;
   partner.intrinsics = {right[0], right[4], right[2], right[5]};
@@ -312,8 +322,8 @@ convert (const Options &options)
     throw BadInput{"expected a format: opencv, luxonis or middlebury; see --help"};
   if (words.size () < format->least_inputs + 2 || words.size () > format->most_inputs + 2)
     throw BadInput{std::string (format->name) + ": expected its calibration and RIG; see --help"};
-  if (!(options.scale > 0) || !(options.unit_m > 0))
-    throw BadInput{"--scale and --unit: expected numbers above 0"};
+  if (!(options.scale > 0 && options.scale <= 1000) || !(options.unit_m > 0))
+    throw BadInput{"--scale and --unit: expected numbers above 0, and --scale at most 1000"};
 
   const std::string rig_path = words.back ();
   View view = format->read ({words.begin () + 1, words.end () - 1}, options);

@@ -79,37 +79,33 @@ expect_poses (const std::vector<TrueCamera> &views, const CalibrationResult &res
   }
 }
 
+/* Calibrates the four views with pictures of a board. */
+void
+expect_calibrated (BoardKind kind, double most_rms_px)
+{
+  CalibrationSettings settings;
+  settings.board.kind = kind;
+  settings.board.square_m = 0.03;
+  const auto views = four_views ();
+  std::vector<CalibrationCamera> cameras;
+  for (const TrueCamera &t : views)
+    cameras.push_back (t.camera);
+  CalibrationResult result;
+  const Status status =
+      calibrate_rig (cameras, render_frames (views, settings.board, kFrames), settings, result);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  EXPECT_LT (result.rms_px, most_rms_px);
+  expect_poses (views, result);
+}
+
 } // namespace
 
 TEST (CalibrationRendered, four_views_are_placed_to_a_tenth_of_a_degree_and_a_millimetre)
 {
-  CalibrationSettings settings;
-  settings.board.square_m = 0.03;
-  const auto views = four_views ();
-  std::vector<CalibrationCamera> cameras;
-  for (const TrueCamera &t : views)
-    cameras.push_back (t.camera);
-  CalibrationResult result;
-  const Status status =
-      calibrate_rig (cameras, render_frames (views, settings.board, kFrames), settings, result);
-  ASSERT_TRUE (status.ok ()) << status.message ();
-  EXPECT_LT (result.rms_px, 0.2);
-  expect_poses (views, result);
+  expect_calibrated (BoardKind::kChessboard, 0.2);
 }
 
 TEST (CalibrationRendered, four_views_are_placed_by_a_charuco_board)
 {
-  CalibrationSettings settings;
-  settings.board.kind = BoardKind::kCharuco;
-  settings.board.square_m = 0.03;
-  const auto views = four_views ();
-  std::vector<CalibrationCamera> cameras;
-  for (const TrueCamera &t : views)
-    cameras.push_back (t.camera);
-  CalibrationResult result;
-  const Status status =
-      calibrate_rig (cameras, render_frames (views, settings.board, kFrames), settings, result);
-  ASSERT_TRUE (status.ok ()) << status.message ();
-  EXPECT_LT (result.rms_px, 0.3);
-  expect_poses (views, result);
+  expect_calibrated (BoardKind::kCharuco, 0.3);
 }

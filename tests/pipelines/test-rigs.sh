@@ -96,6 +96,9 @@ test_views_are_appended_and_not_twice () {
 test_what_is_no_calibration_is_named () {
   echo "cam0=[1 2 3]" >calib.txt
   expect_error "cam0" rig-convert middlebury calib.txt rig.yaml
+  middlebury 994.978
+  sed -i 's/^width=.*/width=1e300/' calib.txt
+  expect_error "width" rig-convert middlebury calib.txt rig.yaml
   expect_error "calib.txt" rig-convert luxonis calib.txt rig.yaml
   expect_error "nowhere.json" rig-convert luxonis nowhere.json rig.yaml
   expect_error "expected a format" rig-convert kinect calib.txt rig.yaml
