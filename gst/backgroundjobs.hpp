@@ -5,11 +5,15 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 
-/* One thread that does jobs one after the other. Jobs must end by themselves. */
+/* One thread that does jobs one after the other. */
 class BackgroundJobs {
 public:
+  /* Must end by itself, and soon once the token says so. */
+  using Job = std::function<void (std::stop_token)>;
+
   BackgroundJobs () = default;
   BackgroundJobs (const BackgroundJobs &) = delete;
   BackgroundJobs &operator= (const BackgroundJobs &) = delete;
@@ -19,23 +23,39 @@ public:
   {
     stop ();
     std::lock_guard guard (lock_);
-    quit_ = false;
+    quit_ = flushing_ = false;
+    stop_source_ = {};
     thread_ = std::thread ([this] { run (); });
   }
-  /* Forgets jobs that have not begun and waits for the one that has. */
-  void stop ()
+  /* Any thread: forgets jobs that have not begun, asks the one that has to end, ends all waits. */
+  void interrupt ()
   {
     {
       std::lock_guard guard (lock_);
       quit_ = true;
       jobs_.clear ();
+      stop_source_.request_stop ();
     }
     changed_.notify_all ();
+  }
+  /* interrupt(), and waits until no job is left. */
+  void stop ()
+  {
+    interrupt ();
     if (thread_.joinable ())
       thread_.join ();
   }
+  /* While flushing, nobody waits; jobs go on. */
+  void set_flushing (bool flushing)
+  {
+    {
+      std::lock_guard guard (lock_);
+      flushing_ = flushing;
+    }
+    changed_.notify_all ();
+  }
   /* Does nothing while stopped. */
-  void post (std::function<void ()> job)
+  void post (Job job)
   {
     {
       std::lock_guard guard (lock_);
@@ -50,10 +70,12 @@ public:
     std::lock_guard guard (lock_);
     return jobs_.empty () && !busy_;
   }
-  void wait_until_idle ()
+  /* @return false: stopped or flushing, jobs may still be there */
+  [[nodiscard]] bool wait_until_idle ()
   {
     std::unique_lock guard (lock_);
-    changed_.wait (guard, [&] { return quit_ || (jobs_.empty () && !busy_); });
+    changed_.wait (guard, [&] { return quit_ || flushing_ || (jobs_.empty () && !busy_); });
+    return !quit_ && !flushing_;
   }
 
 private:
@@ -65,11 +87,12 @@ private:
         changed_.wait (guard);
         continue;
       }
-      const std::function<void ()> job = std::move (jobs_.front ());
+      const Job job = std::move (jobs_.front ());
       jobs_.pop_front ();
       busy_ = true;
+      const std::stop_token token = stop_source_.get_token ();
       guard.unlock ();
-      job ();
+      job (token);
       guard.lock ();
       busy_ = false;
       changed_.notify_all ();
@@ -78,7 +101,8 @@ private:
 
   std::mutex lock_; /* guards what follows but thread_, which start() and stop() alone touch */
   std::condition_variable changed_;
-  std::deque<std::function<void ()>> jobs_;
-  bool busy_ = false, quit_ = true;
+  std::deque<Job> jobs_;
+  std::stop_source stop_source_;
+  bool busy_ = false, quit_ = true, flushing_ = false;
   std::thread thread_;
 };

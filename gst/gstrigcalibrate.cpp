@@ -21,18 +21,15 @@
 #include "gstrigcalibrate.h"
 
 #include "backgroundjobs.hpp"
+#include "calibrationframes.hpp"
 #include "calibrationmessages.hpp"
-#include "calibrationpad.hpp"
 #include "calibrationsettings.hpp"
-#include "picturereader.hpp"
 #include "recycledbuffers.hpp"
 
 #include <algorithm>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <memory>
 #include <mutex>
-#include <optional>
 #include <rangecast/geometry/rig.hpp>
 
 using rangecast::CalibrationCamera;
@@ -47,54 +44,13 @@ enum { PROP_STATS = kCalibrationLast };
 enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
 static guint signals[LAST_SIGNAL];
 
-static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
 /* Pictures that come faster are a film, not photographs; per second. */
 static constexpr int kFastestPhotographs = 2;
-
-struct Camera {
-  GstRigCalibratePad *pad;
-  GstVideoInfo info; /* streaming thread */
-  bool has_info = false;
-  bool refused = false; /* the caps that it has now; the error was posted */
-  PictureReader reader; /* jobs */
-  GstVideoInfo reader_info;
-  bool reader_set = false;
-
-  explicit Camera (GstRigCalibratePad *p)
-      : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))), info{}, reader_info{}
-  {
-  }
-  ~Camera () { gst_object_unref (pad); }
-  [[nodiscard]] GstAggregatorPad *aggregator_pad () const { return GST_AGGREGATOR_PAD (pad); }
-};
-using Cameras = std::vector<std::shared_ptr<Camera>>;
-
-/* Pictures of one moment on their way to the board detector. */
-struct FrameSet {
-  Cameras cameras;
-  std::vector<CalibrationCamera> described;
-  std::vector<GstVideoInfo> infos;
-  std::vector<GstBuffer *> buffers; /* by camera; null where there is none */
-  GstClockTime capture = 0, running = GST_CLOCK_TIME_NONE;
-  guint64 number = 0;
-  std::optional<rangecast::SessionSettings> begin; /* with the first one */
-  int tile_width = 0;
-  bool auto_finish = false;
-
-  FrameSet () = default;
-  FrameSet (const FrameSet &) = delete;
-  ~FrameSet ()
-  {
-    for (GstBuffer *buffer : buffers)
-      if (buffer)
-        gst_buffer_unref (buffer);
-  }
-};
 
 struct GstRigCalibratePrivate {
   std::mutex lock; /* guards what follows; never held across a push, message or job */
   CalibrationProperties properties;
-  Cameras cameras;
+  CalibrationSources cameras;
   guint64 examined = 0, taken = 0, skipped = 0, dropped = 0;
   GstBuffer *still = nullptr; /* drawn and not pushed yet */
   TileLayout still_layout;
@@ -131,7 +87,7 @@ G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR
     G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
 GST_ELEMENT_REGISTER_DEFINE (rigcalibrate, "rigcalibrate", GST_RANK_NONE, GST_TYPE_RIG_CALIBRATE)
 
-static Cameras
+static CalibrationSources
 current_cameras (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
@@ -155,14 +111,14 @@ size_text (const GstVideoInfo &info)
 
 /* From frames to the rig file and the result message. */
 static Status
-calibrate (GstRigCalibrate *self)
+calibrate (GstRigCalibrate *self, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const std::string location = current_properties (self).location;
   rangecast::CalibrationResult result;
   Status status = {StatusCode::kNotFound, "there were no pictures to calibrate from"};
   if (!priv->session.cameras ().empty ())
-    status = priv->session.calibrate (result);
+    status = priv->session.calibrate (result, std::move (stop));
   if (status.ok () && !location.empty ())
     status = rangecast::save_rig (location, result.rig);
   if (status.ok ()) {
@@ -176,51 +132,18 @@ calibrate (GstRigCalibrate *self)
   return status;
 }
 
-/* The pictures of a frame set as the core sees them; unmapped when it goes. */
-class MappedPictures {
-public:
-  explicit MappedPictures (FrameSet &set) : views (set.cameras.size ())
-  {
-    for (std::size_t i = 0; i < set.cameras.size () && status.ok (); i++)
-      if (set.buffers[i])
-        open (set, i);
-  }
-  ~MappedPictures ()
-  {
-    for (Camera *camera : open_)
-      camera->reader.close ();
-  }
-  MappedPictures (const MappedPictures &) = delete;
-
-  std::vector<rangecast::ImageView<const rangecast::Rgbx>> views;
-  Status status;
-
-private:
-  void open (FrameSet &set, std::size_t i)
-  {
-    Camera &camera = *set.cameras[i];
-    if (!camera.reader_set || !gst_video_info_is_equal (&camera.reader_info, &set.infos[i])) {
-      camera.reader_info = set.infos[i];
-      camera.reader_set = camera.reader.set (set.infos[i]);
-    }
-    if (!camera.reader_set)
-      status = {StatusCode::kUnsupported,
-          "pad " + set.described[i].name + ": cannot convert the pictures to RGBx"};
-    else if (!camera.reader.open (set.buffers[i]))
-      status = {StatusCode::kBadData,
-          "pad " + set.described[i].name + ": a buffer is smaller than its caps say"};
-    else {
-      open_.push_back (&camera);
-      views[i] = camera.reader.view ();
-    }
-  }
-
-  std::vector<Camera *> open_;
-};
+/* Nobody wants to hear of what was interrupted. */
+static void
+warn (GstRigCalibrate *self, const Status &status)
+{
+  if (status.code () != StatusCode::kInterrupted)
+    gst_range_post_warning (GST_ELEMENT (self), status);
+}
 
 /* Draws what was found, for the streaming thread to push. */
 static void
-draw_still (GstRigCalibrate *self, const FrameSet &set, const MappedPictures &pictures)
+draw_still (GstRigCalibrate *self, const CalibrationPictures &set,
+    const MappedCalibrationPictures &pictures)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const TileLayout layout = rangecast::lay_out (set.described, set.tile_width);
@@ -243,13 +166,13 @@ draw_still (GstRigCalibrate *self, const FrameSet &set, const MappedPictures &pi
 }
 
 static Status
-examine (GstRigCalibrate *self, FrameSet &set)
+examine (GstRigCalibrate *self, CalibrationPictures &set)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (set.begin)
     if (Status s = priv->session.set (*set.begin); !s.ok ())
       return s;
-  const MappedPictures pictures (set);
+  const MappedCalibrationPictures pictures (set);
   if (!pictures.status.ok ())
     return pictures.status;
   if (Status s = priv->session.examine (set.described, pictures.views, set.capture); !s.ok ())
@@ -271,15 +194,15 @@ examine (GstRigCalibrate *self, FrameSet &set)
 }
 
 static void
-examine_job (GstRigCalibrate *self, FrameSet &set)
+examine_job (GstRigCalibrate *self, CalibrationPictures &set, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
   Status status = examine (self, set);
   bool finished = false;
   if (status.ok () && set.auto_finish && priv->session.complete ()) {
-    const Status calibrated = calibrate (self);
+    const Status calibrated = calibrate (self, std::move (stop));
     finished = calibrated.ok ();
-    gst_range_post_warning (GST_ELEMENT (self), calibrated);
+    warn (self, calibrated);
   }
   std::lock_guard guard (priv->lock);
   priv->failure = std::move (status);
@@ -291,116 +214,19 @@ examine_job (GstRigCalibrate *self, FrameSet &set)
 static void
 gst_rig_calibrate_calibrate (GstRigCalibrate *self)
 {
-  self->priv->jobs.post ([self] { gst_range_post_warning (GST_ELEMENT (self), calibrate (self)); });
+  self->priv->jobs.post (
+      [self] (std::stop_token stop) { warn (self, calibrate (self, std::move (stop))); });
 }
 
 static void
 gst_rig_calibrate_reset (GstRigCalibrate *self)
 {
-  self->priv->jobs.post ([self] {
+  self->priv->jobs.post ([self] (const std::stop_token &) {
     self->priv->session.clear ();
     std::lock_guard guard (self->priv->lock);
     self->priv->examined = self->priv->taken = 0;
     self->priv->stale = true;
   });
-}
-
-/* ---- pictures of one moment ---- */
-
-struct Front {
-  std::size_t camera;
-  GstBuffer *buffer; /* a reference of ours */
-  GstClockTime capture, running;
-};
-
-/* The oldest picture of every pad; unrefs them when it goes. */
-class Fronts {
-public:
-  Fronts (const Cameras &cameras, bool live)
-  {
-    for (std::size_t i = 0; i < cameras.size (); i++) {
-      GstAggregatorPad *pad = cameras[i]->aggregator_pad ();
-      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
-      if (buffer)
-        list.push_back ({i, buffer, gstrange::capture_time_of (pad, buffer, live),
-            gstrange::running_time_of (pad, buffer)});
-      else
-        (gst_aggregator_pad_is_eos (pad) ? ended : missing)++;
-    }
-  }
-  ~Fronts ()
-  {
-    for (const Front &front : list)
-      gst_buffer_unref (front.buffer);
-  }
-  Fronts (const Fronts &) = delete;
-
-  std::vector<Front> list;
-  int missing = 0, ended = 0;
-};
-
-static GstClockTime
-tolerance_of (const Cameras &cameras, GstClockTime max_skew)
-{
-  if (max_skew > 0)
-    return max_skew;
-  GstClockTime shortest = GST_CLOCK_TIME_NONE;
-  for (const auto &camera : cameras)
-    if (camera->has_info && camera->info.fps_n > 0)
-      shortest = std::min (
-          shortest, gst_util_uint64_scale_int (GST_SECOND, camera->info.fps_d, camera->info.fps_n));
-  return GST_CLOCK_TIME_IS_VALID (shortest) ? shortest / 2 : kDefaultTolerance;
-}
-
-/* Drops gaps, and pictures too old to be of the moment of the newest, and all while a camera has
- * not begun. @return whether any went */
-static bool
-drop_unmatched (
-    GstRigCalibrate *self, const Cameras &cameras, const Fronts &fronts, GstClockTime tolerance)
-{
-  GstClockTime latest = 0;
-  for (const Front &front : fronts.list)
-    if (!gstrange::is_gap (front.buffer))
-      latest = std::max (latest, front.capture);
-  const bool early =
-      std::ranges::any_of (cameras, [] (const auto &camera) { return !camera->has_info; });
-  bool any = false;
-  for (const Front &front : fronts.list) {
-    const bool gap = gstrange::is_gap (front.buffer);
-    if (!gap && !early && latest - front.capture <= tolerance)
-      continue;
-    gst_aggregator_pad_drop_buffer (cameras[front.camera]->aggregator_pad ());
-    any = true;
-    std::lock_guard guard (self->priv->lock);
-    self->priv->dropped += !gap;
-  }
-  return any;
-}
-
-/* Takes what waits on all pads. */
-static std::shared_ptr<FrameSet>
-take (GstRigCalibrate *self, const Cameras &cameras, const Fronts &fronts)
-{
-  auto set = std::make_shared<FrameSet> ();
-  set->cameras = cameras;
-  set->buffers.resize (cameras.size ());
-  set->number = self->priv->sets++;
-  for (const auto &camera : cameras) {
-    CalibrationCamera described = calibration_camera (camera->pad);
-    described.width = camera->info.width;
-    described.height = camera->info.height;
-    set->described.push_back (std::move (described));
-    set->infos.push_back (camera->info);
-  }
-  for (const Front &front : fronts.list) {
-    set->buffers[front.camera] =
-        gst_aggregator_pad_pop_buffer (cameras[front.camera]->aggregator_pad ());
-    set->capture = std::max (set->capture, front.capture);
-    set->running = std::min (set->running, front.running); /* NONE is the greatest number */
-  }
-  if (!GST_CLOCK_TIME_IS_VALID (set->running))
-    set->capture = set->number * 2 * GST_SECOND; /* says nothing about motion */
-  return set;
 }
 
 /* ---- output ---- */
@@ -451,7 +277,7 @@ push_still (GstRigCalibrate *self, GstClockTime running)
 
 /* What the first pictures say: whether the cameras make up views, and what to keep. */
 static Status
-begin (GstRigCalibrate *self, FrameSet &set, const CalibrationProperties &p, bool live)
+begin (GstRigCalibrate *self, CalibrationPictures &set, const CalibrationProperties &p, bool live)
 {
   if (Status s = rangecast::check_cameras (set.described, p.core.board); !s.ok ())
     return s;
@@ -471,7 +297,7 @@ begin (GstRigCalibrate *self, FrameSet &set, const CalibrationProperties &p, boo
 
 /* Live, pictures that come while the last ones are looked at go unseen; else they wait. */
 static GstFlowReturn
-hand_over (GstRigCalibrate *self, std::shared_ptr<FrameSet> set, bool live)
+hand_over (GstRigCalibrate *self, std::shared_ptr<CalibrationPictures> set, bool live)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const CalibrationProperties p = current_properties (self);
@@ -486,10 +312,11 @@ hand_over (GstRigCalibrate *self, std::shared_ptr<FrameSet> set, bool live)
       return gst_range_flow_return (GST_ELEMENT (self), s);
   set->tile_width = p.tile_width;
   set->auto_finish = p.auto_finish;
-  priv->jobs.post ([self, set] { examine_job (self, *set); });
+  priv->jobs.post (
+      [self, set] (std::stop_token stop) { examine_job (self, *set, std::move (stop)); });
   set.reset ();
-  if (!live)
-    priv->jobs.wait_until_idle ();
+  if (!live && !priv->jobs.wait_until_idle ())
+    return GST_FLOW_OK; /* flushing or stopping: not for us to say, the base class knows */
   Status failure;
   {
     std::lock_guard guard (priv->lock);
@@ -500,8 +327,8 @@ hand_over (GstRigCalibrate *self, std::shared_ptr<FrameSet> set, bool live)
 }
 
 /* A camera of which nothing is known yet, or null. */
-static const Camera *
-without_caps (const Cameras &cameras)
+static const CalibrationSource *
+without_caps (const CalibrationSources &cameras)
 {
   const auto found = std::ranges::find_if (cameras, [] (const auto &c) { return !c->has_info; });
   return found == cameras.end () ? nullptr : found->get ();
@@ -509,11 +336,11 @@ without_caps (const Cameras &cameras)
 
 /* Why there is nothing to calibrate from, if so. */
 static Status
-nothing_came (GstRigCalibrate *self, const Cameras &cameras)
+nothing_came (GstRigCalibrate *self, const CalibrationSources &cameras)
 {
   if (self->priv->sets > 0)
     return {};
-  if (const Camera *camera = without_caps (cameras))
+  if (const CalibrationSource *camera = without_caps (cameras))
     return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
                                        ": no pictures came; expected some on every pad"};
   return {StatusCode::kNotFound,
@@ -523,10 +350,11 @@ nothing_came (GstRigCalibrate *self, const Cameras &cameras)
 
 /* All pads have ended: calibrates, unless that was done already. */
 static GstFlowReturn
-finish (GstRigCalibrate *self, const Cameras &cameras)
+finish (GstRigCalibrate *self, const CalibrationSources &cameras)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  priv->jobs.wait_until_idle ();
+  if (!priv->jobs.wait_until_idle ())
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
   Status status;
   bool stale;
   {
@@ -538,8 +366,10 @@ finish (GstRigCalibrate *self, const Cameras &cameras)
     status = nothing_came (self, cameras);
   if (status.ok () && stale) {
     const auto outcome = std::make_shared<Status> ();
-    priv->jobs.post ([self, outcome] { *outcome = calibrate (self); });
-    priv->jobs.wait_until_idle ();
+    priv->jobs.post (
+        [self, outcome] (std::stop_token stop) { *outcome = calibrate (self, std::move (stop)); });
+    if (!priv->jobs.wait_until_idle ())
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
     status = *outcome;
   }
   const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
@@ -556,19 +386,24 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
     if (priv->finished)
       return GST_FLOW_EOS;
   }
-  const Cameras cameras = current_cameras (self);
+  const CalibrationSources cameras = current_cameras (self);
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
     return GST_FLOW_ERROR;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const Fronts fronts (cameras, live);
+  const CalibrationFronts fronts (cameras, live);
   if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
     return finish (self, cameras);
   if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime tolerance = tolerance_of (cameras, current_properties (self).max_skew);
-  if (drop_unmatched (self, cameras, fronts, tolerance))
+  const GstClockTime tolerance =
+      calibration_tolerance (cameras, current_properties (self).max_skew);
+  guint64 dropped = 0;
+  if (drop_unmatched (cameras, fronts, tolerance, dropped)) {
+    std::lock_guard guard (priv->lock);
+    priv->dropped += dropped;
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
-  return hand_over (self, take (self, cameras, fronts), live);
+  }
+  return hand_over (self, take_pictures (cameras, fronts, priv->sets++), live);
 }
 
 /* The deadline for a camera that is late counts from the oldest picture that waits. */
@@ -576,15 +411,15 @@ static GstClockTime
 gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 {
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  const Fronts fronts (current_cameras (GST_RIG_CALIBRATE (aggregator)), true);
-  for (const Front &front : fronts.list)
+  const CalibrationFronts fronts (current_cameras (GST_RIG_CALIBRATE (aggregator)), true);
+  for (const CalibrationFronts::Front &front : fronts.list)
     oldest = std::min (oldest, front.running);
   return oldest;
 }
 
 /* Corners of two sizes do not make one camera. */
 static Status
-take_caps (GstRigCalibrate *self, Camera &camera, GstCaps *caps)
+take_caps (GstRigCalibrate *self, CalibrationSource &camera, GstCaps *caps)
 {
   const std::string name = calibration_camera (camera.pad).name;
   GstVideoInfo info;
@@ -605,11 +440,16 @@ take_caps (GstRigCalibrate *self, Camera &camera, GstCaps *caps)
   return {};
 }
 
+/* What waits for a job must not hold up a flush. */
 static gboolean
 gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
   auto self = GST_RIG_CALIBRATE (aggregator);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START)
+    self->priv->jobs.set_flushing (true);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    self->priv->jobs.set_flushing (false);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
     for (const auto &camera : current_cameras (self)) {
@@ -643,7 +483,8 @@ gst_rig_calibrate_request_new_pad (
         GST_RIG_CALIBRATE_PAD (pad), int (std::min<unsigned> (number, rangecast::kMaxViews - 1)));
   {
     std::lock_guard guard (self->priv->lock);
-    self->priv->cameras.push_back (std::make_shared<Camera> (GST_RIG_CALIBRATE_PAD (pad)));
+    self->priv->cameras.push_back (
+        std::make_shared<CalibrationSource> (GST_RIG_CALIBRATE_PAD (pad)));
   }
   gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   return pad;
@@ -667,7 +508,7 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
 static GObject *
 gst_rig_calibrate_get_child_by_index (GstChildProxy *proxy, guint index)
 {
-  const Cameras cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
+  const CalibrationSources cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
   return index < cameras.size () ? G_OBJECT (gst_object_ref (cameras[index]->pad)) : nullptr;
 }
 
@@ -758,6 +599,15 @@ gst_rig_calibrate_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
+/* A calibration can take long; its thread must end before the pads can. */
+static GstStateChangeReturn
+gst_rig_calibrate_change_state (GstElement *element, GstStateChange transition)
+{
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    GST_RIG_CALIBRATE (element)->priv->jobs.interrupt ();
+  return GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->change_state (element, transition);
+}
+
 static void
 gst_rig_calibrate_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
@@ -842,6 +692,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
       "Calibrates cameras and their poses from pictures of a board", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
 
+  element_class->change_state = gst_rig_calibrate_change_state;
   element_class->request_new_pad = gst_rig_calibrate_request_new_pad;
   element_class->release_pad = gst_rig_calibrate_release_pad;
 

@@ -16,6 +16,7 @@ enum class StatusCode {
   kUnsupported, ///< well-formed, but of a version or profile that this code does not know
   kNotFound,    ///< a file, view or field that should be there is not
   kNoSpace,     ///< the caller's output is too small; its contents are unspecified
+  kInterrupted, ///< the caller asked to stop
 };
 
 /** The result of a core function: kOk, or a code and one sentence that names the thing and what

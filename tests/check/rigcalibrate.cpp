@@ -102,6 +102,18 @@ struct Calibrate {
             renderers[c].render (cameras[c].world_from_camera.inverse () * board, 1, random));
     }
   }
+  /* After READY: the pads have forgotten what they knew. */
+  void play_again ()
+  {
+    gst_element_set_state (element, GST_STATE_PLAYING);
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    for (GstHarness *h : in) {
+      gst_harness_push_event (h, gst_event_new_stream_start ("again"));
+      gst_harness_set_src_caps_str (h, kCaps);
+      gst_harness_push_event (h, gst_event_new_segment (&segment));
+    }
+  }
   void end ()
   {
     for (GstHarness *h : in)
@@ -543,16 +555,47 @@ GST_START_TEST (test_stops_in_the_middle_and_starts_again)
   for (int i = 0; i < 2; i++) {
     c.push_boards (3, 3 * i); /* too few, unless the first three are still there */
     gst_element_set_state (c.element, GST_STATE_READY);
-    gst_element_set_state (c.element, GST_STATE_PLAYING);
-    gst_harness_push_event (c.in[0], gst_event_new_stream_start ("again"));
-    gst_harness_set_src_caps_str (c.in[0], kCaps);
-    GstSegment segment;
-    gst_segment_init (&segment, GST_FORMAT_TIME);
-    gst_harness_push_event (c.in[0], gst_event_new_segment (&segment));
+    c.play_again ();
   }
   c.push_boards (2, 6);
   c.end ();
   c.expect_error ("the board was found in 2 frames; expected at least 4");
+}
+GST_END_TEST;
+
+/* Whatever the job is at then: looking for a board, or calibrating. */
+GST_START_TEST (test_ready_interrupts_a_calibration_without_a_word)
+{
+  Calibrate c (2);
+  for (int i = 0; i < 4; i++) {
+    c.push_boards (9, 9 * i);
+    c.wait_until_examined (9);
+    g_signal_emit_by_name (c.element, "calibrate");
+    g_usleep (gulong (i) * 30000);
+    gst_element_set_state (c.element, GST_STATE_READY);
+    fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_ERROR) == nullptr);
+    fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
+    c.play_again ();
+  }
+  c.push_boards (9, 36);
+  c.end ();
+  gst_message_unref (c.message ("rigcalibrate-result"));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_does_not_wait_for_a_calibration)
+{
+  Calibrate c (1, "min-frames=5");
+  c.push_boards (8);
+  c.end (); /* the streaming thread now waits for the job, or soon will */
+  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_start ()));
+  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_harness_push_event (c.in[0], gst_event_new_segment (&segment));
+  c.push_boards (1, 8);
+  c.end ();
+  gst_message_unref (c.message ("rigcalibrate-result"));
 }
 GST_END_TEST;
 
@@ -583,6 +626,8 @@ rigcalibrate_suite ()
   tcase_add_test (tc, test_what_cannot_end_well_does_not_start);
   tcase_add_test (tc, test_live_pictures_go_unseen_while_the_last_ones_are_looked_at);
   tcase_add_test (tc, test_stops_in_the_middle_and_starts_again);
+  tcase_add_test (tc, test_ready_interrupts_a_calibration_without_a_word);
+  tcase_add_test (tc, test_flush_does_not_wait_for_a_calibration);
   return suite;
 }
 

@@ -3,6 +3,7 @@
 #include "board-renderer.hpp"
 #include "test-support.hpp"
 
+#include <rangecast/calibration/bundle.hpp>
 #include <rangecast/calibration/rig_calibration.hpp>
 
 using namespace rangecast;
@@ -124,6 +125,24 @@ TEST (Calibration, cameras_that_share_boards_only_with_a_neighbour_are_chained)
     EXPECT_EQ (result.pairs[i].frames, 14);
   }
   EXPECT_NEAR (result.rms_px, kNoisePx * std::sqrt (2), 0.01);
+}
+
+TEST (Calibration, ends_soon_when_asked_to)
+{
+  const auto truth = ring (2, 20);
+  std::stop_source stop;
+  stop.request_stop ();
+  CalibrationResult result;
+  const auto frames = frames_for (truth, {{0, 1}}, 14);
+  EXPECT_EQ (calibrate_rig (cameras_of (truth), frames, {}, result, stop.get_token ()).code (),
+      StatusCode::kInterrupted);
+
+  Bundle bundle{{truth[0].lens, truth[1].lens}, std::vector<Pose> (2), {}};
+  bundle.first_from_board.assign (frames.size (), {});
+  for (Pose &board : bundle.first_from_board)
+    board.translation.z = 1;
+  EXPECT_EQ (
+      adjust_bundle ({}, frames, {}, bundle, stop.get_token ()).code (), StatusCode::kInterrupted);
 }
 
 TEST (Calibration, lenses_come_back)

@@ -60,6 +60,19 @@ struct CornerError {
   }
 };
 
+/* Ends the adjustment when somebody asks. */
+class StopWhenAsked : public ceres::IterationCallback {
+public:
+  explicit StopWhenAsked (std::stop_token stop) : stop_ (std::move (stop)) {}
+  ceres::CallbackReturnType operator() (const ceres::IterationSummary &) override
+  {
+    return stop_.stop_requested () ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+private:
+  std::stop_token stop_;
+};
+
 class Adjustment {
 public:
   Adjustment (const Bundle &bundle, const BundleSettings &settings)
@@ -91,7 +104,7 @@ public:
       problem_.SetParameterBlockConstant (cameras_[0].data ());
   }
 
-  bool solve ()
+  bool solve (const std::stop_token &stop)
   {
     ceres::Solver::Options options;
     options.linear_solver_type =
@@ -102,6 +115,8 @@ public:
     options.parameter_tolerance = 1e-10;
     options.num_threads = std::clamp (int (std::thread::hardware_concurrency ()), 1, kMostThreads);
     options.logging_type = ceres::SILENT;
+    StopWhenAsked callback (stop);
+    options.callbacks.push_back (&callback);
     ceres::Solver::Summary summary;
     ceres::Solve (options, &problem_, &summary);
     return summary.IsSolutionUsable ();
@@ -140,12 +155,15 @@ private:
 
 Status
 adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &frames,
-    const BundleSettings &settings, Bundle &bundle)
+    const BundleSettings &settings, Bundle &bundle, std::stop_token stop)
 {
   try {
     Adjustment adjustment (bundle, settings);
     adjustment.add (board, frames);
-    if (!adjustment.solve ())
+    const bool solved = adjustment.solve (stop);
+    if (stop.stop_requested ())
+      return {StatusCode::kInterrupted, "bundle adjustment was interrupted"};
+    if (!solved)
       return {StatusCode::kBadValue,
           "no poses of the cameras fit all boards; expected cameras that "
           "take their pictures at the same time, and boards held still"};

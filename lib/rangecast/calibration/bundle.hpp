@@ -3,6 +3,8 @@
 
 #include "lens.hpp"
 
+#include <stop_token>
+
 namespace rangecast {
 
 /** All cameras and all boards at once: what the bundle adjustment makes better. */
@@ -21,8 +23,9 @@ struct BundleSettings {
 /** Moves lenses, cameras and boards so that the corners fall where they were seen (Ceres).
  *  @param frames  as many as bundle.first_from_board; those without sightings stay as they are;
  *  no corner may be behind its camera to begin with
- *  @return kBadValue if there is no solution; bundle is then unspecified */
+ *  @param stop    ends it after the iteration that it is at
+ *  @return kBadValue if there is no solution, kInterrupted; bundle is then unspecified */
 Status adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &frames,
-    const BundleSettings &settings, Bundle &bundle);
+    const BundleSettings &settings, Bundle &bundle, std::stop_token stop = {});
 
 } // namespace rangecast

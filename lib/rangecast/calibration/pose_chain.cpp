@@ -133,7 +133,8 @@ check_linked (
 Status
 chain_cameras (const std::vector<CalibrationCamera> &cameras,
     const std::vector<CalibrationFrame> &frames, const BoardSpec &board,
-    const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links)
+    const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links,
+    const std::stop_token &stop)
 {
   if (Status s = check_linked (cameras, frames); !s.ok ())
     return s;
@@ -145,6 +146,8 @@ chain_cameras (const std::vector<CalibrationCamera> &cameras,
   std::vector<bool> placed (cameras.size ());
   placed[0] = true;
   while (links.size () + 1 < cameras.size ()) {
+    if (stop.stop_requested ())
+      return {StatusCode::kInterrupted, "the calibration was interrupted"};
     CameraLink link = strongest_link (frames, placed);
     if (Status s = link_cameras (cameras, frames, board, lenses, link); !s.ok ())
       return s;

@@ -21,10 +21,13 @@ inline constexpr int kFewestSharedFrames = 3;
  *  greatest weight). Method for a link: cv::stereoCalibrate with fixed intrinsics.
  *  @param lenses  by camera; their poses of boards place the boards
  *  @param[out] links  one less than there are cameras
- *  @return kNotFound that names the cameras that share too few boards with the others */
+ *  @param stop  ends it before the next link
+ *  @return kInterrupted, or kNotFound that names the cameras that share too few boards with the
+ * others */
 Status chain_cameras (const std::vector<CalibrationCamera> &cameras,
     const std::vector<CalibrationFrame> &frames, const BoardSpec &board,
-    const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links);
+    const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links,
+    const std::stop_token &stop = {});
 
 /** @return kNotFound that names the groups of cameras that share no boards */
 Status check_linked (

@@ -39,8 +39,9 @@ find_camera (const std::vector<CalibrationCamera> &cameras, int view_id, CameraR
 class Calibration {
 public:
   Calibration (const std::vector<CalibrationCamera> &cameras, std::vector<CalibrationFrame> &frames,
-      const CalibrationSettings &settings, CalibrationResult &result)
-      : cameras_ (cameras), frames_ (frames), settings_ (settings), result_ (result)
+      const CalibrationSettings &settings, CalibrationResult &result, std::stop_token stop)
+      : cameras_ (cameras), frames_ (frames), settings_ (settings), result_ (result),
+        stop_ (std::move (stop))
   {
   }
 
@@ -52,7 +53,7 @@ public:
     if (s.ok ())
       s = calibrate_lenses ();
     if (s.ok ())
-      s = chain_cameras (cameras_, frames_, settings_.board, lenses_, bundle_, links_);
+      s = chain_cameras (cameras_, frames_, settings_.board, lenses_, bundle_, links_, stop_);
     if (s.ok ())
       s = adjust ();
     if (s.ok ())
@@ -85,6 +86,7 @@ private:
   std::vector<CalibrationFrame> &frames_;
   const CalibrationSettings &settings_;
   CalibrationResult &result_;
+  const std::stop_token stop_;
   std::vector<LensCalibration> lenses_;
   std::vector<CameraLink> links_;
   Bundle bundle_;
@@ -127,11 +129,14 @@ Status
 Calibration::calibrate_lenses ()
 {
   lenses_.resize (cameras_.size ());
-  for (std::size_t i = 0; i < cameras_.size (); i++)
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    if (stop_.stop_requested ())
+      return {StatusCode::kInterrupted, "the calibration was interrupted"};
     if (Status s = calibrate_lens (
             cameras_[i], int (i), frames_, settings_.board, settings_.distortion, lenses_[i]);
         !s.ok ())
       return s;
+  }
   return {};
 }
 
@@ -186,13 +191,13 @@ Calibration::adjust ()
   Status s = drop_outliers (std::numeric_limits<double>::max (), dropped); /* behind a camera */
   dropped = true;
   for (int round = 0; s.ok () && dropped && round < kOutlierRounds; round++) {
-    s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
+    s = adjust_bundle (settings_.board, frames_, bundle, bundle_, stop_);
     if (s.ok ())
       s = drop_outliers (outlier_limit (), dropped);
   }
   bundle.robust_px = 0;
   if (s.ok ())
-    s = adjust_bundle (settings_.board, frames_, bundle, bundle_);
+    s = adjust_bundle (settings_.board, frames_, bundle, bundle_, stop_);
   for (std::size_t i = 0; s.ok () && i < cameras_.size (); i++) {
     std::string warning;
     s = check_lens (cameras_[i], bundle_.lenses[i], reach (int (i)), warning);
@@ -424,7 +429,7 @@ check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &b
 
 Status
 calibrate_rig (const std::vector<CalibrationCamera> &cameras, std::vector<CalibrationFrame> frames,
-    const CalibrationSettings &settings, CalibrationResult &result)
+    const CalibrationSettings &settings, CalibrationResult &result, std::stop_token stop)
 {
   result = {};
   if (Status s = check_cameras (cameras, settings.board); !s.ok ())
@@ -439,7 +444,7 @@ calibrate_rig (const std::vector<CalibrationCamera> &cameras, std::vector<Calibr
           }))
         return bad ("a frame has a camera or a corner that does not exist");
   try {
-    return Calibration (cameras, frames, settings, result).run ();
+    return Calibration (cameras, frames, settings, result, std::move (stop)).run ();
   } catch (const std::exception &e) {
     return bad (std::string ("calibration: ") + e.what ());
   }

@@ -5,6 +5,8 @@
 #include "lens.hpp"
 #include "world_frame.hpp"
 
+#include <stop_token>
+
 namespace rangecast {
 
 struct CalibrationSettings {
@@ -57,10 +59,11 @@ Status check_cameras (const std::vector<CalibrationCamera> &cameras, const Board
  *  the boards that they share (cv::stereoCalibrate), then all lenses, cameras and boards together
  *  (bundle adjustment). Reprojection errors are the square root of the mean square distance.
  *  @param frames  boards at one moment each; corners by id, as BoardDetector gives them
+ *  @param stop    ends it soon: between cameras, between pairs, in the adjustment
  *  @return one status that names the cameras and what was expected: too few frames, cameras that
- *  share no boards, left and right swapped, no solution. Reentrant. */
+ *  share no boards, left and right swapped, no solution; kInterrupted. Reentrant. */
 Status calibrate_rig (const std::vector<CalibrationCamera> &cameras,
     std::vector<CalibrationFrame> frames, const CalibrationSettings &settings,
-    CalibrationResult &result);
+    CalibrationResult &result, std::stop_token stop = {});
 
 } // namespace rangecast

@@ -116,9 +116,10 @@ CalibrationSession::draw (
 }
 
 Status
-CalibrationSession::calibrate (CalibrationResult &result) const
+CalibrationSession::calibrate (CalibrationResult &result, std::stop_token stop) const
 {
-  return calibrate_rig (cameras_, selector_.frames (), settings_.calibration, result);
+  return calibrate_rig (
+      cameras_, selector_.frames (), settings_.calibration, result, std::move (stop));
 }
 
 } // namespace rangecast

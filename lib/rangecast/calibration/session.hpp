@@ -56,7 +56,7 @@ public:
   void draw (std::span<const ImageView<const Rgbx>> pictures, ImageView<Rgbx> out) const;
 
   /** See calibrate_rig(). Frames stay: more may come, and make it better. */
-  Status calibrate (CalibrationResult &result) const;
+  Status calibrate (CalibrationResult &result, std::stop_token stop = {}) const;
 
 private:
   struct Eye {
