@@ -33,7 +33,10 @@ struct Options {
 /* Thrown and caught in this file only: what is wrong, for the user. */
 struct BadInput {
   std::string what;
+  int exit_status = 1;
 };
+
+static constexpr int kWrongUsage = 2;
 
 /* Level at the world's origin, looking along -z with y up. */
 static const Pose kLevel = {{1, 0, 0, 0, -1, 0, 0, 0, -1}, {}};
@@ -119,8 +122,8 @@ read_size (const std::vector<cv::FileStorage> &files, const Options &options, Vi
     }
   char end = 0;
   if (options.size && std::sscanf (options.size, "%dx%d%c", &view.width, &view.height, &end) != 2)
-    throw BadInput{
-        std::string ("--size: expected WIDTHxHEIGHT, e.g. 640x480, got ") + options.size};
+    throw BadInput{std::string ("--size: expected WIDTHxHEIGHT, e.g. 640x480, got ") + options.size,
+        kWrongUsage};
   if (view.width < 1 || view.height < 1)
     throw BadInput{"the files do not say the pictures' size: expected --size WIDTHxHEIGHT"};
 }
@@ -319,11 +322,13 @@ convert (const Options &options)
   const auto format = std::ranges::find_if (
       kFormats, [&] (const Format &f) { return !words.empty () && words[0] == f.name; });
   if (format == std::end (kFormats))
-    throw BadInput{"expected a format: opencv, luxonis or middlebury; see --help"};
+    throw BadInput{"expected a format: opencv, luxonis or middlebury; see --help", kWrongUsage};
   if (words.size () < format->least_inputs + 2 || words.size () > format->most_inputs + 2)
-    throw BadInput{std::string (format->name) + ": expected its calibration and RIG; see --help"};
+    throw BadInput{
+        std::string (format->name) + ": expected its calibration and RIG; see --help", kWrongUsage};
   if (!(options.scale > 0 && options.scale <= 1000) || !(options.unit_m > 0))
-    throw BadInput{"--scale and --unit: expected numbers above 0, and --scale at most 1000"};
+    throw BadInput{
+        "--scale and --unit: expected numbers above 0, and --scale at most 1000", kWrongUsage};
 
   const std::string rig_path = words.back ();
   View view = format->read ({words.begin () + 1, words.end () - 1}, options);
@@ -390,12 +395,12 @@ main (int argc, char **argv)
   Options options;
   int status = 0;
   if (!parse_arguments (&argc, &argv, options))
-    return 2;
+    return kWrongUsage;
   try {
     convert (options);
   } catch (const BadInput &bad) {
     g_printerr ("rig-convert: %s\n", bad.what.c_str ());
-    status = 1;
+    status = bad.exit_status;
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
     g_printerr ("rig-convert: the calibration is not what its format has; see docs/rig.md\n");

@@ -90,6 +90,21 @@ TEST (Rig, yaml_and_json_files_round_trip)
   }
 }
 
+TEST (Rig, what_cannot_be_written_is_named)
+{
+  EXPECT_NE (save_rig ("/nowhere/rig.yaml", stereo_rig ()).message ().find ("/nowhere/rig.yaml"),
+      std::string::npos);
+  const std::string path = temporary ("rig.txt");
+  EXPECT_EQ (save_rig (path, stereo_rig ()).code (), StatusCode::kBadValue);
+  EXPECT_FALSE (std::filesystem::exists (path));
+  if (std::filesystem::exists ("/dev/full")) { // every write to it fails
+    const std::string full = temporary ("full.yaml");
+    std::filesystem::create_symlink ("/dev/full", full);
+    EXPECT_EQ (save_rig (full, stereo_rig ()).code (), StatusCode::kNoSpace);
+    std::filesystem::remove (full);
+  }
+}
+
 TEST (Rig, blob_round_trips_bit_for_bit)
 {
   const Rig rig = stereo_rig ();

@@ -102,6 +102,9 @@ test_what_is_no_calibration_is_named () {
   expect_error "calib.txt" rig-convert luxonis calib.txt rig.yaml
   expect_error "nowhere.json" rig-convert luxonis nowhere.json rig.yaml
   expect_error "expected a format" rig-convert kinect calib.txt rig.yaml
+  local status=0
+  rig-convert luxonis 2>/dev/null || status=$?
+  [ "$status" = 2 ] || fail "wrong usage exits with $status, expected 2"
   echo '{"cameraData": [], "stereoRectificationData": {"leftCameraSocket": 1}}' >calib.json
   expect_error "socket" rig-convert luxonis calib.json rig.yaml
   [ ! -e rig.yaml ] || fail "a rig was written all the same"

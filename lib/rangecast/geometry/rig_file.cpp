@@ -3,6 +3,7 @@
 #include "rig.hpp"
 
 #include <filesystem>
+#include <fstream>
 #include <opencv2/core/persistence.hpp>
 
 namespace rangecast {
@@ -219,20 +220,27 @@ save_rig (const std::string &path, const Rig &rig)
 {
   if (Status s = validate (rig); !s.ok ())
     return {s.code (), path + ": not written: " + s.message ()};
+  const std::string extension = std::filesystem::path (path).extension ().string ();
+  if (extension != ".yml" && extension != ".yaml" && extension != ".json")
+    return {StatusCode::kBadValue,
+        path + ": cannot be written; expected a file name that ends in .yml, .yaml or .json"};
+  std::string text; /* OpenCV cannot say what is wrong with a file */
   try {
-    cv::FileStorage file (path, cv::FileStorage::WRITE);
-    if (!file.isOpened ())
-      return {StatusCode::kNotFound, path + ": cannot be opened for writing"};
+    cv::FileStorage file (path, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
     file << "rangecast_rig" << kVersion;
     file.startWriteStruct ("views", cv::FileNode::SEQ);
     for (const View &view : rig.views)
       write_view (file, view);
     file.endWriteStruct ();
-    file.release ();
-  } catch (const std::exception &) {
-    return {StatusCode::kBadValue,
-        path + ": cannot be written; expected a file name that ends in .yml, .yaml or .json"};
+    text = file.releaseAndGetString ();
+  } catch (const std::exception &e) {
+    return {StatusCode::kBadValue, path + ": not written: " + e.what ()};
   }
+  std::ofstream file (path, std::ios::binary);
+  if (!file)
+    return {StatusCode::kNotFound, path + ": cannot be opened for writing"};
+  if (!file.write (text.data (), std::streamsize (text.size ())).flush ())
+    return {StatusCode::kNoSpace, path + ": cannot be written to its end"};
   return {};
 }
 
