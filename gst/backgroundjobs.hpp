@@ -30,10 +30,11 @@ public:
   /* Any thread: forgets jobs that have not begun, asks the one that has to end, ends all waits. */
   void interrupt ()
   {
+    std::deque<Job> forgotten; /* they go without the lock */
     {
       std::lock_guard guard (lock_);
       quit_ = true;
-      jobs_.clear ();
+      forgotten.swap (jobs_);
       stop_source_.request_stop ();
     }
     changed_.notify_all ();
@@ -87,12 +88,13 @@ private:
         changed_.wait (guard);
         continue;
       }
-      const Job job = std::move (jobs_.front ());
+      Job job = std::move (jobs_.front ());
       jobs_.pop_front ();
       busy_ = true;
       const std::stop_token token = stop_source_.get_token ();
       guard.unlock ();
       job (token);
+      job = nullptr; /* what it holds goes without the lock */
       guard.lock ();
       busy_ = false;
       changed_.notify_all ();

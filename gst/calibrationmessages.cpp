@@ -115,8 +115,8 @@ post_result (GstElement *element, const CalibrationSession &session,
     pairs.push_back (pair_structure (session, pair));
   for (const auto &board : result.dropped)
     dropped.push_back (gst_structure_new ("dropped", "pad", G_TYPE_STRING,
-        session.cameras ()[board.camera].name.c_str (), "frame", G_TYPE_UINT, guint (board.frame),
-        "rms", G_TYPE_DOUBLE, board.rms_px, nullptr));
+        session.cameras ()[board.camera].name.c_str (), "frame", G_TYPE_UINT64,
+        guint64 (board.frame), "rms", G_TYPE_DOUBLE, board.rms_px, nullptr));
   take_array (s, "cameras", cameras);
   take_array (s, "pairs", pairs);
   take_array (s, "dropped", dropped);

@@ -150,7 +150,8 @@ install_frame_properties (GObjectClass *c)
       int (kDefaults.selection));
   g_object_class_install_property (c, kCalibrationAutoFinish,
       g_param_spec_boolean ("auto-finish", "Finish automatically",
-          "Calibrate and end the stream as soon as the coverage is complete (default: false)",
+          "Calibrate and end the stream as soon as the coverage is complete, with an error if that "
+          "cannot be done (default: false)",
           kDefaults.auto_finish, kReady));
   g_object_class_install_property (c, kCalibrationMaxSkew,
       g_param_spec_uint64 ("max-skew", "Maximum skew",

@@ -119,13 +119,13 @@ calibrate (GstRigCalibrate *self, std::stop_token stop)
   Status status = {StatusCode::kNotFound, "there were no pictures to calibrate from"};
   if (!priv->session.cameras ().empty ())
     status = priv->session.calibrate (result, std::move (stop));
-  if (status.ok () && !location.empty ())
-    status = rangecast::save_rig (location, result.rig);
   if (status.ok ()) {
+    if (!location.empty ())
+      status = rangecast::save_rig (location, result.rig); /* the message has the rig anyway */
     for (const std::string &warning : result.warnings)
       gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadValue, warning});
-    post_result (
-        GST_ELEMENT (self), priv->session, result, location.empty () ? nullptr : location.c_str ());
+    post_result (GST_ELEMENT (self), priv->session, result,
+        location.empty () || !status.ok () ? nullptr : location.c_str ());
   }
   std::lock_guard guard (priv->lock);
   priv->stale = !status.ok ();
@@ -165,8 +165,9 @@ draw_still (GstRigCalibrate *self, const CalibrationPictures &set,
   priv->still_capture = set.capture;
 }
 
+/* @param[out] taken  whether the pictures were kept */
 static Status
-examine (GstRigCalibrate *self, CalibrationPictures &set)
+examine (GstRigCalibrate *self, CalibrationPictures &set, bool &taken)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (set.begin)
@@ -175,9 +176,10 @@ examine (GstRigCalibrate *self, CalibrationPictures &set)
   const MappedCalibrationPictures pictures (set);
   if (!pictures.status.ok ())
     return pictures.status;
-  if (Status s = priv->session.examine (set.described, pictures.views, set.capture); !s.ok ())
+  if (Status s = priv->session.examine (set.described, pictures.views, set.capture, set.number);
+      !s.ok ())
     return s;
-  const bool taken = priv->session.verdict () == rangecast::FrameVerdict::kTaken;
+  taken = priv->session.verdict () == rangecast::FrameVerdict::kTaken;
   {
     std::lock_guard guard (priv->lock);
     priv->examined++;
@@ -193,19 +195,20 @@ examine (GstRigCalibrate *self, CalibrationPictures &set)
   return {};
 }
 
+/* Coverage that is complete ends the stream: with the rig, or with the error that says why not. */
 static void
 examine_job (GstRigCalibrate *self, CalibrationPictures &set, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  Status status = examine (self, set);
-  bool finished = false;
-  if (status.ok () && set.auto_finish && priv->session.complete ()) {
-    const Status calibrated = calibrate (self, std::move (stop));
-    finished = calibrated.ok ();
-    warn (self, calibrated);
+  bool taken = false, finished = false;
+  Status status = examine (self, set, taken);
+  if (status.ok () && taken && set.auto_finish && priv->session.complete ()) {
+    status = calibrate (self, std::move (stop));
+    finished = status.ok ();
   }
   std::lock_guard guard (priv->lock);
-  priv->failure = std::move (status);
+  if (priv->failure.ok () && status.code () != StatusCode::kInterrupted) /* the first one counts */
+    priv->failure = std::move (status);
   priv->finished |= finished;
 }
 
@@ -548,6 +551,15 @@ check_location (const std::string &location)
   return {};
 }
 
+static GstFlowReturn
+gst_rig_calibrate_flush (GstAggregator *aggregator)
+{
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (aggregator)->priv;
+  std::lock_guard guard (priv->lock);
+  priv->finished = false;
+  return GST_FLOW_OK;
+}
+
 static gboolean
 gst_rig_calibrate_start (GstAggregator *aggregator)
 {
@@ -697,6 +709,8 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   element_class->release_pad = gst_rig_calibrate_release_pad;
 
   aggregator_class->start = gst_rig_calibrate_start;
+  aggregator_class->flush = gst_rig_calibrate_flush;
+  aggregator_class->propose_allocation = propose_picture_allocation;
   aggregator_class->stop = gst_rig_calibrate_stop;
   aggregator_class->sink_event = gst_rig_calibrate_sink_event;
   aggregator_class->update_src_caps = gst_rig_calibrate_update_src_caps;

@@ -1,9 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <gst/base/gstaggregator.h>
 #include <gst/video/video.h>
 
 #include <rangecast/geometry/range_image.hpp>
+
+/* What a sink pad whose pictures a PictureReader takes says to ALLOCATION queries: rows may be
+ * padded.
+ */
+inline gboolean
+propose_picture_allocation (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
+{
+  gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
+  return TRUE;
+}
 
 /* One camera's pictures as RGBx: mapped as they are, or converted into memory of ours. */
 class PictureReader {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "recycledbuffers.hpp"
 
+#include <algorithm>
 #include <gstrange/gstrangestatus.hpp>
 #include <string>
 
@@ -41,8 +42,12 @@ RecycledBytes::acquire (GstElement *element, gsize size, const char *what)
 {
   if (!pool_ || size > size_) {
     drop ();
+    if (size > G_MAXUINT) { /* more than a pool can be told */
+      post_no_memory (element, what);
+      return nullptr;
+    }
     pool_ = gst_buffer_pool_new ();
-    size_ = size + size / 2;
+    size_ = std::min<gsize> (size + size / 2, G_MAXUINT);
     GstStructure *config = gst_buffer_pool_get_config (pool_);
     gst_buffer_pool_config_set_params (config, nullptr, guint (size_), 0, 0);
     if (!gst_buffer_pool_set_config (pool_, config) || !gst_buffer_pool_set_active (pool_, TRUE)) {

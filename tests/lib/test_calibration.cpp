@@ -215,14 +215,32 @@ TEST (Calibration, board_that_moved_between_two_cameras_is_left_out_and_said)
   auto frames = frames_for (truth, {{0, 1}}, 20);
   for (BoardCorner &corner : frames[7].sightings[1].corners)
     corner.x += 12;
+  frames[7].number = 1007;
   CalibrationResult result;
   const Status status = calibrate_rig (cameras_of (truth), frames, {}, result);
   ASSERT_TRUE (status.ok ()) << status.message ();
   ASSERT_FALSE (result.dropped.empty ());
   for (const DroppedBoard &dropped : result.dropped)
-    EXPECT_EQ (dropped.frame, 7);
+    EXPECT_EQ (dropped.frame, 1007U);
   EXPECT_NEAR (result.rig.views[0].right->partner_from_left.translation.x, -0.1, 0.001);
   EXPECT_LT (result.rms_px, 0.1);
+}
+
+TEST (Calibration, world_that_cannot_begin_at_the_first_board_is_said)
+{
+  const auto truth = stereo_pair ();
+  CalibrationSettings settings;
+  settings.world = WorldFrame::kBoard;
+  auto frames = frames_for (truth, {{0, 1}}, 20);
+  CalibrationResult result;
+  ASSERT_TRUE (calibrate_rig (cameras_of (truth), frames, settings, result).ok ());
+  EXPECT_TRUE (result.warnings.empty ());
+  for (Sighting &sighting : frames[0].sightings)
+    for (BoardCorner &corner : sighting.corners)
+      corner.x += corner.id % 2 ? 12 : -12;
+  ASSERT_TRUE (calibrate_rig (cameras_of (truth), frames, settings, result).ok ());
+  ASSERT_EQ (result.warnings.size (), 1U);
+  EXPECT_NE (result.warnings[0].find ("first frame's board"), std::string::npos);
 }
 
 TEST (Calibration, too_few_frames_name_the_camera_and_the_number)

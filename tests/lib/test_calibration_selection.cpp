@@ -92,13 +92,15 @@ TEST_F (SelectionTest, all_takes_moving_blurred_and_similar_boards)
   EXPECT_EQ (offer ({}), FrameVerdict::kNoBoard);
 }
 
-TEST_F (SelectionTest, full_list_gives_up_the_frame_most_like_others)
+TEST_F (SelectionTest, full_list_gives_up_the_frame_most_like_others_but_the_first)
 {
   selector_.set (board_, {3, true});
-  EXPECT_EQ (offer (frame (0, 0, 0.6)), FrameVerdict::kTaken);
+  const CalibrationFrame first = frame (0, 0, 0.6);
+  EXPECT_EQ (offer (first), FrameVerdict::kTaken);
   EXPECT_EQ (offer (frame (0.001, 0, 0.6)), FrameVerdict::kTaken);
   EXPECT_EQ (offer (frame (0.2, 0, 0.6)), FrameVerdict::kTaken);
   EXPECT_EQ (offer (frame (-0.2, 0, 0.6)), FrameVerdict::kTaken);
+  EXPECT_EQ (selector_.frames ()[0].sightings[0].corners[0].x, first.sightings[0].corners[0].x);
   ASSERT_EQ (selector_.frames ().size (), 3U);
   EXPECT_EQ (offer (frame (-0.2, 0, 0.6)), FrameVerdict::kSimilar);
   double leftmost = 640, rightmost = 0;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,6 +41,7 @@ struct Sighting {
 /** The board at one moment, in the pictures of all cameras that saw it. */
 struct CalibrationFrame {
   std::vector<Sighting> sightings; ///< at most one a camera
+  std::uint64_t number = 0;        ///< by which the caller knows it
 
   [[nodiscard]] const Sighting *find (int camera) const;
 };

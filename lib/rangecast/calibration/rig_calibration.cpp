@@ -172,7 +172,7 @@ Calibration::drop_outliers (double limit_px, bool &any)
       const double rms = sighting_rms (f, sighting);
       const bool fits = rms <= limit_px;
       if (!fits)
-        result_.dropped.push_back ({int (f), sighting.camera, rms});
+        result_.dropped.push_back ({frames_[f].number, sighting.camera, rms});
       return !fits;
     });
   any = result_.dropped.size () > before;
@@ -362,6 +362,10 @@ Status
 Calibration::make_rig ()
 {
   const Pose world = world_from_first ();
+  if (settings_.world == WorldFrame::kBoard && frames_[0].sightings.empty ())
+    result_.warnings.push_back (
+        "the first frame's board was left out, so the world begins at that of "
+        "another frame; hold it still in the first pictures");
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     if (cameras_[i].role != CameraRole::kLeft)
       continue;

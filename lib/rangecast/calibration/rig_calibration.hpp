@@ -36,7 +36,8 @@ struct PairReport {
 
 /** A board that does not fit, and was left out. */
 struct DroppedBoard {
-  int frame = 0, camera = 0;
+  std::uint64_t frame = 0; ///< CalibrationFrame::number
+  int camera = 0;
   double rms_px = 0; ///< how badly
 };
 

@@ -231,7 +231,8 @@ FrameSelector::links_are_few (const CalibrationFrame &frame) const
   return false;
 }
 
-/* When there are enough, the frame most like others makes room, or the new one is it. */
+/* When there are enough, the frame most like others makes room, or the new one is it. The first one
+ * stays: its board may be where the world begins. */
 FrameVerdict
 FrameSelector::take (CalibrationFrame frame, Places places)
 {
@@ -242,7 +243,7 @@ FrameSelector::take (CalibrationFrame frame, Places places)
   }
   std::size_t dullest = 0;
   double least = std::numeric_limits<double>::max ();
-  for (std::size_t f = 0; f < places_.size (); f++)
+  for (std::size_t f = 1; f < places_.size (); f++)
     if (const double d = difference (places_[f], f); d < least) {
       least = d;
       dullest = f;

@@ -39,7 +39,7 @@ struct CameraCoverage {
 };
 
 struct SelectionSettings {
-  int max_frames = 100; ///< 3 .. 1000; then the frame most like others makes room
+  int max_frames = 100; ///< 3 .. 1000; then the frame most like others, but the first, makes room
   bool all = false;     ///< every frame with a board, moving and similar ones too
 };
 

@@ -41,7 +41,7 @@ CalibrationSession::clear ()
 
 Status
 CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
-    std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns)
+    std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns, std::uint64_t number)
 {
   if (!std::ranges::equal (cameras_, cameras | std::views::take (cameras_.size ())))
     clear (); /* one went, or became another */
@@ -60,6 +60,7 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
       eye.status = eye.detector.detect (pictures[i], eye.corners, eye.edge_width);
   });
   CalibrationFrame frame;
+  frame.number = number;
   std::vector<double> edge_widths;
   for (std::size_t i = 0; i < cameras.size (); i++) {
     if (!eyes_[i]->status.ok ())

@@ -29,9 +29,10 @@ public:
    *  @param cameras   the same every time; more may come at the end. All frames are forgotten where
    *  one went or became another
    *  @param pictures  by camera; empty where there is none
-   *  @param time_ns   of the pictures */
+   *  @param time_ns   of the pictures
+   *  @param number    by which the caller knows them */
   Status examine (const std::vector<CalibrationCamera> &cameras,
-      std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns);
+      std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns, std::uint64_t number);
 
   /** @name Of the last pictures @{ */
   [[nodiscard]] FrameVerdict verdict () const { return verdict_; }

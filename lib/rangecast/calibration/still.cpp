@@ -9,6 +9,7 @@ namespace rangecast {
 namespace {
 
 constexpr int kMostInARow = 4;
+constexpr double kTallestTile = 2, kFlattestTile = 0.01; /* height over width */
 
 cv::Mat
 as_mat (ImageView<const Rgbx> picture)
@@ -65,12 +66,16 @@ lay_out (std::span<const CalibrationCamera> cameras, int tile_width)
   const int count = int (cameras.size ());
   layout.columns = std::min (count, kMostInARow);
   layout.rows = count ? (count + layout.columns - 1) / layout.columns : 0;
-  layout.tile_width = std::max (2, tile_width & ~1);
+  double tallest = 0; /* height over width */
   for (const CalibrationCamera &camera : cameras)
     if (camera.width > 0)
-      layout.tile_height = std::max (layout.tile_height,
-          int (std::lround (double (layout.tile_width) * camera.height / camera.width)));
-  layout.tile_height = std::max (2, (layout.tile_height + 1) & ~1);
+      tallest = std::max (tallest, double (camera.height) / camera.width);
+  tallest = std::min (tallest, kTallestTile);
+  const double widest =
+      std::sqrt (double (kMaxStillPixels) /
+                 (std::max (1, layout.columns * layout.rows) * std::max (tallest, kFlattestTile)));
+  layout.tile_width = std::max (2, std::min (tile_width, int (widest)) & ~1);
+  layout.tile_height = std::max (2, (int (std::lround (layout.tile_width * tallest)) + 1) & ~1);
   return layout;
 }
 

@@ -16,8 +16,11 @@ struct TileLayout {
   [[nodiscard]] int height () const { return rows * tile_height; }
 };
 
+inline constexpr int kMaxStillPixels = 1 << 25;
+
 /** All cameras side by side, up to four in a row; stereo pairs stay together if they are given
- *  together.
+ *  together. A tile is at most twice as high as wide, and all of them together have at most
+ *  kMaxStillPixels: tiles become smaller for that.
  *  @param tile_width  pixels, made even */
 [[nodiscard]] TileLayout lay_out (std::span<const CalibrationCamera> cameras, int tile_width);
 
