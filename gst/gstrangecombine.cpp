@@ -368,11 +368,9 @@ combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
   if (!convert_colour (priv, colour, image.colour))
     return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
   const double unit = priv->view.depth_unit_m;
-  const auto limit = [unit] (double metres) {
-    return static_cast<std::uint16_t> (std::clamp (metres / unit, 1.0, 65535.0));
-  };
-  return rangecast::rescale_depth (depth, priv->depth_scale / unit, limit (priv->view.near_m),
-      limit (priv->view.far_m), image.depth);
+  return rangecast::rescale_depth (depth, priv->depth_scale / unit,
+      rangecast::depth_units (priv->view.near_m, unit),
+      rangecast::depth_units (priv->view.far_m, unit), image.depth);
 }
 
 static Status

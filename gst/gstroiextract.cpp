@@ -74,8 +74,6 @@ static constexpr int kDefaultBackgroundFrames = 30;
 static constexpr double kDefaultAdaptTime = 30; /* seconds */
 /* It is taught no more often than this, which nobody sees and saves time, seconds. */
 static constexpr double kShortestStep = 0.2;
-/* A pause longer than this teaches no more than this, seconds. */
-static constexpr double kLongestStep = 1;
 static constexpr rangecast::SegmentationSettings kDefaults;
 /* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
  * fits it no more. */
@@ -98,7 +96,8 @@ struct ViewState {
   bool learnt = false;
   int learning_target = 0;
   int settled = 0;        /* frames seen before learning began */
-  guint64 adapted_ns = 0; /* capture time of the last frame that taught the background */
+  guint64 adapted_ns = 0; /* capture time of the last frame that taught the background, */
+  int adapted_area = 0;   /* and the pixels of its ROI */
   Roi announced;
   guint64 points_in = 0, points_out = 0; /* of the present frame */
   Roi box;
@@ -160,6 +159,7 @@ begin_learning (ViewState &state, const View &view, int frames)
   state.background.reset (view.width, view.height);
   state.segmenter = {}; /* the light is that of the new background */
   state.adapted_ns = 0;
+  state.adapted_area = 0;
   state.learning_target = frames;
   state.learnt = false;
 }
@@ -244,7 +244,8 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 
 /* ---- one frame set ---- */
 
-/* Lets the background follow slow change, where nobody is. */
+/* Lets the background follow slow change, where nobody is. A frame that shows more of it than the
+ * last one always does: stereodepth matches the whole picture only now and then. */
 static void
 adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
 {
@@ -252,14 +253,15 @@ adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s
   if (state.adapted_ns == 0 || now < state.adapted_ns)
     state.adapted_ns = now;
   const double passed = double (now - state.adapted_ns) * 1e-9;
-  if (adapt_time_s <= 0 || passed < kShortestStep || image.roi.empty ())
+  const int area = image.roi.width * image.roi.height;
+  if (adapt_time_s <= 0 || area == 0 || (passed < kShortestStep && area <= state.adapted_area))
     return;
   state.adapted_ns = now;
+  state.adapted_area = area;
   const cv::Mat &quiet = state.segmenter.quiet ();
   state.background.adapt (image,
       {quiet.data, quiet.cols, quiet.rows, static_cast<std::ptrdiff_t> (quiet.step)},
-      state.segmenter.light (),
-      float (1 - std::exp (-std::min (passed, kLongestStep) / adapt_time_s)));
+      state.segmenter.light (), adapt_time_s);
 }
 
 static void
@@ -453,6 +455,7 @@ gst_roi_extract_stop (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
   priv->info = {};
+  priv->relearn = false;
   for (auto &state : priv->views)
     state.reset ();
   return TRUE;

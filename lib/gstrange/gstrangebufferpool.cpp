@@ -277,7 +277,7 @@ gst_range_buffer_new (guint views, guint width, guint height)
 /**
  * gst_range_buffer_add_view:
  * @buffer: a writable buffer of a #GstRangeBufferPool or gst_range_buffer_new()
- * @view_id: 0 to 63
+ * @view_id: 0 to 63, which the buffer does not have yet
  * @x: left edge of the ROI, pixels
  * @y: top edge of the ROI, pixels
  * @width: of the ROI, pixels; 0 for an empty one
@@ -288,15 +288,16 @@ gst_range_buffer_new (guint views, guint width, guint height)
  * one that is for all views, with an empty ROI for a view that is missing. The pixels are not
  * touched.
  *
- * Returns: (transfer none) (nullable): where its planes lie, or %NULL if the buffer has room for no
- *   more views or the ROI does not fit
+ * Returns: (transfer none) (nullable): where its planes lie, or %NULL if the buffer has the view,
+ *   has room for no more, or the ROI does not fit
  */
 GstRangeMeta *
 gst_range_buffer_add_view (GstBuffer *buffer, guint view_id, guint x, guint y, guint width,
     guint height, GstClockTime capture_time)
 {
   const guint index = gst_buffer_n_range_metas (buffer), memories = gst_buffer_n_memory (buffer);
-  if (memories == 0 || !within_limits (1, width, height))
+  if (memories == 0 || !within_limits (1, width, height) ||
+      gst_buffer_get_range_meta (buffer, view_id))
     return nullptr;
   GstMemory *memory = gst_buffer_peek_memory (buffer, MIN (index, memories - 1));
   if (index >= memories && index >= views_that_fit (memory))

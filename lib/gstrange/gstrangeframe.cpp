@@ -65,6 +65,7 @@ RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
 {
   gpointer state = nullptr;
   GstRangeMeta *meta;
+  std::array<bool, rangecast::kMaxViews> seen{};
   while ((meta = gst_buffer_iterate_range_meta (buffer, &state))) {
     const bool fits = count_ < maps_.size () && meta->view_id < guint (rangecast::kMaxViews) &&
                       meta->x <= guint (rangecast::kMaxImageSide) &&
@@ -76,6 +77,14 @@ RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
       unmap ();
       return;
     }
+    if (seen[meta->view_id]) {
+      status_ = {StatusCode::kBadData, "range buffer: view " + std::to_string (meta->view_id) +
+                                           " is there twice; expected one GstRangeMeta a view"};
+      gst_range_view_unmap (&maps_[count_]);
+      unmap ();
+      return;
+    }
+    seen[meta->view_id] = true;
     metas_[count_] = meta;
     images_[count_] = image_of (maps_[count_], meta->capture_time);
     count_++;

@@ -78,14 +78,15 @@ GST_END_TEST;
 GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
 {
   Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "near=0.5 far=2");
-  for (guint16 millimetres : {499, 500, 2000, 2001}) {
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
+      "near=0.7 far=2.3"); /* neither is a whole number of depth units in binary */
+  for (guint16 millimetres : {699, 700, 2300, 2301}) {
     c.push_colour (GST_SECOND * millimetres, 0);
     c.push_depth (GST_SECOND * millimetres, millimetres);
     GstBuffer *output = gst_harness_pull (c.colour);
     {
       gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-      const bool valid = millimetres >= 500 && millimetres <= 2000;
+      const bool valid = millimetres >= 700 && millimetres <= 2300;
       fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), valid ? 10 * millimetres : 0);
     }
     gst_buffer_unref (output);

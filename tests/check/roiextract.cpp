@@ -364,6 +364,56 @@ GST_START_TEST (test_who_sits_still_stays_and_the_wall_may_change_slowly)
 }
 GST_END_TEST;
 
+/* stereodepth matches the whole picture only now and then; what the ROI leaves out catches up. */
+GST_START_TEST (test_wall_that_is_seen_now_and_then_is_followed_too)
+{
+  const Rig rig = ring_rig (1);
+  for (const int phase : {0, 2}) {
+    GstHarness *h = roi_harness (
+        rig, "roiextract background-frames=5 follow-light=false adapt-time=2 margin=0");
+    const Roi person{100, 90, 60, 80}, around{80, 70, 120, 130};
+    int i = 0;
+    for (; i < 5; i++)
+      push (h, boxes (rig, i * 40 * GST_MSECOND, 60, {}));
+    Roi last;
+    for (; i < 1000; i++) { /* 40 s, in which the wall gets more than twice as bright */
+      GstBuffer *buffer = boxes (rig, i * 40 * GST_MSECOND, 60 + i * 80 / 1000, {person});
+      const bool whole = i % 30 == phase;
+      if (!whole) {
+        gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+        frame.crop (0, around);
+      }
+      const Roi found = push (h, buffer);
+      if (whole)
+        last = found;
+    }
+    fail_unless (last == person, "phase %d: %dx%d", phase, last.width, last.height);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_that_is_there_twice_is_one_error)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  GstBuffer *buffer = make_frame_set (rig, 0);
+  GstRangeMeta copy = *gst_buffer_get_range_meta (buffer, 0);
+  auto twin = (GstRangeMeta *)gst_buffer_add_meta (buffer, copy.meta.info, nullptr);
+  copy.meta = twin->meta;
+  *twin = copy;
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_ERROR);
+  const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (said.find ("view 0 is there twice") != std::string::npos, said.c_str ());
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_several_people_are_in_the_roi_and_max_people_keeps_the_largest)
 {
   const Rig rig = ring_rig (1);
@@ -487,6 +537,8 @@ roiextract_suite ()
   tcase_add_test (tc, test_stats_count_points);
   tcase_add_test (tc, test_forgets_the_background_in_null);
   tcase_add_test (tc, test_who_sits_still_stays_and_the_wall_may_change_slowly);
+  tcase_add_test (tc, test_wall_that_is_seen_now_and_then_is_followed_too);
+  tcase_add_test (tc, test_view_that_is_there_twice_is_one_error);
   tcase_add_test (tc, test_several_people_are_in_the_roi_and_max_people_keeps_the_largest);
   tcase_add_test (tc, test_background_at_eos_is_the_one_that_it_has_become);
   tcase_add_test (tc, test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set);

@@ -120,9 +120,11 @@ public:
     return segmenter_.decide (
         image (), background_, scene_->rig ().views[0].depth_unit_m, trial_.settings);
   }
-  void adapt (float share)
+  void adapt (double adapt_time_s)
   {
-    background_.adapt (image (), bytes (segmenter_.quiet ()), segmenter_.light (), share);
+    RangeImage now = image ();
+    now.capture_time_ns = std::uint64_t (time_s_ * 1e9);
+    background_.adapt (now, bytes (segmenter_.quiet ()), segmenter_.light (), adapt_time_s);
   }
   Status clear ()
   {

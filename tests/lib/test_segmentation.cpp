@@ -138,7 +138,7 @@ namespace {
 
 /* A person sits still for a minute while the light falls to 60 %; what is left of it at the end. */
 RoiScore
-score_after_a_minute (RoiStage &stage, float share)
+score_after_a_minute (RoiStage &stage, double adapt_time_s)
 {
   RoiScore last;
   EXPECT_TRUE (stage.prepare ().ok () && stage.learn ().ok ());
@@ -146,7 +146,8 @@ score_after_a_minute (RoiStage &stage, float share)
     stage.take (10 + i, false);
     stage.dim (1 - 0.4 * std::min (i, 50) / 50);
     EXPECT_TRUE (stage.decide ().ok ());
-    stage.adapt (share);
+    if (adapt_time_s > 0)
+      stage.adapt (adapt_time_s);
     EXPECT_TRUE (stage.clear ().ok ());
     if (i >= 55)
       stage.score (last);
@@ -154,7 +155,7 @@ score_after_a_minute (RoiStage &stage, float share)
   return last;
 }
 
-const float kFast = 1 - std::exp (-1 / 5.0f); /* a time constant of 5 s, a frame a second */
+constexpr double kFast = 5; /* seconds */
 
 } // namespace
 

@@ -22,6 +22,12 @@ count_points (const ConstRangeImage &image)
   return points;
 }
 
+std::uint16_t
+depth_units (double metres, double unit_m)
+{
+  return static_cast<std::uint16_t> (std::clamp (std::round (metres / unit_m), 1.0, 65535.0));
+}
+
 Status
 rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t near,
     std::uint16_t far, ImageView<std::uint16_t> out)

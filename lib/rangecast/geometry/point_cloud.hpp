@@ -12,6 +12,9 @@ namespace rangecast {
 /** How many pixels of a range image are valid. */
 std::size_t count_points (const ConstRangeImage &image);
 
+/** A distance in whole depth units, the nearest from 1 to 65535. */
+[[nodiscard]] std::uint16_t depth_units (double metres, double unit_m);
+
 /** Depth of one unit as depth of another: out = round (in * factor), 0 where `in` is 0 or the
  *  result lies outside near..far.
  *  @param in      H x W, 0 = invalid

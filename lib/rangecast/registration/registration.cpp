@@ -244,11 +244,9 @@ Registration::rescale (
     ImageView<const std::uint16_t> depth, double metres, const RangeImage &image) const
 {
   const View &view = range_view_;
-  const auto limit = [&view] (double z) {
-    return static_cast<std::uint16_t> (std::clamp (z / view.depth_unit_m, 1.0, 65535.0));
-  };
-  return rescale_depth (
-      depth, metres / view.depth_unit_m, limit (view.near_m), limit (view.far_m), image.depth);
+  return rescale_depth (depth, metres / view.depth_unit_m,
+      depth_units (view.near_m, view.depth_unit_m), depth_units (view.far_m, view.depth_unit_m),
+      image.depth);
 }
 
 } // namespace rangecast

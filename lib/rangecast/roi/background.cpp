@@ -11,6 +11,8 @@ namespace rangecast {
 static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
 
 constexpr int kFileVersion = 2;
+constexpr std::uint32_t kLongestAdaptMs = 10'000;
+constexpr int kAdaptSteps = 1000; // of 10 ms
 
 void
 BackgroundModel::reset (int width, int height)
@@ -22,6 +24,7 @@ BackgroundModel::reset (int width, int height)
   const auto pixels = static_cast<std::size_t> (width) * static_cast<std::size_t> (height);
   pixels_.assign (pixels, {});
   sums_.assign (pixels, {});
+  taught_ms_.clear ();
 }
 
 Status
@@ -71,28 +74,49 @@ BackgroundModel::finish ()
 }
 
 void
+BackgroundModel::move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
+    const float *to_model, float share)
+{
+  const float rgb[] = {float (colour.r), float (colour.g), float (colour.b)};
+  for (int c = 0; c < 3; c++)
+    pixel.mean[c] += share * (std::min (rgb[c] * to_model[c], 255.f) - pixel.mean[c]);
+  if (depth == kInvalidDepth || pixel.depth_share <= 0)
+    return;
+  const float step = share * (float (depth) - pixel.depth);
+  pixel.depth += step;
+  pixel.nearest += step;
+}
+
+void
 BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
-    const std::array<float, 3> &light, float share)
+    const std::array<float, 3> &light, double adapt_time_s)
 {
   const Roi &roi = image.roi;
+  if (!covers (roi))
+    return;
+  if (taught_ms_.empty () || image.capture_time_ns < adapt_base_ns_) {
+    taught_ms_.assign (pixels_.size (), 0);
+    adapt_base_ns_ = image.capture_time_ns;
+  }
+  const auto now_ms = static_cast<std::uint32_t> (
+      std::min<std::uint64_t> ((image.capture_time_ns - adapt_base_ns_) / 1'000'000, UINT32_MAX));
+  std::array<float, kAdaptSteps + 1> shares; // by the time since a pixel was taught
+  for (int i = 0; i <= kAdaptSteps; i++)
+    shares[i] = float (
+        std::min (1 - std::exp (-i * (kLongestAdaptMs * 1e-3 / kAdaptSteps) / adapt_time_s), 0.5));
   const float to_model[] = {1 / light[0], 1 / light[1], 1 / light[2]};
   for (int y = 0; y < roi.height; y++) {
-    BackgroundPixel *model =
-        pixels_.data () + static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
+    const std::size_t first = static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
     const std::uint8_t *use = teach.row (y);
     const Rgbx *colour = image.colour.row (y);
     const std::uint16_t *depth = image.depth.row (y);
     for (int x = 0; x < roi.width; x++) {
       if (!use[x])
         continue;
-      const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
-      for (int c = 0; c < 3; c++)
-        model[x].mean[c] += share * (std::min (rgb[c] * to_model[c], 255.f) - model[x].mean[c]);
-      if (depth[x] == kInvalidDepth || model[x].depth_share <= 0)
-        continue;
-      const float step = share * (float (depth[x]) - model[x].depth);
-      model[x].depth += step;
-      model[x].nearest += step;
+      const std::uint32_t since = now_ms - std::min (now_ms, taught_ms_[first + x]);
+      taught_ms_[first + x] = now_ms;
+      move_towards (pixels_[first + x], colour[x], depth[x], to_model,
+          shares[std::min (since, kLongestAdaptMs) * kAdaptSteps / kLongestAdaptMs]);
     }
   }
 }

@@ -49,14 +49,16 @@ public:
   /** Makes means and spreads of what was learnt. */
   void finish ();
 
-  /** Follows slow change: moves the means of some pixels towards a picture.
-   *  @param image  its ROI lies in the full image
+  /** Follows slow change: moves the means of some pixels towards a picture, by the share
+   *  1 - exp (-t / adapt_time_s) of the way, t the time since the pixel was taught last (at most
+   *  10 s; never more than half of the way). Pixels that the ROI leaves out catch up later.
+   *  @param image  its ROI lies in the full image, or nothing is done; capture times count
    *  @param teach  of the ROI: other than 0 where the picture shows the background
    *  @param light  the picture's brightness by channel as a share of the model's, which keeps its
    * own
-   *  @param share  of the way that the means go, 0 .. 1 */
+   *  @param adapt_time_s  > 0 */
   void adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
-      const std::array<float, 3> &light, float share);
+      const std::array<float, 3> &light, double adapt_time_s);
 
   /** Whether the ROI lies in the image. */
   [[nodiscard]] bool covers (const Roi &roi) const
@@ -78,11 +80,15 @@ private:
     int colour_n = 0, depth_n = 0;
   };
   void measure_noise ();
+  static void move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
+      const float *to_model, float share);
 
   int width_ = 0, height_ = 0, frames_ = 0;
   double depth_noise_ = 0;
   std::vector<BackgroundPixel> pixels_;
   std::vector<Sums> sums_;
+  std::vector<std::uint32_t> taught_ms_; // since adapt_base_ns_, by pixel; empty before adapt()
+  std::uint64_t adapt_base_ns_ = 0;
 };
 
 /** @name The file form
