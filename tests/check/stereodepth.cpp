@@ -606,17 +606,20 @@ GST_START_TEST (test_third_camera_of_another_size_is_one_error)
 }
 GST_END_TEST;
 
-/* Left and right begin to be grey while a pair in colour waits for its third picture. */
+/* Left and right change from grey to colour, whose pictures are larger, while a grey pair waits for
+ * its third picture. */
 GST_START_TEST (test_pair_that_waits_for_the_third_is_read_as_it_came)
 {
   Trio t;
   t.s.push (t.third, 0);
-  t.push_pair (kFrame);
-  for (GstHarness *h : {t.s.left, t.s.right})
+  for (GstHarness *h : {t.s.left, t.s.right}) {
     gst_harness_set_src_caps_str (
         h, "video/x-raw,format=GRAY8,width=160,height=120,framerate=25/1");
+    Trio::push_noise (h, 160, 120, 1, kFrame);
+  }
   for (GstHarness *h : {t.s.left, t.s.right})
-    Trio::push_noise (h, 160, 120, 1, 2 * kFrame);
+    gst_harness_set_src_caps_str (h, kSmall);
+  t.push_pair (2 * kFrame);
   t.s.push (t.third, kFrame);
   t.pull (kFrame);
   t.s.push (t.third, 2 * kFrame);
@@ -646,9 +649,10 @@ GST_END_TEST;
 GST_START_TEST (test_third_pad_that_is_released_is_forgotten)
 {
   Trio t ("", false); /* not calibrated: an error if it counted */
-  GstElement *element = t.s.left->element;
-  t.s.push (t.third, 0);
-  gst_element_release_request_pad (element, t.pad);
+  GstQuery *query = gst_query_new_allocation (nullptr, FALSE);
+  gst_pad_peer_query (t.third->srcpad, query); /* after it, the caps have been seen */
+  gst_query_unref (query);
+  gst_element_release_request_pad (t.s.left->element, t.pad);
   t.push_pair (0);
   t.pull (0);
 }
