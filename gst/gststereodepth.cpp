@@ -747,7 +747,9 @@ gst_stereo_depth_get_next_time (GstAggregator *aggregator)
   if (!priv->pair.buffers.first) {
     int n = 0;
     for (GstAggregatorPad *pad : priv->pads)
-      if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
+      if (gst_aggregator_pad_is_eos (pad))
+        return 0; /* the end, whatever the third camera does */
+      else if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
         time = std::min (time, gstrange::running_time_of (pad, buffer)); /* NONE is greatest */
         gst_buffer_unref (buffer);
         n++;

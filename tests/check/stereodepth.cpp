@@ -704,6 +704,20 @@ GST_START_TEST (test_live_a_silent_third_camera_costs_the_latency_and_no_frame)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_live_the_stream_ends_though_the_third_camera_is_silent)
+{
+  RigFile rig;
+  GstElement *pipeline = gst_parse_launch (
+      ("avatartestsrc views=1 is-live=true num-buffers=3 name=c c.left ! queue ! d.left c.right ! "
+       "queue ! d.right c.third ! valve drop=true ! d.third stereodepth name=d latency=40000000 " +
+          rig.property () + " ! fakesink")
+          .c_str (),
+      nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_wanted_part_outlives_caps_of_the_same_size)
 {
   Stereo s (std::string (kProperties) + " refresh-interval=1000");
@@ -893,6 +907,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_all_three_cameras_may_change_their_size_one_after_the_other);
   tcase_add_test (tc, test_third_pad_that_is_released_is_forgotten);
   tcase_add_test (tc, test_live_a_silent_third_camera_costs_the_latency_and_no_frame);
+  tcase_add_test (tc, test_live_the_stream_ends_though_the_third_camera_is_silent);
   tcase_add_test (tc, test_wanted_part_outlives_caps_of_the_same_size);
   tcase_add_test (tc, test_gap_on_both_pads_is_a_gap);
   tcase_add_test (tc, test_gap_that_takes_a_picture_with_it_is_a_gap);
