@@ -707,12 +707,11 @@ GST_END_TEST;
 GST_START_TEST (test_live_the_stream_ends_though_the_third_camera_is_silent)
 {
   RigFile rig;
-  GstElement *pipeline = gst_parse_launch (
-      ("avatartestsrc views=1 is-live=true num-buffers=3 name=c c.left ! queue ! d.left c.right ! "
-       "queue ! d.right c.third ! valve drop=true ! d.third stereodepth name=d latency=40000000 " +
-          rig.property () + " ! fakesink")
-          .c_str (),
-      nullptr);
+  const std::string camera = std::string ("videotestsrc is-live=true num-buffers=3 ! ") + kSmall;
+  const std::string line = camera + " ! d.left " + camera + " ! d.right " + camera +
+                           " ! valve drop=true ! d.third stereodepth name=d latency=40000000 " +
+                           rig.property () + " ! fakesink";
+  GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
   play_to_the_end (pipeline);
   gst_object_unref (pipeline);
 }
