@@ -31,6 +31,7 @@
 
 #include <gst/video/video.h>
 
+#include <atomic>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -78,12 +79,15 @@ enum {
   PROP_REFRESH_INTERVAL,
   PROP_STEADY,
   PROP_N_THREADS,
+  PROP_QOS,
   PROP_STATS
 };
 
 static constexpr rangecast::StereoSettings kDefaults;
 static constexpr int kDefaultRefreshInterval = 30;
 static constexpr double kDefaultNear = 0.3, kDefaultFar = 3.0;
+/* Pictures without a partner, one after the other, that are worth a warning: two seconds. */
+static constexpr guint64 kManyWithoutPartner = 100;
 
 struct StereoProperties {
   std::string rig;
@@ -93,22 +97,41 @@ struct StereoProperties {
   double near = 0, far = 0, depth_unit = 0;
   rangecast::StereoSettings core;
   int refresh_interval = kDefaultRefreshInterval;
+  bool qos = true;
+};
+
+/* Left and right of one moment. Both times are by the segment they came in. */
+struct WaitingPair {
+  gstrange::PairMatcher::Pair buffers; /* null: none waits */
+  GstClockTime running = GST_CLOCK_TIME_NONE, capture = 0;
 };
 
 struct GstStereoDepthPrivate {
   std::mutex lock; /* guards what follows; never held across a push, event or message */
   StereoProperties properties;
   Roi wanted; /* of the last GstRangeRoi event; empty: everything */
-  guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0;
+  guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0, dropped_late = 0;
   GstClockTime match_time = 0;
+  GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is older comes too late */
+  double proportion = 1;                       /* of the last QOS event */
+
+  std::atomic<bool> third_released = false; /* by any thread; the streaming thread clears it */
 
   /* streaming thread only */
   GstAggregatorPad *pads[2] = {nullptr, nullptr}; /* left, right; owned by the element */
   std::unique_ptr<gstrange::PairMatcher> matcher;
-  gstrange::PairMatcher::Pair pair; /* waits for the third camera's picture; may be empty */
-  GstVideoInfo info[3];             /* left, right, third */
+  WaitingPair pair;     /* for the third camera's picture */
+  GstVideoInfo info[3]; /* left, right, third */
   bool have_info[3] = {false, false, false};
-  bool negotiate = true, said_mirrored = false;
+  GstVideoInfo next_info[2]; /* left, right: of what comes after the pair that waits */
+  bool have_next_info[2] = {false, false};
+  bool negotiate = true;      /* left or right have changed */
+  bool third_changed = false; /* matters with its next picture */
+  bool said_mirrored = false, said_unpaired = false;
+  bool segment_sent = false, discont = false;
+  guint64 dropped_before = 0;  /* by the matcher, up to the last pair */
+  GstClockTime position = 0;   /* running time at which the output so far ends */
+  GstClockTime head_start = 0; /* live: of the element's own latency, what matching takes */
   PictureReader readers[3];
   rangecast::StereoDepth core;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
@@ -165,12 +188,9 @@ view_from_rig (const StereoProperties &p, int width, int height, View &view)
   if (!found)
     return {
         StatusCode::kNotFound, p.rig + ": has no view with view-id " + std::to_string (p.view_id)};
-  if (found->width != width || found->height != height)
-    return {StatusCode::kBadSize, p.rig + ": view " + std::to_string (found->id) + " is " +
-                                      size_text (found->width, found->height) +
-                                      ", the pictures are " + size_text (width, height)};
   view = *found;
-  return {};
+  const Status scaled = rangecast::scale_view (view, width, height);
+  return scaled.ok () ? scaled : Status{scaled.code (), p.rig + ": " + scaled.message ()};
 }
 
 static Status
@@ -218,24 +238,47 @@ make_view (const StereoProperties &p, int width, int height, View &view)
 
 /* ---- negotiation ---- */
 
+static bool
+same_size (const GstVideoInfo &a, const GstVideoInfo &b)
+{
+  return a.width == b.width && a.height == b.height;
+}
+
+/* The third camera may change its size a little before or after the others; that matters where its
+ * picture is to be matched. */
 static Status
-configure_core (GstStereoDepthPrivate *priv)
+check_sizes (GstStereoDepthPrivate *priv, bool third_is_there)
 {
   static constexpr const char *kNames[] = {"left", "right", "third"};
   const GstVideoInfo &left = priv->info[0];
-  for (int i = 1; i < 3; i++)
-    if (const GstVideoInfo &other = priv->info[i];
-        priv->have_info[i] && (left.width != other.width || left.height != other.height))
+  for (int i = 1; i < (third_is_there ? 3 : 2); i++)
+    if (const GstVideoInfo &other = priv->info[i]; priv->have_info[i] && !same_size (left, other))
       return {StatusCode::kBadSize, std::string ("pad ") + kNames[i] + " is " +
                                         size_text (other.width, other.height) +
                                         " but pad left is " + size_text (left.width, left.height) +
                                         "; expected the same size"};
-  StereoProperties properties;
-  {
-    std::lock_guard guard (priv->lock);
-    properties = priv->properties;
+  return {};
+}
+
+/* Downstream does not see that caps are set anew where they are equal, and so would not ask for its
+ * part of the picture again. */
+static StereoProperties
+current_properties (GstStereoDepthPrivate *priv)
+{
+  const View &before = priv->core.range_view ();
+  std::lock_guard guard (priv->lock);
+  if (before.width != priv->info[0].width || before.height != priv->info[0].height)
     priv->wanted = {};
-  }
+  return priv->properties;
+}
+
+static Status
+configure_core (GstStereoDepthPrivate *priv, bool third_is_there)
+{
+  const GstVideoInfo &left = priv->info[0];
+  if (Status s = check_sizes (priv, third_is_there); !s.ok ())
+    return s;
+  const StereoProperties properties = current_properties (priv);
   View view;
   if (Status s = make_view (properties, left.width, left.height, view); !s.ok ())
     return s;
@@ -243,20 +286,23 @@ configure_core (GstStereoDepthPrivate *priv)
     return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
                                    "rig with a file that has one in view " +
                                        std::to_string (view.id)};
-  if (Status s = priv->core.set (view, properties.core, priv->have_info[2]); !s.ok ())
+  const bool with_third = priv->have_info[2] && same_size (left, priv->info[2]);
+  if (Status s = priv->core.set (view, properties.core, with_third); !s.ok ())
     return s;
   priv->said_mirrored = false;
-  for (int i = 0; i < 3; i++)
-    if (priv->have_info[i] && !priv->readers[i].set (priv->info[i]))
+  priv->third_changed = priv->have_info[2] && !with_third;
+  for (int i = 0; i < (with_third ? 3 : 2); i++)
+    if (!priv->readers[i].set (priv->info[i]))
       return {StatusCode::kUnsupported, "cannot convert the pictures to RGBx"};
   return {};
 }
 
 static GstFlowReturn
-negotiate (GstStereoDepth *self)
+negotiate (GstStereoDepth *self, bool third_is_there)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), configure_core (priv));
+  const GstFlowReturn flow =
+      gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, third_is_there));
   if (flow != GST_FLOW_OK)
     return flow;
   const auto info =
@@ -279,6 +325,32 @@ gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
   return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with the first pair, see negotiate() */
 }
 
+/* Streaming thread. */
+static void
+forget_released_third (GstStereoDepthPrivate *priv)
+{
+  if (priv->third_released.exchange (false))
+    priv->have_info[2] = priv->third_changed = false;
+}
+
+static gboolean
+take_caps (GstStereoDepthPrivate *priv, int side, GstCaps *caps)
+{
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return FALSE;
+  forget_released_third (priv);
+  if (side < 2 && priv->pair.buffers.first) {
+    priv->next_info[side] = info;
+    priv->have_next_info[side] = true;
+    return TRUE;
+  }
+  priv->info[side] = info;
+  priv->have_info[side] = true;
+  (side < 2 ? priv->negotiate : priv->third_changed) = true;
+  return TRUE;
+}
+
 static gboolean
 gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
@@ -287,12 +359,10 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
     const int side = pad == priv->pads[0] ? 0 : pad == priv->pads[1] ? 1 : 2;
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
-    if (!gst_video_info_from_caps (&priv->info[side], caps)) {
+    if (!take_caps (priv, side, caps)) {
       gst_event_unref (event);
       return FALSE;
     }
-    priv->have_info[side] = true;
-    priv->negotiate = true;
   }
   return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_event (aggregator, pad, event);
 }
@@ -314,9 +384,29 @@ take_roi_event (GstStereoDepthPrivate *priv, const GstStructure *s)
   return TRUE;
 }
 
+/* From the sink's thread. Not live, more than is late already is given up, or the next frame would
+ * be late again. */
+static void
+take_qos_event (GstStereoDepth *self, GstEvent *event)
+{
+  double proportion;
+  GstClockTimeDiff late;
+  GstClockTime time;
+  gst_event_parse_qos (event, nullptr, &proportion, &late, &time);
+  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
+  std::lock_guard guard (self->priv->lock);
+  self->priv->proportion = proportion;
+  self->priv->earliest = GST_CLOCK_TIME_NONE;
+  if (!GST_CLOCK_TIME_IS_VALID (time) || (late < 0 && 0 - GstClockTime (late) > time))
+    return;
+  self->priv->earliest = time + GstClockTime (late) * (late > 0 && !live ? 2 : 1);
+}
+
 static gboolean
 gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
 {
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS)
+    take_qos_event (GST_STEREO_DEPTH (aggregator), event);
   const GstStructure *s = gst_event_get_structure (event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && s &&
       gst_structure_has_name (s, "GstRangeRoi")) {
@@ -379,10 +469,10 @@ match_pictures (
 
 /* @param third  may be null */
 static Status
-match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output, GstClockTime capture)
+match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output)
 {
   static constexpr const char *kNames[] = {"left", "right", "third"};
-  GstBuffer *buffers[] = {priv->pair.first, priv->pair.second, third};
+  GstBuffer *buffers[] = {priv->pair.buffers.first, priv->pair.buffers.second, third};
   Status status;
   int n = 0;
   for (; n < 3 && buffers[n] && status.ok (); n++)
@@ -392,7 +482,7 @@ match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output, Gs
       break;
     }
   if (status.ok ())
-    status = match_pictures (priv, third != nullptr, output, capture);
+    status = match_pictures (priv, third != nullptr, output, priv->pair.capture);
   while (n-- > 0)
     priv->readers[n].close ();
   return status;
@@ -416,28 +506,70 @@ static GstFlowReturn
 push_pair (GstStereoDepth *self, GstBuffer *third)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  const gstrange::PairMatcher::Pair &pair = priv->pair;
+  const WaitingPair &pair = priv->pair;
+  GstBuffer *left = pair.buffers.first;
   auto aggregator = GST_AGGREGATOR (self);
   GstBuffer *output = nullptr;
   GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
   if (flow != GST_FLOW_OK)
     return flow;
-  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const GstClockTime capture = gstrange::capture_time_of (priv->pads[0], pair.first, live);
-  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, third, output, capture));
+  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, third, output));
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;
   }
   warn_if_mirrored (self);
-  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (pair.first)
-                                    ? GST_BUFFER_DURATION (pair.first)
-                                    : priv->frame_duration;
-  gstrange::stamp (
-      aggregator, output, gstrange::running_time_of (priv->pads[0], pair.first), duration, capture);
-  if (GST_BUFFER_IS_DISCONT (pair.first))
+  const GstClockTime duration =
+      GST_BUFFER_DURATION_IS_VALID (left) ? GST_BUFFER_DURATION (left) : priv->frame_duration;
+  gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
+  if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
+  priv->discont = false;
+  priv->segment_sent = true;
+  if (GST_CLOCK_TIME_IS_VALID (pair.running))
+    priv->position = pair.running + (GST_CLOCK_TIME_IS_VALID (duration) ? duration : 0);
   return gst_aggregator_finish_buffer (aggregator, output);
+}
+
+/* GstAggregator sends it with buffers only. It comes again with the first one, which changes
+ * nothing. */
+static void
+push_segment (GstStereoDepth *self, const GstSegment &segment)
+{
+  GstEvent *event = gst_event_new_segment (&segment);
+  GstEvent *cause = gst_pad_get_sticky_event (GST_PAD (self->priv->pads[0]), GST_EVENT_SEGMENT, 0);
+  if (cause)
+    gst_event_set_seqnum (event, gst_event_get_seqnum (cause));
+  gst_clear_event (&cause);
+  gst_pad_push_event (GST_AGGREGATOR (self)->srcpad, event);
+  self->priv->segment_sent = true;
+}
+
+/* Tells downstream of a time of which there will be nothing, so that it does not wait for it. */
+static GstFlowReturn
+push_gap (GstStereoDepth *self)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  auto aggregator = GST_AGGREGATOR (self);
+  GstClockTime begin, end;
+  if (!priv->matcher->take_gap (begin, end))
+    return GST_FLOW_OK;
+  begin = std::max (begin, priv->position);
+  end = std::min (end, priv->pair.running); /* NONE is the greatest number */
+  const bool begun = priv->pool != nullptr;
+  if (end <= begin || (!begun && (!priv->have_info[0] || !priv->have_info[1])))
+    return GST_FLOW_OK;
+  if (!begun)
+    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
+      return flow;
+  GST_OBJECT_LOCK (self);
+  const GstSegment segment = GST_AGGREGATOR_PAD (aggregator->srcpad)->segment;
+  GST_OBJECT_UNLOCK (self);
+  if (!priv->segment_sent)
+    push_segment (self, segment);
+  priv->position = end;
+  gst_pad_push_event (aggregator->srcpad, gst_event_new_gap (segment.start + begin, end - begin));
+  return GST_FLOW_OK;
 }
 
 /* The third camera's picture for the pair that waits: none (null) if it is lost or its stream has
@@ -451,8 +583,8 @@ take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, Gst
   if (!pad)
     return GST_FLOW_OK;
   const auto sink = GST_AGGREGATOR_PAD (pad);
-  const GstClockTime left = gstrange::running_time_of (priv->pads[0], priv->pair.first);
-  const GstClockTime tolerance = GST_CLOCK_TIME_IS_VALID (frame_duration) ? frame_duration / 2 : 0;
+  const GstClockTime left = priv->pair.running;
+  const GstClockTime tolerance = gstrange::pairing_tolerance (frame_duration);
   GstFlowReturn flow = GST_FLOW_OK;
   while (true) {
     GstBuffer *buffer = gst_aggregator_pad_peek_buffer (sink);
@@ -478,14 +610,103 @@ take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, Gst
     priv->dropped_third += !gap;
   }
   gst_object_unref (pad);
+  if (*third && !priv->have_info[2]) /* of a pad that was released just now */
+    gst_clear_buffer (third);
   return flow;
 }
 
 static void
 forget_pair (GstStereoDepthPrivate *priv)
 {
-  gst_clear_buffer (&priv->pair.first);
-  gst_clear_buffer (&priv->pair.second);
+  gst_clear_buffer (&priv->pair.buffers.first);
+  gst_clear_buffer (&priv->pair.buffers.second);
+  priv->pair = {};
+  for (int i = 0; i < 2; i++)
+    if (priv->have_next_info[i]) {
+      priv->info[i] = priv->next_info[i];
+      priv->have_next_info[i] = false;
+      priv->negotiate = true;
+    }
+}
+
+/* Two cameras whose clocks have nothing to do with each other may never take a picture at once. */
+static void
+warn_if_nothing_pairs (GstStereoDepth *self, bool paired)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  const guint64 dropped = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
+  if (paired)
+    priv->dropped_before = dropped;
+  if (priv->said_unpaired || dropped - priv->dropped_before < kManyWithoutPartner)
+    return;
+  priv->said_unpaired = true;
+  GST_ELEMENT_WARNING (self, STREAM, FAILED,
+      ("Left and right pictures do not come in pairs: expected times that differ by at most half a "
+       "frame, or 5 ms where the caps have no framerate"),
+      ("the last %" G_GUINT64_FORMAT " pictures found no partner", dropped - priv->dropped_before));
+}
+
+static GstFlowReturn
+take_pair (GstStereoDepth *self, GstClockTime frame_duration)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  WaitingPair &pair = priv->pair;
+  const GstFlowReturn flow = priv->matcher->take (frame_duration, pair.buffers);
+  warn_if_nothing_pairs (self, flow == GST_FLOW_OK);
+  if (flow == GST_FLOW_OK) {
+    const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
+    pair.running = gstrange::running_time_of (priv->pads[0], pair.buffers.first);
+    pair.capture = gstrange::capture_time_of (priv->pads[0], pair.buffers.first, live);
+  }
+  const GstFlowReturn pushed = push_gap (self);
+  return pushed == GST_FLOW_OK ? flow : pushed;
+}
+
+/* Gives up the pair that waits if the sink would throw its depth away. */
+static bool
+drop_if_late (GstStereoDepth *self)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  const GstClockTime running = priv->pair.running;
+  GstClockTime earliest;
+  guint64 frames, dropped;
+  double proportion;
+  {
+    std::lock_guard guard (priv->lock);
+    earliest = priv->earliest;
+    if (!priv->properties.qos || !GST_CLOCK_TIME_IS_VALID (earliest) ||
+        !GST_CLOCK_TIME_IS_VALID (running) || running > earliest)
+      return false;
+    dropped = ++priv->dropped_late;
+    frames = priv->frames;
+    proportion = priv->proportion;
+  }
+  GstBuffer *left = priv->pair.buffers.first;
+  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
+  GST_OBJECT_LOCK (priv->pads[0]);
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time (&priv->pads[0]->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (left));
+  GST_OBJECT_UNLOCK (priv->pads[0]);
+  GstMessage *message = gst_message_new_qos (GST_OBJECT (self), live, running, stream_time,
+      GST_BUFFER_PTS (left), GST_BUFFER_DURATION (left));
+  gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), proportion, 1000000);
+  gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, frames, dropped);
+  gst_element_post_message (GST_ELEMENT (self), message);
+  priv->discont = true;
+  forget_pair (priv);
+  return true;
+}
+
+/* Live, the element's own latency is for the third camera to be late and for matching. */
+static void
+learn_head_start (GstStereoDepth *self)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  guint64 latency = 0;
+  g_object_get (self, "latency", &latency, nullptr);
+  std::lock_guard guard (priv->lock);
+  if (priv->frames > 0)
+    priv->head_start = std::min<GstClockTime> (latency, priv->match_time / priv->frames);
 }
 
 static GstFlowReturn
@@ -493,21 +714,59 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
+  forget_released_third (priv);
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   if (priv->have_info[0] && priv->info[0].fps_n > 0)
     duration = gst_util_uint64_scale_int (GST_SECOND, priv->info[0].fps_d, priv->info[0].fps_n);
-  if (!priv->pair.first)
-    if (const GstFlowReturn flow = priv->matcher->take (duration, priv->pair); flow != GST_FLOW_OK)
+  if (!priv->pair.buffers.first)
+    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK)
       return flow;
+  if (drop_if_late (self))
+    return GST_FLOW_OK;
   GstBuffer *third = nullptr;
   if (const GstFlowReturn flow = take_third (self, duration, timeout, &third); flow != GST_FLOW_OK)
     return flow;
-  GstFlowReturn flow = priv->negotiate ? negotiate (self) : GST_FLOW_OK;
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (priv->negotiate || (priv->third_changed && third))
+    flow = negotiate (self, third != nullptr);
   if (flow == GST_FLOW_OK)
     flow = push_pair (self, third);
   gst_clear_buffer (&third);
   forget_pair (priv);
+  learn_head_start (self);
   return flow;
+}
+
+/* Live, the third camera is waited for until the latency is over. Without left or right there is
+ * nothing to put out, and so no deadline. Called by the streaming thread. */
+static GstClockTime
+gst_stereo_depth_get_next_time (GstAggregator *aggregator)
+{
+  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  GstClockTime time = priv->pair.running;
+  if (!priv->pair.buffers.first) {
+    int n = 0;
+    for (GstAggregatorPad *pad : priv->pads)
+      if (gst_aggregator_pad_is_eos (pad))
+        return 0; /* the end, whatever the third camera does */
+      else if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
+        time = std::min (time, gstrange::running_time_of (pad, buffer)); /* NONE is greatest */
+        gst_buffer_unref (buffer);
+        n++;
+      }
+    if (n < 2)
+      return GST_CLOCK_TIME_NONE;
+  }
+  return GST_CLOCK_TIME_IS_VALID (time) ? time - std::min (time, priv->head_start) : time;
+}
+
+/* Strides and offsets are taken as they are. */
+static gboolean
+gst_stereo_depth_propose_allocation (
+    GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
+{
+  gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
+  return TRUE;
 }
 
 static GstFlowReturn
@@ -517,6 +776,12 @@ gst_stereo_depth_flush (GstAggregator *aggregator)
   priv->since_refresh = 0;
   priv->core.forget ();
   forget_pair (priv);
+  priv->position = 0;
+  priv->segment_sent = priv->discont = false;
+  GstClockTime begin, end;
+  priv->matcher->take_gap (begin, end);
+  std::lock_guard guard (priv->lock);
+  priv->earliest = GST_CLOCK_TIME_NONE;
   return GST_FLOW_OK;
 }
 
@@ -533,6 +798,13 @@ gst_stereo_depth_create_new_pad (
       GST_PAD_SINK, "template", pad_template, nullptr));
 }
 
+static void
+gst_stereo_depth_release_pad (GstElement *element, GstPad *pad)
+{
+  GST_ELEMENT_CLASS (gst_stereo_depth_parent_class)->release_pad (element, pad);
+  GST_STEREO_DEPTH (element)->priv->third_released = true;
+}
+
 /* ---- life ---- */
 
 static gboolean
@@ -542,10 +814,14 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   for (bool &have : priv->have_info)
     have = false;
   priv->negotiate = true;
+  priv->third_changed = priv->third_released = false;
+  priv->said_unpaired = priv->segment_sent = priv->discont = false;
+  priv->dropped_before = priv->position = priv->head_start = 0;
   priv->matcher->reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
-  priv->match_time = 0;
+  priv->dropped_late = priv->match_time = 0;
+  priv->earliest = GST_CLOCK_TIME_NONE;
   priv->wanted = {};
   return TRUE;
 }
@@ -640,6 +916,9 @@ gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, G
     case PROP_N_THREADS:
       p.core.n_threads = g_value_get_int (value);
       break;
+    case PROP_QOS:
+      p.qos = g_value_get_boolean (value);
+      break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
@@ -655,6 +934,7 @@ make_stats (const GstStereoDepthPrivate *priv)
       "dropped-left", G_TYPE_UINT64, priv->matcher->dropped_first (),   //
       "dropped-right", G_TYPE_UINT64, priv->matcher->dropped_second (), //
       "dropped-third", G_TYPE_UINT64, priv->dropped_third,              //
+      "dropped-late", G_TYPE_UINT64, priv->dropped_late,                //
       "match-time", G_TYPE_UINT64, priv->match_time, nullptr);
 }
 
@@ -736,6 +1016,9 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
       break;
     case PROP_N_THREADS:
       g_value_set_int (value, p.core.n_threads);
+      break;
+    case PROP_QOS:
+      g_value_set_boolean (value, p.qos);
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
@@ -882,10 +1165,14 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   object_class->finalize = gst_stereo_depth_finalize;
   install_calibration_properties (object_class);
   install_matching_properties (object_class);
+  g_object_class_install_property (object_class, PROP_QOS,
+      g_param_spec_boolean ("qos", "QoS",
+          "Do not match pictures whose depth would come too late to be shown (default true)", true,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
-          "dropped-right, dropped-third, match-time (ns)",
+          "dropped-right, dropped-third, dropped-late, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   for (GstStaticPadTemplate *pad_template :
@@ -896,6 +1183,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
       "Makes range images of a stereo pair of cameras, or of three cameras", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_STEREO_DEPTH_ALGORITHM, GstPluginAPIFlags (0));
 
+  element_class->release_pad = gst_stereo_depth_release_pad;
   aggregator_class->start = gst_stereo_depth_start;
   aggregator_class->stop = gst_stereo_depth_stop;
   aggregator_class->flush = gst_stereo_depth_flush;
@@ -905,6 +1193,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->create_new_pad = gst_stereo_depth_create_new_pad;
   aggregator_class->clip = gstrange::clip_to_segment;
   aggregator_class->aggregate = gst_stereo_depth_aggregate;
+  aggregator_class->get_next_time = gst_stereo_depth_get_next_time;
+  aggregator_class->propose_allocation = gst_stereo_depth_propose_allocation;
 
   GST_DEBUG_CATEGORY_INIT (gst_stereo_depth_debug, "stereodepth", 0, "Stereo depth");
 }

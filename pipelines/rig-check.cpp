@@ -205,15 +205,12 @@ constexpr double kFieldDeg = 45;
 static View
 with_few_pixels (View view)
 {
-  const auto shrink = [] (int &size, double &f, double &c) {
-    constexpr int kMost = 1024;
-    const double scale = double (std::min (size, kMost)) / size;
-    size = std::min (size, kMost);
-    f *= scale;
-    c = (c + 0.5) * scale - 0.5;
-  };
-  shrink (view.width, view.intrinsics.fx, view.intrinsics.cx);
-  shrink (view.height, view.intrinsics.fy, view.intrinsics.cy);
+  constexpr int kMost = 1024;
+  const int width = std::min (view.width, kMost), height = std::min (view.height, kMost);
+  view.intrinsics =
+      view.intrinsics.scaled (double (width) / view.width, double (height) / view.height);
+  view.width = width;
+  view.height = height;
   return view;
 }
 

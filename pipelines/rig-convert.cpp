@@ -41,20 +41,17 @@ static constexpr int kWrongUsage = 2;
 /* Level at the world's origin, looking along -z with y up. */
 static const Pose kLevel = {{1, 0, 0, 0, -1, 0, 0, 0, -1}, {}};
 
-/* (0, 0) is the centre of the first pixel, so its corner, at -0.5, is what scaling leaves alone. */
-static Intrinsics
-scaled (const Intrinsics &k, double scale)
-{
-  return {k.fx * scale, k.fy * scale, (k.cx + 0.5) * scale - 0.5, (k.cy + 0.5) * scale - 0.5};
-}
-
+/* To whole pixels, as pictures are scaled; rangecast::validate() says whether the size will do. */
 static void
 scale_view (View &view, double scale)
 {
-  view.width = int (std::lround (view.width * scale));
-  view.height = int (std::lround (view.height * scale));
-  view.intrinsics = scaled (view.intrinsics, scale);
-  view.right->intrinsics = scaled (view.right->intrinsics, scale);
+  const int width = int (std::lround (view.width * scale)),
+            height = int (std::lround (view.height * scale));
+  const double sx = double (width) / view.width, sy = double (height) / view.height;
+  view.width = width;
+  view.height = height;
+  view.intrinsics = view.intrinsics.scaled (sx, sy);
+  view.right->intrinsics = view.right->intrinsics.scaled (sx, sy);
 }
 
 /* ---- files that OpenCV reads ---- */

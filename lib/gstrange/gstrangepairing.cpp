@@ -77,6 +77,36 @@ without_partner (GstBuffer *const buffers[2], const GstClockTime times[2], GstCl
   return -1;
 }
 
+GstClockTime
+pairing_tolerance (GstClockTime frame_duration)
+{
+  constexpr GstClockTime kUnknownRate = 5 * GST_MSECOND;
+  return GST_CLOCK_TIME_IS_VALID (frame_duration) ? frame_duration / 2 : kUnknownRate;
+}
+
+/* What a gap took with it is as long as a frame if it does not say how long it is. */
+void
+PairMatcher::note_gap (GstBuffer *dropped, GstClockTime time, GstClockTime tolerance)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (time))
+    return;
+  const GstClockTime length =
+      GST_BUFFER_DURATION_IS_VALID (dropped) ? GST_BUFFER_DURATION (dropped) : 2 * tolerance;
+  const GstClockTime end = time + std::min (length, GST_CLOCK_TIME_NONE - 1 - time);
+  gap_end_ = GST_CLOCK_TIME_IS_VALID (gap_begin_) ? std::max (gap_end_, end) : end;
+  gap_begin_ = std::min (gap_begin_, time); /* NONE is the greatest number */
+}
+
+bool
+PairMatcher::take_gap (GstClockTime &begin, GstClockTime &end)
+{
+  const bool any = GST_CLOCK_TIME_IS_VALID (gap_begin_);
+  begin = gap_begin_;
+  end = gap_end_;
+  gap_begin_ = GST_CLOCK_TIME_NONE;
+  return any;
+}
+
 GstFlowReturn
 PairMatcher::look (GstClockTime tolerance, int &drop)
 {
@@ -94,6 +124,8 @@ PairMatcher::look (GstClockTime tolerance, int &drop)
     drop = without_partner (buffers, times, tolerance);
     if (drop >= 0 && !is_gap (buffers[drop]))
       dropped_[drop]++;
+    if (drop >= 0 && (is_gap (buffers[0]) || is_gap (buffers[1])))
+      note_gap (buffers[drop], times[drop], tolerance);
   }
   gst_clear_buffer (&buffers[0]);
   gst_clear_buffer (&buffers[1]);
@@ -103,8 +135,7 @@ PairMatcher::look (GstClockTime tolerance, int &drop)
 GstFlowReturn
 PairMatcher::take (GstClockTime frame_duration, Pair &pair)
 {
-  const GstClockTime tolerance =
-      GST_CLOCK_TIME_IS_VALID (frame_duration) ? frame_duration / 2 : GstClockTime{0};
+  const GstClockTime tolerance = pairing_tolerance (frame_duration);
   for (int drop = 0; drop >= 0;) {
     if (const GstFlowReturn flow = look (tolerance, drop); flow != GST_FLOW_OK)
       return flow;

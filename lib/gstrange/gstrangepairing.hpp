@@ -9,6 +9,10 @@
 
 namespace gstrange {
 
+/** How far the running times of buffers that belong together may lie apart, ns: half a frame, or 5
+ * ms if the duration of frames is GST_CLOCK_TIME_NONE. */
+GST_RANGE_API GstClockTime pairing_tolerance (GstClockTime frame_duration);
+
 /** Pairs the buffers of two pads of one aggregator by running time; for the streaming thread. */
 class GST_RANGE_API PairMatcher {
 public:
@@ -19,23 +23,34 @@ public:
     GstBuffer *second = nullptr; ///< transfer full
   };
 
-  /** Takes the next pair. Buffers whose running times differ by no more than half the frame
-   *  duration belong together; the older of two that do not is dropped and counted. Buffers
-   *  without PTS are paired as they come. A GAP drops, and counts, what the other pad has for the
-   *  same time.
-   *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE: then only equal running times match
+  /** Takes the next pair. Buffers whose running times differ by no more than pairing_tolerance()
+   *  belong together; the older of two that do not is dropped and counted. Buffers without PTS are
+   *  paired as they come. A GAP drops, and counts, what the other pad has for the same time.
+   *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has nothing */
   GstFlowReturn take (GstClockTime frame_duration, Pair &pair);
 
+  /** The time, in running time, of which take() found since the last call that there will be no
+   * pair because of GAPs.
+   *  @return false if there is none */
+  bool take_gap (GstClockTime &begin, GstClockTime &end);
+
   [[nodiscard]] guint64 dropped_first () const { return dropped_[0]; }
   [[nodiscard]] guint64 dropped_second () const { return dropped_[1]; }
-  void reset () { dropped_[0] = dropped_[1] = 0; }
+  void reset ()
+  {
+    dropped_[0] = dropped_[1] = 0;
+    gap_begin_ = GST_CLOCK_TIME_NONE;
+  }
 
 private:
   GstFlowReturn look (GstClockTime tolerance, int &drop);
 
+  void note_gap (GstBuffer *dropped, GstClockTime time, GstClockTime tolerance);
+
   GstAggregatorPad *pads_[2];
+  GstClockTime gap_begin_ = GST_CLOCK_TIME_NONE, gap_end_ = 0;
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
 

@@ -10,6 +10,7 @@ using namespace rangecast;
 using namespace rangecast::testing;
 
 static constexpr GstClockTime kFrame = GST_SECOND / 25;
+static constexpr const char *kSmall = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
 static constexpr const char *kProperties = "focal-length=160 baseline=0.1 near=0.3 far=1.5";
 
 struct Stereo {
@@ -116,9 +117,10 @@ GST_START_TEST (test_capture_time_is_the_left_cameras)
 GST_END_TEST;
 
 static std::string
-error_of (const std::string &properties, const char *right_caps)
+error_of (const std::string &properties, const char *right_caps,
+    const char *left_caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1")
 {
-  Stereo s (properties, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1", right_caps);
+  Stereo s (properties, left_caps, right_caps);
   s.push (s.left, 0);
   s.push (s.right, 0);
   const std::string text = next_message_text (s.bus, GST_MESSAGE_ERROR);
@@ -302,18 +304,65 @@ GST_START_TEST (test_latency_is_that_of_the_slower_camera_and_its_own)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_rig_without_the_view_or_of_another_size_is_one_error)
+/* A rig file of the ring's first view with cameras beside and above it, 320x240. */
+struct RigFile {
+  gchar *path;
+
+  explicit RigFile (bool with_third = true)
+      : path (g_strdup_printf (
+            "%s/stereodepth-%d-%d.yaml", g_get_tmp_dir (), int (getpid ()), g_random_int ()))
+  {
+    Rig rig = ring_rig (1);
+    View &view = rig.views[0];
+    view.right = PartnerCamera{view.intrinsics, {}, {kIdentity3, {-0.1, 0, 0}}};
+    if (with_third)
+      view.third = PartnerCamera{view.intrinsics, {}, {kIdentity3, {0, 0.1, 0}}};
+    fail_unless (save_rig (path, rig).ok ());
+  }
+  ~RigFile ()
+  {
+    g_unlink (path);
+    g_free (path);
+  }
+  std::string property () const { return std::string ("rig=") + path; }
+};
+
+GST_START_TEST (test_rig_without_the_view_or_of_another_shape_is_one_error)
 {
   const char *same = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
-  gchar *path = g_strdup_printf ("%s/stereodepth-rig-%d.yaml", g_get_tmp_dir (), int (getpid ()));
-  Rig rig = ring_rig (2);
-  fail_unless (save_rig (path, rig).ok ());
-  const std::string file = std::string ("rig=") + path;
-  const std::string missing = error_of (file + " view-id=7", same);
+  const char *square = "video/x-raw,format=RGBx,width=160,height=160,framerate=25/1";
+  RigFile rig;
+  const std::string missing = error_of (rig.property () + " view-id=7", same);
   fail_unless (missing.find ("no view with view-id 7") != std::string::npos, missing.c_str ());
-  fail_unless (error_of (file, same).find ("320x240") != std::string::npos);
-  g_unlink (path);
-  g_free (path);
+  const std::string shape = error_of (rig.property (), square, square);
+  fail_unless (shape.find (rig.path) != std::string::npos, shape.c_str ());
+  fail_unless (shape.find ("320x240") != std::string::npos, shape.c_str ());
+  fail_unless (shape.find ("160x160") != std::string::npos, shape.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_of_another_size_is_scaled_to_the_pictures)
+{
+  RigFile rig;
+  Stereo s (rig.property ());
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless (output != nullptr, "%s", next_message_text (s.bus, GST_MESSAGE_ERROR).c_str ());
+  GstCaps *caps = gst_pad_get_current_caps (s.left->sinkpad);
+  gstrange::RangeInfo info;
+  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  const View &view = info.rig.views[0];
+  fail_unless_equals_int (view.width, 160);
+  fail_unless_equals_int (view.height, 120);
+  fail_unless_equals_float (view.intrinsics.fx, 160);
+  fail_unless_equals_float (view.intrinsics.cx, 79.5); /* (159.5 + 0.5) / 2 - 0.5 */
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless (std::abs (frame.views ()[0].depth.at (100, 60) - 8000) < 100);
+  }
+  gst_caps_unref (caps);
+  gst_buffer_unref (output);
 }
 GST_END_TEST;
 
@@ -484,21 +533,344 @@ GST_START_TEST (test_exchanged_cameras_are_one_warning_that_names_the_cure)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_third_camera_without_calibration_or_of_another_size_is_one_error)
-{
+/* Left, right and a third camera of a rig, 160x120. */
+struct Trio {
+  RigFile rig;
   Stereo s;
-  GstPad *pad = gst_element_request_pad_simple (s.left->element, "third");
-  fail_unless (pad != nullptr);
-  GstHarness *third = gst_harness_new_with_element (s.left->element, "third", nullptr);
+  GstPad *pad;
+  GstHarness *third;
+
+  explicit Trio (const char *properties = "", bool calibrated = true)
+      : rig (calibrated), s (rig.property () + " " + properties)
+  {
+    pad = gst_element_request_pad_simple (s.left->element, "third");
+    third = gst_harness_new_with_element (s.left->element, "third", nullptr);
+    gst_harness_set_live (third, FALSE);
+    gst_harness_set_src_caps_str (third, kSmall);
+  }
+  ~Trio ()
+  {
+    gst_harness_teardown (third);
+    gst_object_unref (pad);
+  }
+  void push_pair (GstClockTime pts)
+  {
+    s.push (s.left, pts);
+    s.push (s.right, pts);
+  }
+  /* A picture of random bytes. */
+  static void push_noise (GstHarness *h, int width, int height, int bytes, GstClockTime pts)
+  {
+    GstBuffer *buffer = gst_buffer_new_allocate (nullptr, width * height * bytes, nullptr);
+    gst_buffer_memset (buffer, 0, 77, gst_buffer_get_size (buffer));
+    GST_BUFFER_PTS (buffer) = pts;
+    gst_harness_push (h, buffer);
+  }
+  void pull (GstClockTime pts, int width = 160)
+  {
+    GstBuffer *output = gst_harness_pull (s.left);
+    fail_unless (output != nullptr, "'%s'", next_message_text (s.bus, GST_MESSAGE_ERROR).c_str ());
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), pts);
+    fail_unless_equals_int (gst_buffer_get_range_meta (output, 0)->width, width);
+    gst_buffer_unref (output);
+  }
+};
+
+static void
+expect_one_error (Trio &t, const char *what)
+{
+  const std::string text = next_message_text (t.s.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("pad third") != std::string::npos, "'%s'", text.c_str ());
+  fail_unless (text.find (what) != std::string::npos, "'%s'", text.c_str ());
+  GstMessage *another = gst_bus_pop_filtered (t.s.bus, GST_MESSAGE_ERROR);
+  fail_unless (another == nullptr, "a second error after '%s'", text.c_str ());
+}
+
+GST_START_TEST (test_third_camera_without_calibration_is_one_error)
+{
+  Trio t ("", false);
+  t.s.push (t.third, 0);
+  t.push_pair (0);
+  expect_one_error (t, "no calibration");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_third_camera_of_another_size_is_one_error)
+{
+  Trio t;
   gst_harness_set_src_caps_str (
-      third, "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1");
-  gst_harness_push (third, Stereo::dots (false, 0));
+      t.third, "video/x-raw,format=GRAY8,width=80,height=60,framerate=25/1");
+  Trio::push_noise (t.third, 80, 60, 1, 0);
+  t.push_pair (0);
+  expect_one_error (t, "80x60");
+}
+GST_END_TEST;
+
+/* Left and right change from grey to colour, whose pictures are larger, while a grey pair waits for
+ * its third picture. */
+GST_START_TEST (test_pair_that_waits_for_the_third_is_read_as_it_came)
+{
+  Trio t;
+  t.s.push (t.third, 0);
+  for (GstHarness *h : {t.s.left, t.s.right}) {
+    gst_harness_set_src_caps_str (
+        h, "video/x-raw,format=GRAY8,width=160,height=120,framerate=25/1");
+    Trio::push_noise (h, 160, 120, 1, kFrame);
+  }
+  for (GstHarness *h : {t.s.left, t.s.right})
+    gst_harness_set_src_caps_str (h, kSmall);
+  t.push_pair (2 * kFrame);
+  t.s.push (t.third, kFrame);
+  t.pull (kFrame);
+  t.s.push (t.third, 2 * kFrame);
+  t.pull (2 * kFrame);
+  fail_unless_equals_uint64 (t.s.stat ("third-frames"), 2);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_all_three_cameras_may_change_their_size_one_after_the_other)
+{
+  static const char *kLarge = "video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1";
+  Trio t;
+  t.push_pair (0);
+  /* The third camera's picture 0 was lost; its next is larger, as are those of the others. */
+  gst_harness_set_src_caps_str (t.third, kLarge);
+  Trio::push_noise (t.third, 320, 240, 1, kFrame);
+  t.pull (0);
+  for (GstHarness *h : {t.s.left, t.s.right}) {
+    gst_harness_set_src_caps_str (h, kLarge);
+    Trio::push_noise (h, 320, 240, 1, kFrame);
+  }
+  t.pull (kFrame, 320);
+  fail_unless_equals_uint64 (t.s.stat ("third-frames"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_third_pad_that_is_released_is_forgotten)
+{
+  Trio t ("", false); /* not calibrated: an error if it counted */
+  GstQuery *query = gst_query_new_allocation (nullptr, FALSE);
+  gst_pad_peer_query (t.third->srcpad, query); /* after it, the caps have been seen */
+  gst_query_unref (query);
+  gst_element_release_request_pad (t.s.left->element, t.pad);
+  t.push_pair (0);
+  t.pull (0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_live_a_silent_third_camera_costs_the_latency_and_no_frame)
+{
+  RigFile rig;
+  GstElement *element =
+      gst_parse_launch (("stereodepth latency=20000000 " + rig.property ()).c_str (), nullptr);
+  GstHarness *left = gst_harness_new_with_element (element, "left", "src");
+  GstHarness *right = gst_harness_new_with_element (element, "right", nullptr);
+  GstHarness *third = gst_harness_new_with_element (element, "third", nullptr);
+  gst_object_unref (element);
+  gst_harness_use_testclock (left);
+  for (GstHarness *h : {left, right, third}) {
+    gst_harness_set_live (h, TRUE);
+    gst_harness_set_src_caps_str (h, kSmall);
+  }
+  gst_harness_play (left);
+  for (int i = 0; i < 4; i++) {
+    gst_harness_push (left, Stereo::dots (false, i * kFrame));
+    gst_harness_push (right, Stereo::dots (true, i * kFrame));
+    if (i == 3) /* it is back */
+      gst_harness_push (third, Stereo::dots (false, i * kFrame));
+    else {
+      fail_unless (gst_harness_wait_for_clock_id_waits (left, 1, 5));
+      GstTestClock *clock = gst_harness_get_testclock (left);
+      GstClockID waited = nullptr;
+      gst_test_clock_wait_for_next_pending_id (clock, &waited);
+      const GstClockTime deadline = gst_clock_id_get_time (waited) - i * kFrame;
+      fail_unless (deadline <= 20 * GST_MSECOND && (i > 0 || deadline == 20 * GST_MSECOND));
+      gst_clock_id_unref (waited);
+      gst_object_unref (clock);
+      fail_unless (gst_harness_crank_single_clock_wait (left));
+    }
+    GstBuffer *output = gst_harness_pull (left);
+    fail_unless (output != nullptr);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), i * kFrame);
+    gst_buffer_unref (output);
+  }
+  GstStructure *stats;
+  g_object_get (left->element, "stats", &stats, nullptr);
+  fail_unless_equals_uint64 (field (stats, "third-frames"), 1);
+  fail_unless_equals_uint64 (field (stats, "dropped-left"), 0);
+  gst_structure_free (stats);
+  for (GstHarness *h : {third, right, left})
+    gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_live_the_stream_ends_though_the_third_camera_is_silent)
+{
+  RigFile rig;
+  const std::string camera = std::string ("videotestsrc is-live=true num-buffers=3 ! ") + kSmall;
+  const std::string line = camera + " ! d.left " + camera + " ! d.right " + camera +
+                           " ! valve drop=true ! d.third stereodepth name=d latency=40000000 " +
+                           rig.property () + " ! fakesink";
+  GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_wanted_part_outlives_caps_of_the_same_size)
+{
+  Stereo s (std::string (kProperties) + " refresh-interval=1000");
   s.push (s.left, 0);
   s.push (s.right, 0);
-  const std::string text = next_message_text (s.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("pad third") != std::string::npos, "'%s'", text.c_str ());
-  gst_harness_teardown (third);
-  gst_object_unref (pad);
+  gst_buffer_unref (gst_harness_pull (s.left));
+  want (s, 50, 20, 60, 70);
+  for (GstHarness *h : {s.left, s.right})
+    gst_harness_set_src_caps_str (h, "video/x-raw,format=RGBA,width=160,height=120,framerate=25/1");
+  for (int i = 1; i < 3; i++) { /* the first one as a whole: nothing is known of it */
+    s.push (s.left, i * kFrame);
+    s.push (s.right, i * kFrame);
+    GstBuffer *output = gst_harness_pull (s.left);
+    if (i == 2)
+      fail_unless_equals_int (gst_buffer_get_range_meta (output, 0)->width, 60);
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
+/* The next GAP that comes out, and nothing but what must be before it. */
+static void
+expect_gap (Stereo &s, GstClockTime begin, GstClockTime length)
+{
+  for (bool segment = false;;) {
+    GstEvent *event = gst_harness_pull_event (s.left);
+    fail_unless (event != nullptr, "no GAP");
+    const GstEventType type = GST_EVENT_TYPE (event);
+    GstClockTime time = 0, duration = 0;
+    if (type == GST_EVENT_GAP)
+      gst_event_parse_gap (event, &time, &duration);
+    gst_event_unref (event);
+    segment |= type == GST_EVENT_SEGMENT;
+    if (type != GST_EVENT_GAP)
+      continue;
+    fail_unless (segment, "a GAP before the segment");
+    fail_unless_equals_uint64 (time, begin);
+    fail_unless_equals_uint64 (duration, length);
+    return;
+  }
+}
+
+GST_START_TEST (test_gap_on_both_pads_is_a_gap)
+{
+  Stereo s;
+  for (GstHarness *h : {s.left, s.right})
+    gst_harness_push_event (h, gst_event_new_gap (0, 10 * kFrame));
+  expect_gap (s, 0, 10 * kFrame);
+  s.push (s.left, 10 * kFrame);
+  s.push (s.right, 10 * kFrame);
+  gst_buffer_unref (gst_harness_pull (s.left));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_gap_that_takes_a_picture_with_it_is_a_gap)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  gst_harness_push_event (s.right, gst_event_new_gap (0, kFrame));
+  expect_gap (s, 0, kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_gap_after_a_flush_follows_a_segment)
+{
+  Stereo s;
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  gst_buffer_unref (gst_harness_pull (s.left));
+  const guint32 seek = gst_util_seqnum_next (); /* the same for both: one flush of the element */
+  for (const bool start : {true, false})
+    for (GstHarness *h : {s.left, s.right}) {
+      GstEvent *event = start ? gst_event_new_flush_start () : gst_event_new_flush_stop (TRUE);
+      gst_event_set_seqnum (event, seek);
+      gst_harness_push_event (h, event);
+    }
+  while (GstEvent *event = gst_harness_try_pull_event (s.left))
+    gst_event_unref (event);
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  for (GstHarness *h : {s.left, s.right}) {
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+    gst_harness_push_event (h, gst_event_new_gap (0, kFrame));
+  }
+  expect_gap (s, 0, kFrame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_late_frames_are_dropped_before_matching_and_said)
+{
+  for (const bool qos : {true, false}) {
+    Stereo s (std::string (kProperties) + (qos ? "" : " qos=false"));
+    s.push (s.left, 0);
+    s.push (s.right, 0);
+    gst_buffer_unref (gst_harness_pull (s.left));
+    gst_harness_push_upstream_event (
+        s.left, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2.0, kFrame, 0));
+    for (int i = 1; i < 4; i++) {
+      s.push (s.left, i * kFrame);
+      s.push (s.right, i * kFrame);
+    }
+    GstBuffer *output = gst_harness_pull (s.left);
+    /* Not live, twice what is late already is left out. */
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), (qos ? 3 : 1) * kFrame);
+    fail_unless_equals_int (GST_BUFFER_IS_DISCONT (output), qos);
+    gst_buffer_unref (output);
+    fail_unless_equals_uint64 (s.stat ("dropped-late"), qos ? 2 : 0);
+    GstMessage *message = gst_bus_pop_filtered (s.bus, GST_MESSAGE_QOS);
+    fail_unless ((message != nullptr) == qos);
+    gst_clear_message (&message);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_sources_with_padded_rows_need_not_copy)
+{
+  Stereo s;
+  GstCaps *caps = gst_caps_from_string (kSmall);
+  GstQuery *query = gst_query_new_allocation (caps, FALSE);
+  fail_unless (gst_pad_peer_query (s.left->srcpad, query));
+  fail_unless (gst_query_find_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr));
+  gst_query_unref (query);
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_without_a_framerate_pictures_5_ms_apart_are_a_pair)
+{
+  const char *caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=0/1";
+  Stereo s (kProperties, caps, caps);
+  s.push (s.left, kFrame);
+  s.push (s.right, kFrame + 5 * GST_MSECOND);
+  gst_buffer_unref (gst_harness_pull (s.left));
+  s.push (s.left, 2 * kFrame);
+  s.push (s.right, 2 * kFrame + 5 * GST_MSECOND + 1); /* too far */
+  s.push (s.left, 3 * kFrame);
+  s.push (s.right, 3 * kFrame);
+  GstBuffer *output = gst_harness_pull (s.left);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 3 * kFrame);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_cameras_that_never_take_a_picture_at_once_are_one_warning)
+{
+  const char *caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=0/1";
+  Stereo s (kProperties, caps, caps);
+  for (int i = 0; i < 150; i++) {
+    s.push (s.left, i * kFrame);
+    s.push (s.right, i * kFrame + kFrame / 2);
+  }
+  const std::string text = next_message_text (s.bus, GST_MESSAGE_WARNING);
+  fail_unless (text.find ("pairs") != std::string::npos, "'%s'", text.c_str ());
+  fail_unless (gst_bus_pop_filtered (s.bus, GST_MESSAGE_WARNING) == nullptr);
 }
 GST_END_TEST;
 
@@ -518,7 +890,8 @@ stereodepth_suite ()
   tcase_add_test (tc, test_new_size_in_the_stream_gives_new_caps);
   tcase_add_test (tc, test_gap_on_one_pad_costs_the_others_picture_and_nothing_else);
   tcase_add_test (tc, test_latency_is_that_of_the_slower_camera_and_its_own);
-  tcase_add_test (tc, test_rig_without_the_view_or_of_another_size_is_one_error);
+  tcase_add_test (tc, test_rig_without_the_view_or_of_another_shape_is_one_error);
+  tcase_add_test (tc, test_rig_of_another_size_is_scaled_to_the_pictures);
   tcase_add_test (tc, test_bad_settings_are_one_error_that_names_them);
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_changes_states_twice);
@@ -527,7 +900,21 @@ stereodepth_suite ()
   tcase_add_test (tc, test_third_camera_that_ends_leaves_two);
   tcase_add_test (tc, test_right_camera_of_half_the_rate_halves_the_output);
   tcase_add_test (tc, test_exchanged_cameras_are_one_warning_that_names_the_cure);
-  tcase_add_test (tc, test_third_camera_without_calibration_or_of_another_size_is_one_error);
+  tcase_add_test (tc, test_third_camera_without_calibration_is_one_error);
+  tcase_add_test (tc, test_third_camera_of_another_size_is_one_error);
+  tcase_add_test (tc, test_pair_that_waits_for_the_third_is_read_as_it_came);
+  tcase_add_test (tc, test_all_three_cameras_may_change_their_size_one_after_the_other);
+  tcase_add_test (tc, test_third_pad_that_is_released_is_forgotten);
+  tcase_add_test (tc, test_live_a_silent_third_camera_costs_the_latency_and_no_frame);
+  tcase_add_test (tc, test_live_the_stream_ends_though_the_third_camera_is_silent);
+  tcase_add_test (tc, test_wanted_part_outlives_caps_of_the_same_size);
+  tcase_add_test (tc, test_gap_on_both_pads_is_a_gap);
+  tcase_add_test (tc, test_gap_that_takes_a_picture_with_it_is_a_gap);
+  tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
+  tcase_add_test (tc, test_late_frames_are_dropped_before_matching_and_said);
+  tcase_add_test (tc, test_sources_with_padded_rows_need_not_copy);
+  tcase_add_test (tc, test_without_a_framerate_pictures_5_ms_apart_are_a_pair);
+  tcase_add_test (tc, test_cameras_that_never_take_a_picture_at_once_are_one_warning);
   return suite;
 }
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <rangecast/scene/scene.hpp>
+#include <rangecast/stereo/histogram_range.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 
 using namespace rangecast;
@@ -315,4 +316,37 @@ TEST (Rectification, near_that_needs_more_disparity_than_there_is_picture_is_nam
   view.near_m = 0.05;
   StereoDepth stereo;
   EXPECT_NE (stereo.set (view, {}).message ().find ("near"), std::string::npos);
+}
+
+TEST (Depth, range_of_disparities_leaves_out_half_a_per_cent_at_either_end)
+{
+  std::vector<int> histogram (4096);
+  EXPECT_EQ (without_half_a_per_cent (histogram).high, 4095);
+  histogram[3] = 4;
+  histogram[20] = 496;
+  histogram[30] = 495;
+  histogram[4095] = 5;
+  EXPECT_EQ (without_half_a_per_cent (histogram).low, 20);
+  EXPECT_EQ (without_half_a_per_cent (histogram).high, 4095);
+}
+
+TEST (Depth, range_of_disparities_knows_pictures_of_many_pixels)
+{
+  std::vector<int> histogram (4096);
+  histogram[5] = 12'000'000; /* 200 times that is more than an int holds */
+  histogram[9] = 120'000'000;
+  EXPECT_EQ (without_half_a_per_cent (histogram).low, 5);
+  EXPECT_EQ (without_half_a_per_cent (histogram).high, 9);
+}
+
+TEST (Depth, near_that_no_disparity_can_show_is_refused_however_near)
+{
+  for (const double near_m : {1e-9, 1e-7, 1e-3}) {
+    View view = ideal_pair ();
+    view.near_m = near_m;
+    StereoDepth stereo;
+    const Status status = stereo.set (view, {});
+    EXPECT_EQ (status.code (), StatusCode::kBadValue) << near_m;
+    EXPECT_NE (status.message ().find ("near = "), std::string::npos) << status.message ();
+  }
 }

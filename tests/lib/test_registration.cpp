@@ -230,17 +230,6 @@ TEST (Registration, colour_of_more_pixels_and_the_same_view_loses_nothing)
   }
 }
 
-TEST (Registration, view_is_scaled_to_its_pictures_if_they_have_its_shape)
-{
-  View view = camera (0, 640, 480, 500, {}, 0);
-  view.intrinsics.cx = 319.5;
-  EXPECT_EQ (scale_view (view, 640, 360).code (), StatusCode::kBadSize);
-  EXPECT_EQ (view.width, 640);
-  ASSERT_TRUE (scale_view (view, 1280, 960).ok ());
-  EXPECT_DOUBLE_EQ (view.intrinsics.fx, 1000);
-  EXPECT_DOUBLE_EQ (view.intrinsics.cx, 639.5);
-}
-
 TEST (Registration, cameras_that_look_apart_or_magnify_absurdly_give_nothing_and_take_no_time)
 {
   View d = depth_camera (), away = camera (1, 320, 240, 300, {}, M_PI), huge = colour_camera ();

@@ -241,3 +241,30 @@ TEST (Rig, merge_unites_and_refuses_one_id_for_two_cameras)
   EXPECT_EQ (merge (some, other).code (), StatusCode::kBadValue);
   EXPECT_EQ (some.views.size (), 4u);
 }
+
+TEST (Rig, view_is_scaled_with_its_partners_if_the_shape_fits)
+{
+  View view = rangecast::testing::ring_view (3, 20, 0.8, 640, 480);
+  view.right = PartnerCamera{{500, 510, 300, 200}, {-0.1, 0, 0, 0}, {kIdentity3, {-0.1, 0, 0}}};
+  view.third = PartnerCamera{{400, 410, 310, 210}, {}, {kIdentity3, {0, 0.1, 0}}};
+  EXPECT_EQ (scale_view (view, 640, 360).code (), StatusCode::kBadSize);
+  EXPECT_EQ (scale_view (view, 0, 0).code (), StatusCode::kBadSize);
+  EXPECT_EQ (view.width, 640);
+  ASSERT_TRUE (scale_view (view, 1280, 960).ok ());
+  EXPECT_EQ (view.height, 960);
+  EXPECT_DOUBLE_EQ (view.intrinsics.fx, 1280);
+  EXPECT_DOUBLE_EQ (view.intrinsics.cx, 639.5);
+  EXPECT_DOUBLE_EQ (view.right->intrinsics.fy, 1020);
+  EXPECT_DOUBLE_EQ (view.right->intrinsics.cx, 600.5);
+  EXPECT_DOUBLE_EQ (view.third->intrinsics.cy, 420.5);
+  EXPECT_EQ (view.right->distortion[0], -0.1);
+  EXPECT_EQ (view.right->partner_from_left.translation.x, -0.1);
+}
+
+TEST (Rig, sizes_rounded_to_whole_pixels_have_the_same_shape)
+{
+  View view = rangecast::testing::ring_view (0, 0, 0.8, 1280, 720);
+  EXPECT_TRUE (scale_view (view, 854, 480).ok ());
+  view = rangecast::testing::ring_view (0, 0, 0.8, 1280, 720);
+  EXPECT_EQ (scale_view (view, 848, 480).code (), StatusCode::kBadSize);
+}

@@ -29,7 +29,8 @@ test_unknown_view_id_is_named () {
 
 test_pictures_that_do_not_match_the_rig_are_named () {
   make_rig
-  expect_error "320x240" pair $vga $vga rig=rig.yaml view-id=0
+  local wide=${vga/480/360} # of the same shape they would be scaled
+  expect_error "320x240" pair "$wide" "$wide" rig=rig.yaml view-id=0
 }
 
 test_left_and_right_of_different_size_are_named () {

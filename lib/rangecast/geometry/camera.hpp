@@ -85,6 +85,13 @@ struct Intrinsics {
   {
     return {(u - cx) / fx * z, (v - cy) / fy * z, z};
   }
+
+  /** Of the same camera, its image scaled. (0, 0) is the centre of the first pixel, so it is that
+   *  pixel's corner, at -0.5, that stays where it is. @param sx, sy  > 0 */
+  [[nodiscard]] Intrinsics scaled (double sx, double sy) const
+  {
+    return {fx * sx, fy * sy, (cx + 0.5) * sx - 0.5, (cy + 0.5) * sy - 0.5};
+  }
 };
 
 /** Lens distortion in OpenCV's order (k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]]):

@@ -13,6 +13,12 @@ bad_field (const View &view, const std::string &what)
   return {StatusCode::kBadValue, "view " + std::to_string (view.id) + ": " + what};
 }
 
+std::string
+size_text (int width, int height)
+{
+  return std::to_string (width) + "x" + std::to_string (height);
+}
+
 bool
 all_finite (std::span<const double> values)
 {
@@ -87,9 +93,8 @@ check_view (const View &view)
     return bad_field (view, "name is longer than 255 bytes");
   if (view.width < 1 || view.height < 1 || view.width > kMaxImageSide ||
       view.height > kMaxImageSide)
-    return bad_field (view, "image size " + std::to_string (view.width) + "x" +
-                                std::to_string (view.height) + ": expected 1 to " +
-                                std::to_string (kMaxImageSide) + " each");
+    return bad_field (view, "image size " + size_text (view.width, view.height) +
+                                ": expected 1 to " + std::to_string (kMaxImageSide) + " each");
   if (Status s = check_lens (view, view.intrinsics, view.distortion, ""); !s.ok ())
     return s;
   if (Status s = check_pose (view, view.world_from_view, "world_from_view"); !s.ok ())
@@ -121,6 +126,26 @@ check_pixels (const Rig &rig)
 }
 
 } // namespace
+
+Status
+scale_view (View &view, int width, int height)
+{
+  if (view.width == width && view.height == height)
+    return {};
+  const double sx = double (width) / view.width, sy = double (height) / view.height;
+  if (!(std::abs (sx / sy - 1) <= kShapeTolerance))
+    return {StatusCode::kBadSize, "view " + std::to_string (view.id) + " is " +
+                                      size_text (view.width, view.height) + ", the pictures are " +
+                                      size_text (width, height) +
+                                      "; expected the same shape, then it is scaled"};
+  view.width = width;
+  view.height = height;
+  view.intrinsics = view.intrinsics.scaled (sx, sy);
+  for (auto *partner : {&view.right, &view.third})
+    if (*partner)
+      (*partner)->intrinsics = (*partner)->intrinsics.scaled (sx, sy);
+  return {};
+}
 
 const View *
 Rig::find (int view_id) const

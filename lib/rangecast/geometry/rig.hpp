@@ -42,6 +42,16 @@ struct View {
 
 inline constexpr std::size_t kMaxViewName = 255;
 
+/** How far the scales of width and height may differ: image sizes are whole numbers, 854x480 is the
+ *  shape of 1280x720. */
+inline constexpr double kShapeTolerance = 0.005;
+
+/** The same cameras at another image size: the intrinsics of the view and of its partners scaled.
+ *  Distortion, poses, near and far stay as they are.
+ *  @return kBadSize if the shape differs by more than kShapeTolerance; the view is then untouched
+ */
+Status scale_view (View &view, int width, int height);
+
 /** All views with their calibration. */
 struct Rig {
   std::vector<View> views; ///< 0 .. kMaxViews of them, in any order, ids unique

@@ -44,35 +44,7 @@ mat_of (ImageView<const Rgbx> picture)
       static_cast<std::size_t> (picture.stride)};
 }
 
-std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
-}
-
 } // namespace
-
-Status
-scale_view (View &view, int width, int height)
-{
-  if (view.width == width && view.height == height)
-    return {};
-  const double sx = double (width) / view.width, sy = double (height) / view.height;
-  /* Sizes are whole numbers: 854x480 is the shape of 1280x720. */
-  constexpr double kShape = 0.005;
-  if (std::abs (sx / sy - 1) > kShape)
-    return {StatusCode::kBadSize, "view " + std::to_string (view.id) + " is " +
-                                      size_text (view.width, view.height) + ", the pictures are " +
-                                      size_text (width, height) +
-                                      "; expected the same shape, then it is scaled"};
-  Intrinsics &k = view.intrinsics;
-  k = {k.fx * sx, k.fy * sy, (k.cx + 0.5) * sx - 0.5, (k.cy + 0.5) * sy - 0.5};
-  view.width = width;
-  view.height = height;
-  view.right.reset (); /* partners have the size that the view had */
-  view.third.reset ();
-  return {};
-}
 
 Status
 Registration::set (const View &depth, const View &colour, RegisterInto into)
@@ -99,8 +71,7 @@ Registration::set (const View &depth, const View &colour, RegisterInto into)
     return s;
   const double share = std::min (1.0, depth.intrinsics.fx / colour.intrinsics.fx);
   const Intrinsics &k = colour.intrinsics;
-  shadow_lens_ = {
-      k.fx * share, k.fy * share, (k.cx + 0.5) * share - 0.5, (k.cy + 0.5) * share - 0.5};
+  shadow_lens_ = k.scaled (share, share);
   try {
     hidden_.create (std::max (1, int (std::lround (colour.height * share))),
         std::max (1, int (std::lround (colour.width * share))), CV_32F);

@@ -11,10 +11,6 @@ namespace rangecast {
 /** Whose view a range image of two cameras is. */
 enum class RegisterInto { kDepth, kColour };
 
-/** The same camera at another image size: its intrinsics scaled.
- *  @return kBadSize if the aspect ratio is another; the view is then untouched */
-Status scale_view (View &view, int width, int height);
-
 /** Depth and colour of two cameras that stand side by side, of any sizes, to one range image.
  *
  *  Into depth: every depth stays as it was measured and gets the colour of its point; points that

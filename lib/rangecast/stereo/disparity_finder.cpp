@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -11,6 +12,15 @@ namespace rangecast {
 /* Rows and columns around the ROI that matching looks at, so that its edge is as good as its
  * middle. */
 constexpr int kMargin = 8;
+
+static Status
+needs_too_much (double near_m, double pixels)
+{
+  char text[120];
+  std::snprintf (text, sizeof text,
+      "near = %g m needs disparities of %g pixels, more than the picture is wide", near_m, pixels);
+  return {StatusCode::kBadValue, text};
+}
 
 Status
 DisparityFinder::set (
@@ -21,6 +31,9 @@ DisparityFinder::set (
   filter_.set_threads (settings.n_threads);
   const double farthest =
       settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
+  const double nearest = pair.focal_baseline / near_m - pair.offset; /* int may not hold it */
+  if (!(nearest < pair.width))
+    return needs_too_much (near_m, nearest);
   least_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
   most_ = static_cast<int> (std::ceil (pair.focal_baseline / near_m - pair.offset));
   most_ = std::max (most_, least_ + 1);
@@ -29,9 +42,7 @@ DisparityFinder::set (
   if (Status s = all_.set (settings.match, least_, most_); !s.ok ())
     return s;
   if (all_.reach () >= pair.width)
-    return {StatusCode::kBadValue, "near = " + std::to_string (near_m) +
-                                       " m needs disparities of " + std::to_string (all_.reach ()) +
-                                       " pixels, more than the picture is wide"};
+    return needs_too_much (near_m, all_.reach ());
   return some_.set (settings.match, least_, most_);
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "histogram_range.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -115,11 +117,7 @@ StereoDepth::learn_range (const RangeImage &image)
   near_now_m_ = far_now_m_ = 0;
   if (seen < 64)
     return;
-  int low = 0, high = 4095;
-  for (int n = 0; (n += histogram_[static_cast<std::size_t> (low)]) * 200 < seen;)
-    low++;
-  for (int n = 0; (n += histogram_[static_cast<std::size_t> (high)]) * 200 < seen;)
-    high--;
+  const auto [low, high] = without_half_a_per_cent (histogram_);
   /* Who walks at 1.5 m/s comes 6 cm nearer in a frame of 25: 7 % at 0.85 m. */
   const double margin = 1 + 0.07 * high;
   near_now_m_ = finder_.disparity_at (1) / 16 / (high + 1 + margin);
@@ -142,7 +140,7 @@ StereoDepth::is_suspect (const RangeImage &image) const
       crowd += depth[x] && d[x] > nearest;
     }
   }
-  return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || 100 * crowd > seen;
+  return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || crowd > 0.01 * seen;
 }
 
 Status

@@ -19,8 +19,9 @@ namespace rangecast {
  *  memory between frames. */
 class StereoDepth {
 public:
-  /** @param view  a raw view with a right camera; its near and far set the disparity range */
-  /** @param with_third  the view's third camera takes part: take() gets its pictures */
+  /** @param view        a raw view with a right camera; its near and far set the disparity range
+   *  @param with_third  the view's third camera takes part: take() gets its pictures
+   *  @return what Rectifier, DisparityFinder and ThirdPair say about the view */
   Status set (const View &view, const StereoSettings &settings, bool with_third = false);
 
   /** The view of the range images. */

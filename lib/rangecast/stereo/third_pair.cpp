@@ -32,47 +32,75 @@ bad_third (const View &view, const char *what)
 /* Axes of the rectified pictures: x to the third camera, z as near to the left camera's as may be.
  */
 Status
-ThirdPair::rectify (const View &view)
+ThirdPair::choose_axes (const View &view)
 {
   const Pose &pose = view.third->partner_from_left;
   const Vec3 to_third = -1.0 * (transposed (pose.rotation) * pose.translation);
-  const double baseline = norm (to_third);
-  if (!(baseline > 1e-4))
+  baseline_m_ = norm (to_third);
+  if (!(baseline_m_ > 1e-4))
     return bad_third (view, "stands where the left one is");
-  const Vec3 x = 1 / baseline * to_third, across = cross ({0, 0, 1}, x);
+  const Vec3 x = 1 / baseline_m_ * to_third, across = cross ({0, 0, 1}, x);
   if (norm (across) < 0.5)
     return bad_third (view, "stands before or behind the left one; expected beside or above");
   const Vec3 y = 1 / norm (across) * across, z = cross (x, y);
   rectified_from_left_ = {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
-  fx_ = view.intrinsics.fx;
-  /* As large as holds the corners of the left picture. */
-  double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
-  for (int corner = 0; corner < 4; corner++) {
-    const Vec3 ray = view.intrinsics.unproject (
-        corner & 1 ? view.width - 1 : 0, corner & 2 ? view.height - 1 : 0, 1);
-    const double depth = dot (z, ray);
-    if (!(depth > 0.1))
-      return bad_third (view, "looks elsewhere");
-    const double at[2] = {fx_ * dot (x, ray) / depth, fx_ * dot (y, ray) / depth};
-    for (int i = 0; i < 2; i++) {
-      low[i] = std::min (low[i], at[i]);
-      high[i] = std::max (high[i], at[i]);
-    }
-  }
-  cx_ = -low[0];
-  cy_ = -low[1];
+  return {};
+}
+
+/* Lays the rectified picture around what the range view shows, which is all that is ever looked up:
+ * both are pinhole cameras, so its corners say where it lies whatever the lenses do. */
+Status
+ThirdPair::place (const View &view, const View &range_view)
+{
+  const Mat3 left_from_range =
+      transposed (view.world_from_view.rotation) * range_view.world_from_view.rotation;
+  const double fx = range_view.intrinsics.fx;
+  picture_from_range_ = cv::Matx33d (fx, 0, 0, 0, fx, 0, 0, 0, 1) * rectified_from_left_ *
+                        matx (left_from_range) * camera_matrix (range_view.intrinsics).inv ();
+  cv::Vec2d low, high;
+  if (!bounds ({0, 0, range_view.width, range_view.height}, low, high))
+    return bad_third (view, "looks elsewhere");
   const int most = 2 * std::max (view.width, view.height);
-  pair_ = {std::min (most, static_cast<int> (std::lround (high[0] - low[0])) + 1),
-      std::min (most, static_cast<int> (std::lround (high[1] - low[1])) + 1), fx_ * baseline, 0};
-  const cv::Matx33d p (fx_, 0, cx_, 0, fx_, cy_, 0, 0, 1);
-  const cv::Matx33d rotations[2] = {
-      rectified_from_left_, rectified_from_left_ * matx (pose.rotation).t ()};
+  const auto length = [&] (int i) {
+    return static_cast<int> (std::lround (std::min<double> (most - 1, high[i] - low[i]))) + 1;
+  };
+  pair_ = {length (0), length (1), fx * baseline_m_, 0};
+  rectified_camera_ = {fx, 0, -low[0], 0, fx, -low[1], 0, 0, 1};
+  picture_from_range_ = cv::Matx33d (1, 0, -low[0], 0, 1, -low[1], 0, 0, 1) * picture_from_range_;
+  return {};
+}
+
+/* Where a ROI of the range view lies in the rectified picture.
+ * @return false if some of it lies behind the camera, or nearly */
+bool
+ThirdPair::bounds (const Roi &roi, cv::Vec2d &low, cv::Vec2d &high) const
+{
+  low = {1e9, 1e9};
+  high = {-1e9, -1e9};
+  for (int x : {roi.x, roi.x + roi.width - 1})
+    for (int y : {roi.y, roi.y + roi.height - 1}) {
+      const cv::Vec3d p = picture_from_range_ * cv::Vec3d (x, y, 1);
+      if (!(p[2] > 0.1))
+        return false;
+      for (int i = 0; i < 2; i++) {
+        low[i] = std::min (low[i], p[i] / p[2]);
+        high[i] = std::max (high[i], p[i] / p[2]);
+      }
+    }
+  return true;
+}
+
+Status
+ThirdPair::rectify (const View &view)
+{
+  const cv::Matx33d rotations[2] = {rectified_from_left_,
+      rectified_from_left_ * matx (view.third->partner_from_left.rotation).t ()};
   const cv::Size size (pair_.width, pair_.height);
   try {
-    cv::initUndistortRectifyMap (camera_matrix (view.intrinsics), view.distortion, rotations[0], p,
-        size, CV_16SC2, maps_[0][0], maps_[0][1]);
+    cv::initUndistortRectifyMap (camera_matrix (view.intrinsics), view.distortion, rotations[0],
+        rectified_camera_, size, CV_16SC2, maps_[0][0], maps_[0][1]);
     cv::initUndistortRectifyMap (camera_matrix (view.third->intrinsics), view.third->distortion,
-        rotations[1], p, size, CV_16SC2, maps_[1][0], maps_[1][1]);
+        rotations[1], rectified_camera_, size, CV_16SC2, maps_[1][0], maps_[1][1]);
   } catch (const cv::Exception &) {
     return bad_third (view, "cannot be rectified; expected a calibrated pair");
   }
@@ -80,19 +108,14 @@ ThirdPair::rectify (const View &view)
 }
 
 void
-ThirdPair::map_range_view (const View &view, const View &range_view, double focal_baseline)
+ThirdPair::map_range_view (const View &range_view, double focal_baseline)
 {
-  const Mat3 left_from_range =
-      transposed (view.world_from_view.rotation) * range_view.world_from_view.rotation;
-  const cv::Matx33d there = rectified_from_left_ * matx (left_from_range);
   where_.create (range_view.height, range_view.width, CV_16SC2);
   factor_.create (range_view.height, range_view.width, CV_32F);
   for (int y = 0; y < where_.rows; y++)
     for (int x = 0; x < where_.cols; x++) {
-      const Vec3 ray = range_view.intrinsics.unproject (x, y, 1);
-      const cv::Vec3d p = there * cv::Vec3d (ray.x, ray.y, ray.z);
-      const int u = p[2] > 0 ? cvRound (fx_ * p[0] / p[2] + cx_) : -1,
-                v = p[2] > 0 ? cvRound (fx_ * p[1] / p[2] + cy_) : -1;
+      const cv::Vec3d p = picture_from_range_ * cv::Vec3d (x, y, 1);
+      const int u = cvRound (p[0] / p[2]), v = cvRound (p[1] / p[2]);
       const bool inside = u >= 0 && v >= 0 && u < pair_.width && v < pair_.height;
       where_.at<cv::Vec2s> (y, x) =
           inside ? cv::Vec2s (static_cast<short> (u), static_cast<short> (v)) : cv::Vec2s (-1, -1);
@@ -108,15 +131,17 @@ ThirdPair::set (
   if (!view.third)
     return {StatusCode::kNotFound,
         "view " + std::to_string (view.id) + ": has no third camera; expected `third` in the rig"};
+  if (Status s = choose_axes (view); !s.ok ())
+    return s;
+  if (Status s = place (view, range_view); !s.ok ())
+    return s;
   if (Status s = rectify (view); !s.ok ())
     return s;
-  map_range_view (view, range_view, focal_baseline);
-  double low, high;
-  cv::minMaxLoc (factor_, &low, &high);
-  const double scale = pair_.focal_baseline / focal_baseline;
-  precision_ = scale;
+  map_range_view (range_view, focal_baseline);
+  precision_ = pair_.focal_baseline / focal_baseline;
+  const DepthFactors there = depth_factors ({0, 0, range_view.width, range_view.height});
   if (Status s = finder_.set (
-          pair_, settings, range_view.near_m * low * scale, range_view.far_m * high * scale);
+          pair_, settings, range_view.near_m * there.least, range_view.far_m * there.most);
       !s.ok ())
     return bad_third (view, s.message ().c_str ());
   return {};
@@ -132,23 +157,26 @@ ThirdPair::take (const cv::Mat &left, const cv::Mat &third)
 Roi
 ThirdPair::bounding_box (const Roi &roi) const
 {
-  int low[2] = {pair_.width, pair_.height}, high[2] = {-1, -1};
-  const auto look = [&] (int x, int y) {
-    const cv::Vec2s &at = where_.at<cv::Vec2s> (y, x);
-    for (int i = 0; i < 2 && at[0] >= 0; i++) {
-      low[i] = std::min<int> (low[i], at[i]);
-      high[i] = std::max<int> (high[i], at[i]);
-    }
-  };
-  for (int x = roi.x; x < roi.x + roi.width; x++)
-    for (int y : {roi.y, roi.y + roi.height - 1})
-      look (x, y);
-  for (int y = roi.y; y < roi.y + roi.height; y++)
-    for (int x : {roi.x, roi.x + roi.width - 1})
-      look (x, y);
-  if (high[0] < low[0])
+  cv::Vec2d low, high;
+  if (!bounds (roi, low, high))
     return {};
-  return {low[0], low[1], high[0] - low[0] + 1, high[1] - low[1] + 1};
+  const int x = std::max (0, cvRound (low[0])), y = std::max (0, cvRound (low[1]));
+  const int right = cvRound (std::min<double> (pair_.width - 1, high[0])),
+            bottom = cvRound (std::min<double> (pair_.height - 1, high[1]));
+  return right < x || bottom < y ? Roi{} : Roi{x, y, right - x + 1, bottom - y + 1};
+}
+
+/* Depth in the rectified picture over depth in the range view is linear in the pixel. */
+ThirdPair::DepthFactors
+ThirdPair::depth_factors (const Roi &roi) const
+{
+  DepthFactors factors = {1e9, 0};
+  for (int x : {roi.x, roi.x + roi.width - 1})
+    for (int y : {roi.y, roi.y + roi.height - 1}) {
+      const double factor = factor_.at<float> (y, x) * precision_;
+      factors = {std::min (factors.least, factor), std::max (factors.most, factor)};
+    }
+  return factors;
 }
 
 Status
@@ -160,7 +188,9 @@ ThirdPair::find (const Roi &roi, double near_m, double far_m)
     disparity_.setTo (0);
     return {};
   }
-  const Status status = finder_.find (pictures_[0], pictures_[1], there, near_m, far_m);
+  const DepthFactors factors = depth_factors (roi);
+  const Status status = finder_.find (
+      pictures_[0], pictures_[1], there, near_m * factors.least, far_m * factors.most);
   if (!status.ok ())
     return status;
   for (int y = 0; y < roi.height; y++) {

@@ -25,7 +25,8 @@ public:
   /** Rectifies. @param left, third  CV_8UC4, of the view's size, as the cameras saw them */
   void take (const cv::Mat &left, const cv::Mat &third);
 
-  /** @param roi  of the range view; near_m, far_m as DisparityFinder::find() */
+  /** @param roi  of the range view
+   *  @param near_m, far_m  depths of the range view; else as DisparityFinder::find() */
   Status find (const Roi &roi, double near_m, double far_m);
 
   /** Of the last ROI, CV_16U, in 1/16 pixel of disparity that the first pair would have. */
@@ -34,15 +35,23 @@ public:
   [[nodiscard]] double precision () const { return precision_; }
 
 private:
+  struct DepthFactors {
+    double least = 1, most = 1; /* depth in the rectified picture over depth in the range view */
+  };
+  Status choose_axes (const View &view);
+  Status place (const View &view, const View &range_view);
   Status rectify (const View &view);
-  void map_range_view (const View &view, const View &range_view, double focal_baseline);
+  void map_range_view (const View &range_view, double focal_baseline);
+  bool bounds (const Roi &roi, cv::Vec2d &low, cv::Vec2d &high) const;
   [[nodiscard]] Roi bounding_box (const Roi &roi) const;
+  [[nodiscard]] DepthFactors depth_factors (const Roi &roi) const;
 
   DisparityFinder finder_;
   PairGeometry pair_;
   cv::Matx33d rectified_from_left_; /* rotation */
-  double fx_ = 0, cx_ = 0, cy_ = 0; /* of both rectified pictures, pixels */
-  double precision_ = 1;
+  cv::Matx33d rectified_camera_;    /* matrix of both rectified pictures */
+  cv::Matx33d picture_from_range_;  /* a pixel (x, y, 1) of the range view to (u w, v w, w) */
+  double baseline_m_ = 0, precision_ = 1;
   cv::Mat maps_[2][2], pictures_[2];
   cv::Mat where_; /* CV_16SC2: pixels of the range view in the rectified picture, x < 0 = outside */
   cv::Mat factor_; /* CV_32F: from disparities there to the first pair's */
