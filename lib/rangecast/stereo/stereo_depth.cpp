@@ -46,6 +46,7 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
     steady_.set (
         view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
   changes_.forget ();
+  occupancy_.set (view.width, view.height);
   near_now_m_ = far_now_m_ = 0;
   last_roi_ = {};
   pictures_[0].release ();
@@ -149,7 +150,8 @@ Status
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
   const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
-  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m);
+  const auto parts = everywhere ? nullptr : occupancy_.find (changes_, image.roi);
+  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m, parts);
   if (status.ok () && has_third_) {
     status = third_.find (image.roi, near_m, far_m);
     if (status.ok ())
@@ -199,6 +201,7 @@ StereoDepth::match (const RangeImage &image)
   if (!status.ok ())
     return status;
   learn_range (image);
+  occupancy_.learn (image);
   if (settings_.steady > 0)
     steady_.apply (image);
   return status;

@@ -9,6 +9,7 @@
 #include "depth.hpp"
 #include "disparity_finder.hpp"
 #include "mirror_check.hpp"
+#include "occupancy.hpp"
 #include "rectification.hpp"
 #include "steady_filter.hpp"
 #include "third_pair.hpp"
@@ -64,6 +65,7 @@ public:
   {
     changes_.forget ();
     steady_.forget ();
+    occupancy_.forget ();
     near_now_m_ = far_now_m_ = 0;
   }
 
@@ -86,6 +88,7 @@ private:
   bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
+  Occupancy occupancy_;
   MirrorCheck mirror_;
   SteadyFilter steady_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
