@@ -96,21 +96,24 @@ void
 BackgroundDisparity::compare (const Job &job, const cv::Rect &piece, const cv::Mat &disparity,
     int least, Memory &m, Plane &unlike) const
 {
-  const int x0 = piece.x - kRadius, y0 = piece.y - kRadius, last = 16 * (job.right.cols - 2);
+  const int x0 = piece.x - kRadius, y0 = piece.y - kRadius;
+  const auto lowest = static_cast<std::int16_t> (least);
   m.pixels.set_size (piece.width + 2 * kRadius, piece.height + 2 * kRadius);
+  const int width = m.pixels.width (), begin = std::max (0, -x0),
+            end = std::min (width, disparity.cols - x0);
   for (int y = 0; y < m.pixels.height (); y++) {
     const int row = std::clamp (y0 + y, 0, disparity.rows - 1);
-    const auto d = disparity.ptr<std::int16_t> (row);
-    const auto r = job.right.ptr<std::uint8_t> (row);
+    const auto d = disparity.ptr<std::int16_t> (row) + x0;
     const std::int16_t *l = m.grey.row (y + kRadius) + kRadius;
     std::int16_t *out = m.pixels.row (y);
-    for (int x = 0; x < m.pixels.width (); x++) {
-      const int column = std::clamp (x0 + x, 0, disparity.cols - 1);
-      const int there = std::clamp (16 * (x0 + x + job.right_x) - d[column], 0, last);
-      const int u = there >> 4, f = there & 15;
-      const int grey = (r[u] * (16 - f) + r[u + 1] * f + 8) >> 4;
-      out[x] = static_cast<std::int16_t> (d[column] < least ? 255 : std::abs (l[x] - grey));
+    look_up (d + begin, end - begin, job.right.ptr<std::uint8_t> (row), job.right.cols,
+        x0 + begin + job.right_x, out + begin);
+    for (int x = begin; x < end; x++) {
+      const auto unlike_here = static_cast<std::int16_t> (std::abs (l[x] - out[x]));
+      out[x] = d[x] < lowest ? std::int16_t{255} : unlike_here;
     }
+    std::fill (out, out + begin, out[begin]);
+    std::fill (out + end, out + width, out[end - 1]);
   }
   sum_windows<kRadius> (m.pixels, unlike, m.columns);
 }

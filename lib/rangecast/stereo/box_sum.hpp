@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -53,6 +55,36 @@ cut_grey (const cv::Mat &picture, const cv::Rect &piece, int around, Plane &to)
       row[x] = from[first + x];
     for (int x = std::max (begin, end); x < to.width (); x++)
       row[x] = from[mirrored (first + x, picture.cols)];
+  }
+}
+
+/** What pixels of a row look like in the other camera's picture.
+ *  @param disparity  of each pixel, 1/16 pixel
+ *  @param row, width other picture's row, at least two pixels wide
+ *  @param x          column there of disparity 0 of the first pixel
+ *  @param[out] grey  levels, linear between two pixels; of the nearest one outside of the row */
+inline void
+look_up (const std::int16_t *disparity, int n, const std::uint8_t *row, int width, int x,
+    std::int16_t *grey)
+{
+  constexpr int kAtOnce = 64, kFirst = std::endian::native == std::endian::little ? 0 : 8;
+  std::int16_t at[kAtOnce];
+  std::uint16_t pairs[kAtOnce]; /* of neighbours: loops without loads from anywhere are vectors */
+  const auto last = static_cast<std::int16_t> (width - 2);
+  for (int begin = 0; begin < n; begin += kAtOnce) {
+    const int end = std::min (n - begin, kAtOnce);
+    const std::int16_t *d = disparity + begin;
+    const auto first = static_cast<std::int16_t> (x + begin);
+    for (int i = 0; i < end; i++) {
+      const auto u = static_cast<std::int16_t> (first + i - ((d[i] >> 4) + ((d[i] & 15) != 0)));
+      at[i] = std::clamp<std::int16_t> (u, 0, last);
+    }
+    for (int i = 0; i < end; i++)
+      std::memcpy (&pairs[i], row + at[i], 2);
+    for (int i = 0; i < end; i++) {
+      const int a = pairs[i] >> kFirst & 255, b = pairs[i] >> (8 - kFirst) & 255, f = -d[i] & 15;
+      grey[begin + i] = static_cast<std::int16_t> ((a * 16 + (b - a) * f + 8) >> 4);
+    }
   }
 }
 

@@ -44,14 +44,13 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
     std::fill_n (difference, width, std::int16_t{0});
     if (row >= 0 && row < disparity.rows) {
       const auto d = disparity.ptr<std::int16_t> (row) + x0;
-      const auto r = right.ptr<std::uint8_t> (row);
       const std::int16_t *l = m.grey.row (y + kPatchRadius) + kPatchRadius;
-      for (int x = begin; x < end; x++)
-        if (d[x] >= least) {
-          valid[x] = 1;
-          difference[x] =
-              std::int16_t (l[x] - grey_at (r, 16 * (x0 + x + right_x) - d[x], right.cols));
-        }
+      look_up (d + begin, end - begin, right.ptr<std::uint8_t> (row), right.cols,
+          x0 + begin + right_x, size);
+      for (int x = begin; x < end; x++) {
+        valid[x] = d[x] >= least;
+        difference[x] = std::int16_t (valid[x] ? l[x] - size[x - begin] : 0);
+      }
     }
     for (int x = 0; x < width; x++)
       size[x] = std::int16_t (std::abs (difference[x]));

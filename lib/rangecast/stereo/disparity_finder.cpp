@@ -119,10 +119,11 @@ DisparityFinder::match ()
     core = whole_[i](all);
     core.setTo (16 * least_ - 16);
   }
-  const int reach = matcher_->reach (), beside = reach + matcher_->reach_right ();
+  const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
+            below = kMargin / 2; /* no path of three goes up */
   for (const cv::Rect &part : parts_) {
     const int top = std::max (0, part.y - kMargin),
-              bottom = std::min (all.height, part.br ().y + kMargin);
+              bottom = std::min (all.height, part.br ().y + below);
     const cv::Rect window (part.x, top, part.width + beside, bottom - top);
     if (Status s = match_window (window_[0](window), window_[1](window), raw_); !s.ok ())
       return s;

@@ -67,8 +67,8 @@ Occupancy::mark (const ChangeDetector &changes, const Roi &roi)
 void
 Occupancy::divide ()
 {
-  constexpr float kSeam = 2;    /* blocks' height that is matched beyond a rectangle */
-  constexpr float kBegin = 100; /* blocks whose matching costs what a rectangle does by itself */
+  constexpr float kSeam = 1.5f; /* blocks' height that is matched beyond a rectangle */
+  constexpr float kBegin = 8;   /* blocks whose matching costs what a rectangle does by itself */
   const int n = int (of_interest_.size ());
   cost_.assign (std::size_t (n) + 1, 0);
   next_.assign (std::size_t (n), n);
