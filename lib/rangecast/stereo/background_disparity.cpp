@@ -150,8 +150,8 @@ BackgroundDisparity::restore_row (
 }
 
 void
-BackgroundDisparity::restore_piece (const Job &job, const cv::Rect &piece, const cv::Mat &disparity,
-    Memory &m, cv::Mat &to) const
+BackgroundDisparity::restore_piece (
+    const Job &job, const cv::Rect &piece, const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
   const cv::Rect part (job.at, job.left.size ());
   cut_grey (job.left, piece, 2 * kRadius, m.grey);

@@ -54,8 +54,8 @@ private:
       Memory &memory, cv::Mat &to) const;
   void restore_row (const Job &job, int x0, int y, int i, int width, Memory &memory,
       std::int16_t *disparity) const;
-  void mark_hidden (const std::int16_t *disparity, const std::uint8_t *grey, int y, int least,
-      int far);
+  void mark_hidden (
+      const std::int16_t *disparity, const std::uint8_t *grey, int y, int least, int far);
 
   cv::Mat known_;   /* CV_16S, kUnknown where nothing is, kHidden where there was no disparity */
   cv::Mat likely_;  /* the same, with guesses from the row */

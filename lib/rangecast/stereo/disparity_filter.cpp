@@ -133,8 +133,8 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least,
       std::int16_t *row = copy.row (y);
       std::fill_n (row, copy.width (), none);
       if (const int v = there.y + y; v >= 0 && v < all.height)
-        std::copy_n (disparity.ptr<std::int16_t> (v) + inside.x, inside.width,
-            row + (inside.x - there.x));
+        std::copy_n (
+            disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
     }
     const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
                         zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
@@ -145,16 +145,15 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least,
       auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
       for (int x = 0; x < piece.width; x += kLanes) {
         const cv::v_int16x8 d = cv::v_load (copy.row (y + 1) + x + 1);
-        const cv::v_uint16x8 most =
-            cv::v_max (cv::v_setall_u16 (8), cv::v_mul_hi (cv::v_reinterpret_as_u16 (
-                                                 cv::v_max (d + shift, zero)),
-                                                 cv::v_setall_u16 (share)));
+        const cv::v_uint16x8 most = cv::v_max (cv::v_setall_u16 (8),
+            cv::v_mul_hi (
+                cv::v_reinterpret_as_u16 (cv::v_max (d + shift, zero)), cv::v_setall_u16 (share)));
         cv::v_int16x8 n = zero;
         for (int v = y; v < y + 3; v++)
           for (int u = x; u < x + 3; u++) {
             const cv::v_int16x8 other = cv::v_load (copy.row (v) + u);
-            n = n + ((other >= valid) &
-                        cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= most));
+            n = n +
+                ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= most));
           }
         const cv::v_int16x8 result = cv::v_select (n < enough, d, nothing);
         if (x + kLanes <= piece.width)

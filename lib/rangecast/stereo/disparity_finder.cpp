@@ -179,9 +179,9 @@ DisparityFinder::filter (const cv::Mat &left)
   if (settings_.gap_width > 0)
     filter_.fill_gaps (colour, settings_.gap_width, least, pieces_, core_);
   if (settings_.silhouette_radius > 0) {
-    silhouettes_.apply ({settings_.silhouette_radius, settings_.flying_pixel_step, offset, least,
-                            nearest},
-        colour, pieces_, core_, next_);
+    silhouettes_.apply (
+        {settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest}, colour,
+        pieces_, core_, next_);
     cv::swap (core_, next_);
   }
   if (!limited)
@@ -211,9 +211,8 @@ DisparityFinder::take (const Roi &roi)
 }
 
 Status
-DisparityFinder::find (
-    const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m,
-    const std::vector<cv::Rect> *parts)
+DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
+    double far_m, const std::vector<cv::Rect> *parts)
 {
   if (Status s = choose_range (near_m, far_m); !s.ok ())
     return s;

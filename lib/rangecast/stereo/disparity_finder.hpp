@@ -49,9 +49,8 @@ public:
    *  @param near_m, far_m  where to look, 0 = everywhere; with limits, what was seen beyond them
    *  while there were none is not taken for something else as long as it stays
    *  @return kNoSpace if OpenCV failed */
-  Status find (
-      const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m,
-      const std::vector<cv::Rect> *parts = nullptr);
+  Status find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
+      double far_m, const std::vector<cv::Rect> *parts = nullptr);
 
   /** CV_16U of the ROI, 1/16 pixel with equal principal points, 0 = none. */
   [[nodiscard]] const cv::Mat &disparity () const { return disparity_; }
@@ -90,8 +89,8 @@ private:
   int missing_[2] = {0, 0};      /* columns that the window has beyond it, left and right */
   std::vector<cv::Rect> parts_;
   cv::Mat grey_, window_[2], raw_, disparity_;
-  cv::Mat whole_[2];        /* as large as the picture: memory of what follows */
-  cv::Mat core_, next_;     /* CV_16S of the core: disparities, and what the next filter writes */
+  cv::Mat whole_[2];    /* as large as the picture: memory of what follows */
+  cv::Mat core_, next_; /* CV_16S of the core: disparities, and what the next filter writes */
 };
 
 } // namespace rangecast

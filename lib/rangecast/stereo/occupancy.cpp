@@ -43,8 +43,8 @@ Occupancy::learn (const RangeImage &image)
 void
 Occupancy::mark (const ChangeDetector &changes, const Roi &roi)
 {
-  const int bx0 = roi.x / kBlock, bx1 = (roi.x + roi.width - 1) / kBlock,
-            by0 = roi.y / kBlock, by1 = (roi.y + roi.height - 1) / kBlock;
+  const int bx0 = roi.x / kBlock, bx1 = (roi.x + roi.width - 1) / kBlock, by0 = roi.y / kBlock,
+            by1 = (roi.y + roi.height - 1) / kBlock;
   first_row_ = std::max (0, by0 - 1);
   const int end = std::min (rows_, by1 + 2);
   of_interest_.assign (std::size_t (end - first_row_), {columns_, 0});

@@ -72,28 +72,29 @@ SilhouetteFilter::sample (
     if (const std::size_t n = width * std::size_t (samples_.height ()); plane.size () < n)
       plane.resize (n);
   constexpr int kRows = 32;
-  in_parallel (std::size_t ((samples_.height () + kRows - 1) / kRows), n_threads, [&] (std::size_t i) {
-    const int begin = int (i) * kRows, end = std::min (begin + kRows, samples_.height ());
-    for (int v = begin; v < end; v++) {
-      std::uint8_t *to[4];
-      for (int c = 0; c < 4; c++)
-        to[c] = colours_[c].data () + std::size_t (v) * width;
-      std::fill_n (to[3], width, std::uint8_t{255});
-      std::int16_t *depth = samples_.row (v);
-      std::fill_n (depth, width, std::int16_t{0});
-      const int y = 2 * (v - pad_);
-      if (y < 0 || y >= disparity.rows)
-        continue;
-      const auto from = colour.ptr<cv::Vec4b> (y);
-      const auto d = disparity.ptr<std::int16_t> (y);
-      std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
-      for (int x = 0; x < cols; x++) {
-        for (int c = 0; c < 3; c++)
-          to[c][pad_ + x] = from[2 * x][c];
-        depth[pad_ + x] = d[2 * x];
-      }
-    }
-  });
+  in_parallel (
+      std::size_t ((samples_.height () + kRows - 1) / kRows), n_threads, [&] (std::size_t i) {
+        const int begin = int (i) * kRows, end = std::min (begin + kRows, samples_.height ());
+        for (int v = begin; v < end; v++) {
+          std::uint8_t *to[4];
+          for (int c = 0; c < 4; c++)
+            to[c] = colours_[c].data () + std::size_t (v) * width;
+          std::fill_n (to[3], width, std::uint8_t{255});
+          std::int16_t *depth = samples_.row (v);
+          std::fill_n (depth, width, std::int16_t{0});
+          const int y = 2 * (v - pad_);
+          if (y < 0 || y >= disparity.rows)
+            continue;
+          const auto from = colour.ptr<cv::Vec4b> (y);
+          const auto d = disparity.ptr<std::int16_t> (y);
+          std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
+          for (int x = 0; x < cols; x++) {
+            for (int c = 0; c < 3; c++)
+              to[c][pad_ + x] = from[2 * x][c];
+            depth[pad_ + x] = d[2 * x];
+          }
+        }
+      });
 }
 
 /* Calls `count (weight, disparity)` with eight samples of a window at a time. */
@@ -102,15 +103,16 @@ void
 SilhouetteFilter::for_window (
     const cv::Vec4b &own, int x, int y, int radius, const Count &count) const
 {
-  static constexpr std::uint8_t kInside[2 * kLanes] = {255, 255, 255, 255, 255, 255, 255, 255, 255,
-      255, 255, 255, 255, 255, 255, 255};
+  static constexpr std::uint8_t kInside[2 * kLanes] = {
+      255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255};
   const cv::v_uint8x16 r = cv::v_setall_u8 (own[0]), g = cv::v_setall_u8 (own[1]),
                        b = cv::v_setall_u8 (own[2]), most = cv::v_setall_u8 (kLike);
   const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
   for (int u = 0; u < radius; u += kLanes) {
     const cv::v_uint8x16 inside = cv::v_load (kInside + kLanes - std::min (kLanes, radius - u));
     for (int v = y0; v < y0 + radius; v++) {
-      const std::size_t at = std::size_t (v) * std::size_t (samples_.width ()) + std::size_t (x0 + u);
+      const std::size_t at =
+          std::size_t (v) * std::size_t (samples_.width ()) + std::size_t (x0 + u);
       /* These sums end at 255, which is far enough. */
       const cv::v_uint8x16 unlike = cv::v_absdiff (cv::v_load (&colours_[0][at]), r) +
                                     cv::v_absdiff (cv::v_load (&colours_[1][at]), g) +
@@ -130,7 +132,9 @@ SilhouetteFilter::vote (
     const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const
 {
   const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.least)),
-                      low = cv::v_max (valid, cv::v_setall_s16 (static_cast<short> (d - most))),
+                      low = cv::v_max (
+                          valid, cv::v_setall_s16 (static_cast<short> (
+                                     settings.only_beyond ? settings.nearest : d - most))),
                       high = cv::v_setall_s16 (static_cast<short> (std::min (d + most, 32767)));
   cv::v_int16x8 all = cv::v_setzero_s16 (), none = all, below = all, above = all;
   for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
@@ -190,9 +194,8 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       const int d = valid ? from[x] : likely (settings, pixels[x], piece.x + x, piece.y + y);
       if (d < std::max (least, settings.nearest))
         continue;
-      const Votes votes =
-          vote (settings, pixels[x], piece.x + x, piece.y + y, d, tolerance (d));
-      if (valid && votes.far + votes.none > votes.same)
+      const Votes votes = vote (settings, pixels[x], piece.x + x, piece.y + y, d, tolerance (d));
+      if (valid && votes.far + (settings.only_beyond ? 0 : votes.none) > votes.same)
         out[x] = static_cast<std::int16_t> (least - 16);
       else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
         out[x] = static_cast<std::int16_t> (d);

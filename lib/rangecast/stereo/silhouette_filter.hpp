@@ -22,6 +22,8 @@ public:
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
     int least = 0;    ///< 1/16 pixel; less = none, least - 16 is what is written
     int nearest = -1; ///< what is farther is of no interest, but that it is there
+    /** Only those that look like what is known to be farther than `nearest` go. */
+    bool only_beyond = false;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size

@@ -146,6 +146,27 @@ StereoDepth::is_suspect (const RangeImage &image) const
   return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || 100 * crowd > seen;
 }
 
+/* What one pair takes for a part of what stands in front, though its colour is that of the
+ * background which the other one knows: edges that run from one camera to the other match anywhere
+ * along themselves. */
+void
+StereoDepth::clear_rims_of_third (const Roi &roi)
+{
+  if (settings_.silhouette_radius == 0)
+    return;
+  constexpr int kLeast = 16; /* disparity, 1/16 pixel; 16 less is none */
+  const cv::Rect whole (0, 0, roi.width, roi.height);
+  pieces_.set ({&whole, 1}, settings_.n_threads);
+  cv::Mat &disparity = finder_.disparity ();
+  before_fusion_.create (disparity.size (), CV_16U);
+  const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
+  cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
+  rims_.apply ({settings_.silhouette_radius, settings_.flying_pixel_step, 0, kLeast,
+                   static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m)), true},
+      pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), pieces_, from, to);
+  cv::swap (disparity, before_fusion_);
+}
+
 Status
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
@@ -154,9 +175,11 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m, parts);
   if (status.ok () && has_third_) {
     status = third_.find (image.roi, near_m, far_m);
-    if (status.ok ())
+    if (status.ok ()) {
       fuse_disparities (
           finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
+      clear_rims_of_third (image.roi);
+    }
   }
   if (status.ok ())
     status = to_depth_.convert (disparity (), image.depth);

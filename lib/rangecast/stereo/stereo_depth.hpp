@@ -76,6 +76,7 @@ public:
 private:
   void rectify (int camera, ImageView<const Rgbx> picture);
   Status find (const RangeImage &image, bool everywhere);
+  void clear_rims_of_third (const Roi &roi);
   void check_mirror ();
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
@@ -85,6 +86,8 @@ private:
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;
+  SilhouetteFilter rims_; /* of what both pairs know */
+  Pieces pieces_;
   bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
