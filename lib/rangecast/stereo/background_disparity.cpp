@@ -82,7 +82,8 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
       if (d[x] >= least && d[x] < far) {
         known[x] = d[x];
         picture[x] = g[x];
-      }
+      } else if (d[x] >= far && known[x] == kHidden)
+        known[x] = kUnknown;
     mark_hidden (d, g, y, least, far);
   }
   known_.copyTo (likely_);
