@@ -91,6 +91,37 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
     guess_row (likely_.ptr<std::int16_t> (y), grey.cols);
 }
 
+void
+BackgroundDisparity::extend (
+    const cv::Point &at, int least, int far, const Pieces &pieces, cv::Mat &disparity) const
+{
+  constexpr std::int16_t kNothing = 32767;
+  pieces.each ([&] (const cv::Rect &piece, std::size_t) {
+    for (int y = piece.y; y < piece.br ().y; y++) {
+      auto d = disparity.ptr<std::int16_t> (y);
+      const auto back = likely_.ptr<std::int16_t> (at.y + y) + at.x;
+      /* What is known of the pixels beside the piece: nothing, or the background. */
+      const auto beside = [&] (int x) {
+        const bool inside = at.x + x >= 0 && at.x + x < likely_.cols;
+        return inside && back[x] > kHidden ? back[x] : kNothing;
+      };
+      for (int x = piece.x; x < piece.br ().x;) {
+        if (d[x] >= least) {
+          x++;
+          continue;
+        }
+        const int begin = x;
+        while (x < piece.br ().x && d[x] < least)
+          x++;
+        const std::int16_t farther = std::min (begin > piece.x ? d[begin - 1] : beside (begin - 1),
+            x < piece.br ().x ? d[x] : beside (x));
+        if (farther >= least && farther < far)
+          std::fill (d + begin, d + x, static_cast<std::int16_t> (least));
+      }
+    }
+  });
+}
+
 /* Differences of patches between both pictures, where there is a disparity. memory.grey is the left
  * one. @param disparity  of the size of job.left */
 void

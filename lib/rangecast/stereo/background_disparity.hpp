@@ -34,6 +34,11 @@ public:
   void restore (const cv::Mat &left, const cv::Mat &right, int right_x, const cv::Point &at,
       int least, int none, const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to);
 
+  /** Gives what has no disparity, but is beside the background in its row, the farthest one there
+   *  is, `least`: one camera does not see it. */
+  void extend (const cv::Point &at, int least, int far, const Pieces &pieces,
+      cv::Mat &disparity) const;
+
 private:
   /* What one thread needs for one piece: pixels, and sums over the patches around them. */
   struct Memory {

@@ -120,9 +120,10 @@ DisparityFinder::match ()
     core.setTo (16 * least_ - 16);
   }
   const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
-            below = kMargin / 2; /* no path of three goes up */
+            above = kMargin - 2, below = 2;
+      /* no path of three goes up */ /* no path of three goes up */
   for (const cv::Rect &part : parts_) {
-    const int top = std::max (0, part.y - kMargin),
+    const int top = std::max (0, part.y - above),
               bottom = std::min (all.height, part.br ().y + below);
     const cv::Rect window (part.x, top, part.width + beside, bottom - top);
     if (Status s = match_window (window_[0](window), window_[1](window), raw_); !s.ok ())
@@ -179,10 +180,17 @@ DisparityFinder::filter (const cv::Mat &left)
   if (settings_.gap_width > 0)
     filter_.fill_gaps (colour, settings_.gap_width, least, pieces_, core_);
   if (settings_.silhouette_radius > 0) {
-    silhouettes_.apply (
-        {settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest}, colour,
-        pieces_, core_, next_);
+    SilhouetteFilter::Settings rims = {
+        settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest};
+    silhouettes_.apply (rims, colour, pieces_, core_, next_);
     cv::swap (core_, next_);
+    if (limited && !background_.empty ()) {
+      background_.extend (core_at_.tl (), least, far_, pieces_, core_);
+      rims.only_beyond = true;
+      rims.look_near = least;
+      silhouettes_.apply (rims, colour, pieces_, core_, next_);
+      cv::swap (core_, next_);
+    }
   }
   if (!limited)
     filter_.clear_doubled (grey, window_[1], right_x, least, pieces_, core_);
@@ -190,7 +198,7 @@ DisparityFinder::filter (const cv::Mat &left)
     background_.remember (grey, core_, least, far_);
 }
 
-/* OpenCV's disparities of the window to ours of the ROI. */
+/* OpenCV's disparities of the window to ours of the ROI. The farthest one is none: see extend(). */
 void
 DisparityFinder::take (const Roi &roi)
 {
@@ -205,7 +213,7 @@ DisparityFinder::take (const Roi &roi)
       const int d = from[x] + offset;
       const int there = 16 * (roi.x + x) - from[x]; /* not where the right picture is repeated */
       const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
-      to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
+      to[x] = from[x] > least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
 }

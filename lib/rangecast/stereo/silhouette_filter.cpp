@@ -15,28 +15,34 @@ constexpr int kEnough = 160;
 constexpr int kLanes = 16;
 
 /* The least or the greatest of each window of `side` pixels squared.
- * @param[out] to  smaller by side - 1; @param line  memory to use */
+ * @param[out] to  smaller by side - 1; @param memory  to use */
 template <typename Choose>
 void
-choose_in_windows (const Plane &from, int side, Plane &line, Plane &to, const Choose &choose)
+choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const Choose &choose)
 {
-  const int width = from.width (), cols = width - side + 1, rows = from.height () - side + 1;
-  line.set_size (width, 2);
+  const int width = from.width (), height = from.height (), cols = width - side + 1,
+            rows = height - side + 1;
+  memory.set_size (width, height);
+  std::copy_n (from.row (0), std::ptrdiff_t (width) * height, memory.row (0));
   to.set_size (cols, rows);
-  for (int y = 0; y < rows; y++) {
-    std::int16_t *down = line.row (0), *out = to.row (y);
-    std::copy_n (from.row (y), width, down);
-    for (int v = y + 1; v < y + side; v++) {
-      const std::int16_t *row = from.row (v);
+  int reach = 1; /* rows, then columns, that each number has been chosen from */
+  for (; 2 * reach <= side; reach *= 2)
+    for (int y = 0; y + reach < height; y++) {
+      std::int16_t *row = memory.row (y);
+      const std::int16_t *below = memory.row (y + reach);
       for (int x = 0; x < width; x++)
-        down[x] = choose (down[x], row[x]);
+        row[x] = choose (row[x], below[x]);
     }
-    int reach = 1; /* columns that `down` has chosen from */
-    for (; 2 * reach <= side; reach *= 2)
-      for (int x = 0; x + reach < width; x++)
-        down[x] = choose (down[x], down[x + reach]);
+  for (int y = 0; y < rows; y++) {
+    std::int16_t *row = memory.row (y), *out = to.row (y);
+    const std::int16_t *below = memory.row (y + side - reach);
+    for (int x = 0; x < width; x++)
+      row[x] = choose (row[x], below[x]);
+    for (int right = 1; 2 * right <= side; right *= 2)
+      for (int x = 0; x + right < width; x++)
+        row[x] = choose (row[x], row[x + right]);
     for (int x = 0; x < cols; x++)
-      out[x] = choose (down[x], down[x + side - reach]);
+      out[x] = choose (row[x], row[x + side - reach]);
   }
 }
 
@@ -127,6 +133,7 @@ SilhouetteFilter::for_window (
   }
 }
 
+template <bool kCountNone>
 SilhouetteFilter::Votes
 SilhouetteFilter::vote (
     const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const
@@ -139,7 +146,8 @@ SilhouetteFilter::vote (
   cv::v_int16x8 all = cv::v_setzero_s16 (), none = all, below = all, above = all;
   for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
     all = all + w;
-    none = none + (w & (depth < valid));
+    if constexpr (kCountNone)
+      none = none + (w & (depth < valid));
     below = below + (w & (depth < low));
     above = above + (w & (depth > high));
   });
@@ -189,13 +197,19 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       out[x] = from[x];
       const bool valid = from[x] >= least;
       if (highest[x] < std::max (least, settings.nearest) ||
-          (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]))))
+          (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
+                        (settings.only_beyond && lowest[x] > settings.look_near))))
         continue; /* a surface, or nothing near */
       const int d = valid ? from[x] : likely (settings, pixels[x], piece.x + x, piece.y + y);
       if (d < std::max (least, settings.nearest))
         continue;
-      const Votes votes = vote (settings, pixels[x], piece.x + x, piece.y + y, d, tolerance (d));
-      if (valid && votes.far + (settings.only_beyond ? 0 : votes.none) > votes.same)
+      const cv::Vec4b &own = pixels[x];
+      const int at_x = piece.x + x, at_y = piece.y + y, most = tolerance (d);
+      const Votes votes = valid && !settings.only_beyond
+                              ? vote<false> (settings, own, at_x, at_y, d, most)
+                              : vote<true> (settings, own, at_x, at_y, d, most);
+
+      if (valid && votes.far > votes.same)
         out[x] = static_cast<std::int16_t> (least - 16);
       else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
         out[x] = static_cast<std::int16_t> (d);

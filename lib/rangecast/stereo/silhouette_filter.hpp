@@ -24,6 +24,8 @@ public:
     int nearest = -1; ///< what is farther is of no interest, but that it is there
     /** Only those that look like what is known to be farther than `nearest` go. */
     bool only_beyond = false;
+    /** With only_beyond: 1/16 pixel; pixels without anything that far near them stay. */
+    int look_near = 0;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
@@ -38,11 +40,13 @@ private:
   };
   /* How much the samples around a pixel are like it in colour, by their depth. */
   struct Votes {
-    int same = 0, near = 0, far = 0, none = 0; /* of disparity d, nearer, farther, without depth */
+    int same = 0, near = 0; /* of disparity d, nearer */
+    int far = 0, none = 0;  /* farther, without depth; not kCountNone: both are far */
   };
   void sample (int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads);
   template <typename Count>
   void for_window (const cv::Vec4b &own, int x, int y, int radius, const Count &count) const;
+  template <bool kCountNone>
   [[nodiscard]] Votes vote (
       const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const;
   [[nodiscard]] int likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const;

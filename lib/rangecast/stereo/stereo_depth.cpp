@@ -161,9 +161,13 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  rims_.apply ({settings_.silhouette_radius, settings_.flying_pixel_step, 0, kLeast,
-                   static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m)), true},
-      pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), pieces_, from, to);
+  SilhouetteFilter::Settings rims = {
+      settings_.silhouette_radius, settings_.flying_pixel_step, 0, kLeast};
+  rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
+  rims.only_beyond = true;
+  rims.look_near = rims.nearest - 1;
+  rims_.apply (
+      rims, pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), pieces_, from, to);
   cv::swap (disparity, before_fusion_);
 }
 
