@@ -114,28 +114,35 @@ DisparityFilter::clear_hidden (int least, const Pieces &pieces, cv::Mat &dispari
   });
 }
 
+/* A piece and one pixel around it, and `more` columns so that vectors may end beyond it. */
+static void
+copy_with_border (
+    const cv::Mat &disparity, const cv::Rect &piece, int more, std::int16_t none, Plane &to)
+{
+  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
+  const cv::Rect there (piece.x - 1, piece.y - 1, piece.width + 2, piece.height + 2);
+  const cv::Rect inside = there & all;
+  to.set_size (there.width + more, there.height);
+  for (int y = 0; y < to.height (); y++) {
+    std::int16_t *row = to.row (y);
+    std::fill_n (row, to.width (), none);
+    if (const int v = there.y + y; v >= 0 && v < all.height)
+      std::copy_n (
+          disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
+  }
+}
+
 void
 DisparityFilter::clear_flying (double step, int support, int offset, int least,
     const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to)
 {
   const auto share = static_cast<std::uint16_t> (std::min (65535.0, 65536 * step));
-  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
   const auto none = static_cast<std::int16_t> (least - 16);
   memory_.reserve (pieces.workers ());
   pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
-    /* With a border of none, so that neither rows nor columns end. */
     Plane &copy = memory_.of (worker).grey;
     constexpr int kLanes = cv::v_int16x8::nlanes;
-    copy.set_size (piece.width + 2 + kLanes, piece.height + 2);
-    const cv::Rect there = cv::Rect (piece.x - 1, piece.y - 1, piece.width + 2, piece.height + 2),
-                   inside = there & all;
-    for (int y = 0; y < copy.height (); y++) {
-      std::int16_t *row = copy.row (y);
-      std::fill_n (row, copy.width (), none);
-      if (const int v = there.y + y; v >= 0 && v < all.height)
-        std::copy_n (
-            disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
-    }
+    copy_with_border (disparity, piece, kLanes, none, copy);
     const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
                         zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
                         shift = cv::v_setall_s16 (static_cast<short> (offset)),
