@@ -28,6 +28,7 @@
 
 #include "picturereader.hpp"
 #include "recycledbuffers.hpp"
+#include "stereosettings.hpp"
 
 #include <gst/video/video.h>
 
@@ -43,7 +44,6 @@
 #include <string>
 
 using rangecast::ImageView;
-using rangecast::MatchAlgorithm;
 using rangecast::Rgbx;
 using rangecast::Roi;
 using rangecast::Status;
@@ -53,52 +53,10 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
 
-enum {
-  PROP_0,
-  PROP_RIG,
-  PROP_VIEW_ID,
-  PROP_FOCAL_LENGTH,
-  PROP_BASELINE,
-  PROP_PRINCIPAL_X,
-  PROP_PRINCIPAL_Y,
-  PROP_PRINCIPAL_OFFSET,
-  PROP_NEAR,
-  PROP_FAR,
-  PROP_DEPTH_UNIT,
-  PROP_ALGORITHM,
-  PROP_BLOCK_SIZE,
-  PROP_UNIQUENESS_RATIO,
-  PROP_SPECKLE_WINDOW_SIZE,
-  PROP_SPECKLE_RANGE,
-  PROP_LEFT_RIGHT_MAX_DIFFERENCE,
-  PROP_PATCH_TOLERANCE,
-  PROP_FLYING_PIXEL_STEP,
-  PROP_SILHOUETTE_RADIUS,
-  PROP_GAP_WIDTH,
-  PROP_SEARCH_FAR,
-  PROP_REFRESH_INTERVAL,
-  PROP_STEADY,
-  PROP_N_THREADS,
-  PROP_QOS,
-  PROP_STATS
-};
+static guint prop_stats; /* number of that property, after the settings */
 
-static constexpr rangecast::StereoSettings kDefaults;
-static constexpr int kDefaultRefreshInterval = 30;
-static constexpr double kDefaultNear = 0.3, kDefaultFar = 3.0;
 /* Pictures without a partner, one after the other, that are worth a warning: two seconds. */
 static constexpr guint64 kManyWithoutPartner = 100;
-
-struct StereoProperties {
-  std::string rig;
-  int view_id = 0;
-  double focal_length = 0, baseline = 0;
-  double principal_x = -1, principal_y = -1, principal_offset = 0;
-  double near = 0, far = 0, depth_unit = 0;
-  rangecast::StereoSettings core;
-  int refresh_interval = kDefaultRefreshInterval;
-  bool qos = true;
-};
 
 /* Left and right of one moment. Both times are by the segment they came in. */
 struct WaitingPair {
@@ -108,7 +66,7 @@ struct WaitingPair {
 
 struct GstStereoDepthPrivate {
   std::mutex lock; /* guards what follows; never held across a push, event or message */
-  StereoProperties properties;
+  StereoDepthSettings settings;
   Roi wanted; /* of the last GstRangeRoi event; empty: everything */
   guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0, dropped_late = 0;
   GstClockTime match_time = 0;
@@ -156,86 +114,6 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstStereoDepth, gst_stereo_depth, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (stereodepth, "stereodepth", GST_RANK_NONE, GST_TYPE_STEREO_DEPTH)
 
-#define GST_TYPE_STEREO_DEPTH_ALGORITHM (gst_stereo_depth_algorithm_get_type ())
-static GType
-gst_stereo_depth_algorithm_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "Block matching", "bm"},
-        {int (MatchAlgorithm::kSgbm), "Semi-global matching, five directions", "sgbm"},
-        {int (MatchAlgorithm::kSgbm3Way), "Semi-global matching, three directions", "sgbm-3way"},
-        {}};
-    return g_enum_register_static ("GstStereoDepthAlgorithm", values);
-  }();
-  return type;
-}
-
-/* ---- the view ---- */
-
-static std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
-}
-
-static Status
-view_from_rig (const StereoProperties &p, int width, int height, View &view)
-{
-  rangecast::Rig rig;
-  if (Status s = rangecast::load_rig (p.rig, rig); !s.ok ())
-    return s;
-  const View *found = rig.find (p.view_id);
-  if (!found)
-    return {
-        StatusCode::kNotFound, p.rig + ": has no view with view-id " + std::to_string (p.view_id)};
-  view = *found;
-  const Status scaled = rangecast::scale_view (view, width, height);
-  return scaled.ok () ? scaled : Status{scaled.code (), p.rig + ": " + scaled.message ()};
-}
-
-static Status
-view_from_properties (const StereoProperties &p, int width, int height, View &view)
-{
-  if (p.focal_length <= 0 || p.baseline <= 0)
-    return {StatusCode::kNotFound,
-        "no calibration: expected property rig, or focal-length and baseline for rectified "
-        "pictures"};
-  view = {};
-  view.id = p.view_id;
-  view.width = width;
-  view.height = height;
-  view.world_from_view.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* level, looking along -z */
-  view.near_m = kDefaultNear;
-  view.far_m = kDefaultFar;
-  view.intrinsics = {p.focal_length, p.focal_length,
-      p.principal_x >= 0 ? p.principal_x : (width - 1) / 2.0,
-      p.principal_y >= 0 ? p.principal_y : (height - 1) / 2.0};
-  rangecast::PartnerCamera right;
-  right.intrinsics = view.intrinsics;
-  right.intrinsics.cx += p.principal_offset;
-  right.partner_from_left.translation.x = -p.baseline;
-  view.right = right;
-  return {};
-}
-
-static Status
-make_view (const StereoProperties &p, int width, int height, View &view)
-{
-  Status status = p.rig.empty () ? view_from_properties (p, width, height, view)
-                                 : view_from_rig (p, width, height, view);
-  if (!status.ok ())
-    return status;
-  if (p.depth_unit > 0)
-    view.depth_unit_m = p.depth_unit;
-  if (p.near > 0)
-    view.near_m = p.near;
-  if (p.far > 0)
-    view.far_m = p.far;
-  if (view.far_m >= 65535 * view.depth_unit_m && p.depth_unit <= 0)
-    view.depth_unit_m = view.far_m / 65000; /* far scenes get a coarser unit by themselves */
-  return rangecast::validate ({{view}});
-}
-
 /* ---- negotiation ---- */
 
 static bool
@@ -262,14 +140,14 @@ check_sizes (GstStereoDepthPrivate *priv, bool third_is_there)
 
 /* Downstream does not see that caps are set anew where they are equal, and so would not ask for its
  * part of the picture again. */
-static StereoProperties
-current_properties (GstStereoDepthPrivate *priv)
+static StereoDepthSettings
+current_settings (GstStereoDepthPrivate *priv)
 {
   const View &before = priv->core.range_view ();
   std::lock_guard guard (priv->lock);
   if (before.width != priv->info[0].width || before.height != priv->info[0].height)
     priv->wanted = {};
-  return priv->properties;
+  return priv->settings;
 }
 
 static Status
@@ -278,16 +156,16 @@ configure_core (GstStereoDepthPrivate *priv, bool third_is_there)
   const GstVideoInfo &left = priv->info[0];
   if (Status s = check_sizes (priv, third_is_there); !s.ok ())
     return s;
-  const StereoProperties properties = current_properties (priv);
+  const StereoDepthSettings settings = current_settings (priv);
   View view;
-  if (Status s = make_view (properties, left.width, left.height, view); !s.ok ())
+  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
     return s;
   if (priv->have_info[2] && !view.third)
     return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
                                    "rig with a file that has one in view " +
                                        std::to_string (view.id)};
   const bool with_third = priv->have_info[2] && same_size (left, priv->info[2]);
-  if (Status s = priv->core.set (view, properties.core, with_third); !s.ok ())
+  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
     return s;
   priv->said_mirrored = false;
   priv->third_changed = priv->have_info[2] && !with_third;
@@ -377,7 +255,7 @@ take_roi_event (GstStereoDepthPrivate *priv, const GstStructure *s)
     return FALSE;
   const guint most = rangecast::kMaxImageSide;
   std::lock_guard guard (priv->lock);
-  if (int (view_id) != priv->properties.view_id || x > most || y > most || width > most ||
+  if (int (view_id) != priv->settings.view_id || x > most || y > most || width > most ||
       height > most)
     return FALSE;
   priv->wanted = {int (x), int (y), int (width), int (height)};
@@ -429,7 +307,7 @@ next_roi (GstStereoDepthPrivate *priv)
   int interval;
   {
     std::lock_guard guard (priv->lock);
-    interval = priv->properties.refresh_interval;
+    interval = priv->settings.refresh_interval;
     roi = priv->wanted;
   }
   roi.width = std::min (roi.width, full.width - roi.x);
@@ -674,7 +552,7 @@ drop_if_late (GstStereoDepth *self)
   {
     std::lock_guard guard (priv->lock);
     earliest = priv->earliest;
-    if (!priv->properties.qos || !GST_CLOCK_TIME_IS_VALID (earliest) ||
+    if (!priv->settings.qos || !GST_CLOCK_TIME_IS_VALID (earliest) ||
         !GST_CLOCK_TIME_IS_VALID (running) || running > earliest)
       return false;
     dropped = ++priv->dropped_late;
@@ -842,86 +720,8 @@ gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, G
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
   std::lock_guard guard (priv->lock);
-  StereoProperties &p = priv->properties;
-  switch (id) {
-    case PROP_RIG:
-      p.rig = g_value_get_string (value) ? g_value_get_string (value) : "";
-      break;
-    case PROP_VIEW_ID:
-      p.view_id = g_value_get_int (value);
-      break;
-    case PROP_FOCAL_LENGTH:
-      p.focal_length = g_value_get_double (value);
-      break;
-    case PROP_BASELINE:
-      p.baseline = g_value_get_double (value);
-      break;
-    case PROP_PRINCIPAL_X:
-      p.principal_x = g_value_get_double (value);
-      break;
-    case PROP_PRINCIPAL_Y:
-      p.principal_y = g_value_get_double (value);
-      break;
-    case PROP_PRINCIPAL_OFFSET:
-      p.principal_offset = g_value_get_double (value);
-      break;
-    case PROP_NEAR:
-      p.near = g_value_get_double (value);
-      break;
-    case PROP_FAR:
-      p.far = g_value_get_double (value);
-      break;
-    case PROP_DEPTH_UNIT:
-      p.depth_unit = g_value_get_double (value);
-      break;
-    case PROP_ALGORITHM:
-      p.core.match.algorithm = MatchAlgorithm (g_value_get_enum (value));
-      break;
-    case PROP_BLOCK_SIZE:
-      p.core.match.block_size = g_value_get_int (value);
-      break;
-    case PROP_UNIQUENESS_RATIO:
-      p.core.match.uniqueness_ratio = g_value_get_int (value);
-      break;
-    case PROP_SPECKLE_WINDOW_SIZE:
-      p.core.match.speckle_window_size = g_value_get_int (value);
-      break;
-    case PROP_SPECKLE_RANGE:
-      p.core.match.speckle_range = g_value_get_int (value);
-      break;
-    case PROP_LEFT_RIGHT_MAX_DIFFERENCE:
-      p.core.match.left_right_max_difference = g_value_get_int (value);
-      break;
-    case PROP_FLYING_PIXEL_STEP:
-      p.core.flying_pixel_step = g_value_get_double (value);
-      break;
-    case PROP_PATCH_TOLERANCE:
-      p.core.patch_tolerance = g_value_get_double (value);
-      break;
-    case PROP_SILHOUETTE_RADIUS:
-      p.core.silhouette_radius = g_value_get_int (value);
-      break;
-    case PROP_GAP_WIDTH:
-      p.core.gap_width = g_value_get_int (value);
-      break;
-    case PROP_SEARCH_FAR:
-      p.core.search_far_m = g_value_get_double (value);
-      break;
-    case PROP_REFRESH_INTERVAL:
-      p.refresh_interval = g_value_get_int (value);
-      break;
-    case PROP_STEADY:
-      p.core.steady = g_value_get_double (value);
-      break;
-    case PROP_N_THREADS:
-      p.core.n_threads = g_value_get_int (value);
-      break;
-    case PROP_QOS:
-      p.qos = g_value_get_boolean (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!set_stereo_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
@@ -943,89 +743,10 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
   std::lock_guard guard (priv->lock);
-  const StereoProperties &p = priv->properties;
-  switch (id) {
-    case PROP_RIG:
-      g_value_set_string (value, p.rig.empty () ? nullptr : p.rig.c_str ());
-      break;
-    case PROP_VIEW_ID:
-      g_value_set_int (value, p.view_id);
-      break;
-    case PROP_FOCAL_LENGTH:
-      g_value_set_double (value, p.focal_length);
-      break;
-    case PROP_BASELINE:
-      g_value_set_double (value, p.baseline);
-      break;
-    case PROP_PRINCIPAL_X:
-      g_value_set_double (value, p.principal_x);
-      break;
-    case PROP_PRINCIPAL_Y:
-      g_value_set_double (value, p.principal_y);
-      break;
-    case PROP_PRINCIPAL_OFFSET:
-      g_value_set_double (value, p.principal_offset);
-      break;
-    case PROP_NEAR:
-      g_value_set_double (value, p.near);
-      break;
-    case PROP_FAR:
-      g_value_set_double (value, p.far);
-      break;
-    case PROP_DEPTH_UNIT:
-      g_value_set_double (value, p.depth_unit);
-      break;
-    case PROP_ALGORITHM:
-      g_value_set_enum (value, int (p.core.match.algorithm));
-      break;
-    case PROP_BLOCK_SIZE:
-      g_value_set_int (value, p.core.match.block_size);
-      break;
-    case PROP_UNIQUENESS_RATIO:
-      g_value_set_int (value, p.core.match.uniqueness_ratio);
-      break;
-    case PROP_SPECKLE_WINDOW_SIZE:
-      g_value_set_int (value, p.core.match.speckle_window_size);
-      break;
-    case PROP_SPECKLE_RANGE:
-      g_value_set_int (value, p.core.match.speckle_range);
-      break;
-    case PROP_LEFT_RIGHT_MAX_DIFFERENCE:
-      g_value_set_int (value, p.core.match.left_right_max_difference);
-      break;
-    case PROP_FLYING_PIXEL_STEP:
-      g_value_set_double (value, p.core.flying_pixel_step);
-      break;
-    case PROP_PATCH_TOLERANCE:
-      g_value_set_double (value, p.core.patch_tolerance);
-      break;
-    case PROP_SILHOUETTE_RADIUS:
-      g_value_set_int (value, p.core.silhouette_radius);
-      break;
-    case PROP_GAP_WIDTH:
-      g_value_set_int (value, p.core.gap_width);
-      break;
-    case PROP_SEARCH_FAR:
-      g_value_set_double (value, p.core.search_far_m);
-      break;
-    case PROP_REFRESH_INTERVAL:
-      g_value_set_int (value, p.refresh_interval);
-      break;
-    case PROP_STEADY:
-      g_value_set_double (value, p.core.steady);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_int (value, p.core.n_threads);
-      break;
-    case PROP_QOS:
-      g_value_set_boolean (value, p.qos);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == prop_stats)
+    g_value_take_boxed (value, make_stats (priv));
+  else if (!get_stereo_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -1047,112 +768,6 @@ gst_stereo_depth_init (GstStereoDepth *self)
       std::make_unique<gstrange::PairMatcher> (self->priv->pads[0], self->priv->pads[1]);
 }
 
-static constexpr auto kReady =
-    GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-
-static void
-install_double (GObjectClass *object_class, guint id, const char *name, const char *nick,
-    const char *blurb, double minimum, double maximum, double fallback)
-{
-  g_object_class_install_property (object_class, id,
-      g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, kReady));
-}
-
-static void
-install_int (GObjectClass *object_class, guint id, const char *name, const char *nick,
-    const char *blurb, int minimum, int maximum, int fallback)
-{
-  g_object_class_install_property (
-      object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, kReady));
-}
-
-static void
-install_calibration_properties (GObjectClass *c)
-{
-  g_object_class_install_property (c, PROP_RIG,
-      g_param_spec_string ("rig", "Rig",
-          "Rig file with the stereo pair that view-id names (default: none, see focal-length)",
-          nullptr, kReady));
-  install_int (c, PROP_VIEW_ID, "view-id", "View id",
-      "View of the rig, and view-id of the output (0 to 63, default 0)", 0,
-      rangecast::kMaxViews - 1, 0);
-  install_double (c, PROP_FOCAL_LENGTH, "focal-length", "Focal length",
-      "Without a rig, for rectified pictures: pixels (default 0: not set)", 0, 1e6, 0);
-  install_double (c, PROP_BASELINE, "baseline", "Baseline",
-      "Without a rig: distance of the cameras in metres (default 0: not set)", 0, 1e4, 0);
-  install_double (c, PROP_PRINCIPAL_X, "principal-x", "Principal point x",
-      "Without a rig: of the left camera, pixels (default -1: the centre)", -1, 1e6, -1);
-  install_double (c, PROP_PRINCIPAL_Y, "principal-y", "Principal point y",
-      "Without a rig: of both cameras, pixels (default -1: the centre)", -1, 1e6, -1);
-  install_double (c, PROP_PRINCIPAL_OFFSET, "principal-offset", "Principal point offset",
-      "Without a rig: right minus left principal point x, pixels (Middlebury's doffs, default 0)",
-      -1e5, 1e5, 0);
-  install_double (c, PROP_NEAR, "near", "Near",
-      "Nearest depth to look for, metres (default 0: the rig's, or 0.3)", 0, 1e4, 0);
-  install_double (c, PROP_FAR, "far", "Far",
-      "Farthest depth to look for, metres (default 0: the rig's, or 3)", 0, 1e4, 0);
-  install_double (c, PROP_DEPTH_UNIT, "depth-unit", "Depth unit",
-      "Metres per depth unit of the output (0 to 1, default 0: the rig's, or 0.0001, coarser if "
-      "far asks for it)",
-      0, 1, 0);
-}
-
-static void
-install_matching_properties (GObjectClass *c)
-{
-  const rangecast::MatchSettings &m = kDefaults.match;
-  g_object_class_install_property (c, PROP_ALGORITHM,
-      g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgbm-3way)",
-          GST_TYPE_STEREO_DEPTH_ALGORITHM, int (m.algorithm), kReady));
-  install_int (c, PROP_BLOCK_SIZE, "block-size", "Block size",
-      "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for the others)", 0, 51,
-      m.block_size);
-  install_int (c, PROP_UNIQUENESS_RATIO, "uniqueness-ratio", "Uniqueness ratio",
-      "Per cent by which the best match must beat the second (0 to 100, default 5)", 0, 100,
-      m.uniqueness_ratio);
-  install_int (c, PROP_SPECKLE_WINDOW_SIZE, "speckle-window-size", "Speckle window size",
-      "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 100)", 0,
-      100000, m.speckle_window_size);
-  install_int (c, PROP_SPECKLE_RANGE, "speckle-range", "Speckle range",
-      "Disparity step within a patch, pixels (0 to 1000, default 2)", 0, 1000, m.speckle_range);
-  install_int (c, PROP_LEFT_RIGHT_MAX_DIFFERENCE, "left-right-max-difference",
-      "Left-right maximum difference",
-      "Disparities of both directions agree to so many pixels (-1 = no check, to 1000, default 1)",
-      -1, 1000, m.left_right_max_difference);
-  install_double (c, PROP_FLYING_PIXEL_STEP, "flying-pixel-step", "Flying pixel step",
-      "Points that fewer than 4 of 8 neighbours follow within this share of their depth are "
-      "cleared (0 = off, to 1, default 0.02)",
-      0, 1, kDefaults.flying_pixel_step);
-  install_double (c, PROP_PATCH_TOLERANCE, "patch-tolerance", "Patch tolerance",
-      "Points around which both pictures differ by more than this share of the contrast are "
-      "cleared "
-      "(0 = off, to 10, default 1)",
-      0, 10, kDefaults.patch_tolerance);
-  install_int (c, PROP_SILHOUETTE_RADIUS, "silhouette-radius", "Silhouette radius",
-      "Near a silhouette, points whose colour is that of the other side are cleared: pixels around "
-      "that are looked at (0 = off, to 64, default 10)",
-      0, 64, kDefaults.silhouette_radius);
-  install_int (c, PROP_GAP_WIDTH, "gap-width", "Gap width",
-      "Gaps in a surface of one colour up to so many pixels are filled (0 = off, to 1000, default "
-      "12)",
-      0, 1000, kDefaults.gap_width);
-  install_double (c, PROP_SEARCH_FAR, "search-far", "Search far",
-      "What lies beyond far is matched, too, so that it is not taken for something nearer, and "
-      "cleared: up to so many metres (default 0: to infinity; as far: nothing is there)",
-      0, 1e4, kDefaults.search_far_m);
-  install_int (c, PROP_REFRESH_INTERVAL, "refresh-interval", "Refresh interval",
-      "When downstream wants only a part, one full picture every so many frames (0: always all, to "
-      "100000, default 30)",
-      0, 100000, kDefaultRefreshInterval);
-  install_double (c, PROP_STEADY, "steady", "Steady",
-      "Hold depth still where nothing moves: each new depth counts 1 - 0.9 of this (0 = off, to 1, "
-      "default 0)",
-      0, 1, kDefaults.steady);
-  install_int (c, PROP_N_THREADS, "n-threads", "Threads",
-      "Threads that match one pair (0, the default: one a core; to 64)", 0, 64,
-      kDefaults.n_threads);
-}
-
 static void
 gst_stereo_depth_class_init (GstStereoDepthClass *klass)
 {
@@ -1163,13 +778,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   object_class->set_property = gst_stereo_depth_set_property;
   object_class->get_property = gst_stereo_depth_get_property;
   object_class->finalize = gst_stereo_depth_finalize;
-  install_calibration_properties (object_class);
-  install_matching_properties (object_class);
-  g_object_class_install_property (object_class, PROP_QOS,
-      g_param_spec_boolean ("qos", "QoS",
-          "Do not match pictures whose depth would come too late to be shown (default true)", true,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property (object_class, PROP_STATS,
+  prop_stats = install_stereo_settings (object_class) + 1;
+  g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
           "dropped-right, dropped-third, dropped-late, match-time (ns)",

@@ -180,6 +180,43 @@ TEST (StereoScene, part_of_picture_and_depths_is_as_good_as_the_whole)
   EXPECT_LT (of_part.judgement ().off, 0.003);
 }
 
+TEST (StereoScene, who_moves_far_within_the_wanted_part_is_found_as_in_the_whole)
+{
+  const auto scene = make_scene (2);
+  StereoDepth whole, part;
+  ASSERT_TRUE (whole.set (scene->rig ().views[0], {}).ok ());
+  ASSERT_TRUE (part.set (scene->rig ().views[0], {}).ok ());
+  Judge of_whole, of_part;
+  Depth depth;
+  const Roi nearly_all = {1, 1, kWidth - 2, kHeight - 2};
+  for (int i = 0; i < 6; i++) {
+    Shot shot (*scene, 1.3 * i);
+    ASSERT_TRUE (depth.match (part, shot, i ? nearly_all : kWhole).ok ());
+    if (i)
+      of_part.add (shot, depth);
+    ASSERT_TRUE (depth.match (whole, shot).ok ());
+    if (i)
+      of_whole.add (shot, depth);
+  }
+  EXPECT_GT (of_part.judgement ().found, 0.99 * of_whole.judgement ().found);
+  EXPECT_LT (of_part.judgement ().off, 0.01);
+}
+
+TEST (StereoScene, third_camera_adds_no_rim_of_the_wall)
+{
+  const auto scene = make_scene (1, {}, 1.1);
+  StereoDepth trio;
+  ASSERT_TRUE (trio.set (scene->rig ().views[0], {}, true).ok ());
+  Judge judge;
+  Depth depth;
+  for (int i = 0; i < 4; i++) {
+    Shot shot (*scene, 0.04 * i);
+    ASSERT_TRUE (depth.match (trio, shot, kWhole, true).ok ());
+    judge.add (shot, depth);
+  }
+  EXPECT_LT (judge.judgement ().off, 0.003);
+}
+
 TEST (StereoScene, who_steps_nearer_than_the_depths_looked_at_is_seen_at_once)
 {
   const auto far = make_scene (0, {}, 1.1), near = make_scene (0, {}, 0.7);

@@ -3,25 +3,26 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <opencv2/imgproc.hpp>
 
 namespace rangecast {
+namespace {
 
-constexpr std::int16_t kUnknown = -32768;
-constexpr int kNoise = 3; /* grey levels, mean of a patch, that mean nothing */
-static const cv::Size kPatch (5, 5);
+constexpr std::int16_t kUnknown = -32768, kHidden = -32767;
+constexpr int kRadius = 2, kArea = 25; /* of a patch, pixels */
+/* Grey levels, mean of a patch, that mean nothing; sums of a patch that are no more than that. */
+constexpr int kNoise = 3, kNoiseSum = kNoise * kArea + kArea / 2;
 
 /* Fills what is not known of a row with the farther one of its neighbours. */
-static void
+void
 guess_row (std::int16_t *row, int width)
 {
   for (int x = 0; x < width;) {
-    if (row[x] != kUnknown) {
+    if (row[x] > kHidden) {
       x++;
       continue;
     }
     int end = x;
-    while (end < width && row[end] == kUnknown)
+    while (end < width && row[end] <= kHidden)
       end++;
     std::int16_t guess = kUnknown;
     if (x > 0 && end < width)
@@ -30,6 +31,37 @@ guess_row (std::int16_t *row, int width)
       guess = x > 0 ? row[x - 1] : row[end];
     std::fill (row + x, row + end, guess);
     x = end;
+  }
+}
+
+} // namespace
+
+/* Pixels without a disparity beside the background: one camera does not see them. */
+void
+BackgroundDisparity::mark_hidden (
+    const std::int16_t *d, const std::uint8_t *grey, int y, int least, int far)
+{
+  auto known = known_.ptr<std::int16_t> (y);
+  auto picture = picture_.ptr<std::uint8_t> (y);
+  const int width = known_.cols;
+  const auto is_background = [&] (int x) {
+    return x >= 0 && x < width && d[x] >= least && d[x] < far;
+  };
+  for (int x = 0; x < width;) {
+    if (d[x] >= least) {
+      x++;
+      continue;
+    }
+    const int begin = x;
+    while (x < width && d[x] < least)
+      x++;
+    if (!is_background (begin - 1) && !is_background (x))
+      continue;
+    for (int i = begin; i < x; i++)
+      if (known[i] <= kHidden) {
+        known[i] = kHidden;
+        picture[i] = grey[i];
+      }
   }
 }
 
@@ -50,70 +82,141 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
       if (d[x] >= least && d[x] < far) {
         known[x] = d[x];
         picture[x] = g[x];
-      }
+      } else if (d[x] >= far && known[x] == kHidden)
+        known[x] = kUnknown;
+    mark_hidden (d, g, y, least, far);
   }
   known_.copyTo (likely_);
   for (int y = 0; y < grey.rows; y++)
     guess_row (likely_.ptr<std::int16_t> (y), grey.cols);
 }
 
-/* Mean differences of patches between both pictures, where there is a disparity. */
 void
-BackgroundDisparity::compare (const cv::Mat &left, const cv::Mat &right, int right_x,
-    const cv::Mat &disparity, int least, cv::Mat &unlike)
+BackgroundDisparity::extend (
+    const cv::Point &at, int least, int far, const Pieces &pieces, cv::Mat &disparity) const
 {
-  unlike.create (left.size (), CV_8U);
-  for (int y = 0; y < left.rows; y++) {
-    const auto l = left.ptr<std::uint8_t> (y), r = right.ptr<std::uint8_t> (y);
-    const auto d = disparity.ptr<std::int16_t> (y);
-    auto to = unlike.ptr<std::uint8_t> (y);
-    for (int x = 0; x < left.cols; x++) {
-      const int there = std::clamp (16 * (x + right_x) - d[x], 0, 16 * (right.cols - 2));
-      const int u = there >> 4, f = there & 15;
-      const int grey = (r[u] * (16 - f) + r[u + 1] * f + 8) >> 4;
-      to[x] = static_cast<std::uint8_t> (d[x] < least ? 255 : std::abs (l[x] - grey));
+  constexpr std::int16_t kNothing = 32767;
+  pieces.each ([&] (const cv::Rect &piece, std::size_t) {
+    for (int y = piece.y; y < piece.br ().y; y++) {
+      auto d = disparity.ptr<std::int16_t> (y);
+      const auto back = likely_.ptr<std::int16_t> (at.y + y) + at.x;
+      /* What is known of the pixels beside the piece: nothing, or the background. */
+      const auto beside = [&] (int x) {
+        const bool inside = at.x + x >= 0 && at.x + x < likely_.cols;
+        return inside && back[x] > kHidden ? back[x] : kNothing;
+      };
+      for (int x = piece.x; x < piece.br ().x;) {
+        if (d[x] >= least) {
+          x++;
+          continue;
+        }
+        const int begin = x;
+        while (x < piece.br ().x && d[x] < least)
+          x++;
+        const std::int16_t farther = std::min (begin > piece.x ? d[begin - 1] : beside (begin - 1),
+            x < piece.br ().x ? d[x] : beside (x));
+        if (farther >= least && farther < far)
+          std::fill (d + begin, d + x, static_cast<std::int16_t> (least));
+      }
     }
+  });
+}
+
+/* Differences of patches between both pictures, where there is a disparity. memory.grey is the left
+ * one. @param disparity  of the size of job.left */
+void
+BackgroundDisparity::compare (const Job &job, const cv::Rect &piece, const cv::Mat &disparity,
+    int least, Memory &m, Plane &unlike) const
+{
+  const int x0 = piece.x - kRadius, y0 = piece.y - kRadius;
+  const auto lowest = static_cast<std::int16_t> (least);
+  m.pixels.set_size (piece.width + 2 * kRadius, piece.height + 2 * kRadius);
+  const int width = m.pixels.width (), begin = std::max (0, -x0),
+            end = std::min (width, disparity.cols - x0);
+  for (int y = 0; y < m.pixels.height (); y++) {
+    const int row = std::clamp (y0 + y, 0, disparity.rows - 1);
+    const auto d = disparity.ptr<std::int16_t> (row) + x0;
+    const std::int16_t *l = m.grey.row (y + kRadius) + kRadius;
+    std::int16_t *out = m.pixels.row (y);
+    look_up (d + begin, end - begin, job.right.ptr<std::uint8_t> (row), job.right.cols,
+        x0 + begin + job.right_x, out + begin);
+    for (int x = begin; x < end; x++) {
+      const auto unlike_here = static_cast<std::int16_t> (std::abs (l[x] - out[x]));
+      out[x] = d[x] < lowest ? std::int16_t{255} : unlike_here;
+    }
+    std::fill (out, out + begin, out[begin]);
+    std::fill (out + end, out + width, out[end - 1]);
   }
-  cv::blur (unlike, unlike, kPatch);
+  sum_windows<kRadius> (m.pixels, unlike, m.columns);
+}
+
+/* Row y of the part, which is row i of the piece, from column x on. */
+void
+BackgroundDisparity::restore_row (
+    const Job &job, int x0, int y, int i, int width, Memory &m, std::int16_t *d) const
+{
+  const std::int16_t *own = m.own.row (i), *other = m.other.row (i), *contrast = m.contrast.row (i),
+                     *change = m.change.row (i);
+  const auto back = likely_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0,
+             seen = known_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0;
+  m.claims.assign (std::size_t (job.right.cols), 32767);
+  const auto there = [&] (int x) {
+    return std::size_t (
+        std::clamp (x0 + x + job.right_x - ((d[x] + 8) >> 4), 0, job.right.cols - 1));
+  };
+  for (int x = 0; x < width; x++) {
+    const bool still = seen[x] != kUnknown && change[x] <= kNoiseSum,
+               fits = back[x] != kUnknown && other[x] <= kNoiseSum + contrast[x] / 2;
+    if (still && seen[x] == kHidden)
+      d[x] = static_cast<std::int16_t> (job.none);
+    else if (still || (fits && (d[x] < job.least || other[x] + kNoise * kArea < own[x]))) {
+      d[x] = back[x];
+      m.claims[there (x)] = std::min (m.claims[there (x)], other[x]);
+    } else if (d[x] < job.least)
+      d[x] = static_cast<std::int16_t> (job.none);
+  }
+  /* What the right camera sees as background cannot be seen as something else as well. */
+  for (int x = 0; x < width; x++)
+    if (d[x] >= job.least && m.claims[there (x)] < own[x])
+      d[x] = static_cast<std::int16_t> (job.none);
+}
+
+void
+BackgroundDisparity::restore_piece (
+    const Job &job, const cv::Rect &piece, const cv::Mat &disparity, Memory &m, cv::Mat &to) const
+{
+  const cv::Rect part (job.at, job.left.size ());
+  cut_grey (job.left, piece, 2 * kRadius, m.grey);
+  differ_from_mean<kRadius> (m.grey, m.pixels, m.sums, m.columns);
+  sum_windows<kRadius> (m.pixels, m.contrast, m.columns);
+  compare (job, piece, disparity, job.least, m, m.own);
+  compare (job, piece, likely_ (part), kHidden + 1, m, m.other);
+  cut_grey (picture_ (part), piece, kRadius, m.before);
+  m.pixels.set_size (m.before.width (), m.before.height ());
+  for (int y = 0; y < m.pixels.height (); y++) {
+    const std::int16_t *now = m.grey.row (y + kRadius) + kRadius, *before = m.before.row (y);
+    std::int16_t *out = m.pixels.row (y);
+    for (int x = 0; x < m.pixels.width (); x++)
+      out[x] = static_cast<std::int16_t> (std::abs (now[x] - before[x]));
+  }
+  sum_windows<kRadius> (m.pixels, m.change, m.columns);
+  for (int i = 0; i < piece.height; i++) {
+    auto out = to.ptr<std::int16_t> (piece.y + i) + piece.x;
+    std::copy_n (disparity.ptr<std::int16_t> (piece.y + i) + piece.x, piece.width, out);
+    restore_row (job, piece.x, piece.y + i, i, piece.width, m, out);
+  }
 }
 
 void
 BackgroundDisparity::restore (const cv::Mat &left, const cv::Mat &right, int right_x,
-    const cv::Point &at, int least, int none, cv::Mat &disparity)
+    const cv::Point &at, int least, int none, const Pieces &pieces, const cv::Mat &disparity,
+    cv::Mat &to)
 {
-  const cv::Rect part (at, left.size ());
-  const cv::Mat likely = likely_ (part), known = known_ (part);
-  compare (left, right, right_x, disparity, least, own_);
-  compare (left, right, right_x, likely, kUnknown + 1, other_);
-  cv::blur (left, mean_, kPatch);
-  cv::absdiff (left, mean_, contrast_);
-  cv::blur (contrast_, contrast_, kPatch);
-  cv::absdiff (left, picture_ (part), change_);
-  cv::blur (change_, change_, kPatch);
-  for (int y = 0; y < left.rows; y++) {
-    const auto own = own_.ptr<std::uint8_t> (y), other = other_.ptr<std::uint8_t> (y),
-               contrast = contrast_.ptr<std::uint8_t> (y), change = change_.ptr<std::uint8_t> (y);
-    const auto back = likely.ptr<std::int16_t> (y), seen = known.ptr<std::int16_t> (y);
-    auto d = disparity.ptr<std::int16_t> (y);
-    claims_.assign (static_cast<std::size_t> (right.cols), 255);
-    const auto there = [&] (int x) {
-      return static_cast<std::size_t> (
-          std::clamp (x + right_x - ((d[x] + 8) >> 4), 0, right.cols - 1));
-    };
-    for (int x = 0; x < left.cols; x++) {
-      const bool still = seen[x] != kUnknown && change[x] <= kNoise,
-                 fits = back[x] != kUnknown && other[x] <= kNoise + contrast[x] / 2;
-      if (still || (fits && (d[x] < least || other[x] + kNoise < own[x]))) {
-        d[x] = back[x];
-        claims_[there (x)] = std::min (claims_[there (x)], other[x]);
-      } else if (d[x] < least)
-        d[x] = static_cast<std::int16_t> (none);
-    }
-    /* What the right camera sees as background cannot be seen as something else as well. */
-    for (int x = 0; x < left.cols; x++)
-      if (d[x] >= least && claims_[there (x)] < own[x])
-        d[x] = static_cast<std::int16_t> (none);
-  }
+  const Job job = {left, right, right_x, at, least, none};
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    restore_piece (job, piece, disparity, memory_.of (worker), to);
+  });
 }
 
 } // namespace rangecast

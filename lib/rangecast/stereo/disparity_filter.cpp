@@ -4,18 +4,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <opencv2/core/hal/intrin.hpp>
-#include <opencv2/core/utility.hpp>
-#include <opencv2/imgproc.hpp>
 
 namespace rangecast {
 namespace {
 
-/* Sum of three colours' differences, levels, above which two pixels do not look alike. */
-constexpr short kLike = 60;
-/* Of weights, each kLike at most: four pixels of nearly the same colour. */
-constexpr int kEnough = 160;
-/* Of patches, pixels. */
-constexpr int kPatch = 7;
+/* Of patches: pixels around their centre, and all. */
+constexpr int kPatchRadius = 3, kPatchArea = 49;
 /* Grey levels that two pictures of one patch differ by from noise and interpolation alone. */
 constexpr int kNoise = 4;
 
@@ -27,226 +21,288 @@ grey_at (const std::uint8_t *row, int x16, int width)
   return (row[x] * (16 - f) + row[std::min (x + 1, width - 1)] * f + 8) >> 4;
 }
 
-/* What cv::parallel_for_ wants to hear: as many pieces as threads; it has as many as cores. */
-double
-n_stripes (int n_threads)
-{
-  return n_threads > 0 ? n_threads : cv::getNumThreads ();
-}
-
 } // namespace
+
+/* Sums over patches: how many pixels have a disparity, their difference between both pictures, how
+ * large it is, and the contrast of the left one. */
+void
+DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+    const cv::Rect &piece, const cv::Mat &disparity, Memory &m) const
+{
+  cut_grey (left, piece, 2 * kPatchRadius, m.grey);
+  differ_from_mean<kPatchRadius> (m.grey, m.contrast, m.sums, m.columns);
+  const int width = m.contrast.width (), height = m.contrast.height ();
+  for (Plane *plane : {&m.valid, &m.difference, &m.size})
+    plane->set_size (width, height);
+  const int x0 = piece.x - kPatchRadius, begin = std::max (0, -x0),
+            end = std::min (width, disparity.cols - x0);
+  for (int y = 0; y < height; y++) {
+    std::int16_t *valid = m.valid.row (y), *difference = m.difference.row (y),
+                 *size = m.size.row (y);
+    const int row = piece.y - kPatchRadius + y;
+    std::fill_n (valid, width, std::int16_t{0});
+    std::fill_n (difference, width, std::int16_t{0});
+    if (row >= 0 && row < disparity.rows) {
+      const auto d = disparity.ptr<std::int16_t> (row) + x0;
+      const std::int16_t *l = m.grey.row (y + kPatchRadius) + kPatchRadius;
+      look_up (d + begin, end - begin, right.ptr<std::uint8_t> (row), right.cols,
+          x0 + begin + right_x, size);
+      for (int x = begin; x < end; x++) {
+        valid[x] = d[x] >= least;
+        difference[x] = std::int16_t (valid[x] ? l[x] - size[x - begin] : 0);
+      }
+    }
+    for (int x = 0; x < width; x++)
+      size[x] = std::int16_t (std::abs (difference[x]));
+  }
+  sum_windows<kPatchRadius> (m.contrast, m.contrasts, m.columns);
+  sum_windows<kPatchRadius> (m.valid, m.counts, m.columns);
+  sum_windows<kPatchRadius> (m.difference, m.differences, m.columns);
+  sum_windows<kPatchRadius> (m.size, m.sizes, m.columns);
+}
 
 void
 DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x,
-    double tolerance, int least, cv::Mat &disparity)
+    double tolerance, int least, const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to)
 {
-  const cv::Size size = disparity.size (), patch (kPatch, kPatch);
-  difference_.create (size, CV_16S);
-  valid_.create (size, CV_16S);
-  for (int y = 0; y < size.height; y++) {
-    const auto l = left.ptr<std::uint8_t> (y), r = right.ptr<std::uint8_t> (y);
-    const auto d = disparity.ptr<std::int16_t> (y);
-    auto e = difference_.ptr<std::int16_t> (y), v = valid_.ptr<std::int16_t> (y);
-    for (int x = 0; x < size.width; x++) {
-      v[x] = d[x] >= least;
-      e[x] = std::int16_t (v[x] ? l[x] - grey_at (r, 16 * (x + right_x) - d[x], right.cols) : 0);
-    }
-  }
-  /* Sums over patches: how many there are, their mean difference, their mean absolute one. */
-  cv::boxFilter (valid_, count_, CV_16S, patch, {-1, -1}, false);
-  cv::boxFilter (difference_, means_, CV_16S, patch, {-1, -1}, false);
-  cv::blur (left, blurred_, patch);
-  cv::absdiff (left, blurred_, contrast_);
-  cv::boxFilter (contrast_, contrast_, CV_16S, patch, {-1, -1}, false);
-  difference_ = cv::abs (difference_);
-  cv::boxFilter (difference_, blurred_, CV_16S, patch, {-1, -1}, false);
   const int share = int (256 * tolerance);
-  for (int y = 0; y < size.height; y++) {
-    const auto n = count_.ptr<std::int16_t> (y), m = means_.ptr<std::int16_t> (y),
-               e = blurred_.ptr<std::int16_t> (y), c = contrast_.ptr<std::int16_t> (y);
-    auto d = disparity.ptr<std::int16_t> (y);
-    for (int x = 0; x < size.width; x++) {
-      if (d[x] < least)
-        continue;
-      const int unlike = e[x] - std::abs (int (m[x])) / 2;
-      if (256 * unlike * kPatch * kPatch > (share * c[x] + 256 * kNoise * kPatch * kPatch) * n[x])
-        d[x] = std::int16_t (least - 16);
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    Memory &m = memory_.of (worker);
+    compare_patches (left, right, right_x, least, piece, disparity, m);
+    for (int y = 0; y < piece.height; y++) {
+      const std::int16_t *counts = m.counts.row (y), *differences = m.differences.row (y),
+                         *sizes = m.sizes.row (y), *contrasts = m.contrasts.row (y);
+      const auto from = disparity.ptr<std::int16_t> (piece.y + y) + piece.x;
+      auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
+      for (int x = 0; x < piece.width; x++) {
+        const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
+                  most = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
+        out[x] = unlike > most ? std::int16_t (least - 16) : from[x];
+      }
     }
-  }
+  });
 }
 
 void
-DisparityFilter::clear_hidden (int least, cv::Mat &disparity)
+DisparityFilter::clear_hidden (int least, const Pieces &pieces, cv::Mat &disparity)
 {
   constexpr int kTolerance = 24; /* 1/16 pixel */
-  constexpr int kBeyond = 2049;  /* columns that a match may lie outside of the part, pixels */
-  const int width = disparity.cols;
-  nearest_.resize (static_cast<std::size_t> (width) + 2 * kBeyond);
-  for (int y = 0; y < disparity.rows; y++) {
-    auto d = disparity.ptr<std::int16_t> (y);
-    std::ranges::fill (nearest_, std::int16_t (least - 16));
-    const auto there = [&] (int x) { return x + kBeyond - ((d[x] + 8) >> 4); };
-    for (int x = 0; x < width; x++)
-      if (d[x] >= least)
-        nearest_[std::size_t (there (x))] = std::max (nearest_[std::size_t (there (x))], d[x]);
-    for (int x = 0; x < width; x++)
-      if (d[x] >= least && d[x] + kTolerance < nearest_[std::size_t (there (x))])
-        d[x] = std::int16_t (least - 16);
-  }
-}
-
-void
-DisparityFilter::clear_flying (double step, int support, int offset, int least, cv::Mat &disparity)
-{
-  cv::copyMakeBorder (disparity, copy_, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar (least - 16));
-  const int share = int (65536 * step);
-  for (int y = 0; y < disparity.rows; y++) {
-    const std::int16_t *rows[3] = {copy_.ptr<std::int16_t> (y), copy_.ptr<std::int16_t> (y + 1),
-        copy_.ptr<std::int16_t> (y + 2)};
-    auto to = disparity.ptr<std::int16_t> (y);
-    for (int x = 0; x < disparity.cols; x++) {
-      const int d = to[x];
-      if (d < least)
-        continue;
-      const int most = std::max (8, (d + offset) * share >> 16);
-      int n = -1; /* itself */
-      for (const std::int16_t *row : rows)
-        for (int u = x; u < x + 3; u++)
-          n += row[u] >= least && std::abs (row[u] - d) <= most;
-      if (n < support)
-        to[x] = std::int16_t (least - 16);
-    }
-  }
-}
-
-void
-DisparityFilter::sample (const cv::Mat &colour, const cv::Mat &disparity, int radius)
-{
-  /* Every second pixel of every second row; around that so much that no window leaves it. Colours
-   * there are like no colour. */
-  constexpr std::int16_t kNoColour = 10000;
-  pad_ = radius / 2 + 1;
-  const int rows = (disparity.rows + 1) / 2, cols = (disparity.cols + 1) / 2;
-  for (cv::Mat &plane : samples_)
-    plane.create (rows + 2 * pad_, cols + 2 * pad_ + 8, CV_16S);
-  for (int c = 0; c < 3; c++)
-    samples_[c].setTo (kNoColour);
-  samples_[3].setTo (0);
-  for (int y = 0; y < rows; y++) {
-    const auto from = colour.ptr<cv::Vec4b> (2 * y);
-    const auto d = disparity.ptr<std::int16_t> (2 * y);
-    std::int16_t *to[4];
-    for (int c = 0; c < 4; c++)
-      to[c] = samples_[c].ptr<std::int16_t> (y + pad_) + pad_;
-    for (int x = 0; x < cols; x++) {
-      for (int c = 0; c < 3; c++)
-        to[c][x] = from[2 * x][c];
-      to[3][x] = d[2 * x];
-    }
-  }
-}
-
-/* Calls `count (weight, disparity)` with eight samples of a window at a time. */
-template <typename Count>
-void
-DisparityFilter::for_window (
-    const cv::Vec4b &own, int x, int y, int radius, const Count &count) const
-{
-  const cv::v_int16x8 lanes (0, 1, 2, 3, 4, 5, 6, 7), most = cv::v_setall_s16 (kLike);
-  const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
-  for (int v = y0; v < y0 + radius; v++)
-    for (int u = 0; u < radius; u += 8) {
-      cv::v_int16x8 unlike = cv::v_setzero_s16 ();
-      for (int c = 0; c < 3; c++) {
-        const cv::v_int16x8 p = cv::v_load (samples_[c].ptr<std::int16_t> (v) + x0 + u);
-        unlike = unlike + cv::v_reinterpret_as_s16 (cv::v_absdiff (p, cv::v_setall_s16 (own[c])));
+  const auto none = static_cast<std::int16_t> (least - 16);
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    std::vector<std::int16_t> &nearest = memory_.of (worker).nearest;
+    for (int y = piece.y; y < piece.br ().y; y++) {
+      auto d = disparity.ptr<std::int16_t> (y) + piece.x;
+      int low = 32767, high = least;
+      for (int x = 0; x < piece.width; x++) {
+        low = std::min<int> (low, d[x] >= least ? d[x] : 32767);
+        high = std::max<int> (high, d[x]);
       }
-      const cv::v_int16x8 inside = lanes < cv::v_setall_s16 (static_cast<short> (radius - u));
-      count (cv::v_max (most - unlike, cv::v_setzero_s16 ()) & inside,
-          cv::v_load (samples_[3].ptr<std::int16_t> (v) + x0 + u));
+      if (low > high)
+        continue;
+      const int first = (high + 8) >> 4; /* columns of the right picture begin so far left */
+      nearest.assign (std::size_t (piece.width + first - ((low + 8) >> 4)), none);
+      const auto there = [&] (int x) { return std::size_t (x + first - ((d[x] + 8) >> 4)); };
+      for (int x = 0; x < piece.width; x++)
+        if (d[x] >= least)
+          nearest[there (x)] = std::max (nearest[there (x)], d[x]);
+      for (int x = 0; x < piece.width; x++)
+        if (d[x] >= least && d[x] + kTolerance < nearest[there (x)])
+          d[x] = none;
+    }
+  });
+}
+
+/* A piece and one pixel around it, and `more` columns so that vectors may end beyond it. */
+static void
+copy_with_border (
+    const cv::Mat &disparity, const cv::Rect &piece, int more, std::int16_t none, Plane &to)
+{
+  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
+  const cv::Rect there (piece.x - 1, piece.y - 1, piece.width + 2, piece.height + 2);
+  const cv::Rect inside = there & all;
+  to.set_size (there.width + more, there.height);
+  for (int y = 0; y < to.height (); y++) {
+    std::int16_t *row = to.row (y);
+    std::fill_n (row, to.width (), none);
+    if (const int v = there.y + y; v >= 0 && v < all.height)
+      std::copy_n (
+          disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
+  }
+}
+
+void
+DisparityFilter::clear_flying (double step, int support, int offset, int least,
+    const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to)
+{
+  const auto share = static_cast<std::uint16_t> (std::min (65535.0, 65536 * step));
+  const auto none = static_cast<std::int16_t> (least - 16);
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    Plane &copy = memory_.of (worker).grey;
+    constexpr int kLanes = cv::v_int16x8::nlanes;
+    copy_with_border (disparity, piece, kLanes, none, copy);
+    const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
+                        zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
+                        shift = cv::v_setall_s16 (static_cast<short> (offset)),
+                        /* counts are negative, and hold the pixel itself */
+        enough = cv::v_setall_s16 (static_cast<short> (-support));
+    for (int y = 0; y < piece.height; y++) {
+      auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
+      for (int x = 0; x < piece.width; x += kLanes) {
+        const cv::v_int16x8 d = cv::v_load (copy.row (y + 1) + x + 1);
+        const cv::v_uint16x8 most = cv::v_max (cv::v_setall_u16 (8),
+            cv::v_mul_hi (
+                cv::v_reinterpret_as_u16 (cv::v_max (d + shift, zero)), cv::v_setall_u16 (share)));
+        cv::v_int16x8 n = zero;
+        for (int v = y; v < y + 3; v++)
+          for (int u = x; u < x + 3; u++) {
+            const cv::v_int16x8 other = cv::v_load (copy.row (v) + u);
+            n = n +
+                ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= most));
+          }
+        const cv::v_int16x8 result = cv::v_select (n < enough, d, nothing);
+        if (x + kLanes <= piece.width)
+          cv::v_store (out + x, result);
+        else {
+          std::int16_t last[kLanes];
+          cv::v_store (last, result);
+          std::copy_n (last, piece.width - x, out + x);
+        }
+      }
+    }
+  });
+}
+
+/* ---- doubles ---- */
+
+void
+DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint8_t *right,
+    int right_width, int right_x, int least, int width, Memory &m, std::int16_t *d)
+{
+  constexpr int kNarrow = 16, kWide = 48; /* pixels */
+  m.surfaces.clear ();
+  for (int x = 0; x < width;) {
+    const int begin = x++;
+    while (x < width && d[begin] >= least && d[x] >= least && std::abs (d[x] - d[x - 1]) <= 16)
+      x++;
+    if (d[begin] >= least && (x - begin <= kNarrow || x - begin >= kWide))
+      m.surfaces.push_back ({begin, x});
+  }
+  const auto there = [&] (int x) {
+    return std::size_t (std::clamp (x + right_x - ((d[x] + 8) >> 4), 0, right_width - 1));
+  };
+  std::vector<std::int16_t> &seen = m.nearest; /* as this disparity, at least, in a wide surface */
+  seen.assign (std::size_t (right_width), 32767);
+  for (const auto &[begin, end] : m.surfaces)
+    for (int x = begin; x < end && end - begin >= kWide; x++)
+      if (std::abs (left[x] - grey_at (right, 16 * (x + right_x) - d[x], right_width)) <= kNoise)
+        seen[there (x)] = std::min (seen[there (x)], d[x]);
+  for (const auto &[begin, end] : m.surfaces) {
+    if (end - begin > kNarrow)
+      continue;
+    int doubled = 0;
+    for (int x = begin; x < end; x++)
+      doubled += seen[there (x)] < d[x] - 32;
+    if (2 * doubled >= end - begin)
+      std::fill (d + begin, d + end, std::int16_t (least - 16));
+  }
+}
+
+void
+DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+    const Pieces &pieces, cv::Mat &disparity)
+{
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    for (int y = piece.y; y < piece.br ().y; y++)
+      clear_doubled_of_row (left.ptr<std::uint8_t> (y) + piece.x, right.ptr<std::uint8_t> (y),
+          right.cols, right_x + piece.x, least, piece.width, memory_.of (worker),
+          disparity.ptr<std::int16_t> (y) + piece.x);
+  });
+}
+
+/* ---- specks ---- */
+
+int
+DisparityFilter::find_root (int run)
+{
+  while (runs_[std::size_t (run)].root != run) {
+    const int up = runs_[std::size_t (run)].root;
+    run = runs_[std::size_t (run)].root = runs_[std::size_t (up)].root;
+  }
+  return run;
+}
+
+/* Joins runs a to a_end of a row with runs a_end to b_end of the row below it. */
+void
+DisparityFilter::join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
+    std::size_t a_end, std::size_t b_end, int range)
+{
+  for (std::size_t b = a_end; a < a_end && b < b_end;) {
+    const int x0 = std::max (runs_[a].x0, runs_[b].x0), x1 = std::min (runs_[a].x1, runs_[b].x1);
+    bool touch = false;
+    for (int x = x0; x < x1 && !touch; x++)
+      touch = std::abs (upper[x] - lower[x]) <= range;
+    if (touch) {
+      const int one = find_root (int (a)), other = find_root (int (b));
+      if (one != other) {
+        runs_[std::size_t (other)].root = one;
+        runs_[std::size_t (one)].size += runs_[std::size_t (other)].size;
+      }
+    }
+    runs_[a].x1 <= runs_[b].x1 ? a++ : b++;
+  }
+}
+
+/* The runs of one row, from x0 to x1. */
+void
+DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, int least)
+{
+  for (int x = x0; x < x1;) {
+    if (d[x] < least) {
+      x++;
+      continue;
+    }
+    const int begin = x++;
+    while (x < x1 && d[x] >= least && std::abs (d[x] - d[x - 1]) <= range)
+      x++;
+    runs_.push_back ({begin, x, int (runs_.size ()), x - begin});
+  }
+}
+
+void
+DisparityFilter::clear_specks (
+    int window, int range, int least, int nearest, const Pieces &pieces, cv::Mat &disparity)
+{
+  runs_.clear ();
+  first_runs_.assign (std::size_t (disparity.rows) + 1, 0);
+  std::size_t next = 0; /* row whose first run is not known yet */
+  for (const cv::Rect &part : pieces.parts ()) {
+    const std::size_t top = std::size_t (part.y);
+    for (; next <= top; next++)
+      first_runs_[next] = runs_.size ();
+    for (std::size_t y = top; y < top + std::size_t (part.height); y++) {
+      const auto row = disparity.ptr<std::int16_t> (int (y));
+      find_runs (row, part.x, part.br ().x, range, nearest);
+      first_runs_[y + 1] = runs_.size ();
+      if (y > 0 && first_runs_[y - 1] < first_runs_[y])
+        join_rows (disparity.ptr<std::int16_t> (int (y) - 1), row, first_runs_[y - 1],
+            first_runs_[y], runs_.size (), range);
+    }
+    next = top + std::size_t (part.height) + 1;
+  }
+  for (const cv::Rect &part : pieces.parts ())
+    for (int y = part.y; y < part.br ().y; y++) {
+      auto row = disparity.ptr<std::int16_t> (y);
+      for (std::size_t i = first_runs_[std::size_t (y)]; i < first_runs_[std::size_t (y) + 1]; i++)
+        if (runs_[std::size_t (find_root (int (i)))].size <= window)
+          std::fill (row + runs_[i].x0, row + runs_[i].x1, std::int16_t (least - 16));
     }
 }
 
-/* How much the samples around a pixel are like it in colour, by their depth. */
-struct DisparityFilter::Votes {
-  int same, near, far, none; /* of disparity d, nearer, farther, without depth */
-};
-
-DisparityFilter::Votes
-DisparityFilter::vote (
-    const cv::Vec4b &own, int x, int y, int d, int radius, int most, int least) const
-{
-  const cv::v_int16x8 low = cv::v_setall_s16 (static_cast<short> (d - most)),
-                      high = cv::v_setall_s16 (static_cast<short> (std::min (d + most, 32767))),
-                      valid = cv::v_setall_s16 (static_cast<short> (least));
-  cv::v_int16x8 same = cv::v_setzero_s16 (), near = same, far = same, none = same;
-  for_window (own, x, y, radius, [&] (const cv::v_int16x8 &weight, const cv::v_int16x8 &depth) {
-    const cv::v_int16x8 without = depth<valid, above = depth> high,
-                        below = (depth < low) & ~without;
-    none = none + (weight & without);
-    near = near + (weight & above);
-    far = far + (weight & below);
-    same = same + (weight & ~(without | above | below));
-  });
-  return {cv::v_reduce_sum (same), cv::v_reduce_sum (near), cv::v_reduce_sum (far),
-      cv::v_reduce_sum (none)};
-}
-
-/* The mean disparity of the samples around a pixel that are like it, or `least` - 1. */
-int
-DisparityFilter::likely (const cv::Vec4b &own, int x, int y, int radius, int least) const
-{
-  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
-                      one = cv::v_setall_s16 (1);
-  cv::v_int32x4 sum = cv::v_setzero_s32 (), weights = sum;
-  for_window (own, x, y, radius, [&] (const cv::v_int16x8 &weight, const cv::v_int16x8 &depth) {
-    const cv::v_int16x8 counting = weight & (depth >= valid);
-    sum = sum + cv::v_dotprod (counting, depth);
-    weights = weights + cv::v_dotprod (counting, one);
-  });
-  const int total = cv::v_reduce_sum (weights);
-  return total < kEnough ? least - 1 : cv::v_reduce_sum (sum) / total;
-}
-
-void
-DisparityFilter::clear_rims (
-    const cv::Mat &colour, int radius, double step, int offset, int least, cv::Mat &disparity)
-{
-  const int share = static_cast<int> (65536 * step), reach = radius * 2 / 3;
-  const cv::Mat around = cv::getStructuringElement (cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1});
-  sample (colour, disparity, radius);
-  cv::erode (disparity, lowest_, around);
-  cv::dilate (disparity, highest_, around);
-  const auto work = [&] (const cv::Range &rows) {
-    for (int y = rows.start; y < rows.end; y++)
-      clear_rims_of_row (colour, y, radius, share, offset, least, disparity);
-  };
-  cv::parallel_for_ (cv::Range (0, disparity.rows), work, n_stripes (n_threads_));
-}
-
-void
-DisparityFilter::clear_rims_of_row (const cv::Mat &colour, int y, int radius, int share, int offset,
-    int least, cv::Mat &disparity) const
-{
-  auto to = disparity.ptr<std::int16_t> (y);
-  const auto lowest = lowest_.ptr<std::int16_t> (y), highest = highest_.ptr<std::int16_t> (y);
-  const auto pixels = colour.ptr<cv::Vec4b> (y);
-  for (int x = 0; x < disparity.cols; x++) {
-    const bool valid = to[x] >= least;
-    if (valid ? lowest[x] >= to[x] - std::max (16, (to[x] + offset) * share >> 16)
-              : highest[x] < least)
-      continue; /* a surface, or nothing near */
-    const int d = valid ? to[x] : likely (pixels[x], x, y, radius, least);
-    if (d < least)
-      continue;
-    const int most = std::max (16, (d + offset) * share >> 16);
-    const Votes votes = vote (pixels[x], x, y, d, radius, most, least);
-    if (valid && votes.far + votes.none > votes.same)
-      to[x] = static_cast<std::int16_t> (least - 16);
-    else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
-      to[x] = static_cast<std::int16_t> (d);
-  }
-}
+/* ---- gaps ---- */
 
 namespace {
 
@@ -261,45 +317,65 @@ is_between (const cv::Vec4b &p, const cv::Vec4b &a, const cv::Vec4b &b)
   return true;
 }
 
-/* A row or a column: steps are in elements. */
+/* Fills elements `last` + 1 to i - 1 of a row or a column, if they are a gap in one surface. Steps
+ * are in elements. */
 void
-fill_line (const cv::Vec4b *colour, std::size_t colour_step, std::int16_t *disparity,
-    std::size_t step, int length, int width, int least)
+fill_gap (const cv::Vec4b *colour, std::ptrdiff_t colour_step, std::int16_t *disparity,
+    std::ptrdiff_t step, int last, int i)
 {
-  int last = -1; /* with a disparity */
-  for (int i = 0; i < length; i++) {
-    const int d = disparity[std::size_t (i) * step];
-    if (d < least)
-      continue;
-    const int gap = i - last - 1, a = last < 0 ? 0 : disparity[std::size_t (last) * step];
-    bool like = last >= 0 && gap > 0 && gap <= width && std::abs (a - d) <= 16;
-    for (int k = last + 1; k < i && like; k++)
-      like = is_between (colour[std::size_t (k) * colour_step],
-          colour[std::size_t (last) * colour_step], colour[std::size_t (i) * colour_step]);
-    for (int k = last + 1; k < i && like; k++)
-      disparity[std::size_t (k) * step] =
-          static_cast<std::int16_t> (a + (d - a) * (k - last) / (gap + 1));
-    last = i;
-  }
+  const int a = disparity[last * step], d = disparity[i * step];
+  if (std::abs (a - d) > 16)
+    return;
+  for (int k = last + 1; k < i; k++)
+    if (!is_between (colour[k * colour_step], colour[last * colour_step], colour[i * colour_step]))
+      return;
+  for (int k = last + 1; k < i; k++)
+    disparity[k * step] = static_cast<std::int16_t> (a + (d - a) * (k - last) / (i - last));
 }
 
 } // namespace
 
 void
-DisparityFilter::fill_gaps (const cv::Mat &colour, int width, int least, cv::Mat &disparity)
+DisparityFilter::fill_gaps (
+    const cv::Mat &colour, int width, int least, const Pieces &pieces, cv::Mat &disparity)
 {
-  const auto rows = [&] (const cv::Range &range) {
-    for (int y = range.start; y < range.end; y++)
-      fill_line (colour.ptr<cv::Vec4b> (y), 1, disparity.ptr<std::int16_t> (y), 1, disparity.cols,
-          width, least);
-  };
-  const auto columns = [&] (const cv::Range &range) {
-    for (int x = range.start; x < range.end; x++)
-      fill_line (colour.ptr<cv::Vec4b> (0) + x, colour.step / sizeof (cv::Vec4b),
-          disparity.ptr<std::int16_t> (0) + x, disparity.step1 (), disparity.rows, width, least);
-  };
-  cv::parallel_for_ (cv::Range (0, disparity.rows), rows, n_stripes (n_threads_));
-  cv::parallel_for_ (cv::Range (0, disparity.cols), columns, n_stripes (n_threads_));
+  pieces.each ([&] (const cv::Rect &piece, std::size_t) {
+    for (int y = piece.y; y < piece.br ().y; y++) {
+      auto d = disparity.ptr<std::int16_t> (y);
+      int last = -1; /* with a disparity */
+      for (int x = piece.x; x < piece.br ().x; x++) {
+        if (d[x] < least)
+          continue;
+        if (last >= 0 && x - last > 1 && x - last - 1 <= width)
+          fill_gap (colour.ptr<cv::Vec4b> (y), 1, d, 1, last, x);
+        last = x;
+      }
+    }
+  });
+  /* Columns go down together, as memory lies; threads share them among each other. */
+  constexpr int kColumns = 64;
+  const cv::Rect hull = pieces.hull ();
+  last_rows_.assign (std::size_t (disparity.cols), -1);
+  in_parallel (std::size_t ((hull.width + kColumns - 1) / kColumns), pieces.n_threads (),
+      [&] (std::size_t stripe) {
+        const int begin = hull.x + int (stripe) * kColumns,
+                  end = std::min (begin + kColumns, hull.br ().x);
+        for (const cv::Rect &part : pieces.parts ())
+          for (int y = part.y; y < part.br ().y; y++) {
+            const auto d = disparity.ptr<std::int16_t> (y);
+            for (int x = std::max (begin, part.x); x < std::min (end, part.br ().x); x++) {
+              if (d[x] < least)
+                continue;
+              int &last = last_rows_[std::size_t (x)];
+              if (last >= 0 && y - last > 1 && y - last - 1 <= width)
+                fill_gap (colour.ptr<cv::Vec4b> (0) + x,
+                    std::ptrdiff_t (colour.step / sizeof (cv::Vec4b)),
+                    disparity.ptr<std::int16_t> (0) + x, std::ptrdiff_t (disparity.step1 ()), last,
+                    y);
+              last = y;
+            }
+          }
+      });
 }
 
 } // namespace rangecast

@@ -28,7 +28,8 @@ DisparityFinder::set (
 {
   pair_ = pair;
   settings_ = settings;
-  filter_.set_threads (settings.n_threads);
+  for (cv::Mat &whole : whole_)
+    whole.create (pair.height, pair.width, CV_16S);
   const double farthest =
       settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
   const double nearest = pair.focal_baseline / near_m - pair.offset; /* int may not hold it */
@@ -88,21 +89,74 @@ DisparityFinder::cut_window (int camera, const cv::Mat &picture)
   cv::copyMakeBorder (grey_, window_[camera], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
 }
 
+void
+DisparityFinder::choose_parts (const std::vector<cv::Rect> *parts)
+{
+  parts_.clear ();
+  const cv::Rect all (0, 0, core_at_.width, core_at_.height);
+  if (!parts)
+    parts_.push_back (all);
+  else
+    for (const cv::Rect &part : *parts)
+      if (const cv::Rect inside = (part - core_at_.tl ()) & all; !inside.empty ())
+        parts_.push_back (inside);
+  pieces_.set (parts_, settings_.n_threads);
+}
+
 /* OpenCV splits a picture among all cores by itself, but not within a parallel loop: so one thread
  * is a loop of one. Some threads get stripes, which overlap so that no seam is seen. */
 Status
-DisparityFinder::match ()
+DisparityFinder::match_window (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity)
 {
   const int cores = cv::getNumThreads (), wanted = settings_.n_threads;
   if (wanted == 0 || wanted >= std::max (cores, 2))
-    return matcher_->match (window_[0], window_[1], raw_);
+    return matcher_->match (left, right, disparity);
   if (wanted == 1) {
     Status status;
     cv::parallel_for_ (cv::Range (0, 1),
-        [&] (const cv::Range &) { status = matcher_->match (window_[0], window_[1], raw_); });
+        [&] (const cv::Range &) { status = matcher_->match (left, right, disparity); });
     return status;
   }
-  return matcher_->match_stripes (window_[0], window_[1], wanted, raw_);
+  return matcher_->match_stripes (left, right, wanted, disparity);
+}
+
+/* Matches each part with some rows around it, and puts it into the core. */
+Status
+DisparityFinder::match ()
+{
+  const cv::Rect all (0, 0, core_at_.width, core_at_.height);
+  for (int i = 0; i < 2; i++) {
+    cv::Mat &core = i ? next_ : core_;
+    core = whole_[i](all);
+    core.setTo (16 * least_ - 16);
+  }
+  const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
+            above = kMargin - 2, below = 2;
+      /* no path of three goes up */ /* no path of three goes up */
+  for (const cv::Rect &part : parts_) {
+    const int top = std::max (0, part.y - above),
+              bottom = std::min (all.height, part.br ().y + below);
+    const cv::Rect window (part.x, top, part.width + beside, bottom - top);
+    if (Status s = match_window (window_[0](window), window_[1](window), raw_); !s.ok ())
+      return s;
+    raw_ (cv::Rect (reach, part.y - top, part.width, part.height)).copyTo (core_ (part));
+  }
+  return {};
+}
+
+/* What was matched at some depths only: disparities of the background, or none, for what lies
+ * beyond. */
+void
+DisparityFinder::know_background (const cv::Mat &grey, int right_x)
+{
+  const int none = 16 * least_ - 16, found = 16 * matcher_->min_disparity ();
+  if (background_.empty ()) {
+    core_.setTo (none, core_ < found);
+    return;
+  }
+  background_.restore (
+      grey, window_[1], right_x, core_at_.tl (), found, none, pieces_, core_, next_);
+  cv::swap (core_, next_);
 }
 
 /* Takes away what cannot be right of the disparities of the ROI and its margin. */
@@ -112,35 +166,50 @@ DisparityFinder::filter (const cv::Mat &left)
   const MatchSettings &m = settings_.match;
   const int least = 16 * least_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
-  const cv::Rect in_window (core_at_.x - window_at_.x + missing_[0], core_at_.y - window_at_.y,
-      core_at_.width, core_at_.height);
-  core_ = raw_ (in_window);
-  const cv::Mat grey = window_[0](in_window), colour = left (core_at_);
-  if (matcher_ != &all_) {
-    const int found = 16 * matcher_->min_disparity ();
-    if (background_.empty ())
-      core_.setTo (least - 16, core_ < found);
-    else
-      background_.restore (grey, window_[1], in_window.x, core_at_.tl (), found, least - 16, core_);
+  const int right_x = matcher_->reach ();
+  const cv::Mat grey = window_[0](cv::Rect (right_x, 0, core_at_.width, core_at_.height)),
+                colour = left (core_at_);
+  const bool limited = matcher_ != &all_;
+  const int nearest = limited ? std::max (least, far_) : least; /* of interest */
+  if (limited)
+    know_background (grey, right_x);
+  if (settings_.patch_tolerance > 0) {
+    filter_.clear_unlike (
+        grey, window_[1], right_x, settings_.patch_tolerance, least, pieces_, core_, next_);
+    cv::swap (core_, next_);
   }
-  if (settings_.patch_tolerance > 0)
-    filter_.clear_unlike (grey, window_[1], in_window.x, settings_.patch_tolerance, least, core_);
-  filter_.clear_hidden (least, core_);
+  filter_.clear_hidden (least, pieces_, core_);
   constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
-  if (settings_.flying_pixel_step > 0)
-    filter_.clear_flying (settings_.flying_pixel_step, kSupport, offset, least, core_);
+  if (settings_.flying_pixel_step > 0) {
+    filter_.clear_flying (
+        settings_.flying_pixel_step, kSupport, offset, least, pieces_, core_, next_);
+    cv::swap (core_, next_);
+  }
   if (m.speckle_window_size > 0)
-    cv::filterSpeckles (core_, least - 16, m.speckle_window_size, 16 * m.speckle_range, specks_);
+    filter_.clear_specks (
+        m.speckle_window_size, 16 * m.speckle_range, least, nearest, pieces_, core_);
   if (settings_.gap_width > 0)
-    filter_.fill_gaps (colour, settings_.gap_width, least, core_);
-  if (settings_.silhouette_radius > 0)
-    filter_.clear_rims (
-        colour, settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, core_);
-  if (matcher_ == &all_ && core_.cols == pair_.width && core_.rows == pair_.height)
+    filter_.fill_gaps (colour, settings_.gap_width, least, pieces_, core_);
+  if (settings_.silhouette_radius > 0) {
+    SilhouetteFilter::Settings rims = {
+        settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest};
+    silhouettes_.apply (rims, colour, pieces_, core_, next_);
+    cv::swap (core_, next_);
+    if (limited && !background_.empty ()) {
+      background_.extend (core_at_.tl (), least, far_, pieces_, core_);
+      rims.only_beyond = true;
+      rims.look_near = least;
+      silhouettes_.apply (rims, colour, pieces_, core_, next_);
+      cv::swap (core_, next_);
+    }
+  }
+  if (!limited)
+    filter_.clear_doubled (grey, window_[1], right_x, least, pieces_, core_);
+  if (!limited && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, least, far_);
 }
 
-/* OpenCV's disparities of the window to ours of the ROI. */
+/* OpenCV's disparities of the window to ours of the ROI. The farthest one is none: see extend(). */
 void
 DisparityFinder::take (const Roi &roi)
 {
@@ -155,19 +224,20 @@ DisparityFinder::take (const Roi &roi)
       const int d = from[x] + offset;
       const int there = 16 * (roi.x + x) - from[x]; /* not where the right picture is repeated */
       const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
-      to[x] = from[x] >= least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
+      to[x] = from[x] > least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
 }
 
 Status
-DisparityFinder::find (
-    const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m)
+DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
+    double far_m, const std::vector<cv::Rect> *parts)
 {
   if (Status s = choose_range (near_m, far_m); !s.ok ())
     return s;
   try {
     place_window (roi);
+    choose_parts (parts);
     cut_window (0, left);
     cut_window (1, right);
     if (Status s = match (); !s.ok ())

@@ -7,6 +7,8 @@
 #include "background_disparity.hpp"
 #include "disparity_filter.hpp"
 #include "matching.hpp"
+#include "pieces.hpp"
+#include "silhouette_filter.hpp"
 
 namespace rangecast {
 
@@ -42,11 +44,13 @@ public:
 
   /** @param left, right  CV_8UC4, R G B x, of the pair's size
    *  @param roi          in the picture, not empty
+   *  @param parts        of the picture, one below the other: where to look in the ROI; null =
+   *  everywhere in it
    *  @param near_m, far_m  where to look, 0 = everywhere; with limits, what was seen beyond them
    *  while there were none is not taken for something else as long as it stays
    *  @return kNoSpace if OpenCV failed */
-  Status find (
-      const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m);
+  Status find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
+      double far_m, const std::vector<cv::Rect> *parts = nullptr);
 
   /** CV_16U of the ROI, 1/16 pixel with equal principal points, 0 = none. */
   [[nodiscard]] const cv::Mat &disparity () const { return disparity_; }
@@ -65,8 +69,11 @@ private:
   Status choose_range (double near_m, double far_m);
   void place_window (const Roi &roi);
   void cut_window (int camera, const cv::Mat &picture);
+  void choose_parts (const std::vector<cv::Rect> *parts);
   Status match ();
+  Status match_window (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
   void filter (const cv::Mat &left);
+  void know_background (const cv::Mat &grey, int right_x);
   void take (const Roi &roi);
 
   PairGeometry pair_;
@@ -75,10 +82,15 @@ private:
   int least_ = 0, most_ = 0; /* disparities, pixels, of all there is to see */
   int far_ = 0;              /* disparity, 1/16 pixel, of the farthest depth of interest */
   DisparityFilter filter_;
+  SilhouetteFilter silhouettes_;
   BackgroundDisparity background_;
-  cv::Rect window_at_, core_at_; /* of the picture: what is matched; the ROI and its margin */
+  cv::Rect window_at_, core_at_; /* of the picture: what is needed; the ROI and its margin */
+  Pieces pieces_;                /* of the core: where to look */
   int missing_[2] = {0, 0};      /* columns that the window has beyond it, left and right */
-  cv::Mat grey_, window_[2], raw_, core_, disparity_, specks_;
+  std::vector<cv::Rect> parts_;
+  cv::Mat grey_, window_[2], raw_, disparity_;
+  cv::Mat whole_[2];    /* as large as the picture: memory of what follows */
+  cv::Mat core_, next_; /* CV_16S of the core: disparities, and what the next filter writes */
 };
 
 } // namespace rangecast

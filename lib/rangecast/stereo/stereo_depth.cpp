@@ -48,6 +48,7 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
     steady_.set (
         view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
   changes_.forget ();
+  occupancy_.set (view.width, view.height);
   near_now_m_ = far_now_m_ = 0;
   last_roi_ = {};
   pictures_[0].release ();
@@ -143,16 +144,44 @@ StereoDepth::is_suspect (const RangeImage &image) const
   return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || crowd > 0.01 * seen;
 }
 
+/* What one pair takes for a part of what stands in front, though its colour is that of the
+ * background which the other one knows: edges that run from one camera to the other match anywhere
+ * along themselves. */
+void
+StereoDepth::clear_rims_of_third (const Roi &roi)
+{
+  if (settings_.silhouette_radius == 0)
+    return;
+  constexpr int kLeast = 16; /* disparity, 1/16 pixel; 16 less is none */
+  const cv::Rect whole (0, 0, roi.width, roi.height);
+  pieces_.set ({&whole, 1}, settings_.n_threads);
+  cv::Mat &disparity = finder_.disparity ();
+  before_fusion_.create (disparity.size (), CV_16U);
+  const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
+  cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
+  SilhouetteFilter::Settings rims = {
+      settings_.silhouette_radius, settings_.flying_pixel_step, 0, kLeast};
+  rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
+  rims.only_beyond = true;
+  rims.look_near = rims.nearest - 1;
+  rims_.apply (
+      rims, pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), pieces_, from, to);
+  cv::swap (disparity, before_fusion_);
+}
+
 Status
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
   const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
-  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m);
+  const auto parts = everywhere ? nullptr : occupancy_.find (changes_, image.roi);
+  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m, parts);
   if (status.ok () && has_third_) {
     status = third_.find (image.roi, near_m, far_m);
-    if (status.ok ())
+    if (status.ok ()) {
       fuse_disparities (
           finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
+      clear_rims_of_third (image.roi);
+    }
   }
   if (status.ok ())
     status = to_depth_.convert (disparity (), image.depth);
@@ -197,6 +226,7 @@ StereoDepth::match (const RangeImage &image)
   if (!status.ok ())
     return status;
   learn_range (image);
+  occupancy_.learn (image);
   if (settings_.steady > 0)
     steady_.apply (image);
   return status;

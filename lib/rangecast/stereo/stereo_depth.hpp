@@ -9,6 +9,7 @@
 #include "depth.hpp"
 #include "disparity_finder.hpp"
 #include "mirror_check.hpp"
+#include "occupancy.hpp"
 #include "rectification.hpp"
 #include "steady_filter.hpp"
 #include "third_pair.hpp"
@@ -65,6 +66,7 @@ public:
   {
     changes_.forget ();
     steady_.forget ();
+    occupancy_.forget ();
     near_now_m_ = far_now_m_ = 0;
   }
 
@@ -75,6 +77,7 @@ public:
 private:
   void rectify (int camera, ImageView<const Rgbx> picture);
   Status find (const RangeImage &image, bool everywhere);
+  void clear_rims_of_third (const Roi &roi);
   void check_mirror ();
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
@@ -84,9 +87,12 @@ private:
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;
+  SilhouetteFilter rims_; /* of what both pairs know */
+  Pieces pieces_;
   bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
+  Occupancy occupancy_;
   MirrorCheck mirror_;
   SteadyFilter steady_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */

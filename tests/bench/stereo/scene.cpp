@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -46,6 +47,39 @@ render (Scene &scene, const SceneSettings &s, double time_s, Shot &shot)
   return status;
 }
 
+/* How long pairs took. */
+class Times {
+public:
+  void begin ()
+  {
+    begin_ = std::chrono::steady_clock::now ();
+    cpu_begin_ = std::clock ();
+  }
+  void end (bool counts)
+  {
+    const std::clock_t cpu = std::clock () - cpu_begin_;
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now () - begin_;
+    if (!counts)
+      return;
+    ms_.push_back (ms.count ());
+    cpu_ms_ += 1000.0 * double (cpu) / CLOCKS_PER_SEC;
+  }
+  void write (SceneRow &row)
+  {
+    if (ms_.empty ())
+      return;
+    std::ranges::nth_element (ms_, ms_.begin () + std::ptrdiff_t (ms_.size () / 2));
+    row.ms = ms_[ms_.size () / 2];
+    row.cpu_ms = cpu_ms_ / double (ms_.size ());
+  }
+
+private:
+  std::chrono::steady_clock::time_point begin_;
+  std::clock_t cpu_begin_ = 0;
+  std::vector<double> ms_;
+  double cpu_ms_ = 0;
+};
+
 /* Adds up what depth pictures are worth. */
 class Judge {
 public:
@@ -70,15 +104,18 @@ public:
           squares_ += d * d, good_++;
       }
   }
-  SceneRow row (const std::string &name, std::vector<double> times)
+  SceneRow row (const std::string &name, Times &times)
   {
-    if (errors_.empty () || times.empty ())
-      return {name};
+    SceneRow row = {name};
+    times.write (row);
+    if (errors_.empty ())
+      return row;
     std::ranges::nth_element (errors_, errors_.begin () + std::ptrdiff_t (errors_.size () / 2));
-    std::ranges::nth_element (times, times.begin () + std::ptrdiff_t (times.size () / 2));
-    return {name, found_ / double (person_), off_ / double (std::max (valid_, 1)),
-        1000 * errors_[errors_.size () / 2], std::sqrt (squares_ / std::max (good_, 1)),
-        times[times.size () / 2]};
+    row.found = found_ / double (person_);
+    row.off_5cm = off_ / double (std::max (valid_, 1));
+    row.median_mm = 1000 * errors_[errors_.size () / 2];
+    row.rms_px = std::sqrt (squares_ / std::max (good_, 1));
+    return row;
   }
 
 private:
@@ -87,23 +124,16 @@ private:
   std::vector<double> errors_;
 };
 
-double
-ms_since (std::chrono::steady_clock::time_point begin)
-{
-  return std::chrono::duration<double, std::milli> (std::chrono::steady_clock::now () - begin)
-      .count ();
-}
-
 } // namespace
 
 void
 print_scene_rows (const std::vector<SceneRow> &rows)
 {
-  std::printf (
-      "%-44s %9s %9s %9s %9s %9s\n", "matcher", "person", "off 5 cm", "median mm", "rms px", "ms");
+  std::printf ("%-44s %9s %9s %9s %9s %9s %9s\n", "matcher", "person", "off 5 cm", "median mm",
+      "rms px", "ms", "cpu ms");
   for (const SceneRow &r : rows)
-    std::printf ("%-44s %7.2f %% %7.3f %% %9.3f %9.3f %9.2f\n", r.matcher.c_str (), 100 * r.found,
-        100 * r.off_5cm, r.median_mm, r.rms_px, r.ms);
+    std::printf ("%-44s %7.2f %% %7.3f %% %9.3f %9.3f %9.2f %9.2f\n", r.matcher.c_str (),
+        100 * r.found, 100 * r.off_5cm, r.median_mm, r.rms_px, r.ms, r.cpu_ms);
 }
 
 namespace {
@@ -129,16 +159,14 @@ public:
     const cv::Rect rect (roi.x, roi.y, roi.width, roi.height);
     depth_.setTo (0);
     const cv::Mat depth = depth_ (rect), colour = colour_ (rect);
-    const auto begin = std::chrono::steady_clock::now ();
+    times_.begin ();
     const Status status =
         stereo_.process (view_of<const Rgbx> (shot.left), view_of<const Rgbx> (shot.right),
             {0, roi, view_of<std::uint16_t> (depth), view_of<Rgbx> (colour), 0},
             third_ ? view_of<const Rgbx> (shot.third) : ImageView<const Rgbx>{});
-    const double ms = ms_since (begin);
-    if (counts) {
-      times_.push_back (ms);
+    times_.end (counts);
+    if (counts)
       judge_.add (shot, depth_);
-    }
     return status;
   }
   SceneRow row () { return judge_.row (name_, times_); }
@@ -150,7 +178,7 @@ private:
   Judge judge_;
   bool roi_, third_, ran_ = false;
   cv::Mat depth_, colour_;
-  std::vector<double> times_;
+  Times times_;
 };
 
 /* OpenCV's 3-way SGBM alone, with the settings that ours gives it, from near to far. */
@@ -169,14 +197,13 @@ public:
   }
   void run (const Shot &shot, bool counts)
   {
-    const auto begin = std::chrono::steady_clock::now ();
+    times_.begin ();
     cv::cvtColor (shot.left, left_, cv::COLOR_RGBA2GRAY);
     cv::cvtColor (shot.right, right_, cv::COLOR_RGBA2GRAY);
     matcher_->compute (left_, right_, raw_);
-    const double ms = ms_since (begin);
+    times_.end (counts);
     if (!counts)
       return;
-    times_.push_back (ms);
     depth_.create (raw_.size (), CV_16U);
     for (int y = 0; y < raw_.rows; y++)
       for (int x = 0; x < raw_.cols; x++) {
@@ -196,7 +223,7 @@ private:
   int least_;
   cv::Ptr<cv::StereoSGBM> matcher_;
   cv::Mat left_, right_, raw_, depth_;
-  std::vector<double> times_;
+  Times times_;
 };
 
 } // namespace

@@ -1,0 +1,231 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "silhouette_filter.hpp"
+
+#include <algorithm>
+#include <opencv2/core/hal/intrin.hpp>
+
+namespace rangecast {
+namespace {
+
+/* Sum of three colours' differences, levels, above which two pixels do not look alike. */
+constexpr int kLike = 60;
+/* Of weights, each kLike at most: four pixels of nearly the same colour. */
+constexpr int kEnough = 160;
+/* Samples that are looked at together. */
+constexpr int kLanes = 16;
+
+/* The least or the greatest of each window of `side` pixels squared.
+ * @param[out] to  smaller by side - 1; @param memory  to use */
+template <typename Choose>
+void
+choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const Choose &choose)
+{
+  const int width = from.width (), height = from.height (), cols = width - side + 1,
+            rows = height - side + 1;
+  memory.set_size (width, height);
+  std::copy_n (from.row (0), std::ptrdiff_t (width) * height, memory.row (0));
+  to.set_size (cols, rows);
+  int reach = 1; /* rows, then columns, that each number has been chosen from */
+  for (; 2 * reach <= side; reach *= 2)
+    for (int y = 0; y + reach < height; y++) {
+      std::int16_t *row = memory.row (y);
+      const std::int16_t *below = memory.row (y + reach);
+      for (int x = 0; x < width; x++)
+        row[x] = choose (row[x], below[x]);
+    }
+  for (int y = 0; y < rows; y++) {
+    std::int16_t *row = memory.row (y), *out = to.row (y);
+    const std::int16_t *below = memory.row (y + side - reach);
+    for (int x = 0; x < width; x++)
+      row[x] = choose (row[x], below[x]);
+    for (int right = 1; 2 * right <= side; right *= 2)
+      for (int x = 0; x + right < width; x++)
+        row[x] = choose (row[x], row[x + right]);
+    for (int x = 0; x < cols; x++)
+      out[x] = choose (row[x], row[x + side - reach]);
+  }
+}
+
+/* A part of a picture and `around` pixels more on each side: of those outside of it, the nearest in
+ * it. */
+void
+cut (const cv::Mat &picture, const cv::Rect &piece, int around, Plane &to)
+{
+  to.set_size (piece.width + 2 * around, piece.height + 2 * around);
+  const int first = piece.x - around, begin = std::max (0, -first),
+            end = std::min (to.width (), picture.cols - first);
+  for (int y = 0; y < to.height (); y++) {
+    const auto from =
+        picture.ptr<std::int16_t> (std::clamp (piece.y - around + y, 0, picture.rows - 1));
+    std::int16_t *row = to.row (y);
+    std::fill (row, row + begin, from[0]);
+    std::copy (from + first + begin, from + first + end, row + begin);
+    std::fill (row + end, row + to.width (), from[picture.cols - 1]);
+  }
+}
+
+} // namespace
+
+void
+SilhouetteFilter::sample (
+    int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
+{
+  pad_ = radius / 2 + 1; /* no window leaves that */
+  const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
+  samples_.set_size (cols + 2 * pad_ + kLanes, rows + 2 * pad_);
+  const auto width = std::size_t (samples_.width ());
+  for (std::vector<std::uint8_t> &plane : colours_)
+    if (const std::size_t n = width * std::size_t (samples_.height ()); plane.size () < n)
+      plane.resize (n);
+  constexpr int kRows = 32;
+  in_parallel (
+      std::size_t ((samples_.height () + kRows - 1) / kRows), n_threads, [&] (std::size_t i) {
+        const int begin = int (i) * kRows, end = std::min (begin + kRows, samples_.height ());
+        for (int v = begin; v < end; v++) {
+          std::uint8_t *to[4];
+          for (int c = 0; c < 4; c++)
+            to[c] = colours_[c].data () + std::size_t (v) * width;
+          std::fill_n (to[3], width, std::uint8_t{255});
+          std::int16_t *depth = samples_.row (v);
+          std::fill_n (depth, width, std::int16_t{0});
+          const int y = 2 * (v - pad_);
+          if (y < 0 || y >= disparity.rows)
+            continue;
+          const auto from = colour.ptr<cv::Vec4b> (y);
+          const auto d = disparity.ptr<std::int16_t> (y);
+          std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
+          for (int x = 0; x < cols; x++) {
+            for (int c = 0; c < 3; c++)
+              to[c][pad_ + x] = from[2 * x][c];
+            depth[pad_ + x] = d[2 * x];
+          }
+        }
+      });
+}
+
+/* Calls `count (weight, disparity)` with eight samples of a window at a time. */
+template <typename Count>
+void
+SilhouetteFilter::for_window (
+    const cv::Vec4b &own, int x, int y, int radius, const Count &count) const
+{
+  static constexpr std::uint8_t kInside[2 * kLanes] = {
+      255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255};
+  const cv::v_uint8x16 r = cv::v_setall_u8 (own[0]), g = cv::v_setall_u8 (own[1]),
+                       b = cv::v_setall_u8 (own[2]), most = cv::v_setall_u8 (kLike);
+  const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
+  for (int u = 0; u < radius; u += kLanes) {
+    const cv::v_uint8x16 inside = cv::v_load (kInside + kLanes - std::min (kLanes, radius - u));
+    for (int v = y0; v < y0 + radius; v++) {
+      const std::size_t at =
+          std::size_t (v) * std::size_t (samples_.width ()) + std::size_t (x0 + u);
+      /* These sums end at 255, which is far enough. */
+      const cv::v_uint8x16 unlike = cv::v_absdiff (cv::v_load (&colours_[0][at]), r) +
+                                    cv::v_absdiff (cv::v_load (&colours_[1][at]), g) +
+                                    cv::v_absdiff (cv::v_load (&colours_[2][at]), b) +
+                                    cv::v_load (&colours_[3][at]);
+      cv::v_uint16x8 low, high;
+      cv::v_expand ((most - unlike) & inside, low, high);
+      const std::int16_t *depth = samples_.row (v) + x0 + u;
+      count (cv::v_reinterpret_as_s16 (low), cv::v_load (depth));
+      count (cv::v_reinterpret_as_s16 (high), cv::v_load (depth + 8));
+    }
+  }
+}
+
+template <bool kCountNone>
+SilhouetteFilter::Votes
+SilhouetteFilter::vote (
+    const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const
+{
+  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.least)),
+                      low = cv::v_max (
+                          valid, cv::v_setall_s16 (static_cast<short> (
+                                     settings.only_beyond ? settings.nearest : d - most))),
+                      high = cv::v_setall_s16 (static_cast<short> (std::min (d + most, 32767)));
+  cv::v_int16x8 all = cv::v_setzero_s16 (), none = all, below = all, above = all;
+  for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
+    all = all + w;
+    if constexpr (kCountNone)
+      none = none + (w & (depth < valid));
+    below = below + (w & (depth < low));
+    above = above + (w & (depth > high));
+  });
+  Votes votes;
+  votes.near = cv::v_reduce_sum (above);
+  votes.none = cv::v_reduce_sum (none);
+  const int farther = cv::v_reduce_sum (below);
+  votes.far = farther - votes.none;
+  votes.same = cv::v_reduce_sum (all) - farther - votes.near;
+  return votes;
+}
+
+/* The mean disparity of the samples around a pixel that are like it, or `least` - 1. */
+int
+SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const
+{
+  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.least)),
+                      one = cv::v_setall_s16 (1);
+  cv::v_int32x4 sum = cv::v_setzero_s32 (), weights = sum;
+  for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
+    const cv::v_int16x8 counting = w & (depth >= valid);
+    sum = sum + cv::v_dotprod (counting, depth);
+    weights = weights + cv::v_dotprod (counting, one);
+  });
+  const int total = cv::v_reduce_sum (weights);
+  return total < kEnough ? settings.least - 1 : cv::v_reduce_sum (sum) / total;
+}
+
+void
+SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &piece,
+    const cv::Mat &disparity, Memory &m, cv::Mat &to) const
+{
+  const int share = static_cast<int> (65536 * settings.step), reach = settings.radius * 2 / 3,
+            least = settings.least;
+  const auto tolerance = [&] (int d) { return std::max (16, (d + settings.offset) * share >> 16); };
+  cut (disparity, piece, reach, m.around);
+  choose_in_windows (m.around, 2 * reach + 1, m.line, m.lowest,
+      [] (std::int16_t a, std::int16_t b) { return std::min (a, b); });
+  choose_in_windows (m.around, 2 * reach + 1, m.line, m.highest,
+      [] (std::int16_t a, std::int16_t b) { return std::max (a, b); });
+  for (int y = 0; y < piece.height; y++) {
+    const auto pixels = colour.ptr<cv::Vec4b> (piece.y + y) + piece.x;
+    const auto from = disparity.ptr<std::int16_t> (piece.y + y) + piece.x;
+    auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
+    const std::int16_t *lowest = m.lowest.row (y), *highest = m.highest.row (y);
+    for (int x = 0; x < piece.width; x++) {
+      out[x] = from[x];
+      const bool valid = from[x] >= least;
+      if (highest[x] < std::max (least, settings.nearest) ||
+          (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
+                        (settings.only_beyond && lowest[x] > settings.look_near))))
+        continue; /* a surface, or nothing near */
+      const int d = valid ? from[x] : likely (settings, pixels[x], piece.x + x, piece.y + y);
+      if (d < std::max (least, settings.nearest))
+        continue;
+      const cv::Vec4b &own = pixels[x];
+      const int at_x = piece.x + x, at_y = piece.y + y, most = tolerance (d);
+      const Votes votes = valid && !settings.only_beyond
+                              ? vote<false> (settings, own, at_x, at_y, d, most)
+                              : vote<true> (settings, own, at_x, at_y, d, most);
+
+      if (valid && votes.far > votes.same)
+        out[x] = static_cast<std::int16_t> (least - 16);
+      else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
+        out[x] = static_cast<std::int16_t> (d);
+    }
+  }
+}
+
+void
+SilhouetteFilter::apply (const Settings &settings, const cv::Mat &colour, const Pieces &pieces,
+    const cv::Mat &disparity, cv::Mat &to)
+{
+  sample (settings.radius, colour, disparity, pieces.n_threads ());
+  memory_.reserve (pieces.workers ());
+  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+    apply_to (settings, colour, piece, disparity, memory_.of (worker), to);
+  });
+}
+
+} // namespace rangecast
