@@ -6,6 +6,7 @@
 #include <random>
 #include <rangecast/scene/scene.hpp>
 #include <rangecast/stereo/histogram_range.hpp>
+#include <rangecast/stereo/silhouette_filter.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 
 using namespace rangecast;
@@ -73,21 +74,31 @@ TEST (Depth, is_focal_length_times_baseline_over_disparity)
   EXPECT_EQ (convert.convert (disparity.view (), other.view ()).code (), StatusCode::kBadSize);
 }
 
+static Pieces
+all_of (const cv::Mat &picture)
+{
+  const cv::Rect all ({0, 0}, picture.size ());
+  Pieces pieces;
+  pieces.set ({&all, 1}, 1);
+  return pieces;
+}
+
 TEST (DisparityFilter, pixel_in_the_air_is_cleared_and_an_edge_stays)
 {
   cv::Mat disparity (5, 6, CV_16S, cv::Scalar (-16));
   disparity.colRange (0, 3).setTo (640);
   disparity.at<std::int16_t> (2, 4) = 560;
-  DisparityFilter ().clear_flying (0.02, 4, 0, 0, disparity);
-  EXPECT_LT (disparity.at<std::int16_t> (2, 4), 0);
-  EXPECT_EQ (disparity.at<std::int16_t> (2, 2), 640);
+  cv::Mat cleared = disparity.clone ();
+  DisparityFilter ().clear_flying (0.02, 4, 0, 0, all_of (disparity), disparity, cleared);
+  EXPECT_LT (cleared.at<std::int16_t> (2, 4), 0);
+  EXPECT_EQ (cleared.at<std::int16_t> (2, 2), 640);
 }
 
 TEST (DisparityFilter, what_the_right_camera_cannot_see_is_cleared)
 {
   cv::Mat disparity (1, 60, CV_16S, cv::Scalar (16 * 5)); /* a wall */
   disparity.colRange (40, 50).setTo (16 * 20);            /* lands on columns 20 to 29 */
-  DisparityFilter ().clear_hidden (0, disparity);
+  DisparityFilter ().clear_hidden (0, all_of (disparity), disparity);
   for (int x = 0; x < 60; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) < 0, x >= 25 && x < 35) << x;
 }
@@ -101,7 +112,7 @@ TEST (DisparityFilter, gap_in_one_surface_is_filled_and_one_between_two_is_not)
   disparity.colRange (18, 22).setTo (-16);
   disparity.colRange (30, 34).setTo (-16);
   colour.colRange (31, 33).setTo (cv::Scalar (200, 10, 10, 0)); /* something else is there */
-  DisparityFilter ().fill_gaps (colour, 12, 0, disparity);
+  DisparityFilter ().fill_gaps (colour, 12, 0, all_of (disparity), disparity);
   for (int x = 0; x < 40; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) < 0, (x >= 18 && x < 22) || (x >= 30 && x < 34))
         << x;
@@ -113,9 +124,12 @@ TEST (DisparityFilter, rim_of_the_walls_colour_is_cleared)
   cv::Mat colour (40, 60, CV_8UC4, cv::Scalar (40, 40, 40, 0));
   colour.colRange (30, 60).setTo (cv::Scalar (200, 180, 160, 0));
   disparity.colRange (27, 60).setTo (480); /* what is near has grown by 3 columns */
-  DisparityFilter ().clear_rims (colour, 10, 0.02, 0, 0, disparity);
+  cv::Mat cleared = disparity.clone ();
+  SilhouetteFilter::Settings settings;
+  settings.step = 0.02;
+  SilhouetteFilter ().apply (settings, colour, all_of (disparity), disparity, cleared);
   for (int x = 0; x < 60; x++)
-    EXPECT_EQ (disparity.at<std::int16_t> (20, x), x < 27 ? 160 : x < 30 ? -16 : 480) << x;
+    EXPECT_EQ (cleared.at<std::int16_t> (20, x), x < 27 ? 160 : x < 30 ? -16 : 480) << x;
 }
 
 TEST (DisparityFilter, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is_not)
@@ -127,9 +141,10 @@ TEST (DisparityFilter, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is
     for (int x = 40; x < 80; x++) /* seen 10 pixels further left, and darker */
       right.at<std::uint8_t> (y, x - 10) = std::uint8_t (left.at<std::uint8_t> (y, x) * 7 / 8);
   cv::Mat disparity (40, 80, CV_16S, cv::Scalar (160));
-  DisparityFilter ().clear_unlike (left, right, 0, 1, 0, disparity);
-  EXPECT_LT (cv::countNonZero (disparity.colRange (15, 35) >= 0), 40 * 20 / 10);
-  EXPECT_GT (cv::countNonZero (disparity.colRange (45, 75) >= 0), 40 * 30 * 95 / 100);
+  cv::Mat cleared = disparity.clone ();
+  DisparityFilter ().clear_unlike (left, right, 0, 1, 0, all_of (disparity), disparity, cleared);
+  EXPECT_LT (cv::countNonZero (cleared.colRange (15, 35) >= 0), 40 * 20 / 10);
+  EXPECT_GT (cv::countNonZero (cleared.colRange (45, 75) >= 0), 40 * 30 * 95 / 100);
 }
 
 TEST (ThirdPair, opinions_that_agree_are_weighed_and_those_that_do_not_are_counted)
