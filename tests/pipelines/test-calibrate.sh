@@ -129,6 +129,14 @@ test_board_is_drawn_in_its_true_size () {
   [ "$(grep -c 'width="256" height="256"/>' board.svg)" = 35 ] || fail "$(wc -l board.svg)"
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" charuco.svg board=charuco
   expect_file charuco.svg 10000
-  expect_error "columns is 99" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg columns=99
-  expect_error "'rows'" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg rows
+  local draw_board=${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board
+  expect_error "columns is 99" "$draw_board" x.svg columns=99
+  expect_error "'rows'" "$draw_board" x.svg rows
+  expect_error "'columns=9x': expected a whole number" "$draw_board" x.svg columns=9x
+  expect_error "'square-size=0.03m': expected metres" "$draw_board" x.svg square-size=0.03m
+  expect_error "'rows=7': is given twice" "$draw_board" x.svg rows=6 rows=7
+  expect_error "'b.png': expected a file name that ends in .svg" "$draw_board" b.png
+  "$draw_board" --help | grep -q "^usage: draw-board" || fail "no help"
+  "$draw_board" -h >/dev/null
+  [ ! -e --help ] && [ ! -e -h ] && [ ! -e x.svg ] && [ ! -e b.png ] || fail "a file was written"
 }
