@@ -250,6 +250,23 @@ TEST (Calibration, boards_that_were_found_but_do_not_fit_are_counted)
       "frames that fit (3 more do not fit: do the pictures of all cameras belong together");
 }
 
+/* Its columns are numbered from the other end, as BoardDetector does. */
+TEST (Calibration, pictures_of_one_camera_that_are_mirrored_get_a_hint)
+{
+  const auto truth = stereo_pair ();
+  auto frames = frames_for (truth, {{0, 1}}, 15);
+  const int columns = BoardSpec{}.columns;
+  for (CalibrationFrame &frame : frames)
+    for (BoardCorner &corner : frame.sightings[1].corners) {
+      corner.x = 639 - corner.x;
+      corner.id = corner.id / columns * columns + columns - 1 - corner.id % columns;
+    }
+  CalibrationResult result;
+  EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames, {}, result),
+      "Each camera alone fits: were their pictures taken at the same moments, and are those of "
+      "one of them mirrored?");
+}
+
 TEST (Calibration, board_that_was_never_found_is_described)
 {
   const auto truth = stereo_pair ();

@@ -147,12 +147,29 @@ test_lengths_that_are_hardly_metres_are_said () {
   [ ! -s said.txt ] || fail "$(cat said.txt)"
 }
 
+# Nothing is drawn at the picture's border: all of it is inside.
+expect_empty_border () { # PNG width height
+  gst-launch-1.0 -q filesrc "location=$1" ! pngdec ! videoconvert ! video/x-raw,format=RGBx ! filesink location=pixels
+  python3 - "$2" "$3" <<'END' || fail "$1: something is cut off"
+import sys
+width, height = map(int, sys.argv[1:])
+pixels = memoryview(open("pixels", "rb").read()).cast("I")
+border = [pixels[y * width + x] for y in range(height) for x in range(width) if x in (0, width - 1) or y in (0, height - 1)]
+sys.exit(len(set(border)) != 1)
+END
+}
+
 # Where no camera's lines are, the picture is its background alone.
 test_cameras_are_drawn () {
   need_gl
   gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 rig-export=rig.yaml ! fakesink
   "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 3000
+  expect_empty_border rig.png 320 240
+  middlebury 994.978
+  rig-convert middlebury calib.txt pair.yaml
+  "$pipelines/rig-check.sh" pair.yaml --png pair.png --width 320 --height 240 >/dev/null
+  expect_empty_border pair.png 320 240
   expect_error "nowhere/rig.png" "$pipelines/rig-check.sh" rig.yaml --png nowhere/rig.png
 }
 

@@ -19,6 +19,7 @@ constexpr int kOutlierRounds = 3;
 constexpr double kRobustPx = 1;
 /* A larger error than that is not a calibration, pixels. */
 constexpr double kWorstRmsPx = 5;
+constexpr double kGoodRmsPx = 1;
 /* Rows of a pair that differ by more are worth a warning: stereodepth looks in one row. */
 constexpr double kOddRowErrorPx = 1;
 /* A pair whose cameras are turned against each other by more cannot be rectified to any use. */
@@ -103,11 +104,11 @@ public:
     if (s.ok ())
       s = chain_cameras (cameras_, frames_, settings_.board, lenses_, bundle_, links_, stop_);
     if (s.ok ())
-      s = adjust ();
+      s = with_hint (adjust ());
     if (s.ok ())
       s = check_pairs ();
     if (s.ok ())
-      s = report ();
+      s = with_hint (report ());
     return s.ok () ? make_rig () : s;
   }
 
@@ -117,6 +118,7 @@ private:
   Status check_counts () const;
   Status calibrate_lenses ();
   Status adjust ();
+  Status with_hint (const Status &status) const;
   Status check_pairs () const;
   Status report ();
   Status make_rig ();
@@ -260,6 +262,21 @@ Calibration::drop_outliers (double limit_px, bool &any)
   return s.ok () ? s
                  : bad (s.message () + "; " + std::to_string (result_.dropped.size ()) +
                         " boards that do not fit were left out: do the pictures belong together?");
+}
+
+/* Where each camera fits its boards and all of them do not, it is not the lenses' fault, whatever
+ * the status says. */
+Status
+Calibration::with_hint (const Status &status) const
+{
+  const bool alone_good = std::ranges::all_of (
+      lenses_, [] (const LensCalibration &lens) { return lens.rms_px < kGoodRmsPx; });
+  if (status.ok () || status.code () == StatusCode::kInterrupted || cameras_.size () < 2 ||
+      !alone_good)
+    return status;
+  return {status.code (), status.message () +
+                              ". Each camera alone fits: were their pictures taken at the same "
+                              "moments, and are those of one of them mirrored?"};
 }
 
 /* A loss that forgives outliers finds them; without them, plain squares are the best estimate. */

@@ -127,6 +127,10 @@ CalibrationSession::check_kept () const
     const auto &seen = eyes_[i]->seen;
     const int all = std::reduce (seen.begin (), seen.end ());
     const int kept = coverage (int (i)).frames, wanted = settings_.calibration.min_frames;
+    if (eyes_[i]->detector.is_mirrored ())
+      return {StatusCode::kBadValue,
+          text_of (cameras_[i]) + ": its pictures are mirrored; expected them as a photograph is: "
+                                  "switch off the camera's mirror mode, or use videoflip"};
     if (kept >= wanted || kept >= all)
       continue;
     std::string text = text_of (cameras_[i]) + ": the board was found in " + std::to_string (all) +
