@@ -61,7 +61,9 @@ set_property () {
   fi
   properties+=("$2=$value")
 }
-is_within () { awk -v value="$1" -v least="${2% to *}" -v most="${2#* to }" 'BEGIN { exit !(value + 0 >= least + 0 && value + 0 <= most + 0) }'; }
+is_within () { # value, "LEAST to MOST"
+  awk -v value="$1" -v least="${2% to *}" -v most="${2#* to }" 'BEGIN { exit !(value + 0 >= least + 0 && value + 0 <= most + 0) }'
+}
 
 roles=() views=() whats=() out= properties=() stills= window=
 view=-1
