@@ -30,7 +30,7 @@
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/geometry/rig.hpp>
+#include <rangecast/geometry/rig_file.hpp>
 
 using rangecast::CalibrationCamera;
 using rangecast::Status;
@@ -531,26 +531,6 @@ gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer)
 
 /* ---- life ---- */
 
-/* What can be known to be wrong before minutes of work are lost. */
-static Status
-check_location (const std::string &location)
-{
-  if (location.empty ())
-    return {};
-  const auto ends_with = [&] (const char *end) {
-    return g_str_has_suffix (location.c_str (), end) != FALSE;
-  };
-  if (!ends_with (".yaml") && !ends_with (".yml") && !ends_with (".json"))
-    return {StatusCode::kBadValue,
-        location + ": expected a file name that ends in .yaml, .yml or .json"};
-  gchar *folder = g_path_get_dirname (location.c_str ());
-  const bool there = g_file_test (folder, G_FILE_TEST_IS_DIR);
-  g_free (folder);
-  if (!there)
-    return {StatusCode::kNotFound, location + ": its folder does not exist"};
-  return {};
-}
-
 static GstFlowReturn
 gst_rig_calibrate_flush (GstAggregator *aggregator)
 {
@@ -569,7 +549,9 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
   settings.selection.max_frames = p.max_frames;
-  Status status = check_location (p.location);
+  Status status;
+  if (!p.location.empty ()) /* before minutes of work are lost */
+    status = rangecast::check_output_path (p.location, rangecast::kRigExtensions);
   if (status.ok ())
     status = priv->session.set (settings);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)

@@ -27,6 +27,7 @@
 #include <memory>
 #include <mutex>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/output_path.hpp>
 #include <rangecast/parallel.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
@@ -113,6 +114,8 @@ struct GstRoiExtractPrivate {
   std::atomic<bool> relearn{false};
 
   /* streaming thread only */
+  std::string refused; /* what was said of caps last: they come again with each buffer */
+  std::string unsaved; /* a file that cannot be written is told once */
   gstrange::RangeInfo info;
   std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
 };
@@ -216,15 +219,44 @@ load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
   return {};
 }
 
+/* What OpenCV can write, and says more politely than it does. */
+static Status
+check_save_path (const std::string &path)
+{
+  static constexpr std::string_view kExtensions[] = {
+      ".yml", ".yaml", ".json", ".xml", ".yml.gz", ".yaml.gz", ".json.gz", ".xml.gz"};
+  return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
+}
+
 static void
 save_when_all_learnt (GstRoiExtract *self, const std::string &path)
 {
-  if (path.empty () || !all_learnt (self->priv))
+  if (path.empty () || path == self->priv->unsaved || !all_learnt (self->priv))
     return;
   std::vector<std::pair<int, const BackgroundModel *>> models;
   for (const View &view : self->priv->info.rig.views)
     models.emplace_back (view.id, &self->priv->views[view.id]->background);
-  gst_range_post_warning (GST_ELEMENT (self), rangecast::save_backgrounds (path, models));
+  Status status = check_save_path (path);
+  if (status.ok ())
+    status = rangecast::save_backgrounds (path, models);
+  self->priv->unsaved = status.ok () ? "" : path;
+  gst_range_post_warning (GST_ELEMENT (self), status);
+}
+
+/* Who wants a background in a file should hear that the stream was too short for one. */
+static void
+warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
+{
+  if (settings.save_background.empty () || all_learnt (self->priv))
+    return;
+  int seen = 0;
+  for (const View &view : self->priv->info.rig.views)
+    seen = std::max (seen, self->priv->views[view.id]->background.frames ());
+  gst_range_post_warning (GST_ELEMENT (self),
+      {StatusCode::kNotFound, settings.save_background + ": not written: the stream ended after " +
+                                  std::to_string (seen) +
+                                  " frames of the background; expected background-frames, " +
+                                  std::to_string (settings.background_frames)});
 }
 
 static gboolean
@@ -239,7 +271,9 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
     if (!settings.background_file.empty () && !all_learnt (priv))
       status = load_background_file (priv, settings.background_file);
   }
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  const bool said = !status.ok () && status.message () == priv->refused;
+  priv->refused = status.message ();
+  return !said && gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* ---- one frame set ---- */
@@ -432,6 +466,7 @@ gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
   auto self = GST_ROI_EXTRACT (base);
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !self->priv->info.rig.views.empty ()) {
     const RoiSettings settings = copy_settings (self->priv);
+    warn_if_not_learnt (self, settings);
     if (settings.adapt_time_s > 0)
       save_when_all_learnt (self, settings.save_background);
   }
@@ -444,6 +479,11 @@ static gboolean
 gst_roi_extract_start (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  const Status status = check_save_path (copy_settings (priv).save_background);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->refused.clear ();
+  priv->unsaved.clear ();
   std::lock_guard guard (priv->lock);
   priv->frames = priv->points_in = priv->points_out = 0;
   priv->last_roi = {};

@@ -28,33 +28,67 @@ the result
   --world W       centre (default), first-view or board: see docs/elements/rigcalibrate.md
   --near M --far M  depths of interest, metres (default 0.3 and 3)
   --min-frames N  frames in which each camera must have seen the board (default 8)
-  --stills DIR    also leave the pictures with the corners found there, as PNG
+  --stills DIR    also leave a PNG of each moment looked at there: all cameras side by side with the corners found, framed
+                  green if it was kept
   --window        also show them
   --auto-finish   end by itself when the board was everywhere (live; Ctrl-C ends, too, and calibrates)
 END
+}
+
+# What gst-inspect-1.0 says of a property is asked once, so that limits are written down in one place.
+inspected=
+property_of () { # property
+  [ -n "$inspected" ] || inspected=$(LC_ALL=C gst-inspect-1.0 --no-colors rigcalibrate) || die "no element rigcalibrate"
+  awk -v name="$1" '/^  [a-z-]+ +:/ { inside = $1 == name } inside' <<<"$inspected"
+}
+
+# usage: set_property OPTION PROPERTY VALUE: checks it and adds it to the properties.
+set_property () {
+  local about kind range allowed value=$3
+  about=$(property_of "$2")
+  if grep -q ' Enum "' <<<"$about"; then
+    allowed=$(sed -nE 's/^ *\([0-9]+\): ([^ ]+) .*/\1/p' <<<"$about" | paste -sd, | sed 's/,/, /g')
+    [[ ", $allowed, " == *", $3, "* ]] || die "$1: expected one of $allowed, got '$3'"
+  else
+    read -r kind range < <(sed -nE 's/^ *(Integer|Double)\. Range: +([^ ]+) +- +([^ ]+) Default.*/\1 \2 to \3/p' <<<"$about")
+    if [ "$kind" = Integer ]; then
+      [[ "$3" =~ ^[0-9]{1,9}$ ]] && is_within "$3" "$range" || die "$1: expected a whole number from $range, got '$3'"
+      value=$((10#$3))
+    else
+      [[ "$3" =~ ^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$ ]] && is_within "$3" "$range" ||
+        die "$1: expected $range metres, got '$3'"
+    fi
+  fi
+  properties+=("$2=$value")
+}
+is_within () { # value, "LEAST to MOST"
+  awk -v value="$1" -v least="${2% to *}" -v most="${2#* to }" 'BEGIN { exit !(value + 0 >= least + 0 && value + 0 <= most + 0) }'
 }
 
 roles=() views=() whats=() out= properties=() stills= window=
 view=-1
 while [ $# -gt 0 ]; do
   case "$1" in
+    --left | --right | --third | --out | --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | \
+      --min-frames | --square | --marker | --stills)
+      [ $# -ge 2 ] && [[ -n "$2" && "$2" != --* ]] || die "$1: expected a value after it" ;;
+  esac
+  case "$1" in
     --left | --right | --third)
       [ "$1" != --left ] || view=$((view + 1))
       [ $view -ge 0 ] || die "$1: expected a --left before it, which begins the view"
-      [ -n "${2:-}" ] || die "$1: expected pictures, a film or a source"
       roles+=("${1#--}") views+=("$view") whats+=("$2"); shift ;;
-    --out) out=${2:-}; shift ;;
+    --out) out=$2; shift ;;
     --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | --min-frames)
-      properties+=("${1#--}=${2:-}"); shift ;;
-    --square) properties+=("square-size=${2:-}"); shift ;;
-    --marker) properties+=("marker-size=${2:-}"); shift ;;
-    --stills) stills=${2:-}; shift ;;
+      set_property "$1" "${1#--}" "$2"; shift ;;
+    --square | --marker) set_property "$1" "${1#--}-size" "$2"; shift ;;
+    --stills) stills=$2; shift ;;
     --window) window=1 ;;
     --auto-finish) properties+=(auto-finish=true) ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift || { echo "calibrate.sh: the last option lacks its value" >&2; exit 2; }
+  shift
 done
 [ ${#whats[@]} -gt 0 ] && [ -n "$out" ] || { usage >&2; die "expected at least --left and --out"; }
 
@@ -74,17 +108,18 @@ list_pictures () {
       [ "$(printf "$pattern" "$((10#$number))")" != "$file" ] || echo "$((10#$number)) $file"
     done | sort -n
   else
-    compgen -G "$pattern" | sort -V | while read -r file; do
+    { compgen -G "$pattern" || true; } | sort -V | while read -r file; do
       echo "$count $file"
       count=$((count + 1))
     done
   fi
 }
 
+# A file that is there is a film, whatever its name looks like.
 is_source () { # a launch string: has a link, or begins with an element's name
-  [[ "$1" == *!* ]] || { [ ! -e "$1" ] && gst-inspect-1.0 --exists "${1%% *}" 2>/dev/null; }
+  [ ! -e "$1" ] && { [[ "$1" == *!* ]] || gst-inspect-1.0 --exists "${1%% *}" 2>/dev/null; }
 }
-is_pattern () { ! is_source "$1" && [[ "$1" == *[%*?]* ]]; }
+is_pattern () { [ ! -e "$1" ] && ! is_source "$1" && [[ "$1" == *[%*?[]* ]]; }
 
 # Pictures that all cameras have, numbered anew: multifilesrc stops at a gap.
 common=
@@ -130,7 +165,8 @@ describe_source () { # camera's number, WHAT
     source=(multifilesrc "location=$folder/$name-%05d" "caps=$type,framerate=1/1" ! decodebin ! videoconvert ! queue)
   else
     [ -f "$what" ] || die "no file, pictures or source '$what'"
-    source=(filesrc "location=$what" ! decodebin ! videoconvert ! queue)
+    ln -s "$(realpath "$what")" "$folder/$name-film" # gst-launch-1.0 knows special characters
+    source=(filesrc "location=$folder/$name-film" ! decodebin ! videoconvert ! queue)
   fi
 }
 
@@ -144,9 +180,10 @@ sink=(fakesink sync=false)
 [ -z "$window" ] || sink=(videoconvert ! autovideosink sync=false)
 if [ -n "$stills" ]; then
   mkdir -p "$stills"
-  sink=(tee name=t ! queue ! "${sink[@]}" t. ! queue ! videoconvert ! pngenc ! multifilesink "location=$stills/still-%05d.png")
+  sink=(tee name=t ! queue ! "${sink[@]}" t. ! queue ! videoconvert ! pngenc ! multifilesink "location=${stills//%/%%}/still-%05d.png")
 fi
 
-# The element's messages are lines of gst-launch-1.0 -m; the report makes them readable.
-python3 "$(dirname "$0")/calibration-report.py" gst-launch-1.0 -e -m rigcalibrate name=c "location=$out" \
+# The element's messages are lines of gst-launch-1.0 -m; the report makes them readable. It takes this process over, with its
+# signals, and removes the folder.
+exec python3 "$(dirname "$0")/calibration-report.py" "$folder" gst-launch-1.0 -e -m rigcalibrate name=c "location=$out" \
   "${properties[@]}" "${pads[@]}" ! "${sink[@]}" "${sources[@]}"

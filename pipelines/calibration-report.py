@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Runs the command line it gets, gst-launch-1.0 -m with a rigcalibrate, and makes its messages readable:
-progress, and the result as a table. Ends with status 1 if there was an error or no result.
+"""Runs a command line, gst-launch-1.0 -e -m with a rigcalibrate, and makes its messages readable: progress, and the
+result as a table. Ends with status 1 if there was an error or no result. usage: calibration-report.py FOLDER COMMAND...;
+the folder is removed in the end. SIGINT (once) ends the stream, which calibrates; SIGTERM and SIGHUP end all.
 """
+import os
+import queue
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -48,27 +52,80 @@ def print_result(text):
         print(f'written: {r["location"]}')
 
 
-def main():
-    child = subprocess.Popen(sys.argv[1:], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # gst-launch-1.0 gets it, ends the stream and calibrates
+def complaint_of(text):
+    """What to say of a line of gst-launch-1.0, and whether it is an error; (None, False) for other lines."""
+    if re.match("ERROR|could not|no element|WARNING: erroneous pipeline", text):
+        return re.sub(r"^([A-Z]+: from element \S+: |WARNING: erroneous pipeline: )", "", text), True
+    if text.startswith("WARNING: from"):
+        return re.sub(r"^WARNING: from element \S+: ", "", text), False
+    refused = re.search(r"value \"(.*?)\" of type '\S+' is invalid or out of range for property '(\S+)'", text)
+    if refused:  # GLib says so, and goes on with the default
+        return f"{refused.group(2)}: '{refused.group(1)}' is out of range; see --help", True
+    return None, False
+
+
+class Child:
+    """The command line, in a process group of its own: Ctrl-C reaches it once, from here."""
+
+    def __init__(self, command):
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        errors="replace", start_new_session=True)
+        self.ended_by = None
+        signal.signal(signal.SIGINT, lambda number, frame: self.process.send_signal(signal.SIGINT))
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self.end)
+
+    def end(self, number, frame):
+        self.ended_by = number
+        self.process.kill()
+
+    def lines(self):
+        """Of both outputs, each read by itself: in one pipe an error may begin in the middle of a line."""
+        lines = queue.Queue()
+        outputs = (self.process.stdout, self.process.stderr)
+        for output in outputs:
+            threading.Thread(target=self.read, args=(output, lines), daemon=True).start()
+        for _ in outputs:
+            yield from iter(lines.get, None)
+
+    @staticmethod
+    def read(output, lines):
+        for line in output:
+            lines.put(line.rstrip("\n").replace("\\", ""))
+        lines.put(None)
+
+
+def report(child):
+    """Prints until the child ends. Returns whether there was a result, and whether an error."""
     result = error = False
-    for line in child.stdout:
-        text = line.rstrip("\n").replace("\\", "")
+    for text in child.lines():
+        complaint, is_error = complaint_of(text)
         if "rigcalibrate-coverage," in text:
             print_coverage(text)
         elif "rigcalibrate-result," in text:
             print_result(text)
             result = True
-        elif re.match("ERROR|WARNING|could not|no element", text):
-            warning = text.startswith("WARNING: from")
-            if warning or not error:  # what follows an error is its consequence
-                print("calibrate.sh: " + re.sub(r"^[A-Z]+: from element \S+: ", "", text), file=sys.stderr)
-            if not warning and not error:
+        elif complaint and not (error and is_error):  # what follows an error is its consequence
+            print("calibrate.sh: " + complaint, file=sys.stderr)
+            if is_error:
                 error = True
                 # After an error that comes before the first picture gst-launch-1.0 may wait for ever.
-                threading.Timer(2, child.kill).start()
+                threading.Timer(2, child.process.kill).start()
         sys.stdout.flush()
-    child.wait()
+    child.process.wait()
+    return result, error
+
+
+def main():
+    folder, *command = sys.argv[1:]
+    try:
+        child = Child(command)
+        result, error = report(child)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    if child.ended_by:  # as a process that does not catch it
+        signal.signal(child.ended_by, signal.SIG_DFL)
+        os.kill(os.getpid(), child.ended_by)
     if not result and not error:
         print("calibrate.sh: there was no result", file=sys.stderr)
     sys.exit(0 if result and not error else 1)

@@ -4,35 +4,79 @@
  *        [marker-size=M] [dictionary=4x4-50]; names and units as rigcalibrate's properties have
  * them */
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <rangecast/calibration/board.hpp>
+#include <set>
 #include <string>
+#include <vector>
 
 using rangecast::BoardKind;
 using rangecast::BoardSpec;
 
 static constexpr int kSquarePx = 256;
 
+/* All of the text is a number. */
 static bool
+read_number (const std::string &text, double &value)
+{
+  char *end = nullptr;
+  value = std::strtod (text.c_str (), &end);
+  return !text.empty () && *end == 0 && std::isfinite (value);
+}
+
+static bool
+read_number (const std::string &text, int &value)
+{
+  const auto [end, error] = std::from_chars (text.data (), text.data () + text.size (), value);
+  return error == std::errc () && end == text.data () + text.size ();
+}
+
+/* @return what is wrong with the value, or nullptr */
+static const char *
 set (BoardSpec &board, const std::string &name, const std::string &value)
 {
-  const auto &dictionaries = rangecast::board_dictionaries ();
-  const auto dictionary = std::ranges::find (dictionaries, value);
-  if (name == "board" && (value == "chessboard" || value == "charuco"))
+  if (name == "board") {
     board.kind = value == "charuco" ? BoardKind::kCharuco : BoardKind::kChessboard;
-  else if (name == "columns")
-    board.columns = std::atoi (value.c_str ());
-  else if (name == "rows")
-    board.rows = std::atoi (value.c_str ());
-  else if (name == "square-size")
-    board.square_m = std::atof (value.c_str ());
-  else if (name == "marker-size")
-    board.marker_m = std::atof (value.c_str ());
-  else if (name == "dictionary" && dictionary != dictionaries.end ())
+    return value == "charuco" || value == "chessboard" ? nullptr : "expected chessboard or charuco";
+  }
+  if (name == "columns" || name == "rows")
+    return read_number (value, name == "rows" ? board.rows : board.columns)
+               ? nullptr
+               : "expected a whole number of inner corners";
+  if (name == "square-size" || name == "marker-size")
+    return read_number (value, name == "square-size" ? board.square_m : board.marker_m)
+               ? nullptr
+               : "expected metres, as a number without a unit";
+  if (name == "dictionary") {
+    const auto &dictionaries = rangecast::board_dictionaries ();
+    const auto dictionary = std::ranges::find (dictionaries, value);
     board.dictionary = int (dictionary - dictionaries.begin ());
-  else
-    return false;
+    return dictionary != dictionaries.end () ? nullptr
+                                             : "expected a dictionary of rigcalibrate's, as 4x4-50";
+  }
+  return "expected a property of rigcalibrate's board; see --help";
+}
+
+/* The words after the file name. @return false if one is wrong, which is then said */
+static bool
+read_properties (const std::vector<std::string> &words, BoardSpec &board)
+{
+  std::set<std::string> names;
+  for (const std::string &word : words) {
+    const std::size_t equals = word.find ('=');
+    const std::string name = word.substr (0, equals);
+    const char *wrong = "expected NAME=VALUE; see --help";
+    if (equals != std::string::npos)
+      wrong = names.insert (name).second ? set (board, name, word.substr (equals + 1))
+                                         : "is given twice; expected once";
+    if (wrong) {
+      std::fprintf (stderr, "draw-board: '%s': %s\n", word.c_str (), wrong);
+      return false;
+    }
+  }
   return true;
 }
 
@@ -69,25 +113,31 @@ write_svg (const char *path, const BoardSpec &board, const std::vector<std::uint
   return std::fclose (file) == 0;
 }
 
+static constexpr char kUsage[] =
+    "usage: draw-board FILE.svg [board=chessboard|charuco] [columns=9] [rows=6] "
+    "[square-size=0.025] [marker-size=M] [dictionary=4x4-50]\n";
+
 int
 main (int argc, char **argv)
 {
-  BoardSpec board;
-  for (int i = 2; i < argc; i++) {
-    const std::string word = argv[i];
-    const std::size_t equals = word.find ('=');
-    if (equals == std::string::npos ||
-        !set (board, word.substr (0, equals), word.substr (equals + 1))) {
-      std::fprintf (
-          stderr, "draw-board: '%s': expected a property of rigcalibrate's board\n", argv[i]);
-      return 2;
-    }
+  const std::vector<std::string> words (argv + 1, argv + argc);
+  if (std::ranges::find (words, "--help") != words.end () ||
+      std::ranges::find (words, "-h") != words.end ()) {
+    std::fputs (kUsage, stdout);
+    return 0;
   }
-  if (argc < 2) {
-    std::fprintf (stderr, "usage: draw-board FILE.svg [board=chessboard|charuco] [columns=9] "
-                          "[rows=6] [square-size=0.025] [marker-size=M] [dictionary=4x4-50]\n");
+  if (words.empty ()) {
+    std::fputs (kUsage, stderr);
     return 2;
   }
+  if (!words[0].ends_with (".svg") && !words[0].ends_with (".SVG")) {
+    std::fprintf (
+        stderr, "draw-board: '%s': expected a file name that ends in .svg\n", words[0].c_str ());
+    return 2;
+  }
+  BoardSpec board;
+  if (!read_properties ({words.begin () + 1, words.end ()}, board))
+    return 2;
   std::vector<std::uint8_t> pixels;
   const rangecast::Status status = rangecast::draw_board (board, kSquarePx, pixels);
   if (!status.ok ()) {

@@ -12,11 +12,18 @@ if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
   export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
 fi
 
-# What runs the launch strings; demo.sh replaces it by rangecast-run, which measures.
+# What runs the launch strings; demo.sh replaces it by rangecast-run, which measures. With -q gst-launch-1.0 would say
+# nothing of warnings, and without it says them among much else on stdout.
 launch () {
   local runner
-  eval "runner=(${RANGECAST_LAUNCH:-gst-launch-1.0 -e -q})" # a command line, quoted where it must be
-  exec "${runner[@]}" "$@"
+  if [ -n "${RANGECAST_LAUNCH:-}" ]; then
+    eval "runner=($RANGECAST_LAUNCH)" # a command line, quoted where it must be
+    exec "${runner[@]}" "$@"
+  fi
+  LANGUAGE=en exec gst-launch-1.0 -e --no-position "$@" > >(
+    trap '' INT TERM # it ends with what it reads
+    exec grep --line-buffered '^WARNING: ' >&2
+  )
 }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }

@@ -38,7 +38,8 @@ struct Camera {
 static std::string
 name_of (const View &view)
 {
-  return "view " + std::to_string (view.id) + (view.name.empty () ? "" : " " + view.name);
+  const std::string number = "view " + std::to_string (view.id);
+  return number + (view.name.empty () || view.name == number ? "" : " " + view.name);
 }
 
 static View
@@ -214,31 +215,74 @@ with_few_pixels (View view)
   return view;
 }
 
-/* All cameras and what is near before them fill most of the picture. striprender turns about where
- * the axes meet, which for a single pair is nowhere in particular, so what it looks at is moved. */
-static Outlook
-look_at_all (const Rig &drawn)
+/* The corners of all frustums, and where they begin. */
+static std::vector<Vec3>
+corners_of (const Rig &drawn)
 {
   std::vector<Vec3> points;
   for (const View &view : drawn.views)
     for (double u : {0, view.width})
       for (double v : {0, view.height})
-        for (double z : {0.0, view.near_m})
+        for (double z : {0.0, view.near_m, view.far_m})
           points.push_back (view.world_from_view * view.intrinsics.unproject (u, v, z));
-  Vec3 least = points[0], most = points[0];
+  return points;
+}
+
+/* The part of the picture that the points take, -1 to 1 from left to right and from the bottom up.
+ */
+struct Frame {
+  double left = 1e9, right = -1e9, bottom = 1e9, top = -1e9;
+  bool behind = false; /* some of them are behind who looks */
+
+  [[nodiscard]] double half_size () const { return std::max (right - left, top - bottom) / 2; }
+};
+
+static Frame
+frame_of (const std::vector<Vec3> &points, const rangecast::Mat4 &m)
+{
+  Frame frame;
   for (Vec3 p : points) {
-    least = {std::min (least.x, p.x), std::min (least.y, p.y), std::min (least.z, p.z)};
-    most = {std::max (most.x, p.x), std::max (most.y, p.y), std::max (most.z, p.z)};
+    const auto row = [&] (int r) {
+      return m[r] * p.x + m[4 + r] * p.y + m[8 + r] * p.z + m[12 + r];
+    };
+    const double w = row (3);
+    if (w <= 1e-6) {
+      frame.behind = true;
+      continue;
+    }
+    frame.left = std::min (frame.left, row (0) / w);
+    frame.right = std::max (frame.right, row (0) / w);
+    frame.bottom = std::min (frame.bottom, row (1) / w);
+    frame.top = std::max (frame.top, row (1) / w);
   }
-  const Vec3 centre = 0.5 * (least + most);
-  double radius = 0;
-  for (Vec3 p : points)
-    radius = std::max (radius, norm (p - centre));
+  return frame;
+}
+
+/* All frustums fill the picture. striprender turns about where the axes meet, which for a single
+ * pair is nowhere in particular, so what it looks at is moved. Perspective makes this a search:
+ * each step centres what is seen and corrects the distance. */
+static Outlook
+look_at_all (const Rig &drawn, const Options &options)
+{
+  constexpr double kFilled = 0.94;
+  const std::vector<Vec3> points = corners_of (drawn);
   const rangecast::SceneFrame scene = rangecast::scene_frame (drawn);
-  const Vec3 off = centre - scene.target;
-  return {
-      {dot (off, cross (scene.up, scene.to_first)), dot (off, scene.up), dot (off, scene.to_first)},
-      1.05 * radius / std::sin (kFieldDeg / 2 * M_PI / 180)};
+  rangecast::Orbit orbit = {options.azimuth_deg, options.elevation_deg, 1, kFieldDeg, {}};
+  for (Vec3 p : points)
+    orbit.distance_m = std::max (orbit.distance_m, 3 * norm (p - scene.target));
+  for (int step = 0; step < 50; step++) {
+    const auto seen =
+        rangecast::orbit_matrices (scene, orbit, double (options.width) / options.height, false);
+    const Frame frame = frame_of (points, seen.clip_from_world);
+    if (frame.behind) {
+      orbit.distance_m *= 1.5;
+      continue;
+    }
+    orbit.pan = orbit.pan + (frame.left + frame.right) / 4 * seen.pan_right -
+                (frame.bottom + frame.top) / 4 * seen.pan_down;
+    orbit.distance_m *= std::clamp (frame.half_size () / kFilled, 0.7, 1.4);
+  }
+  return {orbit.pan, orbit.distance_m};
 }
 
 static void
@@ -251,7 +295,7 @@ set_up (GstElement *pipeline, const Options &options, const Rig &drawn)
   GstCaps *picture = gst_caps_from_string ("video/x-raw(memory:GLMemory)");
   gst_caps_set_simple (
       picture, "width", G_TYPE_INT, options.width, "height", G_TYPE_INT, options.height, nullptr);
-  const Outlook outlook = look_at_all (drawn);
+  const Outlook outlook = look_at_all (drawn, options);
   g_object_set (view, "azimuth", options.azimuth_deg, "elevation", options.elevation_deg,
       "distance", options.distance_m > 0 ? options.distance_m : outlook.distance_m, "field-of-view",
       kFieldDeg, "pan-x", outlook.pan.x, "pan-y", outlook.pan.y, "pan-z", outlook.pan.z, nullptr);
@@ -309,8 +353,9 @@ check_rig (const Options &options)
   Rig rig;
   const Status status = rangecast::load_rig (options.paths[0], rig);
   if (!status.ok () || rig.views.empty ()) {
-    g_printerr (
-        "rig-check: %s\n", status.ok () ? "the rig has no views" : status.message ().c_str ());
+    g_printerr ("rig-check: %s\n",
+        status.ok () ? (std::string (options.paths[0]) + ": has no views").c_str ()
+                     : status.message ().c_str ());
     return false;
   }
   const std::vector<Camera> cameras = cameras_of (rig);
@@ -344,6 +389,8 @@ complaint_of (const Options &o)
     return "--width and --height: expected 1 to 8192 pixels";
   if (!is_within (o.azimuth_deg, -360, 360) || !is_within (o.elevation_deg, -89, 89))
     return "--azimuth and --elevation: expected -360 to 360 and -89 to 89 degrees";
+  if (o.png && !g_str_has_suffix (o.png, ".png") && !g_str_has_suffix (o.png, ".PNG"))
+    return "--png: expected a file name that ends in .png";
   return is_within (o.distance_m, 0, 1000) ? nullptr : "--distance: expected 0 to 1000 metres";
 }
 

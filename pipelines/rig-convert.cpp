@@ -68,10 +68,14 @@ open_storage (const std::string &path)
   throw BadInput{path + ": cannot be read as YAML, XML or JSON"};
 }
 
+/* The files of one calibration. */
+struct OpencvFiles : std::vector<cv::FileStorage> {
+  std::string names; /* for messages */
+};
+
 /* A matrix that goes by one of several names in one of the files. */
 static cv::Mat
-find_matrix (const std::vector<cv::FileStorage> &files, std::initializer_list<const char *> names,
-    const char *what)
+find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names, const char *what)
 {
   for (const cv::FileStorage &file : files)
     for (const char *name : names)
@@ -80,14 +84,14 @@ find_matrix (const std::vector<cv::FileStorage> &files, std::initializer_list<co
         node.mat ().convertTo (m, CV_64F);
         return m;
       }
-  throw BadInput{std::string ("no ") + what + " (" + *names.begin () + ") in the files"};
+  throw BadInput{files.names + ": no " + what + " (" + *names.begin () + ")"};
 }
 
 static Intrinsics
 intrinsics_of (const cv::Mat &k)
 {
   if (k.rows != 3 || k.cols != 3)
-    throw BadInput{"camera matrices: expected 3 x 3"};
+    throw BadInput{"a camera matrix is not 3 x 3"};
   return {k.at<double> (0, 0), k.at<double> (1, 1), k.at<double> (0, 2), k.at<double> (1, 2)};
 }
 
@@ -110,7 +114,7 @@ pose_of (const cv::Mat &r, const cv::Mat &t, double unit_m)
 }
 
 static void
-read_size (const std::vector<cv::FileStorage> &files, const Options &options, View &view)
+read_size (const OpencvFiles &files, const Options &options, View &view)
 {
   for (const cv::FileStorage &file : files)
     if (file["image_width"].isInt () && file["image_height"].isInt ()) {
@@ -118,20 +122,26 @@ read_size (const std::vector<cv::FileStorage> &files, const Options &options, Vi
       view.height = int (file["image_height"]);
     }
   char end = 0;
-  if (options.size && std::sscanf (options.size, "%dx%d%c", &view.width, &view.height, &end) != 2)
+  if (options.size &&
+      (std::sscanf (options.size, "%dx%d%c", &view.width, &view.height, &end) != 2 ||
+          view.width < 1 || view.height < 1))
     throw BadInput{std::string ("--size: expected WIDTHxHEIGHT, e.g. 640x480, got ") + options.size,
         kWrongUsage};
   if (view.width < 1 || view.height < 1)
-    throw BadInput{"the files do not say the pictures' size: expected --size WIDTHxHEIGHT"};
+    throw BadInput{files.names +
+                   ": the pictures' size is not there (image_width, image_height): expected "
+                   "--size WIDTHxHEIGHT"};
 }
 
 /* What samples/cpp/stereo_calib.cpp writes: M1, D1, M2, D2 in one file, R, T in the other. */
 static View
 read_opencv (const std::vector<std::string> &paths, const Options &options)
 {
-  std::vector<cv::FileStorage> files;
-  for (const std::string &path : paths)
+  OpencvFiles files;
+  for (const std::string &path : paths) {
     files.push_back (open_storage (path));
+    files.names += (files.names.empty () ? "" : ", ") + path;
+  }
   View view;
   read_size (files, options, view);
   view.intrinsics = intrinsics_of (
@@ -304,10 +314,39 @@ static const Format kFormats[] = {{"opencv", 1, 2, read_opencv}, {"luxonis", 1, 
     {"middlebury", 1, 1, read_middlebury}};
 
 static void
-check (const Status &status)
+check (const Status &status, const std::string &about = "")
 {
   if (!status.ok ())
-    throw BadInput{status.message ()};
+    throw BadInput{about + status.message ()};
+}
+
+/* Whatever is wrong, the message begins with the file or the option. */
+static View
+read_named (const Format &format, const std::vector<std::string> &paths, const Options &options)
+{
+  try {
+    return format.read (paths, options);
+  } catch (const BadInput &bad) {
+    if (bad.exit_status == kWrongUsage || bad.what.starts_with (paths[0]) ||
+        bad.what.starts_with (paths.back ()))
+      throw;
+    throw BadInput{paths[0] + ": " + bad.what};
+  } catch (
+      const std::exception &) { /* cv::Exception's own text is many lines of source positions */
+    throw BadInput{paths[0] + ": is not what the format has; see docs/rig.md"};
+  }
+}
+
+/* Lengths in board squares, centimetres or millimetres that were taken for metres. */
+static void
+warn_if_wide (const View &view)
+{
+  constexpr double kWideM = 1;
+  const double baseline_m = norm (view.right->partner_from_left.translation);
+  if (baseline_m > kWideM)
+    g_printerr ("rig-convert: warning: the cameras stand %.3g m apart; is a T of 1 really a metre? "
+                "See --unit\n",
+        baseline_m);
 }
 
 static void
@@ -328,7 +367,8 @@ convert (const Options &options)
         "--scale and --unit: expected numbers above 0, and --scale at most 1000", kWrongUsage};
 
   const std::string rig_path = words.back ();
-  View view = format->read ({words.begin () + 1, words.end () - 1}, options);
+  const std::vector<std::string> paths (words.begin () + 1, words.end () - 1);
+  View view = read_named (*format, paths, options);
   view.id = options.view_id;
   view.name = options.name ? options.name : "";
   view.world_from_view = kLevel;
@@ -340,10 +380,14 @@ convert (const Options &options)
   Rig rig;
   if (options.append)
     check (rangecast::load_rig (rig_path, rig));
-  check (rangecast::merge (rig, {{view}}));
-  check (rangecast::validate (rig));
+  if (rig.find (view.id))
+    throw BadInput{rig_path + " already has view " + std::to_string (view.id) +
+                   ": expected another --view-id"};
+  check (rangecast::merge (rig, {{view}}), rig_path + ": ");
+  check (rangecast::validate (rig), paths.back () + ": ");
   rangecast::Rectifier rectifier; /* says what stereodepth would say */
-  check (rectifier.set (view));
+  check (rectifier.set (view), paths.back () + ": ");
+  warn_if_wide (view);
   check (rangecast::save_rig (rig_path, rig));
 }
 

@@ -11,7 +11,7 @@ data=$(realpath "$1")/luxonis_people_stereo out=$(realpath "$2")
 cd "$(mktemp -d)"
 width=224 height=140
 moments=(38 42 44 68 75 83) # of 5 a second
-"$pipelines/rig-from-luxonis.py" "$data/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
+rig-convert luxonis "$data/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
 
 side () { # camera, contrast
   echo "filesrc location=$data/$1.mp4 ! decodebin ! videoconvert ! videorate drop-only=true ! video/x-raw,framerate=5/1

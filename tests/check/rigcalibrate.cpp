@@ -327,6 +327,20 @@ GST_START_TEST (test_too_few_boards_are_one_error_with_their_number)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_boards_that_were_seen_but_not_kept_are_counted)
+{
+  Calibrate c (1, "selection=spread min-frames=6");
+  Pose board = {kIdentity3, -0.5 * BoardSpec{}.corner (53)};
+  board.translation.z = 0.4;
+  const auto picture = c.renderers[0].render (board, 1, c.random);
+  for (int i = 0; i < 5; i++)
+    c.push_picture (0, i * GST_SECOND, picture);
+  c.end ();
+  c.expect_error ("sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
+                  "expected at least 6. Of the rest 4 were as one before: hold the board still");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_swapped_cameras_are_one_error)
 {
   Calibrate c (2);
@@ -539,7 +553,8 @@ GST_START_TEST (test_what_cannot_end_well_does_not_start)
 {
   const std::pair<const char *, const char *> cases[] = {
       {"location=/nowhere/rig.yaml", "/nowhere/rig.yaml: its folder does not exist"},
-      {"location=rig.txt", "rig.txt: expected a file name that ends in .yaml"},
+      {"location=rig.txt", "rig.txt: cannot be written; expected a file name that ends in .yml"},
+      {"location=/proc/rig.yaml", "/proc/rig.yaml: cannot be opened for writing"},
       {"near=2 far=1", "expected 0 < near < far"},
       {"min-frames=20 max-frames=10", "expected at least min-frames, 20"},
       {"board=charuco marker-size=0.1", "marker size"},
@@ -655,6 +670,7 @@ rigcalibrate_suite ()
   tcase_add_test (tc, test_still_pictures_stand_side_by_side);
   tcase_add_test (tc, test_pictures_without_a_board_are_one_error_at_eos);
   tcase_add_test (tc, test_too_few_boards_are_one_error_with_their_number);
+  tcase_add_test (tc, test_boards_that_were_seen_but_not_kept_are_counted);
   tcase_add_test (tc, test_swapped_cameras_are_one_error);
   tcase_add_test (tc, test_new_size_in_the_stream_is_an_error_that_names_the_pad);
   tcase_add_test (tc, test_new_size_after_a_reset_is_taken);

@@ -221,6 +221,54 @@ GST_START_TEST (test_background_is_saved_and_loaded)
 }
 GST_END_TEST;
 
+/* At start, before a background is learnt in vain. */
+GST_START_TEST (test_place_that_a_background_cannot_be_saved_to_is_one_error_at_start)
+{
+  const std::pair<const char *, const char *> cases[] = {
+      {"/nowhere/b.yml", "/nowhere/b.yml: its folder does not exist"},
+      {"b.txt", "b.txt: cannot be written; expected a file name that ends in .yml"}};
+  for (const auto &[path, text] : cases) {
+    GstElement *element = gst_element_factory_make ("roiextract", nullptr);
+    GstBus *bus = gst_bus_new ();
+    gst_element_set_bus (element, bus);
+    g_object_set (element, "save-background", path, nullptr);
+    fail_unless_equals_int (
+        gst_element_set_state (element, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+    const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
+    fail_unless (said.find (text) != std::string::npos, said.c_str ());
+    fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+    gst_element_set_state (element, GST_STATE_NULL);
+    gst_element_set_bus (element, nullptr);
+    gst_object_unref (bus);
+    gst_object_unref (element);
+  }
+  fail_if (g_file_test ("b.txt", G_FILE_TEST_EXISTS));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_too_short_for_a_background_to_save_is_a_warning)
+{
+  const Rig rig = ring_rig (1);
+  gchar *path = g_strdup_printf ("%s/roi-short-%d.yml", g_get_tmp_dir (), int (getpid ()));
+  gchar *save = g_strdup_printf ("roiextract background-frames=9 save-background=%s", path);
+  GstHarness *h = roi_harness (rig, save);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  for (int i = 0; i < 2; i++)
+    push (h, scene (rig, i, false));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  const std::string said = next_message_text (bus, GST_MESSAGE_WARNING);
+  fail_unless (said.find ("not written: the stream ended after 2 frames") != std::string::npos,
+      said.c_str ());
+  fail_if (g_file_test (path, G_FILE_TEST_EXISTS));
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+  g_free (path);
+  g_free (save);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_missing_background_file_is_one_error_that_names_it)
 {
   GstHarness *h = gst_harness_new_parse ("roiextract background-file=/nowhere/b.yml");
@@ -230,6 +278,10 @@ GST_START_TEST (test_missing_background_file_is_one_error_that_names_it)
       h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
   fail_unless (
       next_message_text (bus, GST_MESSAGE_ERROR).find ("/nowhere/b.yml") != std::string::npos);
+  /* Caps that were refused come again with the next buffer. */
+  gst_harness_set_src_caps (
+      h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -530,6 +582,8 @@ roiextract_suite ()
   tcase_add_test (tc, test_new_caps_leave_a_captured_background_alone);
   tcase_add_test (tc, test_flush_gap_and_eos_keep_the_background);
   tcase_add_test (tc, test_background_is_saved_and_loaded);
+  tcase_add_test (tc, test_place_that_a_background_cannot_be_saved_to_is_one_error_at_start);
+  tcase_add_test (tc, test_stream_too_short_for_a_background_to_save_is_a_warning);
   tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
   tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);
   tcase_add_test (tc, test_growing_person_is_told_before_the_edge_is_reached);

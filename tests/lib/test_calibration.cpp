@@ -209,6 +209,74 @@ TEST (Calibration, cameras_one_above_the_other_are_no_stereo_pair)
   EXPECT_TRUE (result.rig.views[0].third);
 }
 
+TEST (Calibration, camera_that_is_rolled_against_its_partner_is_told)
+{
+  for (const auto &[degrees, text] : {std::pair{180., "is upside down against camera 0 (left)"},
+           {-90., "lies on its side against camera 0 (left)"}}) {
+    auto truth = stereo_pair ();
+    truth[1].world_from_camera =
+        truth[1].world_from_camera * rotation_about ({0, 0, 1}, degrees * kDegree);
+    CalibrationResult result;
+    EXPECT_ERROR (
+        calibrate_rig (cameras_of (truth), frames_for (truth, {{0, 1}}, 15), {}, result), text);
+  }
+}
+
+/* The right camera sees each board a little higher or lower than it was for the left one. */
+TEST (Calibration, rows_that_do_not_agree_are_a_warning)
+{
+  const auto truth = stereo_pair ();
+  auto frames = frames_for (truth, {{0, 1}}, 20);
+  for (std::size_t f = 0; f < frames.size (); f++)
+    for (BoardCorner &corner : frames[f].sightings[1].corners)
+      corner.y += f % 2 ? 3 : -3;
+  CalibrationResult result;
+  const Status status = calibrate_rig (cameras_of (truth), frames, {}, result);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  EXPECT_TRUE (std::ranges::any_of (result.warnings, [] (const std::string &warning) {
+    return warning.starts_with ("view 0: rows of camera 0 and camera 1 differ by");
+  }));
+}
+
+TEST (Calibration, boards_that_were_found_but_do_not_fit_are_counted)
+{
+  const auto truth = stereo_pair ();
+  auto frames = frames_for (truth, {{0, 1}}, 10);
+  for (std::size_t f = 0; f < 3; f++)
+    for (BoardCorner &corner : frames[f].sightings[1].corners)
+      corner.x += corner.id % 2 ? 20 : -20;
+  CalibrationResult result;
+  EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames, {}, result),
+      "frames that fit (3 more do not fit: do the pictures of all cameras belong together");
+}
+
+/* Its columns are numbered from the other end, as BoardDetector does. */
+TEST (Calibration, pictures_of_one_camera_that_are_mirrored_get_a_hint)
+{
+  const auto truth = stereo_pair ();
+  auto frames = frames_for (truth, {{0, 1}}, 15);
+  const int columns = BoardSpec{}.columns;
+  for (CalibrationFrame &frame : frames)
+    for (BoardCorner &corner : frame.sightings[1].corners) {
+      corner.x = 639 - corner.x;
+      corner.id = corner.id / columns * columns + columns - 1 - corner.id % columns;
+    }
+  CalibrationResult result;
+  EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames, {}, result),
+      "Each camera alone fits: were their pictures taken at the same moments, and are those of "
+      "one of them mirrored?");
+}
+
+TEST (Calibration, board_that_was_never_found_is_described)
+{
+  const auto truth = stereo_pair ();
+  CalibrationSettings settings;
+  settings.board.kind = BoardKind::kCharuco;
+  CalibrationResult result;
+  EXPECT_ERROR (calibrate_rig (cameras_of (truth), {}, settings, result),
+      "no board was found; expected 9x6 inner corners, with markers of the dictionary 4x4-50");
+}
+
 TEST (Calibration, board_that_moved_between_two_cameras_is_left_out_and_said)
 {
   const auto truth = stereo_pair ();

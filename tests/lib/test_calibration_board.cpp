@@ -127,6 +127,28 @@ TEST (CalibrationBoard, part_of_a_charuco_board_will_do)
   EXPECT_TRUE (detect ({}, part).empty ()); /* but not of a chessboard */
 }
 
+TEST (CalibrationBoard, charuco_board_in_a_mirror_is_told)
+{
+  Drawn drawn (charuco ());
+  BoardDetector detector;
+  ASSERT_TRUE (detector.set (drawn.board).ok ());
+  std::vector<BoardCorner> corners;
+  const auto view = drawn.view ();
+  const auto mirror = [&] {
+    for (int y = 0; y < view.height; y++)
+      std::reverse (drawn.pixels.begin () + std::ptrdiff_t (y) * view.width,
+          drawn.pixels.begin () + std::ptrdiff_t (y + 1) * view.width);
+  };
+  mirror ();
+  ASSERT_TRUE (detector.detect (view, corners).ok ());
+  EXPECT_TRUE (corners.empty ());
+  EXPECT_TRUE (detector.is_mirrored ());
+  mirror ();
+  ASSERT_TRUE (detector.detect (view, corners).ok ());
+  EXPECT_FALSE (corners.empty ());
+  EXPECT_FALSE (detector.is_mirrored ());
+}
+
 TEST (CalibrationBoard, pictures_without_a_board_have_no_corners)
 {
   std::vector<std::uint8_t> noise (320 * 240);

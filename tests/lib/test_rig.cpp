@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <rangecast/geometry/rig_file.hpp>
 
 using namespace rangecast;
 using rangecast::testing::ring_rig;
@@ -105,6 +106,36 @@ TEST (Rig, what_cannot_be_written_is_named)
   }
 }
 
+TEST (Rig, place_to_write_to_is_tried_and_left_as_it_was)
+{
+  const std::string path = temporary ("place.yaml"), link = temporary ("link.yaml");
+  EXPECT_TRUE (check_output_path (path, kRigExtensions).ok ());
+  EXPECT_FALSE (std::filesystem::exists (path));
+  std::filesystem::create_symlink (path, link);
+  EXPECT_TRUE (check_output_path (link, kRigExtensions).ok ());
+  EXPECT_FALSE (std::filesystem::exists (path));
+  EXPECT_TRUE (std::filesystem::is_symlink (link));
+  std::ofstream (path) << "text";
+  EXPECT_TRUE (check_output_path (path, kRigExtensions).ok ());
+  EXPECT_EQ (std::filesystem::file_size (path), 4U);
+  std::filesystem::remove (link);
+  std::filesystem::remove (path);
+  std::filesystem::create_directory (path);
+  EXPECT_NE (
+      check_output_path (path, kRigExtensions).message ().find ("is a folder"), std::string::npos);
+  std::filesystem::remove (path);
+  EXPECT_NE (check_output_path ("/nowhere/rig.yaml", kRigExtensions)
+                 .message ()
+                 .find ("folder does not exist"),
+      std::string::npos);
+  EXPECT_EQ (
+      check_output_path (temporary ("rig.txt"), kRigExtensions).code (), StatusCode::kBadValue);
+  if (std::filesystem::is_directory ("/proc"))
+    EXPECT_NE (
+        check_output_path ("/proc/rig.yaml", kRigExtensions).message ().find ("cannot be opened"),
+        std::string::npos);
+}
+
 TEST (Rig, blob_round_trips_bit_for_bit)
 {
   const Rig rig = stereo_rig ();
@@ -166,6 +197,13 @@ TEST (Rig, message_of_a_bad_file_names_the_field)
                               "    image_size: [ 320, 240 ]\n    intrinsics: [ 1, 2 ]\n")
                  .find ("views[0].intrinsics"),
       std::string::npos);
+  const std::string view = "%YAML:1.0\n---\nrangecast_rig: 1\nviews:\n  - id: ";
+  EXPECT_NE (message_of_file (view + "0\n    image_size: [ 640.5, 480 ]\n")
+                 .find ("views[0].image_size: expected whole numbers"),
+      std::string::npos);
+  EXPECT_NE (message_of_file (view + "99999999999999999999\n")
+                 .find ("views[0].id: expected an integer from 0 to 63"),
+      std::string::npos);
 }
 
 TEST (Rig, missing_file_is_named)
@@ -174,13 +212,15 @@ TEST (Rig, missing_file_is_named)
   const Status status = load_rig ("/nowhere/rig.yaml", rig);
   EXPECT_EQ (status.code (), StatusCode::kNotFound);
   EXPECT_NE (status.message ().find ("/nowhere/rig.yaml"), std::string::npos);
+  EXPECT_NE (
+      load_rig ("/dev/null", rig).message ().find ("is a folder or a device"), std::string::npos);
 }
 
 TEST (Rig, validate_names_view_and_field)
 {
   Rig rig = ring_rig (2);
   rig.views[1].near_m = -1;
-  EXPECT_NE (validate (rig).message ().find ("view 1: near"), std::string::npos);
+  EXPECT_NE (validate (rig).message ().find ("view 1: near and far are -1 and"), std::string::npos);
   rig = ring_rig (2);
   rig.views[1].id = 0;
   EXPECT_NE (validate (rig).message ().find ("twice"), std::string::npos);

@@ -47,6 +47,81 @@ test_bad_arguments_are_named () {
   expect_error "its folder does not exist" "$pipelines/calibrate.sh" --left videotestsrc --out nowhere/rig.yaml
 }
 
+test_values_out_of_range_name_the_option_and_what_is_allowed () {
+  local calibrate=("$pipelines/calibrate.sh" --left videotestsrc --out rig.yaml)
+  expect_error "--square: expected 0.0001 to 10 metres, got '30'" "${calibrate[@]}" --square 30
+  expect_error "--near: expected 0.001 to 1000 metres, got '-1'" "${calibrate[@]}" --near -1
+  expect_error "--far: expected 0.001 to 1000 metres, got '3m'" "${calibrate[@]}" --far 3m
+  expect_error "--columns: expected a whole number from 3 to 32, got '2'" "${calibrate[@]}" --columns 2
+  expect_error "--rows: expected a whole number from 3 to 32, got 'six'" "${calibrate[@]}" --rows six
+  expect_error "--board: expected one of chessboard, charuco, got 'circles'" "${calibrate[@]}" --board circles
+  expect_error "--distortion: expected one of none, four, five, eight, got 'six'" "${calibrate[@]}" --distortion six
+  expect_error "--world: expected one of centre, first-view, board, got 'room'" "${calibrate[@]}" --world room
+  expect_error "--columns: expected a value" "$pipelines/calibrate.sh" --left videotestsrc --columns --out rig.yaml
+  expect_error "--out: expected a value" "$pipelines/calibrate.sh" --left videotestsrc --out
+  [ ! -e rig.yaml ] || fail "a rig was written"
+}
+
+# What calibrate.sh did not check, gst-launch-1.0 ignores but for a warning of GLib's.
+test_report_takes_a_value_out_of_range_for_an_error () {
+  expect_error "square-size: '30.000000' is out of range" python3 "$pipelines/calibration-report.py" "$PWD/none" gst-launch-1.0 -e -m \
+    rigcalibrate name=c square-size=30 ! fakesink videotestsrc num-buffers=1 ! c.sink_0
+}
+
+test_patterns_without_pictures_are_named () {
+  expect_error "no pictures 'nothing*.png'" "$pipelines/calibrate.sh" --left 'nothing*.png' --out rig.yaml
+  expect_error "no pictures 'nothing[12].png'" "$pipelines/calibrate.sh" --left 'nothing[12].png' --out rig.yaml
+}
+
+test_films_may_have_any_name () {
+  need_boards
+  local name
+  for name in 'a%d.jpg' 'b?[1].jpg' 'c!d.jpg' 'e f"g.jpg'; do
+    cp "$boards/left01.jpg" "$name"
+    expect_error "the board was found in 1 frame" "$pipelines/calibrate.sh" --left "$name" --out rig.yaml
+  done
+}
+
+# Starts a calibration that has no end; sets $calibration to its process, which leads a session of its own.
+endless_calibration () {
+  setsid "$pipelines/calibrate.sh" --left 'videotestsrc is-live=true' --out rig.yaml >said.txt 2>&1 &
+  calibration=$!
+  local i
+  for i in {1..100}; do
+    pgrep -P "$calibration" gst-launch >/dev/null && break
+    sleep 0.1
+  done
+  gst_launch=$(pgrep -P "$calibration" gst-launch) || fail "no gst-launch-1.0: $(cat said.txt)"
+  sleep 1
+}
+
+expect_gone () { # process
+  local i
+  for i in {1..100}; do
+    kill -0 "$1" 2>/dev/null || return 0
+    sleep 0.1
+  done
+  kill -KILL "$1"
+  fail "process $1 goes on"
+}
+
+test_interrupt_ends_the_stream_and_calibrates () {
+  endless_calibration
+  kill -INT "$calibration"
+  expect_gone "$gst_launch"
+  expect_gone "$calibration"
+  grep -q "no board was found" said.txt || fail "$(cat said.txt)"
+}
+
+test_terminate_leaves_nothing_behind () {
+  endless_calibration
+  local status=0
+  kill -TERM "$calibration"
+  wait "$calibration" || status=$?
+  [ $status = 143 ] || fail "ended with $status: $(cat said.txt)"
+  expect_gone "$gst_launch"
+}
+
 test_board_is_drawn_in_its_true_size () {
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" board.svg columns=9 rows=6 square-size=0.02
   grep -q 'width="240.0000mm" height="180.0000mm"' board.svg || fail "$(head -n 1 board.svg)"
@@ -54,6 +129,14 @@ test_board_is_drawn_in_its_true_size () {
   [ "$(grep -c 'width="256" height="256"/>' board.svg)" = 35 ] || fail "$(wc -l board.svg)"
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" charuco.svg board=charuco
   expect_file charuco.svg 10000
-  expect_error "columns is 99" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg columns=99
-  expect_error "'rows'" "${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board" x.svg rows
+  local draw_board=${RANGECAST_BUILD:-$source_dir/build}/pipelines/draw-board
+  expect_error "columns is 99" "$draw_board" x.svg columns=99
+  expect_error "'rows'" "$draw_board" x.svg rows
+  expect_error "'columns=9x': expected a whole number" "$draw_board" x.svg columns=9x
+  expect_error "'square-size=0.03m': expected metres" "$draw_board" x.svg square-size=0.03m
+  expect_error "'rows=7': is given twice" "$draw_board" x.svg rows=6 rows=7
+  expect_error "'b.png': expected a file name that ends in .svg" "$draw_board" b.png
+  "$draw_board" --help | grep -q "^usage: draw-board" || fail "no help"
+  "$draw_board" -h >/dev/null
+  [ ! -e --help ] && [ ! -e -h ] && [ ! -e x.svg ] && [ ! -e b.png ] || fail "a file was written"
 }

@@ -77,6 +77,18 @@ test_aloe_pair_is_rendered () {
   expect_file aloe.png 100000
 }
 
+test_warnings_reach_stderr_and_nothing_else_does () {
+  need_gl
+  local folder
+  folder=$(dirname "$(dpkg -L opencv-doc 2>/dev/null | grep -m 1 'aloeL.jpg')" 2>/dev/null) || folder=
+  [ -f "$folder/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"
+  local pair=(--focal-length 1200 --baseline 0.16 --near 0.6 --far 3)
+  "$pipelines/stereo-to-png.sh" "$folder/aloeL.jpg" "$folder/aloeR.jpg" right.png "${pair[@]}" >said.txt 2>&1
+  [ ! -s said.txt ] || fail "$(cat said.txt)"
+  [ "$("$pipelines/stereo-to-png.sh" "$folder/aloeR.jpg" "$folder/aloeL.jpg" wrong.png "${pair[@]}" 2>&1 >/dev/null |
+    grep -c "cameras seem to be exchanged")" = 1 ] || fail "no warning"
+}
+
 test_bunny_scans_go_through_everything () {
   need_gl
   need_data stanford_bunny_range/bun000.ply.gz

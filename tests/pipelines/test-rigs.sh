@@ -112,6 +112,7 @@ test_what_is_no_calibration_is_named () {
   expect_error "-89 to 89 degrees" rig-check nowhere.yaml --elevation 300
   expect_error "1 to 8192 pixels" rig-check nowhere.yaml --width 99999
   expect_error "1000 metres" rig-check nowhere.yaml --distance nan
+  expect_error "ends in .png" rig-check nowhere.yaml --png a.jpg
 }
 
 test_factory_calibration_becomes_a_rig () {
@@ -120,12 +121,55 @@ test_factory_calibration_becomes_a_rig () {
   rig-check rig.yaml | grep -qE "640x400 +76.7 x 52.7 deg" || fail "$(rig-check rig.yaml)"
 }
 
+test_messages_begin_with_the_file () {
+  middlebury 994.978
+  rig-convert middlebury calib.txt rig.yaml
+  expect_error "rig.yaml already has view 0" rig-convert middlebury calib.txt rig.yaml --append
+  echo "cam0=[1 2 3]" >calib.txt
+  expect_error "calib.txt: cam0: expected 9 numbers" rig-convert middlebury calib.txt rig.yaml
+  echo '{"a": 1}' >calib.json
+  expect_error "calib.json: expected a Luxonis calibration" rig-convert luxonis calib.json rig.yaml
+  opencv_pair 3.2
+  expect_error "extrinsics.yml: view 0" rig-convert opencv intrinsics.yml extrinsics.yml swapped.yaml --size 640x480
+  expect_error "intrinsics.yml: no " rig-convert opencv intrinsics.yml swapped.yaml --size 640x480
+  expect_error "--size: expected WIDTHxHEIGHT, e.g. 640x480, got -640x480" \
+    rig-convert opencv intrinsics.yml extrinsics.yml swapped.yaml --size=-640x480
+  [ ! -e swapped.yaml ] || fail "a rig was written"
+  printf '%%YAML:1.0\n---\nrangecast_rig: 1\nviews: []\n' >empty.yaml
+  expect_error "empty.yaml: has no views" rig-check empty.yaml
+}
+
+test_lengths_that_are_hardly_metres_are_said () {
+  opencv_pair -3.2
+  rig-convert opencv intrinsics.yml extrinsics.yml rig.yaml --size 640x480 2>said.txt
+  grep -q "cameras stand 3.2 m apart" said.txt || fail "no warning: $(cat said.txt)"
+  rig-convert opencv intrinsics.yml extrinsics.yml rig.yaml --size 640x480 --unit 0.025 2>said.txt
+  [ ! -s said.txt ] || fail "$(cat said.txt)"
+}
+
+# Nothing is drawn at the picture's border: all of it is inside.
+expect_empty_border () { # PNG width height
+  gst-launch-1.0 -q filesrc "location=$1" ! pngdec ! videoconvert ! video/x-raw,format=RGBx ! filesink location=pixels
+  python3 - "$2" "$3" <<'END' || fail "$1: something is cut off"
+import sys
+width, height = map(int, sys.argv[1:])
+pixels = memoryview(open("pixels", "rb").read()).cast("I")
+border = [pixels[y * width + x] for y in range(height) for x in range(width) if x in (0, width - 1) or y in (0, height - 1)]
+sys.exit(len(set(border)) != 1)
+END
+}
+
 # Where no camera's lines are, the picture is its background alone.
 test_cameras_are_drawn () {
   need_gl
   gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 rig-export=rig.yaml ! fakesink
   "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 3000
+  expect_empty_border rig.png 320 240
+  middlebury 994.978
+  rig-convert middlebury calib.txt pair.yaml
+  "$pipelines/rig-check.sh" pair.yaml --png pair.png --width 320 --height 240 >/dev/null
+  expect_empty_border pair.png 320 240
   expect_error "nowhere/rig.png" "$pipelines/rig-check.sh" rig.yaml --png nowhere/rig.png
 }
 
@@ -139,4 +183,33 @@ test_cameras_of_a_rig_with_many_pixels_are_drawn () {
   for id in {1..7}; do rig-convert middlebury calib.txt rig.yaml --view-id "$id" --append; done
   "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 1000
+}
+
+# usage: exchanged LEFT RIGHT RIG: how often the cameras are called exchanged.
+exchanged () {
+  gst-launch-1.0 filesrc "location=$1" ! decodebin ! videoconvert ! d.left filesrc "location=$2" ! decodebin ! videoconvert ! d.right \
+    stereodepth name=d "rig=$3" ! fakesink 2>&1 | grep -c "cameras seem to be exchanged"
+}
+
+test_exchanged_cameras_of_real_pairs_are_noticed_and_right_ones_are_not () {
+  local pair=$data/stereo_motorcycle/motorcycle near
+  need_data stereo_motorcycle/motorcycle_left.png
+  middlebury 994.978
+  for near in 2.1 1.5; do
+    rig-convert middlebury calib.txt rig.yaml --near $near --far 5
+    [ "$(exchanged "${pair}_left.png" "${pair}_right.png" rig.yaml || true)" = 0 ] || fail "near $near: a false alarm"
+    [ "$(exchanged "${pair}_right.png" "${pair}_left.png" rig.yaml)" = 1 ] || fail "near $near: not noticed"
+  done
+}
+
+test_exchanged_cameras_that_need_rectification_are_noticed () {
+  need_data luxonis_people_stereo/left.mp4
+  local recording=$data/luxonis_people_stereo camera
+  rig-convert luxonis "$recording/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
+  for camera in left right; do
+    gst-launch-1.0 -q filesrc "location=$recording/$camera.mp4" ! decodebin ! videoconvert ! videoscale method=bilinear2 \
+      ! video/x-raw,width=640,height=400 ! identity eos-after=40 ! pngenc compression-level=1 ! multifilesink "location=$camera-%02d.png"
+  done
+  [ "$(exchanged left-38.png right-38.png rig.yaml || true)" = 0 ] || fail "a false alarm"
+  [ "$(exchanged right-38.png left-38.png rig.yaml)" = 1 ] || fail "not noticed"
 }

@@ -225,7 +225,16 @@ struct BoardDetector::Charuco {
     return smallest / marker_share;
   }
 
+  /* Enough corners to say how the board lies, or none. */
   void detect (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
+  {
+    find_corners (picture, corners);
+    if (corners.size () < kFewestCharucoCorners ||
+        !spans_a_plane (corners, board->getChessboardSize ().width - 1))
+      corners.clear ();
+  }
+
+  void find_corners (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
   {
     std::vector<std::vector<cv::Point2f>> markers;
     std::vector<int> marker_ids;
@@ -259,6 +268,7 @@ BoardDetector::set (const BoardSpec &board, bool thorough)
     return s;
   board_ = board;
   thorough_ = thorough;
+  found_ = mirrored_ = false;
   charuco_.reset ();
   if (board.kind == BoardKind::kCharuco) {
     charuco_ = std::make_unique<Charuco> ();
@@ -277,8 +287,15 @@ BoardDetector::detect (ImageView<const std::uint8_t> picture, std::vector<BoardC
   try {
     if (charuco_) {
       charuco_->detect (as_mat (picture), corners);
-      if (corners.size () < kFewestCharucoCorners || !spans_a_plane (corners, board_.columns))
-        corners.clear ();
+      found_ |= !corners.empty ();
+      mirrored_ &= !found_;
+      if (!found_ && !mirrored_) {
+        cv::Mat flipped;
+        std::vector<BoardCorner> seen;
+        cv::flip (as_mat (picture), flipped, 1);
+        charuco_->detect (flipped, seen);
+        mirrored_ = !seen.empty ();
+      }
       return {};
     }
     std::vector<cv::Point2f> found;

@@ -76,11 +76,16 @@ public:
   Status detect (
       ImageView<const Rgbx> picture, std::vector<BoardCorner> &corners, double &edge_width);
 
+  /** Whether pictures showed a board only in a mirror so far. ChArUco only: a chessboard's mirror
+   *  image is a chessboard. */
+  [[nodiscard]] bool is_mirrored () const { return mirrored_; }
+
 private:
   struct Charuco;
 
   BoardSpec board_;
   bool thorough_ = false;
+  bool found_ = false, mirrored_ = false;
   std::unique_ptr<Charuco> charuco_;
   std::vector<std::uint8_t> grey_;
 };

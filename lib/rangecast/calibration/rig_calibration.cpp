@@ -19,11 +19,24 @@ constexpr int kOutlierRounds = 3;
 constexpr double kRobustPx = 1;
 /* A larger error than that is not a calibration, pixels. */
 constexpr double kWorstRmsPx = 5;
+constexpr double kGoodRmsPx = 1;
+/* Rows of a pair that differ by more are worth a warning: stereodepth looks in one row. */
+constexpr double kOddRowErrorPx = 1;
+/* A pair whose cameras are turned against each other by more cannot be rectified to any use. */
+constexpr double kMostRollDeg = 45;
 
 Status
 bad (const std::string &what)
 {
   return {StatusCode::kBadValue, what};
+}
+
+std::string
+rounded (double value)
+{
+  char text[32];
+  std::snprintf (text, sizeof text, "%.3g", value);
+  return text;
 }
 
 int
@@ -33,6 +46,42 @@ find_camera (const std::vector<CalibrationCamera> &cameras, int view_id, CameraR
     if (cameras[i].view_id == view_id && cameras[i].role == role)
       return int (i);
   return -1;
+}
+
+/* By how much a camera is turned about its axis against another one, degrees, -180 .. 180. */
+double
+roll_deg (const Pose &right_from_left)
+{
+  const Vec3 x = right_from_left.rotation * Vec3{1, 0, 0};
+  return std::atan2 (x.y, x.x) * 180 / M_PI;
+}
+
+/* The two cameras of a pair stand the same way up, and the right one on the left one's +x side. */
+Status
+check_pair (
+    const CalibrationCamera &left, const CalibrationCamera &right, const Pose &right_from_left)
+{
+  const std::string view = "view " + std::to_string (left.view_id) + ": ";
+  const double roll = roll_deg (right_from_left);
+  char text[64];
+  if (std::abs (roll) > kMostRollDeg) {
+    std::snprintf (text, sizeof text, "%.0f degrees", roll);
+    return bad (view + right.name + " (right) " +
+                (std::abs (roll) > 135 ? "is upside down" : "lies on its side") + " against " +
+                left.name + " (left): it is turned by " + text +
+                " about its axis; turn the camera, or its pictures with videoflip");
+  }
+  const Vec3 c = right_from_left.inverse ().translation;
+  std::snprintf (text, sizeof text, "%.4f m", norm (c));
+  if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
+    return bad (view + left.name + " and " + right.name + " stand " + text +
+                " apart, but not side by side; expected a left and a right camera");
+  if (c.x < 0)
+    return bad (view + "left and right cameras are swapped: " + right.name + " (right) stands " +
+                text + " to the left of " + left.name +
+                " (left); swap the two. If they are not, both are upside down, or both pictures "
+                "are mirrored");
+  return {};
 }
 
 /* The calibration as it goes. */
@@ -55,18 +104,21 @@ public:
     if (s.ok ())
       s = chain_cameras (cameras_, frames_, settings_.board, lenses_, bundle_, links_, stop_);
     if (s.ok ())
-      s = adjust ();
+      s = with_hint (adjust ());
     if (s.ok ())
       s = check_pairs ();
     if (s.ok ())
-      s = report ();
+      s = with_hint (report ());
     return s.ok () ? make_rig () : s;
   }
 
 private:
+  std::string what_was_dropped (int camera) const;
+  std::string wanted_board () const;
   Status check_counts () const;
   Status calibrate_lenses ();
   Status adjust ();
+  Status with_hint (const Status &status) const;
   Status check_pairs () const;
   Status report ();
   Status make_rig ();
@@ -92,22 +144,47 @@ private:
   Bundle bundle_;
 };
 
+/* Frames of a camera that drop_outliers() took away, in words; empty if there are none. */
+std::string
+Calibration::what_was_dropped (int camera) const
+{
+  const auto count = std::ranges::count (result_.dropped, camera, &DroppedBoard::camera);
+  if (count == 0)
+    return {};
+  return " (" + std::to_string (count) +
+         " more do not fit: do the pictures of all cameras belong together, and did the board lie "
+         "still?)";
+}
+
+std::string
+Calibration::wanted_board () const
+{
+  const bool charuco = settings_.board.kind == BoardKind::kCharuco;
+  return std::to_string (settings_.board.columns) + "x" + std::to_string (settings_.board.rows) +
+         " inner corners, " +
+         (charuco ? "with markers of the dictionary " +
+                        std::string (board_dictionaries ()[settings_.board.dictionary]) +
+                        " in the white squares (ChArUco), sharp"
+                  : "whole and sharp");
+}
+
 Status
 Calibration::check_counts () const
 {
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     const auto count = std::ranges::count_if (
         frames_, [&] (const CalibrationFrame &frame) { return frame.find (int (i)) != nullptr; });
-    if (count == 0)
+    if (count >= settings_.min_frames)
+      continue;
+    const std::string dropped = what_was_dropped (int (i));
+    if (count == 0 && dropped.empty ())
       return {StatusCode::kNotFound, text_of (cameras_[i]) + ": no board was found; expected " +
-                                         std::to_string (settings_.board.columns) + "x" +
-                                         std::to_string (settings_.board.rows) +
-                                         " inner corners, whole and sharp, in at least " +
+                                         wanted_board () + ", in at least " +
                                          std::to_string (settings_.min_frames) + " frames"};
-    if (count < settings_.min_frames)
-      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": the board was found in " +
-                                         std::to_string (count) + " frames; expected at least " +
-                                         std::to_string (settings_.min_frames)};
+    return {StatusCode::kNotFound,
+        text_of (cameras_[i]) + ": the board was found in " + std::to_string (count) +
+            (count == 1 ? " frame" : " frames") + (dropped.empty () ? "" : " that fit") + dropped +
+            "; expected at least " + std::to_string (settings_.min_frames)};
   }
   return {};
 }
@@ -178,8 +255,28 @@ Calibration::drop_outliers (double limit_px, bool &any)
   any = result_.dropped.size () > before;
   if (!any)
     return {};
-  const Status s = check_counts ();
-  return s.ok () && cameras_.size () > 1 ? check_linked (cameras_, frames_) : s;
+  Status s = check_counts ();
+  if (!s.ok () || cameras_.size () < 2)
+    return s;
+  s = check_linked (cameras_, frames_);
+  return s.ok () ? s
+                 : bad (s.message () + "; " + std::to_string (result_.dropped.size ()) +
+                        " boards that do not fit were left out: do the pictures belong together?");
+}
+
+/* Where each camera fits its boards and all of them do not, it is not the lenses' fault, whatever
+ * the status says. */
+Status
+Calibration::with_hint (const Status &status) const
+{
+  const bool alone_good = std::ranges::all_of (
+      lenses_, [] (const LensCalibration &lens) { return lens.rms_px < kGoodRmsPx; });
+  if (status.ok () || status.code () == StatusCode::kInterrupted || cameras_.size () < 2 ||
+      !alone_good)
+    return status;
+  return {status.code (), status.message () +
+                              ". Each camera alone fits: were their pictures taken at the same "
+                              "moments, and are those of one of them mirrored?"};
 }
 
 /* A loss that forgives outliers finds them; without them, plain squares are the best estimate. */
@@ -207,7 +304,6 @@ Calibration::adjust ()
   return s;
 }
 
-/* The right camera stands on the left one's +x side. */
 Status
 Calibration::check_pairs () const
 {
@@ -217,18 +313,9 @@ Calibration::check_pairs () const
     const int right = find_camera (cameras_, cameras_[left].view_id, CameraRole::kRight);
     if (right < 0)
       continue;
-    const Vec3 c = between (int (left), right).inverse ().translation;
-    char text[64];
-    std::snprintf (text, sizeof text, "%.4f m", norm (c));
-    if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
-      return bad ("view " + std::to_string (cameras_[left].view_id) + ": " + cameras_[left].name +
-                  " and " + cameras_[right].name + " stand " + text +
-                  " apart, but not side by side; expected a left and a right camera");
-    if (c.x < 0)
-      return bad ("view " + std::to_string (cameras_[left].view_id) +
-                  ": left and right cameras are swapped: " + cameras_[right].name +
-                  " (right) stands " + text + " to the left of " + cameras_[left].name +
-                  " (left); swap the two");
+    if (Status s = check_pair (cameras_[left], cameras_[right], between (int (left), right));
+        !s.ok ())
+      return s;
   }
   return {};
 }
@@ -327,6 +414,14 @@ Calibration::report ()
       if (stereo || linked)
         result_.pairs.push_back (pair_report (a, b));
     }
+  for (const PairReport &pair : result_.pairs)
+    if (pair.row_error_px > kOddRowErrorPx)
+      result_.warnings.push_back ("view " + std::to_string (cameras_[pair.a].view_id) +
+                                  ": rows of " + cameras_[pair.a].name + " and " +
+                                  cameras_[pair.b].name + " differ by " +
+                                  rounded (pair.row_error_px) +
+                                  " pixels after rectification, where 0.3 is good: were the "
+                                  "pictures taken at the same time, and did no camera move?");
   return {};
 }
 

@@ -51,6 +51,7 @@ enum class FrameVerdict {
   kBlurred, ///< its edges are wide
   kSimilar, ///< no camera sees it at a new place
 };
+inline constexpr int kFrameVerdicts = 5;
 
 [[nodiscard]] std::string_view verdict_name (FrameVerdict verdict);
 

@@ -5,6 +5,7 @@
 #include "pose_chain.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <ranges>
 
 namespace rangecast {
@@ -71,6 +72,8 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
     edge_widths.push_back (eyes_[i]->edge_width);
   }
   verdict_ = selector_.offer (cameras, std::move (frame), edge_widths, time_ns);
+  for (const auto &eye : eyes_)
+    eye->seen[int (verdict_)] += !eye->corners.empty ();
   return {};
 }
 
@@ -116,9 +119,42 @@ CalibrationSession::draw (
   }
 }
 
+/* Too few boards were kept, although more were seen: says why. */
+Status
+CalibrationSession::check_kept () const
+{
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const auto &seen = eyes_[i]->seen;
+    const int all = std::reduce (seen.begin (), seen.end ());
+    const int kept = coverage (int (i)).frames, wanted = settings_.calibration.min_frames;
+    if (eyes_[i]->detector.is_mirrored ())
+      return {StatusCode::kBadValue,
+          text_of (cameras_[i]) + ": its pictures are mirrored; expected them as a photograph is: "
+                                  "switch off the camera's mirror mode, or use videoflip"};
+    if (kept >= wanted || kept >= all)
+      continue;
+    std::string text = text_of (cameras_[i]) + ": the board was found in " + std::to_string (all) +
+                       " pictures, but only " + std::to_string (kept) +
+                       " were kept; expected at least " + std::to_string (wanted) + ". Of the rest";
+    const std::pair<FrameVerdict, const char *> reasons[] = {{FrameVerdict::kMoving, "moving"},
+        {FrameVerdict::kBlurred, "blurred"}, {FrameVerdict::kSimilar, "as one before"}};
+    const char *comma = "";
+    for (const auto &[verdict, reason] : reasons)
+      if (const int count = seen[int (verdict)]) {
+        text += std::string (comma) + " " + std::to_string (count) + " were " + reason;
+        comma = ",";
+      }
+    return {StatusCode::kNotFound, text + ": hold the board still for a moment in each new place"};
+  }
+  return {};
+}
+
 Status
 CalibrationSession::calibrate (CalibrationResult &result, std::stop_token stop) const
 {
+  result = {};
+  if (Status s = check_kept (); !s.ok ())
+    return s;
   return calibrate_rig (
       cameras_, selector_.frames (), settings_.calibration, result, std::move (stop));
 }

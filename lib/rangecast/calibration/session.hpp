@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 
@@ -65,7 +66,9 @@ private:
     std::vector<BoardCorner> corners;
     double edge_width = 0;
     Status status;
+    std::array<int, kFrameVerdicts> seen{}; // pictures with a board so far, by verdict
   };
+  [[nodiscard]] Status check_kept () const;
 
   SessionSettings settings_;
   std::vector<CalibrationCamera> cameras_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace rangecast {
 namespace {
@@ -102,8 +103,13 @@ check_view (const View &view)
   if (!(view.depth_unit_m >= 1e-7 && view.depth_unit_m <= 1.0))
     return bad_field (view, "depth_unit: expected 1e-7 to 1 metres");
   if (!(view.near_m > 0) || !(view.far_m > view.near_m) ||
-      !(view.far_m / view.depth_unit_m < 65536.0))
-    return bad_field (view, "near and far: expected 0 < near < far < 65536 depth units");
+      !(view.far_m / view.depth_unit_m < 65536.0)) {
+    char text[160];
+    std::snprintf (text, sizeof text,
+        "near and far are %g and %g m; expected 0 < near < far < 65536 depth units of %g m",
+        view.near_m, view.far_m, view.depth_unit_m);
+    return bad_field (view, text);
+  }
   if (Status s = check_partner (view, view.right, "right"); !s.ok ())
     return s;
   return check_partner (view, view.third, "third");

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The file form of a rig; the layout is described in docs/rig.md. */
-#include "rig.hpp"
+#include "rig_file.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
@@ -88,15 +89,17 @@ read_view (const cv::FileNode &node)
     throw BadFile{"expected a map"};
   View view;
   const cv::FileNode id = node["id"];
-  if (!id.isInt ())
-    throw BadFile{"id: expected an integer"};
+  /* OpenCV makes -1 of an integer that is too large, so the value is not worth printing. */
+  if (!id.isInt () || static_cast<int> (id) < 0 || static_cast<int> (id) >= kMaxViews)
+    throw BadFile{"id: expected an integer from 0 to " + std::to_string (kMaxViews - 1)};
   view.id = static_cast<int> (id);
   if (node["name"].isString ())
     view.name = node["name"].string ();
   const auto size = numbers (node["image_size"], "image_size", 2);
   for (double side : size)
-    if (!(side >= 1 && side <= kMaxImageSide))
-      throw BadFile{"image_size: expected 1 to " + std::to_string (kMaxImageSide) + " each"};
+    if (!(side >= 1 && side <= kMaxImageSide && side == std::floor (side)))
+      throw BadFile{
+          "image_size: expected whole numbers from 1 to " + std::to_string (kMaxImageSide)};
   view.width = static_cast<int> (size[0]);
   view.height = static_cast<int> (size[1]);
   read_lens (node, view.intrinsics, view.distortion);
@@ -196,8 +199,12 @@ Status
 load_rig (const std::string &path, Rig &rig)
 {
   std::error_code error;
-  if (!std::filesystem::is_regular_file (path, error))
+  const std::filesystem::file_status there = std::filesystem::status (path, error);
+  if (!std::filesystem::exists (there))
     return {StatusCode::kNotFound, path + ": no such file; expected a rig file (YAML or JSON)"};
+  if (!std::filesystem::is_regular_file (there))
+    return {StatusCode::kNotFound,
+        path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
   Rig loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);
@@ -220,10 +227,8 @@ save_rig (const std::string &path, const Rig &rig)
 {
   if (Status s = validate (rig); !s.ok ())
     return {s.code (), path + ": not written: " + s.message ()};
-  const std::string extension = std::filesystem::path (path).extension ().string ();
-  if (extension != ".yml" && extension != ".yaml" && extension != ".json")
-    return {StatusCode::kBadValue,
-        path + ": cannot be written; expected a file name that ends in .yml, .yaml or .json"};
+  if (Status s = check_extension (path, kRigExtensions); !s.ok ())
+    return s;
   std::string text; /* OpenCV cannot say what is wrong with a file */
   try {
     cv::FileStorage file (path, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);

@@ -5,20 +5,32 @@
 
 namespace rangecast {
 
-/** Tells cameras whose pictures come on each other's pads: then hardly anything matches, and much
- *  does with left and right exchanged. Looks at small pictures. */
+/** Tells cameras whose pictures come on each other's pads. What can be matched then seems to lie
+ *  beyond infinity, which nothing does, and before the cameras with the pictures exchanged. Looks
+ *  at small pictures, and only at pixels that can be matched without doubt. */
 class MirrorCheck {
 public:
-  void reset () { decided_ = mirrored_ = false; }
+  /** A rectified pair, CV_8UC4. */
+  struct Pair {
+    cv::Mat left, right;
+  };
+
+  void reset () { *this = {}; }
   /** Whether look() has seen enough; it is not needed after that. */
   [[nodiscard]] bool decided () const { return decided_; }
   [[nodiscard]] bool mirrored () const { return mirrored_; }
+  /** Whether these pictures should be looked at: all at first, then fewer and fewer, so that
+   * cameras which see nothing to match cost little. Counts them. */
+  [[nodiscard]] bool wants_next ();
 
-  /** @param left, right  CV_8UC4, rectified
-   *  @param least, most  disparities to look for, pixels */
-  void look (const cv::Mat &left, const cv::Mat &right, int least, int most);
+  /** @param as_is      rectified as they come
+   *  @param exchanged  the same pictures, exchanged and then rectified
+   *  @param infinity   disparity of what is infinitely far, pixels
+   *  @param most       largest disparity to look for, pixels */
+  void look (const Pair &as_is, const Pair &exchanged, double infinity, double most);
 
 private:
+  int seen_ = 0, next_ = 0;
   bool decided_ = false, mirrored_ = false;
 };
 

@@ -93,7 +93,8 @@ Rectifier::set_from_rectification (const View &view)
   }
   const double fx = p1.at<double> (0, 0);
   if (std::abs (p2.at<double> (1, 3)) > std::abs (p2.at<double> (0, 3)))
-    return bad_pair (view, "its cameras stand one above the other; expected side by side");
+    return bad_pair (view, "its cameras stand one above the other, or one lies on its side or is "
+                           "upside down; expected them side by side and the same way up");
   baseline_m_ = -p2.at<double> (0, 3) / fx;
   principal_offset_ = p2.at<double> (0, 2) - p1.at<double> (0, 2);
   if (!(baseline_m_ > 0))

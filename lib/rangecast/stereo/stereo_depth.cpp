@@ -59,7 +59,7 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
 void
 StereoDepth::rectify (int camera, ImageView<const Rgbx> picture)
 {
-  pictures_[camera] = as_mat (picture);
+  raw_[camera] = pictures_[camera] = as_mat (picture);
   if (rectifier_.is_identity ())
     return;
   rectifier_.rectify (camera, pictures_[camera], rectified_[camera]);
@@ -188,15 +188,23 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   return status;
 }
 
+/* Exchanged before they are rectified: lenses and rows are those of the other camera. */
 void
 StereoDepth::check_mirror ()
 {
-  if (mirror_.decided ())
+  if (!mirror_.wants_next ())
     return;
   try {
-    mirror_.look (pictures_[0], pictures_[1], finder_.least (), finder_.most ());
+    MirrorCheck::Pair exchanged = {raw_[1], raw_[0]};
+    if (!rectifier_.is_identity ()) {
+      exchanged = {};
+      rectifier_.rectify (0, raw_[1], exchanged.left);
+      rectifier_.rectify (1, raw_[0], exchanged.right);
+    }
+    mirror_.look (
+        {pictures_[0], pictures_[1]}, exchanged, -rectifier_.principal_offset (), finder_.most ());
   } catch (const cv::Exception &) {
-    mirror_.reset (); /* too small a picture to say */
+    return; /* too small a picture to say */
   }
 }
 

@@ -95,6 +95,7 @@ private:
   Occupancy occupancy_;
   MirrorCheck mirror_;
   SteadyFilter steady_;
+  cv::Mat raw_[2];      /* the caller's memory */
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
   cv::Mat rectified_[2], before_fusion_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
