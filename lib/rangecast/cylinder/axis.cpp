@@ -5,6 +5,8 @@
 #include <tuple>
 #include <utility>
 
+#include "isa.hpp"
+
 namespace rangecast {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
@@ -12,39 +14,51 @@ constexpr double kLeastSpreadRatio = 1.3;
 /* Share of the new frame's axis. A person moves at up to a metre a second, but turns slowly. */
 constexpr double kFollowPosition = 0.3, kFollowDirection = 0.1;
 
-/* Four sums at a time of what Moments holds, which compilers turn into vector instructions. */
-struct MomentLanes {
-  static constexpr int kLanes = 4;
-  float sum[9][kLanes] = {};
+/* Sums of what Moments holds, eight points at a time. Floats add up exactly enough over a block. */
+struct MomentsLoop {
+  const float *x, *y, *z;
+  std::size_t n;
+  static constexpr std::size_t kBlock = 512;
 
-  void add (const float *x, const float *y, const float *z, int lanes)
+  static constexpr int kLanes = 8;
+
+  static void add (float (&sum)[9][kLanes], const float *x, const float *y, const float *z, int n)
   {
-    for (int l = 0; l < lanes; l++) {
+    for (int l = 0; l < n; l++) {
       sum[0][l] += x[l], sum[1][l] += y[l], sum[2][l] += z[l];
       sum[3][l] += x[l] * x[l], sum[4][l] += x[l] * y[l], sum[5][l] += x[l] * z[l];
       sum[6][l] += y[l] * y[l], sum[7][l] += y[l] * z[l], sum[8][l] += z[l] * z[l];
     }
   }
+
+  void run (double (&total)[9]) const
+  {
+    for (std::size_t begin = 0; begin < n; begin += kBlock) {
+      const std::size_t end = std::min (n, begin + kBlock);
+      float sum[9][kLanes] = {};
+      std::size_t i = begin;
+      for (; i + kLanes <= end; i += kLanes)
+        add (sum, x + i, y + i, z + i, kLanes);
+      add (sum, x + i, y + i, z + i, static_cast<int> (end - i));
+      for (int k = 0; k < 9; k++)
+        for (float s : sum[k])
+          total[k] += s;
+    }
+  }
+
+  [[RANGECAST_CYLINDER_ANY]] void run_any (double (&total)[9]) const { run (total); }
+  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 (double (&total)[9]) const { run (total); }
 };
 
 void
 Moments::add (const WorldPoints &points, WorldPoints::Part part)
 {
-  constexpr std::size_t kBlock = 256; /* floats add up exactly enough over this many */
-  constexpr int kLanes = MomentLanes::kLanes;
-  for (std::size_t begin = part.begin; begin < part.end; begin += kBlock) {
-    const auto count = static_cast<int> (std::min (kBlock, part.end - begin));
-    const float *x = points.x.data () + begin, *y = points.y.data () + begin,
-                *z = points.z.data () + begin;
-    MomentLanes lanes;
-    int i = 0;
-    for (; i + kLanes <= count; i += kLanes)
-      lanes.add (x + i, y + i, z + i, kLanes);
-    lanes.add (x + i, y + i, z + i, count - i);
-    for (int k = 0; k < 9; k++)
-      for (float s : lanes.sum[k])
-        (k < 3 ? sum[k] : product[k - 3]) += s;
-  }
+  const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
+      points.z.data () + part.begin, part.size ()};
+  double total[9] = {};
+  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 (total) : loop.run_any (total);
+  for (int k = 0; k < 9; k++)
+    (k < 3 ? sum[k] : product[k - 3]) += total[k];
   n += static_cast<double> (part.size ());
 }
 

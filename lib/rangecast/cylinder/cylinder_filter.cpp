@@ -10,10 +10,6 @@
 
 namespace rangecast {
 
-/* Views that look at a surface more squarely than this, |N . a|, from opposite sides see two
- * surfaces. Well above what noise makes of a camera that looks along the surface. */
-constexpr float kOtherSide = 0.35f;
-
 static Status
 check (const CylinderSettings &settings)
 {
@@ -27,6 +23,9 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
   if (!(settings.hidden_gap_m >= 0 && settings.hidden_gap_m <= 100))
     return bad ("cylinder: hidden gap, expected 0 to 100 metres");
+  if (!(settings.hysteresis >= 0 && settings.hysteresis <= 2) ||
+      !(settings.agreement >= 0 && settings.agreement <= 2))
+    return bad ("cylinder: hysteresis and agreement, expected 0 to 2");
   const double length = norm (settings.fixed_axis.direction);
   if (settings.axis == AxisMode::kFixed &&
       !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
@@ -53,6 +52,13 @@ CylinderFilter::set_rig (const Rig &rig)
   return {};
 }
 
+void
+CylinderFilter::reset ()
+{
+  tracker_.reset ();
+  units_.rows.forget ();
+}
+
 Status
 CylinderFilter::take_cameras (std::span<const RangeImage> images)
 {
@@ -64,6 +70,7 @@ CylinderFilter::take_cameras (std::span<const RangeImage> images)
       return {StatusCode::kNotFound,
           "rig: no view " + std::to_string (id) + ", which the frame set has"};
     rays_[i] = rig_rays_[id];
+    ids_[i] = id;
   }
   return {};
 }
@@ -94,21 +101,52 @@ CylinderFilter::choose_axis (const CylinderSettings &settings, std::size_t image
   axis_ = tracker_.follow (axis_of_points (settings.axis, all, {rays_.data (), images}));
 }
 
+/* Where cameras are about a body's cylinder. */
 void
-CylinderFilter::unroll (int columns, int threads)
+CylinderFilter::look_from (int body, const CylinderFrame &frame, std::size_t images)
+{
+  const Mat3 world_from_body = transposed (frame.rotation);
+  for (std::size_t i = 0; i < images; i++) {
+    const float *a = rays_[i].optical_axis;
+    const Vec3 optical = frame.rotation * Vec3{a[0], a[1], a[2]};
+    rules_.optical[body][i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+    const PixelLookup &world = rig_lookups_[ids_[i]];
+    for (int k = 0; k < 3; k++) {
+      const float *row = world.rows[k];
+      const Vec3 r{row[0], row[1], row[2]};
+      const Mat3 &m = world_from_body;
+      const double turned[] = {dot (r, {m[0], m[3], m[6]}), dot (r, {m[1], m[4], m[7]}),
+          dot (r, {m[2], m[5], m[8]}), dot (r, frame.origin) + row[3]};
+      for (int c = 0; c < 4; c++)
+        lookups_[body][i].rows[k][c] = static_cast<float> (turned[c]);
+    }
+  }
+}
+
+void
+CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
 {
   const CylinderFrame frame (axis_);
+  look_from (0, frame, images);
   if (radius_.size () < cloud_.x.size ()) {
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
-  in_parallel (cloud_.parts ().size (), threads, [&] (std::size_t i) {
-    ranges_[i] =
-        to_wall (cloud_, cloud_.parts ()[i], frame, columns, radius_.data (), column_.data ());
-    const float *a = rays_[i].optical_axis;
-    const Vec3 optical = frame.rotation * Vec3{a[0], a[1], a[2]};
-    optical_[i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+  runs_.clear ();
+  for (std::size_t i = 0; i < images; i++)
+    runs_.push_back ({cloud_.parts ()[i].begin, cloud_.parts ()[i].end, std::uint32_t (i), 0});
+  run_ranges_.resize (runs_.size ());
+  in_parallel (runs_.size (), settings.threads, [&] (std::size_t i) {
+    run_ranges_[i] = to_wall (cloud_, {runs_[i].begin, runs_[i].end}, frame, settings.units.columns,
+        radius_.data (), column_.data ());
   });
+  constexpr float kHuge = std::numeric_limits<float>::max ();
+  ranges_.fill ({kHuge, -kHuge});
+  for (std::size_t i = 0; i < runs_.size (); i++) {
+    WallRange &range = ranges_[runs_[i].body];
+    range.y_min = std::min (range.y_min, run_ranges_[i].y_min);
+    range.y_max = std::max (range.y_max, run_ranges_[i].y_max);
+  }
 }
 
 static std::uint64_t
@@ -150,96 +188,159 @@ CylinderFilter::work (
   result.axis = axis_;
   if (views_with_points (cloud_) < 2)
     return {};
-  unroll (settings.units.columns, settings.threads);
-  WallRange range = ranges_[0];
-  for (std::size_t i = 1; i < images.size (); i++) {
-    range.y_min = std::min (range.y_min, ranges_[i].y_min);
-    range.y_max = std::max (range.y_max, ranges_[i].y_max);
-  }
-  units_.sort (cloud_, radius_, column_, range, settings.units);
-  units_.find_tangents (settings.threads);
-  units_.smooth (settings.threads);
-  result.units = units_.occupied;
-  result.units_shared = units_.shared;
-  mark_losers ();
+  unroll (settings, images.size ());
+  units_.sort (
+      cloud_, radius_, column_, runs_, {ranges_.data (), 1}, settings.units, settings.threads);
+  set_rules (settings, images.size ());
+  decide_units (settings, result);
+  mark_losers (images);
   if (settings.hidden_gap_m > 0)
     keep_uncovered (images, settings);
   clear_losers (images);
+  units_.rows.remember (ids_, static_cast<int> (images.size ()));
   result.points_out -= losers_.size ();
   return {};
 }
 
-/* The views that stay in a layer: one, or two that look at it from opposite sides. */
-std::uint64_t
-CylinderFilter::winners (const UnitLayer &layer) const
+void
+CylinderFilter::set_rules (const CylinderSettings &settings, std::size_t images)
 {
-  float tx = layer.tangent[0], tz = layer.tangent[1];
-  if (const float length = std::sqrt (tx * tx + tz * tz); length > 1e-6f) {
-    tx /= length, tz /= length;
-  } else {
-    const UnitEntry &entry = units_.entries[layer.first_entry];
-    const float r = std::max (entry.radius, 1e-6f);
-    tx = -entry.z / r, tz = entry.x / r;
-  }
-  /* Least (greatest) facing: who sees the outside (inside) most squarely. */
-  float least = std::numeric_limits<float>::max (), greatest = -least;
-  int outside = 0, inside = 0;
-  for (std::uint64_t rest = layer.covering; rest; rest &= rest - 1) {
-    const int view = std::countr_zero (rest);
-    const float facing = tz * optical_[view][0] - tx * optical_[view][1];
-    if (facing < least)
-      least = facing, outside = view;
-    if (facing > greatest)
-      greatest = facing, inside = view;
-  }
-  const std::uint64_t out = std::uint64_t{1} << outside, in = std::uint64_t{1} << inside;
-  if (least < -kOtherSide && greatest > kOtherSide)
-    return out | in;
-  return -least >= greatest ? out : in;
+  /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
+   */
+  constexpr double kMostSlices = 8;
+  const UnitSettings &units = settings.units;
+  const double slices = std::min (units.smoothing_m / units_.slice_height_m, kMostSlices);
+  rules_.layer_gap = static_cast<float> (units.layer_gap_m);
+  rules_.smoothing_columns = static_cast<float> (units.smoothing_m * units.columns / (2 * M_PI));
+  rules_.most_columns = std::min (float{UnitRows::kPad}, static_cast<float> (units.columns / 4));
+  rules_.smoothing_slices = units.smoothing_m > 0 ? static_cast<int> (slices + 0.5) : 0;
+  rules_.hysteresis = static_cast<float> (settings.hysteresis);
+  rules_.agreement = static_cast<float> (settings.agreement);
+  rules_.images = static_cast<int> (images);
 }
 
 void
-CylinderFilter::mark_losers ()
+CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &result)
+{
+  const std::size_t slices = units_.slices.size ();
+  in_parallel (slices, settings.threads, [&] (std::size_t s) {
+    units_.find_tangents (static_cast<int> (s));
+    units_.rows.sum_along (rules_, static_cast<int> (s));
+  });
+  in_parallel (slices, settings.threads,
+      [&] (std::size_t s) { units_.rows.sum_across (rules_, static_cast<int> (s)); });
+  units_.rows.recall (ids_, rules_.images);
+  const RowCounts counts = units_.rows.decide (rules_, settings.threads);
+  result.units_held = counts.held;
+  result.units_changed = counts.changed;
+  for (const Units::Slice &slice : units_.slices) {
+    result.units += slice.occupied;
+    result.units_shared += slice.shared;
+  }
+}
+
+/* The views that stay in a layer that is in no row: decided by its own points. */
+std::uint64_t
+CylinderFilter::winners_alone (const UnitLayer &layer, int body) const
+{
+  float tx = 0, tz = 0;
+  for (std::uint32_t e = 0; e < layer.entry_count; e++) {
+    const UnitEntry &entry = units_.entries[layer.first_entry + e];
+    tx += static_cast<float> (entry.point_count) * entry.tangent[0];
+    tz += static_cast<float> (entry.point_count) * entry.tangent[1];
+  }
+  int winner = 0;
+  float most = -1;
+  for (std::uint64_t rest = layer.views; rest; rest &= rest - 1) {
+    const int view = std::countr_zero (rest);
+    const auto &optical = rules_.optical[body][view];
+    if (const float facing = std::abs (tz * optical[0] - tx * optical[1]); facing > most)
+      most = facing, winner = view;
+  }
+  return std::uint64_t{1} << winner;
+}
+
+void
+CylinderFilter::mark_losers (std::span<const RangeImage> images)
 {
   losers_.clear ();
   losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
-  for (const UnitLayer &layer : units_.layers) {
-    if (!(layer.covering & (layer.covering - 1)))
-      continue;
-    const std::uint64_t stay = winners (layer);
-    const UnitEntry *entry = &units_.entries[layer.first_entry];
-    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++) {
-      if (stay >> entry->view & 1)
-        continue;
-      const std::uint64_t rivals = layer.covering & ~(std::uint64_t{1} << entry->view);
-      for (std::uint32_t i = 0; i < entry->point_count; i++)
-        losers_.push_back ({rivals, cloud_.pixel[units_.points[entry->first_point + i].index],
-            static_cast<std::uint8_t> (entry->view)});
+  const UnitRows &rows = units_.rows;
+  for (std::size_t s = 0; s < units_.slices.size (); s++) {
+    const Units::Slice &slice = units_.slices[s];
+    const auto number = static_cast<int> (s);
+    for (const UnitLayer &layer : units_.layers_of (slice)) {
+      std::uint64_t covering = layer.views, stay = 0;
+      if (units_.has_cell (number, layer)) {
+        const std::uint32_t cell = rows.cell (number, layer.plane, layer.column);
+        covering = rows.covering (cell);
+        stay = std::uint64_t{1} << std::max (0, rows.winner (cell));
+        if (const int second = rows.second (cell); second >= 0)
+          stay |= std::uint64_t{1} << second;
+      } else {
+        stay = winners_alone (layer, slice.body);
+      }
+      if (layer.views & ~stay)
+        mark_losers_of (images, layer, covering, stay, slice.body);
     }
   }
 }
 
-/* What a view has in the pixel and its neighbours where it sees a point at depth z. */
+void
+CylinderFilter::mark_losers_of (std::span<const RangeImage> images, const UnitLayer &layer,
+    std::uint64_t covering, std::uint64_t stay, int body)
+{
+  for (std::uint32_t e = 0; e < layer.entry_count; e++) {
+    const UnitEntry &entry = units_.entries[layer.first_entry + e];
+    if (stay >> entry.view & 1)
+      continue;
+    const std::uint64_t rivals = covering & ~(std::uint64_t{1} << entry.view);
+    const auto width = static_cast<std::uint32_t> (images[entry.view].depth.width);
+    const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[entry.view].begin);
+    const auto winner = static_cast<std::uint8_t> (std::countr_zero (stay));
+    for (std::uint32_t i = 0; i < entry.point_count; i++) {
+      const std::uint32_t point = units_.points[entry.first_point + i].index;
+      const std::uint32_t pixel = cloud_.pixel[point];
+      losers_.push_back ({rivals, point, begin + (pixel >> 16) * width + (pixel & 0xffff),
+          static_cast<std::uint8_t> (entry.view), static_cast<std::uint8_t> (body), winner});
+    }
+  }
+}
+
+/* What a view has in the pixel and its neighbours where it sees a point at depth z. Without
+ * branches but one: what neighbours have is a coin toss along every seam. */
 bool
 CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
 {
   const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
-  const int left = static_cast<int> (std::floor (x)), top = static_cast<int> (std::floor (y));
-  const int column = static_cast<int> (std::floor (x + 0.5f)),
-            row = static_cast<int> (std::floor (y + 0.5f));
-  bool covered = false;
-  for (int py = top; py <= top + 1; py++)
-    for (int px = left; px <= left + 1; px++) {
-      if (px < 0 || py < 0 || px >= image.depth.width || py >= image.depth.height)
-        continue;
-      const std::uint16_t there = image.depth.at (px, py);
-      if (there == kInvalidDepth || z - there > behind_[i] || there - z > before_[i])
-        continue;
-      if (lost_[cloud_.parts ()[i].begin + static_cast<std::size_t> (py) * image.depth.width + px])
-        return false; /* the winner's region ends here: overlap by a pixel */
-      covered |= px == column && py == row;
+  const int width = image.depth.width, height = image.depth.height;
+  if (!(x > -1 && y > -1 && x < static_cast<float> (width) && y < static_cast<float> (height)))
+    return false;
+  const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
+  const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
+                      (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
+  const std::uint8_t *lost = lost_.data () + cloud_.parts ()[i].begin;
+  bool same[4] = {}, gone = false;
+  if (left >= 0 && top >= 0 && left + 1 < width && top + 1 < height) {
+    const std::uint16_t *upper = image.depth.row (top) + left,
+                        *lower = image.depth.row (top + 1) + left;
+    const std::uint8_t *flags = lost + static_cast<std::size_t> (top) * width + left;
+    const int depth[] = {upper[0], upper[1], lower[0], lower[1]};
+    const bool flag[] = {flags[0] != 0, flags[1] != 0, flags[width] != 0, flags[width + 1] != 0};
+    for (int k = 0; k < 4; k++) {
+      same[k] = is_same (i, depth[k], z);
+      gone |= same[k] & flag[k];
     }
-  return covered;
+  } else {
+    for (int k = 0; k < 4; k++) {
+      const int px = left + k % 2, py = top + k / 2;
+      if (px < 0 || py < 0 || px >= width || py >= height)
+        continue;
+      same[k] = is_same (i, image.depth.at (px, py), z);
+      gone |= same[k] & (lost[static_cast<std::size_t> (py) * width + px] != 0);
+    }
+  }
+  return same[nearest] & !gone; /* where the winner's region ends: overlap by a pixel */
 }
 
 /* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
@@ -249,21 +350,24 @@ CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v
 bool
 CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
 {
-  const RangeImage &image = images[loser.image];
-  const int column = static_cast<int> (loser.pixel & 0xffff),
-            row = static_cast<int> (loser.pixel >> 16);
-  float point[3];
-  rays_[loser.image].point (static_cast<float> (image.roi.x + column),
-      static_cast<float> (image.roi.y + row), image.depth.at (column, row), point);
-  for (std::uint64_t rest = loser.rivals; rest; rest &= rest - 1) {
-    const auto i = static_cast<std::size_t> (std::countr_zero (rest));
-    float u, v, z;
-    rig_lookups_[images[i].view_id].find (point, u, v, z);
-    constexpr float kFar = 1e6f; /* pixels; keeps what follows within integers */
-    if (z > 0 && std::abs (u) < kFar && std::abs (v) < kFar && covers (i, images[i], u, v, z))
+  /* Most often it is the winner. */
+  if ((loser.rivals >> loser.winner & 1) && is_covered_by (images, loser, loser.winner))
+    return true;
+  for (std::uint64_t rest = loser.rivals & ~(std::uint64_t{1} << loser.winner); rest;
+       rest &= rest - 1)
+    if (is_covered_by (images, loser, static_cast<std::size_t> (std::countr_zero (rest))))
       return true;
-  }
   return false;
+}
+
+bool
+CylinderFilter::is_covered_by (
+    std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const
+{
+  const float point[] = {cloud_.x[loser.point], cloud_.y[loser.point], cloud_.z[loser.point]};
+  float u, v, z;
+  lookups_[loser.body][rival].find (point, u, v, z);
+  return z > 0 && covers (rival, images[rival], u, v, z);
 }
 
 /* One after the other, so that of two losers at one place only the first stays. */
@@ -278,28 +382,23 @@ CylinderFilter::keep_uncovered (
   }
   lost_.assign (cloud_.x.size (), 0);
   for (const Loser &loser : losers_)
-    lost_[place (images, loser)] = 1;
+    lost_[loser.place] = 1;
   std::erase_if (losers_, [&] (const Loser &loser) {
     if (is_covered (images, loser))
       return false;
-    lost_[place (images, loser)] = 0;
+    lost_[loser.place] = 0;
     return true;
   });
-}
-
-std::size_t
-CylinderFilter::place (std::span<const RangeImage> images, const Loser &loser) const
-{
-  const auto width = static_cast<std::size_t> (images[loser.image].depth.width);
-  return cloud_.parts ()[loser.image].begin + (loser.pixel >> 16) * width + (loser.pixel & 0xffff);
 }
 
 void
 CylinderFilter::clear_losers (std::span<const RangeImage> images) const
 {
-  for (const Loser &loser : losers_)
-    images[loser.image].depth.at (static_cast<int> (loser.pixel & 0xffff),
-        static_cast<int> (loser.pixel >> 16)) = kInvalidDepth;
+  for (const Loser &loser : losers_) {
+    const std::uint32_t pixel = cloud_.pixel[loser.point];
+    images[loser.image].depth.at (
+        static_cast<int> (pixel & 0xffff), static_cast<int> (pixel >> 16)) = kInvalidDepth;
+  }
 }
 
 } // namespace rangecast

@@ -23,6 +23,12 @@ struct CylinderSettings {
    *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
   double hidden_gap_m = 0.006;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
+  /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
+   *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
+  double hysteresis = 0.1;
+  /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
+   *  each), 0 .. 2. 0 = none. */
+  double agreement = 0.1;
 };
 
 /** What one frame came to. */
@@ -32,6 +38,9 @@ struct CylinderResult {
   std::uint64_t units = 0;        ///< units with points
   std::uint64_t units_shared = 0; ///< units with points of more than one view
   Axis axis;                      ///< the cylinder's
+  /** Surfaces in units that some view won in the frame before, too; and those of them that another
+   *  view won now. */
+  std::uint64_t units_held = 0, units_changed = 0;
 };
 
 /** Clears the points that several views see of the same place, all but those of the view that sees
@@ -63,8 +72,8 @@ class CylinderFilter {
 public:
   /** Takes the cameras and forgets the stream. All views must be range views. */
   Status set_rig (const Rig &rig);
-  /** Forgets where the axis was. */
-  void reset () { tracker_.reset (); }
+  /** Forgets where the axis was and who won. */
+  void reset ();
 
   /** Clears depths in place. A frame set of less than two images with points is left alone.
    *  Nothing is allocated once the largest frame set has been seen.
@@ -77,8 +86,9 @@ private:
   /* A point in a unit that another view won. */
   struct Loser {
     std::uint64_t rivals; /* bit i: image i competes for the unit, too */
-    std::uint32_t pixel;  /* as in WorldPoints */
-    std::uint8_t image;
+    std::uint32_t point;  /* in the cloud */
+    std::uint32_t place;  /* in lost_ */
+    std::uint8_t image, body, winner;
   };
 
   Status work (
@@ -86,14 +96,25 @@ private:
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
   void choose_axis (const CylinderSettings &settings, std::size_t images);
-  void unroll (int columns, int threads);
-  [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
-  void mark_losers ();
+  void unroll (const CylinderSettings &settings, std::size_t images);
+  void look_from (int body, const CylinderFrame &frame, std::size_t images);
+  void set_rules (const CylinderSettings &settings, std::size_t images);
+  void decide_units (const CylinderSettings &settings, CylinderResult &result);
+  [[nodiscard]] std::uint64_t winners_alone (const UnitLayer &layer, int body) const;
+  void mark_losers (std::span<const RangeImage> images);
+  void mark_losers_of (std::span<const RangeImage> images, const UnitLayer &layer,
+      std::uint64_t covering, std::uint64_t stay, int body);
   void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
   [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
+  [[nodiscard]] bool is_covered_by (
+      std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const;
   [[nodiscard]] bool covers (
       std::size_t i, const RangeImage &image, float u, float v, float z) const;
-  [[nodiscard]] std::size_t place (std::span<const RangeImage> images, const Loser &loser) const;
+  [[nodiscard]] bool is_same (std::size_t i, int depth, float z) const
+  {
+    const float behind = z - static_cast<float> (depth);
+    return (depth != kInvalidDepth) & (behind <= behind_[i]) & (-behind <= before_[i]);
+  }
   void clear_losers (std::span<const RangeImage> images) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
@@ -104,14 +125,19 @@ private:
 
   /* Of the present frame; kept for their memory. By number of the image. */
   std::array<PixelRays, kMaxViews> rays_;
+  std::array<int, kMaxViews> ids_{};
   std::array<Moments, kMaxViews> moments_;
-  std::array<WallRange, kMaxViews> ranges_;
-  std::array<std::array<float, 2>, kMaxViews> optical_; /* x, z of the optical axis */
+  /* Where images see points of each body's cylinder. */
+  std::array<std::array<PixelLookup, kMaxViews>, kMaxBodies> lookups_;
   Axis axis_;
   WorldPoints cloud_;
+  std::vector<PointRun> runs_;
+  std::vector<WallRange> run_ranges_;
+  std::array<WallRange, kMaxBodies> ranges_;
   std::vector<float> radius_;
   std::vector<std::int32_t> column_;
   Units units_;
+  RowRules rules_;
 
   std::vector<Loser> losers_;
   std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
