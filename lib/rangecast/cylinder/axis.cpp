@@ -11,8 +11,17 @@ namespace rangecast {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
 constexpr double kLeastSpreadRatio = 1.3;
-/* Share of the new frame's axis. A person moves at up to a metre a second, but turns slowly. */
-constexpr double kFollowPosition = 0.3, kFollowDirection = 0.1;
+/* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
+ * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
+struct Follow {
+  double least, most, far;
+  [[nodiscard]] double share (double off) const
+  {
+    return least + (most - least) * std::min (1.0, off / far);
+  }
+};
+constexpr Follow kFollowPosition{0.2, 0.8, 0.02};             /* metres */
+constexpr Follow kFollowDirection{0.05, 0.7, 8 * M_PI / 180}; /* radians */
 
 /* Sums of what Moments holds, eight points at a time. Floats add up exactly enough over a block. */
 struct MomentsLoop {
@@ -156,11 +165,13 @@ AxisTracker::follow (const Axis &measured)
     axis_ = measured;
     return axis_;
   }
-  axis_.position = axis_.position + kFollowPosition * (measured.position - axis_.position);
+  const Vec3 move = measured.position - axis_.position;
+  axis_.position = axis_.position + kFollowPosition.share (norm (move)) * move;
   /* A nearly level axis may come back the other way round; it is the same line. */
-  const double sign = dot (axis_.direction, measured.direction) < 0 ? -1 : 1;
+  const double cosine = dot (axis_.direction, measured.direction);
+  const double share = kFollowDirection.share (std::acos (std::min (1.0, std::abs (cosine))));
   const Vec3 blend =
-      (1 - kFollowDirection) * axis_.direction + sign * kFollowDirection * measured.direction;
+      (1 - share) * axis_.direction + (cosine < 0 ? -share : share) * measured.direction;
   axis_.direction = 1 / norm (blend) * blend;
   return axis_;
 }

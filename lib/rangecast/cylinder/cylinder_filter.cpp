@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "../parallel.hpp"
+#include "isa.hpp"
 
 namespace rangecast {
 
@@ -193,7 +194,8 @@ CylinderFilter::work (
       cloud_, radius_, column_, runs_, {ranges_.data (), 1}, settings.units, settings.threads);
   set_rules (settings, images.size ());
   decide_units (settings, result);
-  mark_losers (images);
+  mark_losers ();
+  list_losers (images);
   if (settings.hidden_gap_m > 0)
     keep_uncovered (images, settings);
   clear_losers (images);
@@ -239,70 +241,52 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
   }
 }
 
-/* The views that stay in a layer that is in no row: decided by its own points. */
-std::uint64_t
-CylinderFilter::winners_alone (const UnitLayer &layer, int body) const
-{
-  float tx = 0, tz = 0;
-  for (std::uint32_t e = 0; e < layer.entry_count; e++) {
-    const UnitEntry &entry = units_.entries[layer.first_entry + e];
-    tx += static_cast<float> (entry.point_count) * entry.tangent[0];
-    tz += static_cast<float> (entry.point_count) * entry.tangent[1];
-  }
-  int winner = 0;
-  float most = -1;
-  for (std::uint64_t rest = layer.views; rest; rest &= rest - 1) {
-    const int view = std::countr_zero (rest);
-    const auto &optical = rules_.optical[body][view];
-    if (const float facing = std::abs (tz * optical[0] - tx * optical[1]); facing > most)
-      most = facing, winner = view;
-  }
-  return std::uint64_t{1} << winner;
-}
-
 void
-CylinderFilter::mark_losers (std::span<const RangeImage> images)
+CylinderFilter::mark_losers ()
 {
-  losers_.clear ();
-  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
+  fate_.resize (std::max (fate_.size (), cloud_.x.size ()));
+  for (const PointRun &run : runs_)
+    std::fill (fate_.begin () + run.begin, fate_.begin () + run.end, kStays);
   const UnitRows &rows = units_.rows;
   for (std::size_t s = 0; s < units_.slices.size (); s++) {
-    const Units::Slice &slice = units_.slices[s];
     const auto number = static_cast<int> (s);
+    const Units::Slice &slice = units_.slices[s];
     for (const UnitLayer &layer : units_.layers_of (slice)) {
-      std::uint64_t covering = layer.views, stay = 0;
-      if (units_.has_cell (number, layer)) {
-        const std::uint32_t cell = rows.cell (number, layer.plane, layer.column);
-        covering = rows.covering (cell);
-        stay = std::uint64_t{1} << std::max (0, rows.winner (cell));
-        if (const int second = rows.second (cell); second >= 0)
-          stay |= std::uint64_t{1} << second;
-      } else {
-        stay = winners_alone (layer, slice.body);
+      if (!units_.has_cell (number, layer))
+        continue;
+      const std::uint32_t cell = rows.cell (number, layer.plane, layer.column);
+      std::uint64_t stay = std::uint64_t{1} << std::max (0, rows.winner (cell));
+      if (const int second = rows.second (cell); second >= 0)
+        stay |= std::uint64_t{1} << second;
+      if (!(layer.views & ~stay))
+        continue;
+      for (std::uint32_t e = 0; e < layer.entry_count; e++) {
+        const UnitEntry &entry = units_.entries[layer.first_entry + e];
+        if (stay >> entry.view & 1)
+          continue;
+        for (std::uint32_t i = 0; i < entry.point_count; i++)
+          fate_[units_.points[entry.first_point + i].index] = cell;
       }
-      if (layer.views & ~stay)
-        mark_losers_of (images, layer, covering, stay, slice.body);
     }
   }
 }
 
+/* In the order of the cloud, in which neighbours follow each other and meet the same pixels. */
 void
-CylinderFilter::mark_losers_of (std::span<const RangeImage> images, const UnitLayer &layer,
-    std::uint64_t covering, std::uint64_t stay, int body)
+CylinderFilter::list_losers (std::span<const RangeImage> images)
 {
-  for (std::uint32_t e = 0; e < layer.entry_count; e++) {
-    const UnitEntry &entry = units_.entries[layer.first_entry + e];
-    if (stay >> entry.view & 1)
-      continue;
-    const std::uint64_t rivals = covering & ~(std::uint64_t{1} << entry.view);
-    const auto width = static_cast<std::uint32_t> (images[entry.view].depth.width);
-    const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[entry.view].begin);
-    const auto winner = static_cast<std::uint8_t> (std::countr_zero (stay));
-    for (std::uint32_t i = 0; i < entry.point_count; i++) {
-      const std::uint32_t point = units_.points[entry.first_point + i].index;
-      const std::uint32_t pixel = cloud_.pixel[point];
-      losers_.push_back ({rivals, point, begin + (pixel >> 16) * width + (pixel & 0xffff),
-          static_cast<std::uint8_t> (entry.view), static_cast<std::uint8_t> (body), winner});
+  losers_.clear ();
+  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
+  for (const PointRun &run : runs_) {
+    const auto width = static_cast<std::uint32_t> (images[run.view].depth.width);
+    const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[run.view].begin);
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      if (fate_[i] == kStays)
+        continue;
+      const std::uint32_t pixel = cloud_.pixel[i];
+      losers_.push_back ({static_cast<std::uint32_t> (i),
+          begin + (pixel >> 16) * width + (pixel & 0xffff), fate_[i],
+          static_cast<std::uint8_t> (run.view), static_cast<std::uint8_t> (run.body)});
     }
   }
 }
@@ -312,6 +296,7 @@ CylinderFilter::mark_losers_of (std::span<const RangeImage> images, const UnitLa
 bool
 CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
 {
+  using I = Narrow::I;
   const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
   const int width = image.depth.width, height = image.depth.height;
   if (!(x > -1 && y > -1 && x < static_cast<float> (width) && y < static_cast<float> (height)))
@@ -320,27 +305,31 @@ CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v
   const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
                       (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
   const std::uint8_t *lost = lost_.data () + cloud_.parts ()[i].begin;
-  bool same[4] = {}, gone = false;
+  /* Most that do not cover have lost the place themselves. */
+  const int column = left + nearest % 2, row = top + nearest / 2;
+  if (column < 0 || row < 0 || column >= width || row >= height ||
+      lost[static_cast<std::size_t> (row) * width + column])
+    return false;
+  I depth = {}, gone = {};
   if (left >= 0 && top >= 0 && left + 1 < width && top + 1 < height) {
     const std::uint16_t *upper = image.depth.row (top) + left,
                         *lower = image.depth.row (top + 1) + left;
     const std::uint8_t *flags = lost + static_cast<std::size_t> (top) * width + left;
-    const int depth[] = {upper[0], upper[1], lower[0], lower[1]};
-    const bool flag[] = {flags[0] != 0, flags[1] != 0, flags[width] != 0, flags[width + 1] != 0};
-    for (int k = 0; k < 4; k++) {
-      same[k] = is_same (i, depth[k], z);
-      gone |= same[k] & flag[k];
-    }
+    depth = I{upper[0], upper[1], lower[0], lower[1]};
+    gone = I{flags[0], flags[1], flags[width], flags[width + 1]};
   } else {
     for (int k = 0; k < 4; k++) {
       const int px = left + k % 2, py = top + k / 2;
       if (px < 0 || py < 0 || px >= width || py >= height)
         continue;
-      same[k] = is_same (i, image.depth.at (px, py), z);
-      gone |= same[k] & (lost[static_cast<std::size_t> (py) * width + px] != 0);
+      depth[k] = image.depth.at (px, py);
+      gone[k] = lost[static_cast<std::size_t> (py) * width + px];
     }
   }
-  return same[nearest] & !gone; /* where the winner's region ends: overlap by a pixel */
+  const Narrow::F behind = z - __builtin_convertvector(depth, Narrow::F);
+  const I same = (depth != kInvalidDepth) & (behind <= behind_[i]) & (-behind <= before_[i]);
+  /* Where the winner's region ends the two overlap by a pixel. */
+  return same[nearest] != 0 && !Narrow::any (same & (gone != 0));
 }
 
 /* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
@@ -350,12 +339,13 @@ CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v
 bool
 CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
 {
+  const int winner = units_.rows.winner (loser.cell);
+  std::uint64_t rivals = units_.rows.covering (loser.cell) & ~(std::uint64_t{1} << loser.image);
   /* Most often it is the winner. */
-  if ((loser.rivals >> loser.winner & 1) && is_covered_by (images, loser, loser.winner))
+  if ((rivals >> winner & 1) && is_covered_by (images, loser, static_cast<std::size_t> (winner)))
     return true;
-  for (std::uint64_t rest = loser.rivals & ~(std::uint64_t{1} << loser.winner); rest;
-       rest &= rest - 1)
-    if (is_covered_by (images, loser, static_cast<std::size_t> (std::countr_zero (rest))))
+  for (rivals &= ~(std::uint64_t{1} << winner); rivals; rivals &= rivals - 1)
+    if (is_covered_by (images, loser, static_cast<std::size_t> (std::countr_zero (rivals))))
       return true;
   return false;
 }

@@ -25,7 +25,7 @@ struct CylinderSettings {
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
   /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
    *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
-  double hysteresis = 0.1;
+  double hysteresis = 0.2;
   /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
    *  each), 0 .. 2. 0 = none. */
   double agreement = 0.1;
@@ -82,13 +82,22 @@ public:
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
+  /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
+   *  the other, from the lowest up. */
+  [[nodiscard]] int unit_slices () const { return units_.rows.old_slices (); }
+  /** The view-id of the winner of a unit's outermost surface; -1 where there is none. */
+  [[nodiscard]] int unit_winner (int slice, int column) const
+  {
+    return units_.rows.old_winner (slice, column);
+  }
+
 private:
   /* A point in a unit that another view won. */
   struct Loser {
-    std::uint64_t rivals; /* bit i: image i competes for the unit, too */
-    std::uint32_t point;  /* in the cloud */
-    std::uint32_t place;  /* in lost_ */
-    std::uint8_t image, body, winner;
+    std::uint32_t point; /* in the cloud */
+    std::uint32_t place; /* in lost_ */
+    std::uint32_t cell;  /* in the rows */
+    std::uint8_t image, body;
   };
 
   Status work (
@@ -100,21 +109,14 @@ private:
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_units (const CylinderSettings &settings, CylinderResult &result);
-  [[nodiscard]] std::uint64_t winners_alone (const UnitLayer &layer, int body) const;
-  void mark_losers (std::span<const RangeImage> images);
-  void mark_losers_of (std::span<const RangeImage> images, const UnitLayer &layer,
-      std::uint64_t covering, std::uint64_t stay, int body);
+  void mark_losers ();
+  void list_losers (std::span<const RangeImage> images);
   void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
   [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
   [[nodiscard]] bool is_covered_by (
       std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const;
   [[nodiscard]] bool covers (
       std::size_t i, const RangeImage &image, float u, float v, float z) const;
-  [[nodiscard]] bool is_same (std::size_t i, int depth, float z) const
-  {
-    const float behind = z - static_cast<float> (depth);
-    return (depth != kInvalidDepth) & (behind <= behind_[i]) & (-behind <= before_[i]);
-  }
   void clear_losers (std::span<const RangeImage> images) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
@@ -139,7 +141,10 @@ private:
   Units units_;
   RowRules rules_;
 
-  std::vector<Loser> losers_;
+  /* Of each point of the cloud: its cell if another view won that; else kStays. */
+  std::vector<std::uint32_t> fate_;
+  static constexpr std::uint32_t kStays = UINT32_MAX;
+  std::vector<Loser> losers_;      /* in the order of the cloud */
   std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
   /* How far a point may lie behind, or before, what the image has there; in its depth units. */
   std::array<float, kMaxViews> behind_{}, before_{};

@@ -237,20 +237,10 @@ template <typename L> struct UnitRows::Loops {
 
   /* ---- decisions ---- */
 
-  /* The row of slices of the frame before that has the same place; null if there is none. */
-  const Slice *old_slice (const Slice &slice) const
-  {
-    const std::uint32_t begin = rows.old_begin_[slice.body], end = rows.old_begin_[slice.body + 1];
-    if (begin == end || rows.old_columns_ != rows.columns_)
-      return nullptr;
-    const std::int64_t at = std::int64_t{slice.number} - rows.old_slices_[begin].number;
-    return at < 0 || at >= end - begin ? nullptr : &rows.old_slices_[begin + at];
-  }
-
   /* Who held each cell of a row: the winner of the layer whose radius was nearest. */
   void find_held (std::uint32_t row, const Slice &slice) const
   {
-    const Slice *old = old_slice (slice);
+    const Slice *old = rows.old_slice (slice);
     const std::size_t to = std::size_t{row} * rows.width_ + kPad;
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const F radius = L::at (&rows.radius_[to + c]);
@@ -479,6 +469,17 @@ UnitRows::decide (const RowRules &rules, int threads)
   return all;
 }
 
+/* The slice of the frame before that has the same place; null if there is none. */
+const UnitRows::Slice *
+UnitRows::old_slice (const Slice &slice) const
+{
+  const std::uint32_t begin = old_begin_[slice.body], end = old_begin_[slice.body + 1];
+  if (begin == end || old_columns_ != columns_)
+    return nullptr;
+  const std::int64_t at = std::int64_t{slice.number} - old_slices_[begin].number;
+  return at < 0 || at >= std::int64_t{end} - begin ? nullptr : &old_slices_[begin + at];
+}
+
 void
 UnitRows::count_slice (const Slice &slice, RowCounts &counts) const
 {
@@ -498,9 +499,31 @@ UnitRows::count_slice (const Slice &slice, RowCounts &counts) const
 
 /* ---- from frame to frame ---- */
 
+/* A unit that has no point for a frame does not forget who held it. */
+void
+UnitRows::carry_over ()
+{
+  if (old_columns_ != columns_)
+    return;
+  for (const Slice &slice : slices_) {
+    const Slice *old = old_slice (slice);
+    const int planes = old ? std::min (slice.planes, old->planes) : 0;
+    for (int p = 0; p < planes; p++) {
+      const std::size_t to = std::size_t{slice.first_row + p} * width_,
+                        from = std::size_t{old->first_row + p} * width_;
+      for (std::uint32_t c = 0; c < width_; c++) {
+        const bool empty = radius_[to + c] >= kNowhere;
+        radius_[to + c] = empty ? old_radius_[from + c] : radius_[to + c];
+        first_[to + c] = empty ? old_first_[from + c] : first_[to + c];
+      }
+    }
+  }
+}
+
 void
 UnitRows::remember (const std::array<int, kMaxViews> &ids, int images)
 {
+  carry_over ();
   std::swap (radius_, old_radius_);
   std::swap (first_, old_first_);
   std::swap (slices_, old_slices_);
@@ -531,6 +554,21 @@ UnitRows::recall (const std::array<int, kMaxViews> &ids, int images)
     view = view < 0 || view >= old_images_ ? -1 : now[view];
   old_ids_ = ids;
   old_images_ = images;
+}
+
+int
+UnitRows::old_winner (int slice, int column) const
+{
+  if (slice < 0 || slice >= old_slices () || column < 0 || column >= old_columns_)
+    return -1;
+  const Slice &old = old_slices_[slice];
+  for (int p = old.planes - 1; p >= 0; p--) {
+    const std::size_t row = old.first_row + static_cast<std::uint32_t> (p);
+    const int image = old_first_[row * old_width_ + kPad + static_cast<std::size_t> (column)];
+    if (image >= 0 && image < old_images_)
+      return old_ids_[image];
+  }
+  return -1;
 }
 
 void

@@ -110,11 +110,18 @@ public:
   void recall (const std::array<int, kMaxViews> &ids, int images);
   void forget ();
 
+  /** What remember() kept: the slices, and the view-id of the winner of a unit's outermost layer,
+   * -1 if it has none. */
+  [[nodiscard]] int old_slices () const { return static_cast<int> (old_slices_.size ()); }
+  [[nodiscard]] int old_winner (int slice, int column) const;
+
 private:
   template <typename L> struct Loops; /* over some columns at a time */
   struct Twins;
   enum class Pass { kAlone, kAskNeighbours };
 
+  [[nodiscard]] const Slice *old_slice (const Slice &slice) const;
+  void carry_over ();
   void count_slice (const Slice &slice, RowCounts &counts) const;
 
   template <typename Number> using Plane = std::vector<Number>;
