@@ -41,6 +41,7 @@ enum {
   PROP_HIDDEN_GAP,
   PROP_HYSTERESIS,
   PROP_AGREEMENT,
+  PROP_BODIES,
   PROP_N_THREADS,
   PROP_STATS,
 };
@@ -50,11 +51,12 @@ enum GstCylinderFilterMode { GST_CYLINDER_FILTER_OFF, GST_CYLINDER_FILTER_WINNER
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
                         kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006,
                         kDefaultHysteresis = 0.2, kDefaultAgreement = 0.1;
-static constexpr int kDefaultColumns = 360;
+static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
 struct CylinderCounts {
   guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0, units_held = 0,
           units_changed = 0;
+  int bodies = 0;
   rangecast::Axis axis;
 };
 
@@ -149,6 +151,7 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.units_shared += result.units_shared;
   counts.units_held += result.units_held;
   counts.units_changed += result.units_changed;
+  counts.bodies = result.bodies;
   counts.axis = result.axis;
 }
 
@@ -288,6 +291,9 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_AGREEMENT:
       settings.agreement = g_value_get_double (value);
       break;
+    case PROP_BODIES:
+      settings.bodies = g_value_get_int (value);
+      break;
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
       break;
@@ -299,11 +305,12 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
 static GstStructure *
 gst_cylinder_filter_stats (const CylinderCounts &counts)
 {
-  GstStructure *stats = gst_structure_new ("application/x-cylinderfilter-stats", "frames",
-      G_TYPE_UINT64, counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out",
-      G_TYPE_UINT64, counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared",
-      G_TYPE_UINT64, counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held,
-      "units-changed", G_TYPE_UINT64, counts.units_changed, nullptr);
+  GstStructure *stats =
+      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
+          counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
+          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
+          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
   const char *names[] = {"axis-position", "axis-direction"};
   const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
   for (int i = 0; i < 2; i++) {
@@ -355,6 +362,9 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
     case PROP_AGREEMENT:
       g_value_set_double (value, settings.agreement);
       break;
+    case PROP_BODIES:
+      g_value_set_int (value, settings.bodies);
+      break;
     case PROP_N_THREADS:
       g_value_set_int (value, settings.threads);
       break;
@@ -384,6 +394,7 @@ gst_cylinder_filter_init (GstCylinderFilter *self)
   self->priv->settings.hidden_gap_m = kDefaultHiddenGap;
   self->priv->settings.hysteresis = kDefaultHysteresis;
   self->priv->settings.agreement = kDefaultAgreement;
+  self->priv->settings.bodies = kDefaultBodies;
   self->priv->settings.threads = 0;
   gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
 }
@@ -412,6 +423,11 @@ install_axis_properties (GObjectClass *object_class, GParamFlags flags)
           "For axis=fixed: a point of the axis, <x, y, z> in the world, metres (default: <0, 0, "
           "0>)",
           flags));
+  g_object_class_install_property (object_class, PROP_BODIES,
+      g_param_spec_int ("bodies", "Bodies",
+          "Bodies that stand beside each other get a cylinder each, so many at most, 1 to 8; 1 is "
+          "one cylinder for all, and so is axis=fixed (default: 4)",
+          1, rangecast::kMaxBodies, kDefaultBodies, controllable));
   g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
       vector_spec ("axis-direction", "Axis direction",
           "For axis=fixed: its direction, <x, y, z> in the world, any length (default: <0, 1, 0>)",
@@ -484,7 +500,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
-          "READY; axis-position, axis-direction of the last frame",
+          "READY; bodies, axis-position, axis-direction of the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -27,6 +27,8 @@ check (const CylinderSettings &settings)
   if (!(settings.hysteresis >= 0 && settings.hysteresis <= 2) ||
       !(settings.agreement >= 0 && settings.agreement <= 2))
     return bad ("cylinder: hysteresis and agreement, expected 0 to 2");
+  if (settings.bodies < 1 || settings.bodies > kMaxBodies)
+    return bad ("cylinder: bodies, expected 1 to 8");
   const double length = norm (settings.fixed_axis.direction);
   if (settings.axis == AxisMode::kFixed &&
       !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
@@ -56,7 +58,8 @@ CylinderFilter::set_rig (const Rig &rig)
 void
 CylinderFilter::reset ()
 {
-  tracker_.reset ();
+  for (AxisTracker &tracker : trackers_)
+    tracker.reset ();
   units_.rows.forget ();
 }
 
@@ -79,27 +82,84 @@ CylinderFilter::take_cameras (std::span<const RangeImage> images)
 void
 CylinderFilter::make_points (std::span<const RangeImage> images, int threads)
 {
-  in_parallel (images.size (), threads, [&] (std::size_t i) {
-    cloud_.fill (i, images[i], rays_[i]);
-    moments_[i] = {};
-    moments_[i].add (cloud_, cloud_.parts ()[i]);
+  in_parallel (
+      images.size (), threads, [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
+}
+
+/* Sorts the points by body, and adds each body's up. */
+void
+CylinderFilter::find_bodies (const CylinderSettings &settings)
+{
+  const auto parts = cloud_.parts ();
+  body_count_ = bodies_.find (cloud_, settings.axis == AxisMode::kFixed ? 1 : settings.bodies);
+  const auto bodies = static_cast<std::size_t> (body_count_);
+  runs_.resize (parts.size () * bodies);
+  moments_.resize (runs_.size ());
+  in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
+    std::array<std::size_t, kMaxBodies> ends{parts[i].end};
+    if (bodies > 1)
+      bodies_.sort_part (cloud_, i, ends);
+    std::size_t begin = parts[i].begin;
+    for (std::size_t b = 0; b < bodies; b++) {
+      PointRun &run = runs_[i * bodies + b];
+      run = {begin, ends[b], static_cast<std::uint32_t> (i), static_cast<std::uint32_t> (b)};
+      begin = run.end;
+      moments_[i * bodies + b] = {};
+      moments_[i * bodies + b].add (cloud_, {run.begin, run.end});
+    }
   });
 }
 
-void
-CylinderFilter::choose_axis (const CylinderSettings &settings, std::size_t images)
+/* Where a body was in the frame before: the nearest place, if it is nearer than half a metre, else
+ * one where nobody was. */
+int
+CylinderFilter::slot_for (const Axis &measured, unsigned taken) const
 {
-  if (settings.axis == AxisMode::kFixed) {
-    const Vec3 direction = settings.fixed_axis.direction;
-    axis_ = {
-        settings.fixed_axis.position, (direction.y < 0 ? -1 : 1) / norm (direction) * direction};
-    tracker_.reset ();
-    return;
+  constexpr double kFar = 0.5;
+  int best = -1;
+  double least = kFar;
+  for (int slot = 0; slot < kMaxBodies; slot++) {
+    if ((taken >> slot & 1) || !trackers_[slot].started ())
+      continue;
+    const double distance = norm (trackers_[slot].axis ().position - measured.position);
+    if (distance < least)
+      least = distance, best = slot;
   }
-  Moments all;
-  for (std::size_t i = 0; i < images; i++)
-    all += moments_[i];
-  axis_ = tracker_.follow (axis_of_points (settings.axis, all, {rays_.data (), images}));
+  for (int slot = 0; best < 0 && slot < kMaxBodies; slot++)
+    if (!(taken >> slot & 1) && !trackers_[slot].started ())
+      best = slot;
+  for (int slot = 0; best < 0 && slot < kMaxBodies; slot++)
+    if (!(taken >> slot & 1))
+      best = slot;
+  return best;
+}
+
+void
+CylinderFilter::choose_axes (const CylinderSettings &settings, std::size_t images)
+{
+  unsigned taken = 0;
+  for (int body = 0; body < body_count_; body++) {
+    if (settings.axis == AxisMode::kFixed) {
+      const Vec3 direction = settings.fixed_axis.direction;
+      const double up = direction.y < 0 ? -1 : 1;
+      axes_[0] = {settings.fixed_axis.position, up / norm (direction) * direction};
+      slots_[0] = 0;
+      break;
+    }
+    Moments all;
+    for (std::size_t i = 0; i < images; i++)
+      all += moments_[i * static_cast<std::size_t> (body_count_) + static_cast<std::size_t> (body)];
+    const Axis measured = axis_of_points (settings.axis, all, {rays_.data (), images});
+    const int slot = slots_[body] = slot_for (measured, taken);
+    if (norm (trackers_[slot].axis ().position - measured.position) > 0.5)
+      trackers_[slot].reset ();
+    axes_[slot] = trackers_[slot].follow (measured);
+    taken |= 1u << slot;
+  }
+  for (int slot = 0; slot < kMaxBodies; slot++)
+    if (!(taken >> slot & 1))
+      trackers_[slot].reset ();
+  axis_ = axes_[slots_[0]];
 }
 
 /* Where cameras are about a body's cylinder. */
@@ -127,19 +187,21 @@ CylinderFilter::look_from (int body, const CylinderFrame &frame, std::size_t ima
 void
 CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
 {
-  const CylinderFrame frame (axis_);
-  look_from (0, frame, images);
+  std::array<CylinderFrame, kMaxBodies> frames;
+  for (int body = 0; body < body_count_; body++) {
+    const int slot = slots_[body];
+    frames[slot] = CylinderFrame (axes_[slot]);
+    look_from (slot, frames[slot], images);
+  }
   if (radius_.size () < cloud_.x.size ()) {
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
-  runs_.clear ();
-  for (std::size_t i = 0; i < images; i++)
-    runs_.push_back ({cloud_.parts ()[i].begin, cloud_.parts ()[i].end, std::uint32_t (i), 0});
   run_ranges_.resize (runs_.size ());
   in_parallel (runs_.size (), settings.threads, [&] (std::size_t i) {
-    run_ranges_[i] = to_wall (cloud_, {runs_[i].begin, runs_[i].end}, frame, settings.units.columns,
-        radius_.data (), column_.data ());
+    runs_[i].body = static_cast<std::uint32_t> (slots_[runs_[i].body]);
+    run_ranges_[i] = to_wall (cloud_, {runs_[i].begin, runs_[i].end}, frames[runs_[i].body],
+        settings.units.columns, radius_.data (), column_.data ());
   });
   constexpr float kHuge = std::numeric_limits<float>::max ();
   ranges_.fill ({kHuge, -kHuge});
@@ -184,14 +246,16 @@ CylinderFilter::work (
     return status;
   make_points (images, settings.threads);
   result.points_in = result.points_out = cloud_.size ();
-  if (result.points_in > 0)
-    choose_axis (settings, images.size ());
+  if (result.points_in > 0) {
+    find_bodies (settings);
+    choose_axes (settings, images.size ());
+    result.bodies = body_count_;
+  }
   result.axis = axis_;
   if (views_with_points (cloud_) < 2)
     return {};
   unroll (settings, images.size ());
-  units_.sort (
-      cloud_, radius_, column_, runs_, {ranges_.data (), 1}, settings.units, settings.threads);
+  units_.sort (cloud_, radius_, column_, runs_, ranges_, settings.units, settings.threads);
   set_rules (settings, images.size ());
   decide_units (settings, result);
   mark_losers ();

@@ -10,6 +10,7 @@
 #include "../geometry/rig.hpp"
 #include "../status.hpp"
 #include "axis.hpp"
+#include "bodies.hpp"
 #include "units.hpp"
 #include "world_points.hpp"
 
@@ -29,6 +30,9 @@ struct CylinderSettings {
   /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
    *  each), 0 .. 2. 0 = none. */
   double agreement = 0.1;
+  /** Bodies that stand beside each other get a cylinder each, so many at most, 1 .. kMaxBodies; 1:
+   *  one cylinder for all. Not with AxisMode::kFixed. */
+  int bodies = 4;
 };
 
 /** What one frame came to. */
@@ -37,7 +41,8 @@ struct CylinderResult {
   std::uint64_t points_out = 0;   ///< valid pixels after
   std::uint64_t units = 0;        ///< units with points
   std::uint64_t units_shared = 0; ///< units with points of more than one view
-  Axis axis;                      ///< the cylinder's
+  Axis axis;                      ///< of the cylinder of the largest body
+  int bodies = 0;                 ///< cylinders
   /** Surfaces in units that some view won in the frame before, too; and those of them that another
    *  view won now. */
   std::uint64_t units_held = 0, units_changed = 0;
@@ -104,7 +109,9 @@ private:
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
-  void choose_axis (const CylinderSettings &settings, std::size_t images);
+  void find_bodies (const CylinderSettings &settings);
+  void choose_axes (const CylinderSettings &settings, std::size_t images);
+  [[nodiscard]] int slot_for (const Axis &measured, unsigned taken) const;
   void unroll (const CylinderSettings &settings, std::size_t images);
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
@@ -123,15 +130,20 @@ private:
   std::array<PixelLookup, kMaxViews> rig_lookups_;
   std::array<float, kMaxViews> rig_units_per_metre_{};
   std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
-  AxisTracker tracker_;
+  /* Of each body. A body keeps its place in these as long as it is there. */
+  std::array<AxisTracker, kMaxBodies> trackers_;
+  Bodies bodies_;
 
   /* Of the present frame; kept for their memory. By number of the image. */
   std::array<PixelRays, kMaxViews> rays_;
   std::array<int, kMaxViews> ids_{};
-  std::array<Moments, kMaxViews> moments_;
+  std::vector<Moments> moments_; /* of each run */
   /* Where images see points of each body's cylinder. */
   std::array<std::array<PixelLookup, kMaxViews>, kMaxBodies> lookups_;
-  Axis axis_;
+  Axis axis_; /* of the largest body */
+  std::array<Axis, kMaxBodies> axes_;
+  int body_count_ = 0;
+  std::array<int, kMaxBodies> slots_{}; /* of the bodies, the largest first */
   WorldPoints cloud_;
   std::vector<PointRun> runs_;
   std::vector<WallRange> run_ranges_;
