@@ -110,55 +110,68 @@ CylinderFilter::find_bodies (const CylinderSettings &settings)
   });
 }
 
-/* Where a body was in the frame before: the nearest place, if it is nearer than half a metre, else
- * one where nobody was. */
-int
-CylinderFilter::slot_for (const Axis &measured, unsigned taken) const
+/* Gives each body the place that it had in the frame before: the nearest pair of a body and a place
+ * first, if they are nearer than half a metre; bodies that are left get places where nobody was. */
+void
+CylinderFilter::choose_slots (const std::array<Axis, kMaxBodies> &measured)
 {
   constexpr double kFar = 0.5;
-  int best = -1;
-  double least = kFar;
-  for (int slot = 0; slot < kMaxBodies; slot++) {
-    if ((taken >> slot & 1) || !trackers_[slot].started ())
-      continue;
-    const double distance = norm (trackers_[slot].axis ().position - measured.position);
-    if (distance < least)
-      least = distance, best = slot;
+  slots_.fill (-1);
+  unsigned taken = 0;
+  const auto take = [&] (int body, int slot) {
+    slots_[body] = slot;
+    taken |= 1u << slot;
+  };
+  for (int pair = 0; pair < body_count_; pair++) {
+    double least = kFar;
+    int best_body = -1, best_slot = -1;
+    for (int body = 0; body < body_count_; body++)
+      for (int slot = 0; slot < kMaxBodies; slot++) {
+        if (slots_[body] >= 0 || (taken >> slot & 1) || !trackers_[slot].started ())
+          continue;
+        const double distance = norm (trackers_[slot].axis ().position - measured[body].position);
+        if (distance < least)
+          least = distance, best_body = body, best_slot = slot;
+      }
+    if (best_body >= 0)
+      take (best_body, best_slot);
   }
-  for (int slot = 0; best < 0 && slot < kMaxBodies; slot++)
-    if (!(taken >> slot & 1) && !trackers_[slot].started ())
-      best = slot;
-  for (int slot = 0; best < 0 && slot < kMaxBodies; slot++)
+  for (int slot = 0; slot < kMaxBodies; slot++)
     if (!(taken >> slot & 1))
-      best = slot;
-  return best;
+      trackers_[slot].reset ();
+  for (int body = 0, slot = 0; body < body_count_; body++) {
+    while (slots_[body] < 0 && (taken >> slot & 1))
+      slot++;
+    if (slots_[body] < 0)
+      take (body, slot);
+  }
 }
 
 void
 CylinderFilter::choose_axes (const CylinderSettings &settings, std::size_t images)
 {
-  unsigned taken = 0;
-  for (int body = 0; body < body_count_; body++) {
-    if (settings.axis == AxisMode::kFixed) {
-      const Vec3 direction = settings.fixed_axis.direction;
-      const double up = direction.y < 0 ? -1 : 1;
-      axes_[0] = {settings.fixed_axis.position, up / norm (direction) * direction};
-      slots_[0] = 0;
-      break;
-    }
+  if (settings.axis == AxisMode::kFixed) {
+    const Vec3 direction = settings.fixed_axis.direction;
+    const double up = direction.y < 0 ? -1 : 1;
+    axis_ = axes_[0] = {settings.fixed_axis.position, up / norm (direction) * direction};
+    slots_[0] = 0;
+    for (AxisTracker &tracker : trackers_)
+      tracker.reset ();
+    return;
+  }
+  std::array<Axis, kMaxBodies> measured;
+  const auto bodies = static_cast<std::size_t> (body_count_);
+  for (std::size_t body = 0; body < bodies; body++) {
     Moments all;
     for (std::size_t i = 0; i < images; i++)
-      all += moments_[i * static_cast<std::size_t> (body_count_) + static_cast<std::size_t> (body)];
-    const Axis measured = axis_of_points (settings.axis, all, {rays_.data (), images});
-    const int slot = slots_[body] = slot_for (measured, taken);
-    if (norm (trackers_[slot].axis ().position - measured.position) > 0.5)
-      trackers_[slot].reset ();
-    axes_[slot] = trackers_[slot].follow (measured);
-    taken |= 1u << slot;
+      all += moments_[i * bodies + body];
+    measured[body] = axis_of_points (settings.axis, all, {rays_.data (), images});
   }
-  for (int slot = 0; slot < kMaxBodies; slot++)
-    if (!(taken >> slot & 1))
-      trackers_[slot].reset ();
+  choose_slots (measured);
+  for (std::size_t body = 0; body < bodies; body++) {
+    const int slot = slots_[body];
+    axes_[slot] = trackers_[slot].follow (measured[body]);
+  }
   axis_ = axes_[slots_[0]];
 }
 

@@ -111,7 +111,7 @@ private:
   void make_points (std::span<const RangeImage> images, int threads);
   void find_bodies (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);
-  [[nodiscard]] int slot_for (const Axis &measured, unsigned taken) const;
+  void choose_slots (const std::array<Axis, kMaxBodies> &measured);
   void unroll (const CylinderSettings &settings, std::size_t images);
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
