@@ -508,6 +508,28 @@ TEST (Degenerate, settings_at_their_ends)
       }
 }
 
+TEST (Degenerate, more_slices_than_the_wall_has_units_for)
+{
+  /* 65 m of depth along the axis, slices of 0.2 mm, as narrow as they get and as wide. */
+  Rig rig;
+  for (int i = 0; i < 2; i++) {
+    rig.views.push_back (small_view (i, 0, 200, 150));
+    rig.views.back ().depth_unit_m = 0.001;
+    rig.views.back ().far_m = 65;
+  }
+  for (const int columns : {8, 3600}) {
+    CylinderSettings settings;
+    settings.axis = AxisMode::kFixed;
+    settings.fixed_axis.direction = {0, 0, 1};
+    settings.units.columns = columns;
+    settings.units.unit_height_m = 0.0002;
+    const auto scattered = [] (int i, int u, int v) {
+      return std::uint16_t (u * 40503 + v * 30011 + i);
+    };
+    expect_sane (rig, scattered, settings);
+  }
+}
+
 TEST (Degenerate, frame_sets_without_images_or_points)
 {
   CylinderFilter filter;

@@ -271,12 +271,12 @@ CylinderFilter::work (
   units_.sort (cloud_, radius_, column_, runs_, ranges_, settings.units, settings.threads);
   set_rules (settings, images.size ());
   decide_units (settings, result);
-  mark_losers ();
+  find_cells ();
   list_losers (images);
   if (settings.hidden_gap_m > 0)
     keep_uncovered (images, settings);
   clear_losers (images);
-  units_.rows.remember (ids_, static_cast<int> (images.size ()));
+  units_.rows.remember (rules_, ids_);
   result.points_out -= losers_.size ();
   return {};
 }
@@ -318,31 +318,23 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
   }
 }
 
+/* Where units of a slice have several layers, a point's column does not tell its cell. */
 void
-CylinderFilter::mark_losers ()
+CylinderFilter::find_cells ()
 {
-  fate_.resize (std::max (fate_.size (), cloud_.x.size ()));
-  for (const PointRun &run : runs_)
-    std::fill (fate_.begin () + run.begin, fate_.begin () + run.end, kStays);
+  cell_of_.resize (std::max (cell_of_.size (), cloud_.x.size ()));
   const UnitRows &rows = units_.rows;
   for (std::size_t s = 0; s < units_.slices.size (); s++) {
     const auto number = static_cast<int> (s);
-    const Units::Slice &slice = units_.slices[s];
-    for (const UnitLayer &layer : units_.layers_of (slice)) {
-      if (!units_.has_cell (number, layer))
-        continue;
-      const std::uint32_t cell = rows.cell (number, layer.plane, layer.column);
-      std::uint64_t stay = std::uint64_t{1} << std::max (0, rows.winner (cell));
-      if (const int second = rows.second (cell); second >= 0)
-        stay |= std::uint64_t{1} << second;
-      if (!(layer.views & ~stay))
-        continue;
+    if (units_.is_plain (static_cast<std::uint32_t> (s)))
+      continue;
+    for (const UnitLayer &layer : units_.layers_of (units_.slices[s])) {
+      const std::uint32_t cell =
+          units_.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
       for (std::uint32_t e = 0; e < layer.entry_count; e++) {
         const UnitEntry &entry = units_.entries[layer.first_entry + e];
-        if (stay >> entry.view & 1)
-          continue;
         for (std::uint32_t i = 0; i < entry.point_count; i++)
-          fate_[units_.points[entry.first_point + i].index] = cell;
+          cell_of_[units_.points[entry.first_point + i].index] = cell;
       }
     }
   }
@@ -354,16 +346,21 @@ CylinderFilter::list_losers (std::span<const RangeImage> images)
 {
   losers_.clear ();
   losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
+  const UnitRows &rows = units_.rows;
   for (const PointRun &run : runs_) {
+    const auto view = static_cast<int> (run.view);
     const auto width = static_cast<std::uint32_t> (images[run.view].depth.width);
     const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[run.view].begin);
     for (std::size_t i = run.begin; i < run.end; i++) {
-      if (fate_[i] == kStays)
+      const auto slice = static_cast<int> (units_.slice_of[i]);
+      const std::uint32_t cell =
+          units_.is_plain (units_.slice_of[i]) ? rows.cell (slice, 0, column_[i]) : cell_of_[i];
+      if (cell == kNoCell || rows.winner (cell) == view || rows.second (cell) == view)
         continue;
       const std::uint32_t pixel = cloud_.pixel[i];
-      losers_.push_back ({static_cast<std::uint32_t> (i),
-          begin + (pixel >> 16) * width + (pixel & 0xffff), fate_[i],
-          static_cast<std::uint8_t> (run.view), static_cast<std::uint8_t> (run.body)});
+      losers_.push_back (
+          {static_cast<std::uint32_t> (i), begin + (pixel >> 16) * width + (pixel & 0xffff), cell,
+              static_cast<std::uint8_t> (run.view), static_cast<std::uint8_t> (run.body)});
     }
   }
 }

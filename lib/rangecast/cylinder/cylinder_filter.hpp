@@ -116,7 +116,7 @@ private:
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_units (const CylinderSettings &settings, CylinderResult &result);
-  void mark_losers ();
+  void find_cells ();
   void list_losers (std::span<const RangeImage> images);
   void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
   [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
@@ -153,9 +153,10 @@ private:
   Units units_;
   RowRules rules_;
 
-  /* Of each point of the cloud: its cell if another view won that; else kStays. */
-  std::vector<std::uint32_t> fate_;
-  static constexpr std::uint32_t kStays = UINT32_MAX;
+  /* Of each point of the cloud in a slice of several planes; kNoCell for the fifth and further
+   * surfaces of a unit, whose points all stay. */
+  std::vector<std::uint32_t> cell_of_;
+  static constexpr std::uint32_t kNoCell = UINT32_MAX;
   std::vector<Loser> losers_;      /* in the order of the cloud */
   std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
   /* How far a point may lie behind, or before, what the image has there; in its depth units. */

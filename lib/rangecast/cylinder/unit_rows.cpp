@@ -258,7 +258,25 @@ template <typename L> struct UnitRows::Loops {
     }
   }
 
-  /* Winners of up to 4 neighbours of eight cells, of all planes; -1 where there is none. */
+  /* A unit that has no point for a frame does not forget who held it. */
+  void carry_over (const Slice &slice) const
+  {
+    const Slice *old = rows.old_slice (slice);
+    const int planes = old ? std::min (slice.planes, old->planes) : 0;
+    for (int p = 0; p < planes; p++) {
+      const std::size_t to = std::size_t{slice.first_row + p} * rows.width_,
+                        from = std::size_t{old->first_row + p} * rows.old_width_;
+      for (std::uint32_t c = 0; c < rows.width_; c += kLanes) {
+        F &radius = L::at (&rows.radius_[to + c]);
+        I &first = L::at (&rows.first_[to + c]);
+        const I empty = radius >= kNowhere;
+        radius = empty ? L::at (&rows.old_radius_[from + c]) : radius;
+        first = empty ? L::at (&rows.old_first_[from + c]) : first;
+      }
+    }
+  }
+
+  /* Winners of up to 4 neighbours of some cells, of all planes; -1 where there is none. */
   struct Neighbours {
     I winners[4 * kPlanes];
     int count = 0;
@@ -422,6 +440,14 @@ struct UnitRows::Twins {
   [[RANGECAST_CYLINDER_AVX2]] static void along (const Avx2 &loops, int s) { loops.along (s); }
   [[RANGECAST_CYLINDER_ANY]] static void across (const Any &loops, int s) { loops.across (s); }
   [[RANGECAST_CYLINDER_AVX2]] static void across (const Avx2 &loops, int s) { loops.across (s); }
+  [[RANGECAST_CYLINDER_ANY]] static void carry_over (const Any &loops, const Slice &slice)
+  {
+    loops.carry_over (slice);
+  }
+  [[RANGECAST_CYLINDER_AVX2]] static void carry_over (const Avx2 &loops, const Slice &slice)
+  {
+    loops.carry_over (slice);
+  }
   [[RANGECAST_CYLINDER_ANY]] static void decide (const Any &loops, int s, Pass pass)
   {
     loops.decide (s, pass);
@@ -499,31 +525,12 @@ UnitRows::count_slice (const Slice &slice, RowCounts &counts) const
 
 /* ---- from frame to frame ---- */
 
-/* A unit that has no point for a frame does not forget who held it. */
 void
-UnitRows::carry_over ()
+UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids)
 {
-  if (old_columns_ != columns_)
-    return;
-  for (const Slice &slice : slices_) {
-    const Slice *old = old_slice (slice);
-    const int planes = old ? std::min (slice.planes, old->planes) : 0;
-    for (int p = 0; p < planes; p++) {
-      const std::size_t to = std::size_t{slice.first_row + p} * width_,
-                        from = std::size_t{old->first_row + p} * width_;
-      for (std::uint32_t c = 0; c < width_; c++) {
-        const bool empty = radius_[to + c] >= kNowhere;
-        radius_[to + c] = empty ? old_radius_[from + c] : radius_[to + c];
-        first_[to + c] = empty ? old_first_[from + c] : first_[to + c];
-      }
-    }
-  }
-}
-
-void
-UnitRows::remember (const std::array<int, kMaxViews> &ids, int images)
-{
-  carry_over ();
+  for (const Slice &slice : slices_)
+    Twins::avx2 () ? Twins::carry_over (Twins::Avx2{*this, rules}, slice)
+                   : Twins::carry_over (Twins::Any{*this, rules}, slice);
   std::swap (radius_, old_radius_);
   std::swap (first_, old_first_);
   std::swap (slices_, old_slices_);
@@ -535,7 +542,7 @@ UnitRows::remember (const std::array<int, kMaxViews> &ids, int images)
   old_width_ = width_;
   old_columns_ = columns_;
   old_ids_ = ids;
-  old_images_ = images;
+  old_images_ = rules.images;
 }
 
 void

@@ -105,7 +105,7 @@ public:
 
   /** Keeps the winners for the next frame's hysteresis.
    *  @param ids  view-id of each image */
-  void remember (const std::array<int, kMaxViews> &ids, int images);
+  void remember (const RowRules &rules, const std::array<int, kMaxViews> &ids);
   /** Before the next decide(): what images the winners kept have now. */
   void recall (const std::array<int, kMaxViews> &ids, int images);
   void forget ();
@@ -121,7 +121,6 @@ private:
   enum class Pass { kAlone, kAskNeighbours };
 
   [[nodiscard]] const Slice *old_slice (const Slice &slice) const;
-  void carry_over ();
   void count_slice (const Slice &slice, RowCounts &counts) const;
 
   template <typename Number> using Plane = std::vector<Number>;

@@ -10,6 +10,9 @@
 namespace rangecast {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
+/* 1 / n of small n: units hold few points of a view. */
+constexpr std::array<float, 9> kShares = {
+    0, 1, 1 / 2.f, 1 / 3.f, 1 / 4.f, 1 / 5.f, 1 / 6.f, 1 / 7.f, 1 / 8.f};
 /* Cells of rows, at most; slices beyond have fewer planes. */
 constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
 
@@ -21,9 +24,8 @@ Units::sort (const WorldPoints &cloud, std::span<const float> radius,
   settings_ = settings;
   lay_out (ranges);
   count_units (cloud, column, runs);
-  scatter (cloud, radius, runs);
-  in_parallel (
-      slices.size (), threads, [&] (std::size_t s) { cut_slice (cloud, static_cast<int> (s)); });
+  scatter (cloud, radius, column, runs);
+  in_parallel (slices.size (), threads, [&] (std::size_t s) { cut_slice (static_cast<int> (s)); });
   const auto images = static_cast<int> (cloud.parts ().size ());
   rows.begin (settings.columns, images, slices.size ());
   int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
@@ -66,28 +68,27 @@ void
 Units::count_units (
     const WorldPoints &cloud, std::span<const std::int32_t> column, std::span<const PointRun> runs)
 {
-  if (unit_of_.size () < cloud.x.size ())
-    unit_of_.resize (cloud.x.size ());
+  if (slice_of.size () < cloud.x.size ())
+    slice_of.resize (cloud.x.size ());
   begin_.assign (slices.size () * settings_.columns + 1, 0);
   const auto per_metre = static_cast<float> (1 / slice_height_m);
-  const int columns = settings_.columns;
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
   for (const PointRun &run : runs) {
     const Stack &stack = stacks_[run.body];
     const float first_y = stack.first_y;
-    const int last = stack.count - 1, first_unit = stack.first_slice * columns;
+    const int last = stack.count - 1, first = stack.first_slice;
     for (std::size_t i = run.begin; i < run.end; i++) {
       const int slice = static_cast<int> ((cloud.y[i] - first_y) * per_metre);
-      unit_of_[i] = static_cast<std::uint32_t> (
-          first_unit + std::clamp (slice, 0, last) * columns + column[i]);
+      slice_of[i] = static_cast<std::uint32_t> (first + std::clamp (slice, 0, last));
     }
     for (std::size_t i = run.begin; i < run.end; i++)
-      begin_[unit_of_[i]]++;
+      begin_[slice_of[i] * columns + static_cast<std::uint32_t> (column[i])]++;
   }
 }
 
 void
-Units::scatter (
-    const WorldPoints &cloud, std::span<const float> radius, std::span<const PointRun> runs)
+Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, std::span<const PointRun> runs)
 {
   std::uint32_t total = 0;
   for (std::size_t s = 0; s < slices.size (); s++) {
@@ -105,10 +106,13 @@ Units::scatter (
     layers.resize (total);
     chain_.resize (total);
   }
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
   for (const PointRun &run : runs)
-    for (std::size_t i = run.begin; i < run.end; i++)
-      points[begin_[unit_of_[i]]++] = {
-          radius[i], cloud.x[i], cloud.z[i], static_cast<std::uint32_t> (i)};
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const std::uint32_t unit = slice_of[i] * columns + static_cast<std::uint32_t> (column[i]);
+      points[begin_[unit]++] = {
+          radius[i], cloud.x[i], cloud.z[i], static_cast<std::uint32_t> (i), run.view};
+    }
   /* Now each element is its unit's end, which is the next one's begin. */
 }
 
@@ -116,17 +120,15 @@ Units::scatter (
 struct Units::Cutter {
   Units &units;
   Slice &slice;
-  const WorldPoints::Part *parts;
   float gap;
   int column = 0;
   std::uint32_t entry_end, layer_end;
   std::uint64_t views = 0; /* of the slice */
   std::uint32_t first[kMaxViews], last[kMaxViews];
 
-  Cutter (Units &owner, Slice &cut, const WorldPoints &cloud)
-      : units (owner), slice (cut), parts (cloud.parts ().data ()),
-        gap (static_cast<float> (owner.settings_.layer_gap_m)), entry_end (cut.begin),
-        layer_end (cut.begin)
+  Cutter (Units &owner, Slice &cut)
+      : units (owner), slice (cut), gap (static_cast<float> (owner.settings_.layer_gap_m)),
+        entry_end (cut.begin), layer_end (cut.begin)
   {
   }
 
@@ -155,14 +157,12 @@ struct Units::Cutter {
     layer = {0, entry_end, 0, column, plane, 0};
     const Point *points = units.points.data ();
     float radii = 0, low = kNowhere, high = 0;
-    std::uint32_t view = 0, to = entry_end;
+    std::uint32_t to = entry_end;
     for (std::uint32_t i = begin; i < end; to++) {
       float x = 0, z = 0, radius = 0;
       const std::uint32_t from = i;
-      while (points[i].index >= parts[view].end)
-        view++;
-      const std::size_t part_end = parts[view].end;
-      for (; i < end && points[i].index < part_end; i++) {
+      const std::uint32_t view = points[i].view;
+      for (; i < end && points[i].view == view; i++) {
         const float r = points[i].radius;
         x += points[i].x;
         z += points[i].z;
@@ -171,7 +171,8 @@ struct Units::Cutter {
         high = r > high ? r : high;
       }
       radii += radius;
-      const float share = 1 / static_cast<float> (i - from);
+      const std::uint32_t count = i - from;
+      const float share = count < kShares.size () ? kShares[count] : 1 / static_cast<float> (count);
       layer.views |= std::uint64_t{1} << view;
       units.entries[to] = {
           x * share, z * share, radius * share, {}, 0, column, from, i - from, view};
@@ -231,9 +232,9 @@ struct Units::Cutter {
 };
 
 void
-Units::cut_slice (const WorldPoints &cloud, int number)
+Units::cut_slice (int number)
 {
-  Cutter cutter (*this, slices[number], cloud);
+  Cutter cutter (*this, slices[number]);
   cutter.cut (
       begin_.data () + static_cast<std::size_t> (number) * settings_.columns, settings_.columns);
 }

@@ -54,13 +54,14 @@ struct UnitLayer {
 };
 
 /** The points of a frame set, sorted into the units of the inner walls of some cylinders. Keeps its
- * memory from frame to frame: 20 bytes a point, 4 a unit, 40 a layer, 40 an entry and what UnitRows
+ * memory from frame to frame: 24 bytes a point, 4 a unit, 40 a layer, 40 an entry and what UnitRows
  * has. */
 class Units {
 public:
   struct Point {
     float radius, x, z;
     std::uint32_t index; ///< in the cloud
+    std::uint32_t view;  ///< number of the image
   };
 
   /** Sorts points (in cylinder coordinates, with radius and column as to_wall() gives them) into
@@ -101,7 +102,14 @@ public:
     return layer.plane < rows.slices ()[slice].planes;
   }
 
+  /** Whether a slice has one layer in each unit, all of them in the rows. */
+  [[nodiscard]] bool is_plain (std::uint32_t slice) const
+  {
+    return slices[slice].planes == 1 && rows.slices ()[slice].planes == 1;
+  }
+
   std::vector<Point> points;
+  std::vector<std::uint32_t> slice_of; ///< of each point of the cloud
   std::vector<UnitEntry> entries;
   std::vector<UnitLayer> layers;
   std::vector<Slice> slices;
@@ -117,17 +125,16 @@ private:
   void lay_out (std::span<const WallRange> ranges);
   void count_units (const WorldPoints &cloud, std::span<const std::int32_t> column,
       std::span<const PointRun> runs);
-  void scatter (
-      const WorldPoints &cloud, std::span<const float> radius, std::span<const PointRun> runs);
-  void cut_slice (const WorldPoints &cloud, int slice);
+  void scatter (const WorldPoints &cloud, std::span<const float> radius,
+      std::span<const std::int32_t> column, std::span<const PointRun> runs);
+  void cut_slice (int slice);
   struct Cutter;
   [[nodiscard]] std::uint32_t next_entry (std::uint32_t number, int reach) const;
 
   UnitSettings settings_;
   std::array<Stack, kMaxBodies> stacks_;
-  std::vector<std::uint32_t> unit_of_; /* of each point of the cloud */
-  std::vector<std::uint32_t> begin_;   /* of each unit in points; after scatter () its end */
-  std::vector<std::uint32_t> chain_;   /* of each entry: the view's next one, in a ring */
+  std::vector<std::uint32_t> begin_; /* of each unit in points; after scatter () its end */
+  std::vector<std::uint32_t> chain_; /* of each entry: the view's next one, in a ring */
 };
 
 } // namespace rangecast
