@@ -66,7 +66,9 @@ struct GstCylinderFilterPrivate {
   rangecast::CylinderSettings settings;
   CylinderCounts counts;
 
-  rangecast::CylinderFilter core; /* streaming thread only */
+  /* Streaming thread only. */
+  rangecast::CylinderFilter core;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
 };
 
 struct _GstCylinderFilter {
@@ -155,6 +157,18 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.axis = result.axis;
 }
 
+/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
+ */
+static bool
+gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  return !known || now <= last || now - last > GST_SECOND / 2;
+}
+
 static GstFlowReturn
 gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
@@ -167,7 +181,7 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     return GST_FLOW_OK;
 
-  if (GST_BUFFER_IS_DISCONT (buffer))
+  if (gst_cylinder_filter_begins_anew (priv, buffer))
     priv->core.reset ();
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
   rangecast::CylinderResult result;
@@ -197,6 +211,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
   const std::lock_guard guard (priv->lock);
   priv->counts = {};
   priv->core.reset ();
+  priv->last_pts = GST_CLOCK_TIME_NONE;
   return TRUE;
 }
 

@@ -192,10 +192,11 @@ GST_END_TEST;
 
 /* Winners that last frame's winners had a word in. */
 static guint64
-held_by_frame (GstHarness *h, GstElement *element, const Rig &rig, bool discont)
+held_by_frame (
+    GstHarness *h, GstElement *element, const Rig &rig, bool discont, GstClockTime time = 0)
 {
   const guint64 before = stat (element, "units-held");
-  GstBuffer *in = make_frame_set (rig);
+  GstBuffer *in = make_frame_set (rig, time);
   if (discont)
     GST_BUFFER_FLAG_SET (in, GST_BUFFER_FLAG_DISCONT);
   gst_buffer_unref (gst_harness_push_and_pull (h, in));
@@ -224,6 +225,22 @@ GST_START_TEST (test_forgets_winners_on_discont_flush_and_new_caps)
 
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 15, 1)));
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  held_by_frame (h, element, rig, true, 0);
+  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 30) > 0);
+  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 10) > 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, 5 * GST_SECOND), 0);
+  fail_unless (held_by_frame (h, element, rig, false, 9 * GST_SECOND) > 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, GST_SECOND), 0);
   gst_object_unref (element);
   gst_harness_teardown (h);
 }
@@ -402,6 +419,7 @@ cylinderfilter_suite ()
   tcase_add_test (tc, test_caps_may_change_in_the_stream);
   tcase_add_test (tc, test_stats_count_frames_points_and_units);
   tcase_add_test (tc, test_forgets_winners_on_discont_flush_and_new_caps);
+  tcase_add_test (tc, test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is);
   tcase_add_test (tc, test_bodies_and_steadiness_may_change_while_playing);
   tcase_add_test (tc, test_views_of_one_pixel_and_64_views_pass);
   tcase_add_test (tc, test_axis_is_set_as_an_array);

@@ -370,6 +370,14 @@ template <typename L> struct UnitRows::Loops {
     std::uint64_t views = 0;
     for (int w = 0; w < rows.words_; w++)
       views |= std::uint64_t{L::any_of (L::at (&rows.covering_[w][here]))} << (32 * w);
+    if (std::has_single_bit (views)) { /* nobody else sees this */
+      const int view = std::countr_zero (views);
+      I in;
+      covers (in, here, view);
+      L::at (&rows.next_[here]) = in ? view + I{} : I{} - 1;
+      L::at (&rows.second_[here]) = I{} - 1;
+      return;
+    }
     Best best = {F{} - 1, F{}, F{}, F{}, I{} - 1};
     for (std::uint64_t rest = views; rest; rest &= rest - 1) {
       const int view = std::countr_zero (rest);
