@@ -10,9 +10,6 @@
 namespace rangecast {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
-/* 1 / n of small n: units hold few points of a view. */
-constexpr std::array<float, 9> kShares = {
-    0, 1, 1 / 2.f, 1 / 3.f, 1 / 4.f, 1 / 5.f, 1 / 6.f, 1 / 7.f, 1 / 8.f};
 /* Cells of rows, at most; slices beyond have fewer planes. */
 constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
 
@@ -107,11 +104,13 @@ Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
     chain_.resize (total);
   }
   const auto columns = static_cast<std::uint32_t> (settings_.columns);
+  std::uint32_t *ends = begin_.data ();
+  Point *to = points.data ();
   for (const PointRun &run : runs)
     for (std::size_t i = run.begin; i < run.end; i++) {
-      const std::uint32_t unit = slice_of[i] * columns + static_cast<std::uint32_t> (column[i]);
-      points[begin_[unit]++] = {
-          radius[i], cloud.x[i], cloud.z[i], static_cast<std::uint32_t> (i), run.view};
+      const auto at = static_cast<std::uint32_t> (column[i]);
+      to[ends[slice_of[i] * columns + at]++] = {radius[i], cloud.x[i], cloud.z[i],
+          static_cast<std::uint32_t> (i), at * kMaxViews + run.view};
     }
   /* Now each element is its unit's end, which is the next one's begin. */
 }
@@ -148,6 +147,78 @@ struct Units::Cutter {
     }
   }
 
+  /* Adds up the points of each entry of the slice as if its units had one layer each. Without
+   * branches: runs of one or two points, which all here are, are what processors guess worst.
+   * @return whether they have: no unit's radii lie further apart than a gap */
+  bool sum_entries (std::uint32_t end)
+  {
+    typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    typedef std::int32_t I4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    const F4 one = {0, 0, 0, 1};
+    const I4 three = {-1, -1, -1, 0};
+    F4 sum = {};
+    float low = 0, high = 0, span = 0;
+    std::uint32_t before = UINT32_MAX, to = slice.begin - 1;
+    /* Not through the vectors: stores of vectors may alias them, for all that compilers know. */
+    const Point *points = units.points.data ();
+    UnitEntry *entries = units.entries.data ();
+    for (std::uint32_t i = slice.begin; i < end; i++) {
+      const Point &point = points[i];
+      const std::uint32_t differs = point.key ^ before;
+      before = point.key;
+      const std::int32_t goes_on = -static_cast<std::int32_t> (differs == 0);
+      to += differs != 0;
+      const I4 keep = {goes_on, goes_on, goes_on, goes_on};
+      const F4 values = (F4)((I4) * reinterpret_cast<const F4 *> (&point.radius) & three) + one;
+      sum = (F4)((I4)sum & keep) + values;
+      *reinterpret_cast<F4 *> (&entries[to].radius) = sum;
+      entries[to].key = point.key;
+      const bool new_unit = differs >= kMaxViews;
+      low = new_unit || point.radius < low ? point.radius : low;
+      high = new_unit || point.radius > high ? point.radius : high;
+      span = high - low > span ? high - low : span;
+    }
+    entry_end = to + 1;
+    return span <= gap;
+  }
+
+  /* Makes the layers of those entries. */
+  void finish_entries ()
+  {
+    std::uint32_t column_before = UINT32_MAX;
+    UnitEntry *entries = units.entries.data ();
+    UnitLayer *layers = units.layers.data ();
+    layer_end = slice.begin - 1;
+    UnitLayer layer;
+    float weight = 0, radii = 0;
+    for (std::uint32_t e = slice.begin; e < entry_end; e++) {
+      UnitEntry &entry = entries[e];
+      const std::uint32_t at = entry.key / kMaxViews;
+      const bool fresh = at != column_before;
+      column_before = at;
+      layer_end += fresh;
+      weight = (fresh ? 0 : weight) + entry.weight;
+      radii = (fresh ? 0 : radii) + entry.radius;
+      layer.views = (fresh ? 0 : layer.views) | std::uint64_t{1} << entry.view ();
+      layer.first_entry = fresh ? e : layer.first_entry;
+      layer.entry_count = e + 1 - layer.first_entry;
+      layer.column = static_cast<int> (at);
+      layer.radius = radii / weight;
+      layers[layer_end] = layer;
+      slice.occupied += fresh;
+      slice.shared += layer.entry_count == 2;
+      const float share = 1 / entry.weight;
+      entry.radius *= share;
+      entry.x *= share;
+      entry.z *= share;
+      entry.tangent[0] = entry.tangent[1] = 0;
+      entry.layer = layer_end;
+      link (e, entry.view ());
+    }
+    layer_end++;
+    slice.planes = layer_end > slice.begin;
+  }
+
   /* Makes a layer of points, which come in the order of the cloud, so view after view.
    * @param any  whether they may lie further apart than a gap
    * @return whether they do; then nothing has been made */
@@ -160,31 +231,27 @@ struct Units::Cutter {
     std::uint32_t to = entry_end;
     for (std::uint32_t i = begin; i < end; to++) {
       float x = 0, z = 0, radius = 0;
-      const std::uint32_t from = i;
-      const std::uint32_t view = points[i].view;
-      for (; i < end && points[i].view == view; i++) {
-        const float r = points[i].radius;
+      const std::uint32_t from = i, key = points[i].key;
+      for (; i < end && points[i].key == key; i++) {
         x += points[i].x;
         z += points[i].z;
-        radius += r;
-        low = r < low ? r : low;
-        high = r > high ? r : high;
+        radius += points[i].radius;
+        low = std::min (low, points[i].radius);
+        high = std::max (high, points[i].radius);
       }
       radii += radius;
-      const std::uint32_t count = i - from;
-      const float share = count < kShares.size () ? kShares[count] : 1 / static_cast<float> (count);
-      layer.views |= std::uint64_t{1} << view;
+      const auto weight = static_cast<float> (i - from);
+      const float share = 1 / weight;
       units.entries[to] = {
-          x * share, z * share, radius * share, {}, 0, column, from, i - from, view};
+          radius * share, x * share, z * share, weight, {}, key, layer_end, from, i - from};
+      layer.views |= std::uint64_t{1} << units.entries[to].view ();
     }
     if (any && high - low > gap)
       return true;
     layer.radius = radii / static_cast<float> (end - begin);
     layer.entry_count = to - entry_end;
-    for (; entry_end < to; entry_end++) {
-      units.entries[entry_end].layer_radius = layer.radius;
-      link (entry_end, units.entries[entry_end].view);
-    }
+    for (; entry_end < to; entry_end++)
+      link (entry_end, units.entries[entry_end].view ());
     layer_end++;
     return false;
   }
@@ -208,7 +275,7 @@ struct Units::Cutter {
     return plane;
   }
 
-  void cut (const std::uint32_t *ends, int columns)
+  void cut_units (const std::uint32_t *ends, int columns)
   {
     std::uint32_t begin = slice.begin;
     for (column = 0; column < columns; column++) {
@@ -224,6 +291,16 @@ struct Units::Cutter {
       slice.occupied++;
       slice.shared += (all & (all - 1)) != 0;
       begin = end;
+    }
+  }
+
+  void cut (const std::uint32_t *ends, int columns)
+  {
+    if (sum_entries (ends[columns - 1])) {
+      finish_entries ();
+    } else {
+      entry_end = slice.begin;
+      cut_units (ends, columns);
     }
     close_rings ();
     slice.layer_count = layer_end - slice.begin;
@@ -245,15 +322,16 @@ Units::next_entry (std::uint32_t number, int reach) const
 {
   const UnitEntry &entry = entries[number];
   const auto gap = static_cast<float> (settings_.layer_gap_m);
-  int column = entry.column;
+  int column = entry.column ();
   for (std::uint32_t next = chain_[number], before = number; next != number;
        before = next, next = chain_[next]) {
     const UnitEntry &other = entries[next];
     if (next < before)
       column -= settings_.columns;
-    if (other.column - column > reach)
+    const int distance = other.column () - column;
+    if (distance > reach)
       return kNone;
-    if (other.column > column && std::abs (other.layer_radius - entry.radius) <= gap)
+    if (distance > 0 && std::abs (layers[other.layer].radius - entry.radius) <= gap)
       return next;
   }
   return kNone;
@@ -287,7 +365,7 @@ Units::find_tangents (int number)
     const UnitEntry *entry = entries.data () + layer.first_entry;
     for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++)
       for (int k = 0; k < 2; k++)
-        cell.tangent[k] += static_cast<float> (entry->point_count) * entry->tangent[k];
+        cell.tangent[k] += entry->weight * entry->tangent[k];
     rows.put (rows.cell (number, layer.plane, layer.column), cell);
   }
 }

@@ -33,14 +33,17 @@ struct PointRun {
 
 /** The points of one view in one layer of one unit. */
 struct UnitEntry {
-  float x = 0, z = 0;     ///< mean of the points, cylinder coordinates, metres
-  float radius = 0;       ///< mean of the points, metres
-  float tangent[2] = {};  ///< x, z; unit vector, the way phi grows; 0, 0 if not known
-  float layer_radius = 0; ///< of its layer
-  int column = 0;
-  std::uint32_t first_point = 0; ///< in Units::points
-  std::uint32_t point_count = 0;
-  std::uint32_t view = 0; ///< number of the image
+  float radius = 0, x = 0, z = 0; ///< mean of the points, cylinder coordinates, metres
+  float weight = 0;               ///< number of points
+  float tangent[2] = {};          ///< x, z; unit vector, as phi grows; 0, 0 if not known
+  std::uint32_t key = 0;          ///< as in Units::Point
+  std::uint32_t layer = 0;        ///< in Units::layers
+  /** In Units::points; not known where the slice is plain. */
+  std::uint32_t first_point = 0, point_count = 0;
+
+  /** Number of the image in the frame set, not its view-id. */
+  [[nodiscard]] std::uint32_t view () const { return key % kMaxViews; }
+  [[nodiscard]] int column () const { return static_cast<int> (key / kMaxViews); }
 };
 
 /** One surface in one unit: points whose radii have no gap between them. */
@@ -61,7 +64,7 @@ public:
   struct Point {
     float radius, x, z;
     std::uint32_t index; ///< in the cloud
-    std::uint32_t view;  ///< number of the image
+    std::uint32_t key;   ///< column * kMaxViews + number of the image
   };
 
   /** Sorts points (in cylinder coordinates, with radius and column as to_wall() gives them) into
