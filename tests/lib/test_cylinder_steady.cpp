@@ -394,6 +394,29 @@ TEST (Bodies, winners_do_not_change_when_another_body_comes_and_goes)
   }
 }
 
+TEST (Bodies, one_thread_and_many_give_the_same_over_several_frames)
+{
+  const Rig rig = ring_rig (6);
+  const Surface people = both (ellipsoid ({-0.15, 0, 0}, {0.07, 0.2, 0.08}),
+      ellipsoid ({0.15, 0, 0.05}, {0.07, 0.19, 0.08}));
+  CylinderFilter one, many;
+  ASSERT_TRUE (one.set_rig (rig).ok () && many.set_rig (rig).ok ());
+  std::mt19937 random (11);
+  for (int i = 0; i < 3; i++) {
+    Frame first (rig, people);
+    first.add_noise (random, 0.2);
+    Frame second = first;
+    CylinderSettings settings;
+    const CylinderResult a = run (one, first, settings);
+    settings.threads = 5;
+    const CylinderResult b = run (many, second, settings);
+    EXPECT_TRUE (first == second);
+    EXPECT_EQ (a.bodies, 2);
+    EXPECT_EQ (a.units_changed, b.units_changed);
+    EXPECT_EQ (a.units_held, b.units_held);
+  }
+}
+
 TEST (Bodies, stray_points_are_no_body)
 {
   const Rig rig = ring_rig (4);

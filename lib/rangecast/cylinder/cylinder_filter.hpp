@@ -72,6 +72,10 @@ struct CylinderResult {
  *    layer gap behind it, and in the pixels beside no such point that goes. Where two regions meet
  *    they overlap by a pixel.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
+ *  - Added to |N . a| is something for the view that won the unit in the frame before (hysteresis)
+ *    and for those that won its neighbours (agreement).
+ *  - Bodies that stand beside each other have a cylinder each (Bodies).
+ *  - Of more than four surfaces in a unit, those beyond the fourth stay (UnitRows).
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
 public:
