@@ -85,25 +85,16 @@ Bodies::spread ()
     });
 }
 
+/* Labels connected places, and lists the largest. @return how many are listed */
 int
-Bodies::find (const WorldPoints &cloud, int most)
+Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
 {
-  count_ = 1;
-  if (most <= 1 || cloud.size () == 0)
-    return 1;
-  lay_grid (cloud);
-  count_points (cloud);
   /* A place with a point or two is noise between bodies, not a bridge. */
   const std::uint32_t least = 1 + counted_ / 5000;
   for (std::uint32_t &points : points_)
     points = points > least ? points : 0;
   labels_.assign (kSide * kSide, 0);
   queue_.reserve (kSide * kSide);
-  struct Found {
-    std::uint32_t points;
-    std::uint16_t label;
-  };
-  std::array<Found, kMaxBodies + 1> found{};
   int count = 0;
   std::uint16_t label = 0;
   const auto enough = static_cast<std::uint32_t> (kLeastShare * counted_);
@@ -120,7 +111,19 @@ Bodies::find (const WorldPoints &cloud, int most)
     });
     found[most] = {};
   }
-  count_ = std::max (1, count);
+  return count;
+}
+
+int
+Bodies::find (const WorldPoints &cloud, int most)
+{
+  count_ = 1;
+  if (most <= 1 || cloud.size () == 0)
+    return 1;
+  lay_grid (cloud);
+  count_points (cloud);
+  std::array<Found, kMaxBodies + 1> found{};
+  count_ = std::max (1, label_places (most, found));
   if (count_ == 1)
     return 1;
   body_.assign (kSide * kSide, kNobody);

@@ -38,6 +38,11 @@ private:
 
   void lay_grid (const WorldPoints &cloud);
   void count_points (const WorldPoints &cloud);
+  struct Found {
+    std::uint32_t points = 0;
+    std::uint16_t label = 0;
+  };
+  int label_places (int most, std::array<Found, kMaxBodies + 1> &found);
   std::uint32_t fill_body (std::uint16_t place, std::uint16_t label);
   void spread ();
   [[nodiscard]] int place_of (float x, float z) const
