@@ -39,6 +39,9 @@ enum {
   PROP_LAYER_GAP,
   PROP_SMOOTHING,
   PROP_HIDDEN_GAP,
+  PROP_HYSTERESIS,
+  PROP_AGREEMENT,
+  PROP_BODIES,
   PROP_N_THREADS,
   PROP_STATS,
 };
@@ -46,11 +49,14 @@ enum {
 enum GstCylinderFilterMode { GST_CYLINDER_FILTER_OFF, GST_CYLINDER_FILTER_WINNER };
 
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006;
-static constexpr int kDefaultColumns = 360;
+                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006,
+                        kDefaultHysteresis = 0.2, kDefaultAgreement = 0.1;
+static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
 struct CylinderCounts {
-  guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0;
+  guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0, units_held = 0,
+          units_changed = 0;
+  int bodies = 0;
   rangecast::Axis axis;
 };
 
@@ -60,7 +66,9 @@ struct GstCylinderFilterPrivate {
   rangecast::CylinderSettings settings;
   CylinderCounts counts;
 
-  rangecast::CylinderFilter core; /* streaming thread only */
+  /* Streaming thread only. */
+  rangecast::CylinderFilter core;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
 };
 
 struct _GstCylinderFilter {
@@ -143,7 +151,22 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.points_out += result.points_out;
   counts.units += result.units;
   counts.units_shared += result.units_shared;
+  counts.units_held += result.units_held;
+  counts.units_changed += result.units_changed;
+  counts.bodies = result.bodies;
   counts.axis = result.axis;
+}
+
+/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
+ */
+static bool
+gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  return !known || now <= last || now - last > GST_SECOND / 2;
 }
 
 static GstFlowReturn
@@ -158,6 +181,8 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     return GST_FLOW_OK;
 
+  if (gst_cylinder_filter_begins_anew (priv, buffer))
+    priv->core.reset ();
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
   rangecast::CylinderResult result;
   rangecast::Status status = frame.status ();
@@ -186,6 +211,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
   const std::lock_guard guard (priv->lock);
   priv->counts = {};
   priv->core.reset ();
+  priv->last_pts = GST_CLOCK_TIME_NONE;
   return TRUE;
 }
 
@@ -274,6 +300,15 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_HIDDEN_GAP:
       settings.hidden_gap_m = g_value_get_double (value);
       break;
+    case PROP_HYSTERESIS:
+      settings.hysteresis = g_value_get_double (value);
+      break;
+    case PROP_AGREEMENT:
+      settings.agreement = g_value_get_double (value);
+      break;
+    case PROP_BODIES:
+      settings.bodies = g_value_get_int (value);
+      break;
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
       break;
@@ -285,10 +320,12 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
 static GstStructure *
 gst_cylinder_filter_stats (const CylinderCounts &counts)
 {
-  GstStructure *stats = gst_structure_new ("application/x-cylinderfilter-stats", "frames",
-      G_TYPE_UINT64, counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out",
-      G_TYPE_UINT64, counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared",
-      G_TYPE_UINT64, counts.units_shared, nullptr);
+  GstStructure *stats =
+      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
+          counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
+          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
+          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
   const char *names[] = {"axis-position", "axis-direction"};
   const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
   for (int i = 0; i < 2; i++) {
@@ -334,6 +371,15 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
     case PROP_HIDDEN_GAP:
       g_value_set_double (value, settings.hidden_gap_m);
       break;
+    case PROP_HYSTERESIS:
+      g_value_set_double (value, settings.hysteresis);
+      break;
+    case PROP_AGREEMENT:
+      g_value_set_double (value, settings.agreement);
+      break;
+    case PROP_BODIES:
+      g_value_set_int (value, settings.bodies);
+      break;
     case PROP_N_THREADS:
       g_value_set_int (value, settings.threads);
       break;
@@ -361,6 +407,9 @@ gst_cylinder_filter_init (GstCylinderFilter *self)
   self->priv->settings.units = {
       kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
   self->priv->settings.hidden_gap_m = kDefaultHiddenGap;
+  self->priv->settings.hysteresis = kDefaultHysteresis;
+  self->priv->settings.agreement = kDefaultAgreement;
+  self->priv->settings.bodies = kDefaultBodies;
   self->priv->settings.threads = 0;
   gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
 }
@@ -389,6 +438,11 @@ install_axis_properties (GObjectClass *object_class, GParamFlags flags)
           "For axis=fixed: a point of the axis, <x, y, z> in the world, metres (default: <0, 0, "
           "0>)",
           flags));
+  g_object_class_install_property (object_class, PROP_BODIES,
+      g_param_spec_int ("bodies", "Bodies",
+          "Bodies that stand beside each other get a cylinder each, so many at most, 1 to 8; 1 is "
+          "one cylinder for all, and so is axis=fixed (default: 4)",
+          1, rangecast::kMaxBodies, kDefaultBodies, controllable));
   g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
       vector_spec ("axis-direction", "Axis direction",
           "For axis=fixed: its direction, <x, y, z> in the world, any length (default: <0, 1, 0>)",
@@ -424,6 +478,21 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
 }
 
 static void
+install_steadiness_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_HYSTERESIS,
+      g_param_spec_double ("hysteresis", "Hysteresis",
+          "A unit changes its view only if the other one looks at it more squarely by this cosine, "
+          "0 to 2; 0 forgets every frame (default: 0.2)",
+          0, 2, kDefaultHysteresis, controllable));
+  g_object_class_install_property (object_class, PROP_AGREEMENT,
+      g_param_spec_double ("agreement", "Agreement",
+          "Cosine that a view gains in a unit whose neighbours it won, 0 to 2 (default: 0.1)", 0, 2,
+          kDefaultAgreement, controllable));
+}
+
+static void
 gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -438,14 +507,15 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
 
   install_axis_properties (object_class, flags);
   install_unit_properties (object_class, flags);
+  install_steadiness_properties (object_class, flags);
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
           "Views and slices worked on at the same time, 0 to 64; 0 = number of cores (default: 0)",
           0, 64, 0, flags));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "frames, points-in, points-out, units, units-shared since READY; axis-position, "
-          "axis-direction of the last frame",
+          "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
+          "READY; bodies, axis-position, axis-direction of the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

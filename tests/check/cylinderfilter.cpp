@@ -190,6 +190,104 @@ GST_START_TEST (test_stats_count_frames_points_and_units)
 }
 GST_END_TEST;
 
+/* Winners that last frame's winners had a word in. */
+static guint64
+held_by_frame (
+    GstHarness *h, GstElement *element, const Rig &rig, bool discont, GstClockTime time = 0)
+{
+  const guint64 before = stat (element, "units-held");
+  GstBuffer *in = make_frame_set (rig, time);
+  if (discont)
+    GST_BUFFER_FLAG_SET (in, GST_BUFFER_FLAG_DISCONT);
+  gst_buffer_unref (gst_harness_push_and_pull (h, in));
+  return stat (element, "units-held") - before;
+}
+
+GST_START_TEST (test_forgets_winners_on_discont_flush_and_new_caps)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), 0);
+  const guint64 all = held_by_frame (h, element, rig, false);
+  fail_unless (all > 0);
+  fail_unless_equals_uint64 (stat (element, "units-changed"), 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, true), 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), all);
+
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_start ()));
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  fail_unless (gst_harness_push_event (h, gst_event_new_segment (&segment)));
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), all);
+
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 15, 1)));
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  held_by_frame (h, element, rig, true, 0);
+  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 30) > 0);
+  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 10) > 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, 5 * GST_SECOND), 0);
+  fail_unless (held_by_frame (h, element, rig, false, 9 * GST_SECOND) > 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, GST_SECOND), 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_bodies_and_steadiness_may_change_while_playing)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig);
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  for (int bodies : {1, 8}) {
+    g_object_set (element, "bodies", bodies, "hysteresis", bodies / 8.0, "agreement", 2.0, nullptr);
+    gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+    GstStructure *stats = nullptr;
+    gint count = 0;
+    g_object_get (element, "stats", &stats, nullptr);
+    fail_unless (gst_structure_get_int (stats, "bodies", &count) && count >= 1 && count <= bodies);
+    gst_structure_free (stats);
+  }
+  double hysteresis = 0, agreement = 0;
+  int bodies = 0;
+  g_object_get (
+      element, "bodies", &bodies, "hysteresis", &hysteresis, "agreement", &agreement, nullptr);
+  fail_unless_equals_int (bodies, 8);
+  fail_unless_equals_float (hysteresis, 1);
+  fail_unless_equals_float (agreement, 2);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_views_of_one_pixel_and_64_views_pass)
+{
+  for (int views : {1, 2, 64}) {
+    const Rig rig = ring_rig (views, 16, 16);
+    GstHarness *h = harness_for (rig);
+    for (int i = 0; i < 3; i++) {
+      GstBuffer *out = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 9, 1, 1}));
+      fail_unless_equals_int (gst_buffer_n_range_metas (out), views);
+      fail_unless (points_of_view (out, 0) <= 1);
+      gst_buffer_unref (out);
+    }
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_axis_is_set_as_an_array)
 {
   GstHarness *h = harness_for (ring_rig (2),
@@ -320,6 +418,10 @@ cylinderfilter_suite ()
   tcase_add_test (tc, test_frame_sets_may_lack_views);
   tcase_add_test (tc, test_caps_may_change_in_the_stream);
   tcase_add_test (tc, test_stats_count_frames_points_and_units);
+  tcase_add_test (tc, test_forgets_winners_on_discont_flush_and_new_caps);
+  tcase_add_test (tc, test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is);
+  tcase_add_test (tc, test_bodies_and_steadiness_may_change_while_playing);
+  tcase_add_test (tc, test_views_of_one_pixel_and_64_views_pass);
   tcase_add_test (tc, test_axis_is_set_as_an_array);
   tcase_add_test (tc, test_mode_follows_its_controller);
   tcase_add_test (tc, test_view_that_the_caps_lack_is_one_error_by_name);

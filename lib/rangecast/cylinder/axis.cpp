@@ -5,46 +5,69 @@
 #include <tuple>
 #include <utility>
 
+#include "isa.hpp"
+
 namespace rangecast {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
 constexpr double kLeastSpreadRatio = 1.3;
-/* Share of the new frame's axis. A person moves at up to a metre a second, but turns slowly. */
-constexpr double kFollowPosition = 0.3, kFollowDirection = 0.1;
-
-/* Four sums at a time of what Moments holds, which compilers turn into vector instructions. */
-struct MomentLanes {
-  static constexpr int kLanes = 4;
-  float sum[9][kLanes] = {};
-
-  void add (const float *x, const float *y, const float *z, int lanes)
+/* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
+ * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
+struct Follow {
+  double least, most, far;
+  [[nodiscard]] double share (double off) const
   {
-    for (int l = 0; l < lanes; l++) {
+    return least + (most - least) * std::min (1.0, off / far);
+  }
+};
+constexpr Follow kFollowPosition{0.2, 0.8, 0.02};             /* metres */
+constexpr Follow kFollowDirection{0.05, 0.7, 8 * M_PI / 180}; /* radians */
+
+/* Sums of what Moments holds, eight points at a time. Floats add up exactly enough over a block. */
+struct MomentsLoop {
+  const float *x, *y, *z;
+  std::size_t n;
+  static constexpr std::size_t kBlock = 512;
+
+  static constexpr int kLanes = 8;
+
+  static void add (float (&sum)[9][kLanes], const float *x, const float *y, const float *z, int n)
+  {
+    for (int l = 0; l < n; l++) {
       sum[0][l] += x[l], sum[1][l] += y[l], sum[2][l] += z[l];
       sum[3][l] += x[l] * x[l], sum[4][l] += x[l] * y[l], sum[5][l] += x[l] * z[l];
       sum[6][l] += y[l] * y[l], sum[7][l] += y[l] * z[l], sum[8][l] += z[l] * z[l];
     }
   }
+
+  void run (double (&total)[9]) const
+  {
+    for (std::size_t begin = 0; begin < n; begin += kBlock) {
+      const std::size_t end = std::min (n, begin + kBlock);
+      float sum[9][kLanes] = {};
+      std::size_t i = begin;
+      for (; i + kLanes <= end; i += kLanes)
+        add (sum, x + i, y + i, z + i, kLanes);
+      add (sum, x + i, y + i, z + i, static_cast<int> (end - i));
+      for (int k = 0; k < 9; k++)
+        for (float s : sum[k])
+          total[k] += s;
+    }
+  }
+
+  [[RANGECAST_CYLINDER_ANY]] void run_any (double (&total)[9]) const { run (total); }
+  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 (double (&total)[9]) const { run (total); }
 };
 
 void
 Moments::add (const WorldPoints &points, WorldPoints::Part part)
 {
-  constexpr std::size_t kBlock = 256; /* floats add up exactly enough over this many */
-  constexpr int kLanes = MomentLanes::kLanes;
-  for (std::size_t begin = part.begin; begin < part.end; begin += kBlock) {
-    const auto count = static_cast<int> (std::min (kBlock, part.end - begin));
-    const float *x = points.x.data () + begin, *y = points.y.data () + begin,
-                *z = points.z.data () + begin;
-    MomentLanes lanes;
-    int i = 0;
-    for (; i + kLanes <= count; i += kLanes)
-      lanes.add (x + i, y + i, z + i, kLanes);
-    lanes.add (x + i, y + i, z + i, count - i);
-    for (int k = 0; k < 9; k++)
-      for (float s : lanes.sum[k])
-        (k < 3 ? sum[k] : product[k - 3]) += s;
-  }
+  const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
+      points.z.data () + part.begin, part.size ()};
+  double total[9] = {};
+  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 (total) : loop.run_any (total);
+  for (int k = 0; k < 9; k++)
+    (k < 3 ? sum[k] : product[k - 3]) += total[k];
   n += static_cast<double> (part.size ());
 }
 
@@ -142,11 +165,13 @@ AxisTracker::follow (const Axis &measured)
     axis_ = measured;
     return axis_;
   }
-  axis_.position = axis_.position + kFollowPosition * (measured.position - axis_.position);
+  const Vec3 move = measured.position - axis_.position;
+  axis_.position = axis_.position + kFollowPosition.share (norm (move)) * move;
   /* A nearly level axis may come back the other way round; it is the same line. */
-  const double sign = dot (axis_.direction, measured.direction) < 0 ? -1 : 1;
+  const double cosine = dot (axis_.direction, measured.direction);
+  const double share = kFollowDirection.share (std::acos (std::min (1.0, std::abs (cosine))));
   const Vec3 blend =
-      (1 - kFollowDirection) * axis_.direction + sign * kFollowDirection * measured.direction;
+      (1 - share) * axis_.direction + (cosine < 0 ? -share : share) * measured.direction;
   axis_.direction = 1 / norm (blend) * blend;
   return axis_;
 }

@@ -49,6 +49,8 @@ public:
   /** Takes in one frame's axis; the first is taken as it is. */
   const Axis &follow (const Axis &measured);
   void reset () { started_ = false; }
+  [[nodiscard]] bool started () const { return started_; }
+  [[nodiscard]] const Axis &axis () const { return axis_; }
 
 private:
   bool started_ = false;

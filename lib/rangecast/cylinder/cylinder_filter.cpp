@@ -7,12 +7,9 @@
 #include <limits>
 
 #include "../parallel.hpp"
+#include "isa.hpp"
 
 namespace rangecast {
-
-/* Views that look at a surface more squarely than this, |N . a|, from opposite sides see two
- * surfaces. Well above what noise makes of a camera that looks along the surface. */
-constexpr float kOtherSide = 0.35f;
 
 static Status
 check (const CylinderSettings &settings)
@@ -27,6 +24,11 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
   if (!(settings.hidden_gap_m >= 0 && settings.hidden_gap_m <= 100))
     return bad ("cylinder: hidden gap, expected 0 to 100 metres");
+  if (!(settings.hysteresis >= 0 && settings.hysteresis <= 2) ||
+      !(settings.agreement >= 0 && settings.agreement <= 2))
+    return bad ("cylinder: hysteresis and agreement, expected 0 to 2");
+  if (settings.bodies < 1 || settings.bodies > kMaxBodies)
+    return bad ("cylinder: bodies, expected 1 to 8");
   const double length = norm (settings.fixed_axis.direction);
   if (settings.axis == AxisMode::kFixed &&
       !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
@@ -53,6 +55,14 @@ CylinderFilter::set_rig (const Rig &rig)
   return {};
 }
 
+void
+CylinderFilter::reset ()
+{
+  for (AxisTracker &tracker : trackers_)
+    tracker.reset ();
+  units_.rows.forget ();
+}
+
 Status
 CylinderFilter::take_cameras (std::span<const RangeImage> images)
 {
@@ -64,6 +74,7 @@ CylinderFilter::take_cameras (std::span<const RangeImage> images)
       return {StatusCode::kNotFound,
           "rig: no view " + std::to_string (id) + ", which the frame set has"};
     rays_[i] = rig_rays_[id];
+    ids_[i] = id;
   }
   return {};
 }
@@ -71,44 +82,147 @@ CylinderFilter::take_cameras (std::span<const RangeImage> images)
 void
 CylinderFilter::make_points (std::span<const RangeImage> images, int threads)
 {
-  in_parallel (images.size (), threads, [&] (std::size_t i) {
-    cloud_.fill (i, images[i], rays_[i]);
-    moments_[i] = {};
-    moments_[i].add (cloud_, cloud_.parts ()[i]);
+  in_parallel (
+      images.size (), threads, [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
+}
+
+/* Sorts the points by body, and adds each body's up. */
+void
+CylinderFilter::find_bodies (const CylinderSettings &settings)
+{
+  const auto parts = cloud_.parts ();
+  body_count_ = bodies_.find (cloud_, settings.axis == AxisMode::kFixed ? 1 : settings.bodies);
+  const auto bodies = static_cast<std::size_t> (body_count_);
+  runs_.resize (parts.size () * bodies);
+  moments_.resize (runs_.size ());
+  in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
+    std::array<std::size_t, kMaxBodies> ends{parts[i].end};
+    if (bodies > 1)
+      bodies_.sort_part (cloud_, i, ends);
+    std::size_t begin = parts[i].begin;
+    for (std::size_t b = 0; b < bodies; b++) {
+      PointRun &run = runs_[i * bodies + b];
+      run = {begin, ends[b], static_cast<std::uint32_t> (i), static_cast<std::uint32_t> (b)};
+      begin = run.end;
+      moments_[i * bodies + b] = {};
+      moments_[i * bodies + b].add (cloud_, {run.begin, run.end});
+    }
   });
 }
 
+/* Gives each body the place that it had in the frame before: the nearest pair of a body and a place
+ * first, if they are nearer than half a metre; bodies that are left get places where nobody was. */
 void
-CylinderFilter::choose_axis (const CylinderSettings &settings, std::size_t images)
+CylinderFilter::choose_slots (const std::array<Axis, kMaxBodies> &measured)
 {
-  if (settings.axis == AxisMode::kFixed) {
-    const Vec3 direction = settings.fixed_axis.direction;
-    axis_ = {
-        settings.fixed_axis.position, (direction.y < 0 ? -1 : 1) / norm (direction) * direction};
-    tracker_.reset ();
-    return;
+  constexpr double kFar = 0.5;
+  slots_.fill (-1);
+  unsigned taken = 0;
+  const auto take = [&] (int body, int slot) {
+    slots_[body] = slot;
+    taken |= 1u << slot;
+  };
+  for (int pair = 0; pair < body_count_; pair++) {
+    double least = kFar;
+    int best_body = -1, best_slot = -1;
+    for (int body = 0; body < body_count_; body++)
+      for (int slot = 0; slot < kMaxBodies; slot++) {
+        if (slots_[body] >= 0 || (taken >> slot & 1) || !trackers_[slot].started ())
+          continue;
+        const double distance = norm (trackers_[slot].axis ().position - measured[body].position);
+        if (distance < least)
+          least = distance, best_body = body, best_slot = slot;
+      }
+    if (best_body >= 0)
+      take (best_body, best_slot);
   }
-  Moments all;
-  for (std::size_t i = 0; i < images; i++)
-    all += moments_[i];
-  axis_ = tracker_.follow (axis_of_points (settings.axis, all, {rays_.data (), images}));
+  for (int slot = 0; slot < kMaxBodies; slot++)
+    if (!(taken >> slot & 1))
+      trackers_[slot].reset ();
+  for (int body = 0, slot = 0; body < body_count_; body++) {
+    while (slots_[body] < 0 && (taken >> slot & 1))
+      slot++;
+    if (slots_[body] < 0)
+      take (body, slot);
+  }
 }
 
 void
-CylinderFilter::unroll (int columns, int threads)
+CylinderFilter::choose_axes (const CylinderSettings &settings, std::size_t images)
 {
-  const CylinderFrame frame (axis_);
+  if (settings.axis == AxisMode::kFixed) {
+    const Vec3 direction = settings.fixed_axis.direction;
+    const double up = direction.y < 0 ? -1 : 1;
+    axis_ = axes_[0] = {settings.fixed_axis.position, up / norm (direction) * direction};
+    slots_[0] = 0;
+    for (AxisTracker &tracker : trackers_)
+      tracker.reset ();
+    return;
+  }
+  std::array<Axis, kMaxBodies> measured;
+  const auto bodies = static_cast<std::size_t> (body_count_);
+  for (std::size_t body = 0; body < bodies; body++) {
+    Moments all;
+    for (std::size_t i = 0; i < images; i++)
+      all += moments_[i * bodies + body];
+    measured[body] = axis_of_points (settings.axis, all, {rays_.data (), images});
+  }
+  choose_slots (measured);
+  for (std::size_t body = 0; body < bodies; body++) {
+    const int slot = slots_[body];
+    axes_[slot] = trackers_[slot].follow (measured[body]);
+  }
+  axis_ = axes_[slots_[0]];
+}
+
+/* Where cameras are about a body's cylinder. */
+void
+CylinderFilter::look_from (int body, const CylinderFrame &frame, std::size_t images)
+{
+  const Mat3 world_from_body = transposed (frame.rotation);
+  for (std::size_t i = 0; i < images; i++) {
+    const float *a = rays_[i].optical_axis;
+    const Vec3 optical = frame.rotation * Vec3{a[0], a[1], a[2]};
+    rules_.optical[body][i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+    const PixelLookup &world = rig_lookups_[ids_[i]];
+    for (int k = 0; k < 3; k++) {
+      const float *row = world.rows[k];
+      const Vec3 r{row[0], row[1], row[2]};
+      const Mat3 &m = world_from_body;
+      const double turned[] = {dot (r, {m[0], m[3], m[6]}), dot (r, {m[1], m[4], m[7]}),
+          dot (r, {m[2], m[5], m[8]}), dot (r, frame.origin) + row[3]};
+      for (int c = 0; c < 4; c++)
+        lookups_[body][i].rows[k][c] = static_cast<float> (turned[c]);
+    }
+  }
+}
+
+void
+CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
+{
+  std::array<CylinderFrame, kMaxBodies> frames;
+  for (int body = 0; body < body_count_; body++) {
+    const int slot = slots_[body];
+    frames[slot] = CylinderFrame (axes_[slot]);
+    look_from (slot, frames[slot], images);
+  }
   if (radius_.size () < cloud_.x.size ()) {
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
-  in_parallel (cloud_.parts ().size (), threads, [&] (std::size_t i) {
-    ranges_[i] =
-        to_wall (cloud_, cloud_.parts ()[i], frame, columns, radius_.data (), column_.data ());
-    const float *a = rays_[i].optical_axis;
-    const Vec3 optical = frame.rotation * Vec3{a[0], a[1], a[2]};
-    optical_[i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+  run_ranges_.resize (runs_.size ());
+  in_parallel (runs_.size (), settings.threads, [&] (std::size_t i) {
+    runs_[i].body = static_cast<std::uint32_t> (slots_[runs_[i].body]);
+    run_ranges_[i] = to_wall (cloud_, {runs_[i].begin, runs_[i].end}, frames[runs_[i].body],
+        settings.units.columns, radius_.data (), column_.data ());
   });
+  constexpr float kHuge = std::numeric_limits<float>::max ();
+  ranges_.fill ({kHuge, -kHuge});
+  for (std::size_t i = 0; i < runs_.size (); i++) {
+    WallRange &range = ranges_[runs_[i].body];
+    range.y_min = std::min (range.y_min, run_ranges_[i].y_min);
+    range.y_max = std::max (range.y_max, run_ranges_[i].y_max);
+  }
 }
 
 static std::uint64_t
@@ -145,101 +259,151 @@ CylinderFilter::work (
     return status;
   make_points (images, settings.threads);
   result.points_in = result.points_out = cloud_.size ();
-  if (result.points_in > 0)
-    choose_axis (settings, images.size ());
+  if (result.points_in > 0) {
+    find_bodies (settings);
+    choose_axes (settings, images.size ());
+    result.bodies = body_count_;
+  }
   result.axis = axis_;
   if (views_with_points (cloud_) < 2)
     return {};
-  unroll (settings.units.columns, settings.threads);
-  WallRange range = ranges_[0];
-  for (std::size_t i = 1; i < images.size (); i++) {
-    range.y_min = std::min (range.y_min, ranges_[i].y_min);
-    range.y_max = std::max (range.y_max, ranges_[i].y_max);
-  }
-  units_.sort (cloud_, radius_, column_, range, settings.units);
-  units_.find_tangents (settings.threads);
-  units_.smooth (settings.threads);
-  result.units = units_.occupied;
-  result.units_shared = units_.shared;
-  mark_losers ();
+  unroll (settings, images.size ());
+  units_.sort (cloud_, radius_, column_, runs_, ranges_, settings.units, settings.threads);
+  set_rules (settings, images.size ());
+  decide_units (settings, result);
+  find_cells ();
+  list_losers (images);
   if (settings.hidden_gap_m > 0)
     keep_uncovered (images, settings);
   clear_losers (images);
+  units_.rows.remember (rules_, ids_);
   result.points_out -= losers_.size ();
   return {};
 }
 
-/* The views that stay in a layer: one, or two that look at it from opposite sides. */
-std::uint64_t
-CylinderFilter::winners (const UnitLayer &layer) const
+void
+CylinderFilter::set_rules (const CylinderSettings &settings, std::size_t images)
 {
-  float tx = layer.tangent[0], tz = layer.tangent[1];
-  if (const float length = std::sqrt (tx * tx + tz * tz); length > 1e-6f) {
-    tx /= length, tz /= length;
-  } else {
-    const UnitEntry &entry = units_.entries[layer.first_entry];
-    const float r = std::max (entry.radius, 1e-6f);
-    tx = -entry.z / r, tz = entry.x / r;
-  }
-  /* Least (greatest) facing: who sees the outside (inside) most squarely. */
-  float least = std::numeric_limits<float>::max (), greatest = -least;
-  int outside = 0, inside = 0;
-  for (std::uint64_t rest = layer.covering; rest; rest &= rest - 1) {
-    const int view = std::countr_zero (rest);
-    const float facing = tz * optical_[view][0] - tx * optical_[view][1];
-    if (facing < least)
-      least = facing, outside = view;
-    if (facing > greatest)
-      greatest = facing, inside = view;
-  }
-  const std::uint64_t out = std::uint64_t{1} << outside, in = std::uint64_t{1} << inside;
-  if (least < -kOtherSide && greatest > kOtherSide)
-    return out | in;
-  return -least >= greatest ? out : in;
+  /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
+   */
+  constexpr double kMostSlices = 8;
+  const UnitSettings &units = settings.units;
+  const double slices = std::min (units.smoothing_m / units_.slice_height_m, kMostSlices);
+  rules_.layer_gap = static_cast<float> (units.layer_gap_m);
+  rules_.smoothing_columns = static_cast<float> (units.smoothing_m * units.columns / (2 * M_PI));
+  rules_.most_columns = std::min (float{UnitRows::kPad}, static_cast<float> (units.columns / 4));
+  rules_.smoothing_slices = units.smoothing_m > 0 ? static_cast<int> (slices + 0.5) : 0;
+  rules_.hysteresis = static_cast<float> (settings.hysteresis);
+  rules_.agreement = static_cast<float> (settings.agreement);
+  rules_.images = static_cast<int> (images);
 }
 
 void
-CylinderFilter::mark_losers ()
+CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &result)
 {
-  losers_.clear ();
-  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
-  for (const UnitLayer &layer : units_.layers) {
-    if (!(layer.covering & (layer.covering - 1)))
+  const std::size_t slices = units_.slices.size ();
+  in_parallel (slices, settings.threads, [&] (std::size_t s) {
+    units_.find_tangents (static_cast<int> (s));
+    units_.rows.sum_along (rules_, static_cast<int> (s));
+  });
+  in_parallel (slices, settings.threads,
+      [&] (std::size_t s) { units_.rows.sum_across (rules_, static_cast<int> (s)); });
+  units_.rows.recall (ids_, rules_.images);
+  const RowCounts counts = units_.rows.decide (rules_, settings.threads);
+  result.units_held = counts.held;
+  result.units_changed = counts.changed;
+  for (const Units::Slice &slice : units_.slices) {
+    result.units += slice.occupied;
+    result.units_shared += slice.shared;
+  }
+}
+
+/* Where units of a slice have several layers, a point's column does not tell its cell. */
+void
+CylinderFilter::find_cells ()
+{
+  cell_of_.resize (std::max (cell_of_.size (), cloud_.x.size ()));
+  const UnitRows &rows = units_.rows;
+  for (std::size_t s = 0; s < units_.slices.size (); s++) {
+    const auto number = static_cast<int> (s);
+    if (units_.slices[s].planes < 2)
       continue;
-    const std::uint64_t stay = winners (layer);
-    const UnitEntry *entry = &units_.entries[layer.first_entry];
-    for (std::uint64_t rest = layer.views; rest; rest &= rest - 1, entry++) {
-      if (stay >> entry->view & 1)
-        continue;
-      const std::uint64_t rivals = layer.covering & ~(std::uint64_t{1} << entry->view);
-      for (std::uint32_t i = 0; i < entry->point_count; i++)
-        losers_.push_back ({rivals, cloud_.pixel[units_.points[entry->first_point + i].index],
-            static_cast<std::uint8_t> (entry->view)});
+    for (const UnitLayer &layer : units_.layers_of (units_.slices[s])) {
+      const std::uint32_t cell =
+          units_.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
+      for (std::uint32_t e = 0; e < layer.entry_count; e++) {
+        const UnitEntry &entry = units_.entries[layer.first_entry + e];
+        for (std::uint32_t i = 0; i < entry.point_count; i++)
+          cell_of_[units_.points[entry.first_point + i].index] = cell;
+      }
     }
   }
 }
 
-/* What a view has in the pixel and its neighbours where it sees a point at depth z. */
+/* In the order of the cloud, in which neighbours follow each other and meet the same pixels. */
+void
+CylinderFilter::list_losers (std::span<const RangeImage> images)
+{
+  losers_.clear ();
+  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
+  const UnitRows &rows = units_.rows;
+  for (const PointRun &run : runs_) {
+    const auto view = static_cast<int> (run.view);
+    const auto width = static_cast<std::uint32_t> (images[run.view].depth.width);
+    const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[run.view].begin);
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const auto slice = static_cast<int> (units_.slice_of[i]);
+      const std::uint32_t cell =
+          units_.is_plain (units_.slice_of[i]) ? rows.cell (slice, 0, column_[i]) : cell_of_[i];
+      if (cell == kNoCell || rows.winner (cell) == view || rows.second (cell) == view)
+        continue;
+      const std::uint32_t pixel = cloud_.pixel[i];
+      losers_.push_back (
+          {static_cast<std::uint32_t> (i), begin + (pixel >> 16) * width + (pixel & 0xffff), cell,
+              static_cast<std::uint8_t> (run.view), static_cast<std::uint8_t> (run.body)});
+    }
+  }
+}
+
+/* What a view has in the pixel and its neighbours where it sees a point at depth z. Without
+ * branches but one: what neighbours have is a coin toss along every seam. */
 bool
 CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
 {
+  using I = Narrow::I;
   const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
-  const int left = static_cast<int> (std::floor (x)), top = static_cast<int> (std::floor (y));
-  const int column = static_cast<int> (std::floor (x + 0.5f)),
-            row = static_cast<int> (std::floor (y + 0.5f));
-  bool covered = false;
-  for (int py = top; py <= top + 1; py++)
-    for (int px = left; px <= left + 1; px++) {
-      if (px < 0 || py < 0 || px >= image.depth.width || py >= image.depth.height)
+  const int width = image.depth.width, height = image.depth.height;
+  if (!(x > -1 && y > -1 && x < static_cast<float> (width) && y < static_cast<float> (height)))
+    return false;
+  const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
+  const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
+                      (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
+  const std::uint8_t *lost = lost_.data () + cloud_.parts ()[i].begin;
+  /* Most that do not cover have lost the place themselves. */
+  const int column = left + nearest % 2, row = top + nearest / 2;
+  if (column < 0 || row < 0 || column >= width || row >= height ||
+      lost[static_cast<std::size_t> (row) * width + column])
+    return false;
+  I depth = {}, gone = {};
+  if (left >= 0 && top >= 0 && left + 1 < width && top + 1 < height) {
+    const std::uint16_t *upper = image.depth.row (top) + left,
+                        *lower = image.depth.row (top + 1) + left;
+    const std::uint8_t *flags = lost + static_cast<std::size_t> (top) * width + left;
+    depth = I{upper[0], upper[1], lower[0], lower[1]};
+    gone = I{flags[0], flags[1], flags[width], flags[width + 1]};
+  } else {
+    for (int k = 0; k < 4; k++) {
+      const int px = left + k % 2, py = top + k / 2;
+      if (px < 0 || py < 0 || px >= width || py >= height)
         continue;
-      const std::uint16_t there = image.depth.at (px, py);
-      if (there == kInvalidDepth || z - there > behind_[i] || there - z > before_[i])
-        continue;
-      if (lost_[cloud_.parts ()[i].begin + static_cast<std::size_t> (py) * image.depth.width + px])
-        return false; /* the winner's region ends here: overlap by a pixel */
-      covered |= px == column && py == row;
+      depth[k] = image.depth.at (px, py);
+      gone[k] = lost[static_cast<std::size_t> (py) * width + px];
     }
-  return covered;
+  }
+  const Narrow::F behind = z - __builtin_convertvector(depth, Narrow::F);
+  const I same = (depth != kInvalidDepth) & (behind <= behind_[i]) & (-behind <= before_[i]);
+  /* Where the winner's region ends the two overlap by a pixel. */
+  return same[nearest] != 0 && !Narrow::any (same & (gone != 0));
 }
 
 /* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
@@ -249,21 +413,25 @@ CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v
 bool
 CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
 {
-  const RangeImage &image = images[loser.image];
-  const int column = static_cast<int> (loser.pixel & 0xffff),
-            row = static_cast<int> (loser.pixel >> 16);
-  float point[3];
-  rays_[loser.image].point (static_cast<float> (image.roi.x + column),
-      static_cast<float> (image.roi.y + row), image.depth.at (column, row), point);
-  for (std::uint64_t rest = loser.rivals; rest; rest &= rest - 1) {
-    const auto i = static_cast<std::size_t> (std::countr_zero (rest));
-    float u, v, z;
-    rig_lookups_[images[i].view_id].find (point, u, v, z);
-    constexpr float kFar = 1e6f; /* pixels; keeps what follows within integers */
-    if (z > 0 && std::abs (u) < kFar && std::abs (v) < kFar && covers (i, images[i], u, v, z))
+  const int winner = units_.rows.winner (loser.cell);
+  std::uint64_t rivals = units_.rows.covering (loser.cell) & ~(std::uint64_t{1} << loser.image);
+  /* Most often it is the winner. */
+  if ((rivals >> winner & 1) && is_covered_by (images, loser, static_cast<std::size_t> (winner)))
+    return true;
+  for (rivals &= ~(std::uint64_t{1} << winner); rivals; rivals &= rivals - 1)
+    if (is_covered_by (images, loser, static_cast<std::size_t> (std::countr_zero (rivals))))
       return true;
-  }
   return false;
+}
+
+bool
+CylinderFilter::is_covered_by (
+    std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const
+{
+  const float point[] = {cloud_.x[loser.point], cloud_.y[loser.point], cloud_.z[loser.point]};
+  float u, v, z;
+  lookups_[loser.body][rival].find (point, u, v, z);
+  return z > 0 && covers (rival, images[rival], u, v, z);
 }
 
 /* One after the other, so that of two losers at one place only the first stays. */
@@ -278,28 +446,23 @@ CylinderFilter::keep_uncovered (
   }
   lost_.assign (cloud_.x.size (), 0);
   for (const Loser &loser : losers_)
-    lost_[place (images, loser)] = 1;
+    lost_[loser.place] = 1;
   std::erase_if (losers_, [&] (const Loser &loser) {
     if (is_covered (images, loser))
       return false;
-    lost_[place (images, loser)] = 0;
+    lost_[loser.place] = 0;
     return true;
   });
-}
-
-std::size_t
-CylinderFilter::place (std::span<const RangeImage> images, const Loser &loser) const
-{
-  const auto width = static_cast<std::size_t> (images[loser.image].depth.width);
-  return cloud_.parts ()[loser.image].begin + (loser.pixel >> 16) * width + (loser.pixel & 0xffff);
 }
 
 void
 CylinderFilter::clear_losers (std::span<const RangeImage> images) const
 {
-  for (const Loser &loser : losers_)
-    images[loser.image].depth.at (static_cast<int> (loser.pixel & 0xffff),
-        static_cast<int> (loser.pixel >> 16)) = kInvalidDepth;
+  for (const Loser &loser : losers_) {
+    const std::uint32_t pixel = cloud_.pixel[loser.point];
+    images[loser.image].depth.at (
+        static_cast<int> (pixel & 0xffff), static_cast<int> (pixel >> 16)) = kInvalidDepth;
+  }
 }
 
 } // namespace rangecast

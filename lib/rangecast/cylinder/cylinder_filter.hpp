@@ -10,6 +10,7 @@
 #include "../geometry/rig.hpp"
 #include "../status.hpp"
 #include "axis.hpp"
+#include "bodies.hpp"
 #include "units.hpp"
 #include "world_points.hpp"
 
@@ -23,6 +24,15 @@ struct CylinderSettings {
    *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
   double hidden_gap_m = 0.006;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
+  /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
+   *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
+  double hysteresis = 0.2;
+  /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
+   *  each), 0 .. 2. 0 = none. */
+  double agreement = 0.1;
+  /** Bodies that stand beside each other get a cylinder each, so many at most, 1 .. kMaxBodies; 1:
+   *  one cylinder for all. Not with AxisMode::kFixed. */
+  int bodies = 4;
 };
 
 /** What one frame came to. */
@@ -31,7 +41,11 @@ struct CylinderResult {
   std::uint64_t points_out = 0;   ///< valid pixels after
   std::uint64_t units = 0;        ///< units with points
   std::uint64_t units_shared = 0; ///< units with points of more than one view
-  Axis axis;                      ///< the cylinder's
+  Axis axis;                      ///< of the cylinder of the largest body
+  int bodies = 0;                 ///< cylinders
+  /** Surfaces in units that some view won in the frame before, too; and those of them that another
+   *  view won now. */
+  std::uint64_t units_held = 0, units_changed = 0;
 };
 
 /** Clears the points that several views see of the same place, all but those of the view that sees
@@ -58,13 +72,17 @@ struct CylinderResult {
  *    layer gap behind it, and in the pixels beside no such point that goes. Where two regions meet
  *    they overlap by a pixel.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
+ *  - Added to |N . a| is something for the view that won the unit in the frame before (hysteresis)
+ *    and for those that won its neighbours (agreement).
+ *  - Bodies that stand beside each other have a cylinder each (Bodies).
+ *  - Of more than four surfaces in a unit, those beyond the fourth stay (UnitRows).
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
 public:
   /** Takes the cameras and forgets the stream. All views must be range views. */
   Status set_rig (const Rig &rig);
-  /** Forgets where the axis was. */
-  void reset () { tracker_.reset (); }
+  /** Forgets where the axis was and who won. */
+  void reset ();
 
   /** Clears depths in place. A frame set of less than two images with points is left alone.
    *  Nothing is allocated once the largest frame set has been seen.
@@ -73,47 +91,77 @@ public:
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
+  /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
+   *  the other, from the lowest up. */
+  [[nodiscard]] int unit_slices () const { return units_.rows.old_slices (); }
+  /** The view-id of the winner of a unit's outermost surface; -1 where there is none. */
+  [[nodiscard]] int unit_winner (int slice, int column) const
+  {
+    return units_.rows.old_winner (slice, column);
+  }
+
 private:
   /* A point in a unit that another view won. */
   struct Loser {
-    std::uint64_t rivals; /* bit i: image i competes for the unit, too */
-    std::uint32_t pixel;  /* as in WorldPoints */
-    std::uint8_t image;
+    std::uint32_t point; /* in the cloud */
+    std::uint32_t place; /* in lost_ */
+    std::uint32_t cell;  /* in the rows */
+    std::uint8_t image, body;
   };
 
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
   void make_points (std::span<const RangeImage> images, int threads);
-  void choose_axis (const CylinderSettings &settings, std::size_t images);
-  void unroll (int columns, int threads);
-  [[nodiscard]] std::uint64_t winners (const UnitLayer &layer) const;
-  void mark_losers ();
+  void find_bodies (const CylinderSettings &settings);
+  void choose_axes (const CylinderSettings &settings, std::size_t images);
+  void choose_slots (const std::array<Axis, kMaxBodies> &measured);
+  void unroll (const CylinderSettings &settings, std::size_t images);
+  void look_from (int body, const CylinderFrame &frame, std::size_t images);
+  void set_rules (const CylinderSettings &settings, std::size_t images);
+  void decide_units (const CylinderSettings &settings, CylinderResult &result);
+  void find_cells ();
+  void list_losers (std::span<const RangeImage> images);
   void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
   [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
+  [[nodiscard]] bool is_covered_by (
+      std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const;
   [[nodiscard]] bool covers (
       std::size_t i, const RangeImage &image, float u, float v, float z) const;
-  [[nodiscard]] std::size_t place (std::span<const RangeImage> images, const Loser &loser) const;
   void clear_losers (std::span<const RangeImage> images) const;
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
   std::array<float, kMaxViews> rig_units_per_metre_{};
   std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
-  AxisTracker tracker_;
+  /* Of each body. A body keeps its place in these as long as it is there. */
+  std::array<AxisTracker, kMaxBodies> trackers_;
+  Bodies bodies_;
 
   /* Of the present frame; kept for their memory. By number of the image. */
   std::array<PixelRays, kMaxViews> rays_;
-  std::array<Moments, kMaxViews> moments_;
-  std::array<WallRange, kMaxViews> ranges_;
-  std::array<std::array<float, 2>, kMaxViews> optical_; /* x, z of the optical axis */
-  Axis axis_;
+  std::array<int, kMaxViews> ids_{};
+  std::vector<Moments> moments_; /* of each run */
+  /* Where images see points of each body's cylinder. */
+  std::array<std::array<PixelLookup, kMaxViews>, kMaxBodies> lookups_;
+  Axis axis_; /* of the largest body */
+  std::array<Axis, kMaxBodies> axes_;
+  int body_count_ = 0;
+  std::array<int, kMaxBodies> slots_{}; /* of the bodies, the largest first */
   WorldPoints cloud_;
+  std::vector<PointRun> runs_;
+  std::vector<WallRange> run_ranges_;
+  std::array<WallRange, kMaxBodies> ranges_;
   std::vector<float> radius_;
   std::vector<std::int32_t> column_;
   Units units_;
+  RowRules rules_;
 
-  std::vector<Loser> losers_;
+  /* Of each point of the cloud in a slice of several planes; kNoCell for the fifth and further
+   * surfaces of a unit, whose points all stay. */
+  std::vector<std::uint32_t> cell_of_;
+  static constexpr std::uint32_t kNoCell = UINT32_MAX;
+  std::vector<Loser> losers_;      /* in the order of the cloud */
   std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
   /* How far a point may lie behind, or before, what the image has there; in its depth units. */
   std::array<float, kMaxViews> behind_{}, before_{};

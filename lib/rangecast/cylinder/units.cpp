@@ -2,314 +2,372 @@
 #include "units.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <opencv2/core/utility.hpp>
+
+#include "../parallel.hpp"
 
 namespace rangecast {
 
+constexpr std::uint32_t kNone = UINT32_MAX;
+/* Cells of rows, at most; slices beyond have fewer planes. */
+constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
+
 void
 Units::sort (const WorldPoints &cloud, std::span<const float> radius,
-    std::span<const std::int32_t> column, WallRange range, const UnitSettings &settings)
+    std::span<const std::int32_t> column, std::span<const PointRun> runs,
+    std::span<const WallRange> ranges, const UnitSettings &settings, int threads)
 {
   settings_ = settings;
-  const double most = kMaxUnits / settings.columns - 2;
-  const double height = std::max (0.0, double{range.y_max} - range.y_min);
-  const double step = std::max (settings.unit_height_m, height / most);
-  /* Slices begin at multiples of their height from the axis' origin, not at the lowest point. */
-  const double first = std::floor (range.y_min / step);
-  first_y_ = static_cast<float> (first * step);
-  slices_per_metre_ = static_cast<float> (1 / step);
-  slices_ = std::max (1, static_cast<int> (std::floor (range.y_max / step) - first) + 1);
-  count_units (cloud, column);
-  scatter (cloud, radius);
-  cut_into_layers (cloud);
+  lay_out (ranges);
+  count_units (cloud, column, runs);
+  scatter (cloud, radius, column, runs);
+  in_parallel (slices.size (), threads, [&] (std::size_t s) { cut_slice (static_cast<int> (s)); });
+  const auto images = static_cast<int> (cloud.parts ().size ());
+  rows.begin (settings.columns, images, slices.size ());
+  int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
+  for (const Slice &slice : slices) {
+    const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
+    rows.add_slice (slice.body, slice.number, planes);
+    most -= planes;
+  }
+  rows.make_room ();
 }
 
 void
-Units::count_units (const WorldPoints &cloud, std::span<const std::int32_t> column)
+Units::lay_out (std::span<const WallRange> ranges)
 {
-  if (unit_of_.size () < cloud.x.size ())
-    unit_of_.resize (cloud.x.size ());
-  begin_.assign (static_cast<std::size_t> (slices_) * settings_.columns + 1, 0);
-  for (const WorldPoints::Part &part : cloud.parts ())
-    for (std::size_t i = part.begin; i < part.end; i++) {
-      const int slice = static_cast<int> ((cloud.y[i] - first_y_) * slices_per_metre_);
-      const int unit = std::clamp (slice, 0, slices_ - 1) * settings_.columns + column[i];
-      unit_of_[i] = static_cast<std::uint32_t> (unit);
-      begin_[unit]++;
+  double height = 0;
+  for (const WallRange &range : ranges)
+    height += std::max (0.0, double{range.y_max} - range.y_min);
+  const double most = kMaxUnits / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
+  const double step = slice_height_m = std::max (settings_.unit_height_m, height / most);
+  slices.clear ();
+  for (std::size_t body = 0; body < ranges.size (); body++) {
+    const WallRange &range = ranges[body];
+    Stack &stack = stacks_[body];
+    stack = {static_cast<int> (slices.size ()), 0, 0};
+    if (!(range.y_min <= range.y_max))
+      continue;
+    /* Slices begin at multiples of their height from the axis' origin, not at the lowest point. */
+    const double first = std::floor (range.y_min / step);
+    stack.count = static_cast<int> (std::floor (range.y_max / step) - first) + 1;
+    stack.first_y = static_cast<float> (first * step);
+    for (int i = 0; i < stack.count; i++) {
+      Slice &slice = slices.emplace_back ();
+      slice.body = static_cast<int> (body);
+      slice.number = static_cast<int> (std::clamp (first, -1e9, 1e9)) + i;
     }
+  }
 }
 
 void
-Units::scatter (const WorldPoints &cloud, std::span<const float> radius)
+Units::count_units (
+    const WorldPoints &cloud, std::span<const std::int32_t> column, std::span<const PointRun> runs)
+{
+  if (slice_of.size () < cloud.x.size ())
+    slice_of.resize (cloud.x.size ());
+  begin_.assign (slices.size () * settings_.columns + 1, 0);
+  const auto per_metre = static_cast<float> (1 / slice_height_m);
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
+  for (const PointRun &run : runs) {
+    const Stack &stack = stacks_[run.body];
+    const float first_y = stack.first_y;
+    const int last = stack.count - 1, first = stack.first_slice;
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const int slice = static_cast<int> ((cloud.y[i] - first_y) * per_metre);
+      slice_of[i] = static_cast<std::uint32_t> (first + std::clamp (slice, 0, last));
+    }
+    for (std::size_t i = run.begin; i < run.end; i++)
+      begin_[slice_of[i] * columns + static_cast<std::uint32_t> (column[i])]++;
+  }
+}
+
+void
+Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, std::span<const PointRun> runs)
 {
   std::uint32_t total = 0;
-  for (std::uint32_t &begin : begin_) {
-    const std::uint32_t count = begin;
-    begin = total;
-    total += count;
+  for (std::size_t s = 0; s < slices.size (); s++) {
+    slices[s].begin = total;
+    for (int c = 0; c < settings_.columns; c++) {
+      std::uint32_t &begin = begin_[s * settings_.columns + c];
+      const std::uint32_t count = begin;
+      begin = total;
+      total += count;
+    }
   }
-  if (points.size () < total)
+  if (points.size () < total) {
     points.resize (total);
-  for (const WorldPoints::Part &part : cloud.parts ())
-    for (std::size_t i = part.begin; i < part.end; i++)
-      points[begin_[unit_of_[i]]++] = {
-          radius[i], cloud.x[i], cloud.z[i], static_cast<std::uint32_t> (i)};
+    entries.resize (total);
+    layers.resize (total);
+    chain_.resize (total);
+  }
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
+  std::uint32_t *ends = begin_.data ();
+  Point *to = points.data ();
+  for (const PointRun &run : runs)
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const auto at = static_cast<std::uint32_t> (column[i]);
+      to[ends[slice_of[i] * columns + at]++] = {radius[i], cloud.x[i], cloud.z[i],
+          static_cast<std::uint32_t> (i), at * kMaxViews + run.view};
+    }
   /* Now each element is its unit's end, which is the next one's begin. */
 }
 
-/* Whether all radii lie within a gap: then there is one layer, and nothing to sort. */
-static bool
-is_one_layer (std::span<const Units::Point> points, float gap)
-{
-  float low = points[0].radius, high = low;
-  for (const Units::Point &point : points) {
-    low = std::min (low, point.radius);
-    high = std::max (high, point.radius);
-  }
-  return high - low <= gap;
-}
+/* Cuts the units of a slice into layers, and links the entries of each view in their order. */
+struct Units::Cutter {
+  Units &units;
+  Slice &slice;
+  float gap;
+  int column = 0;
+  std::uint32_t entry_end, layer_end;
+  std::uint64_t views = 0; /* of the slice */
+  std::uint32_t first[kMaxViews], last[kMaxViews];
 
-void
-Units::cut_into_layers (const WorldPoints &cloud)
-{
-  const auto gap = static_cast<float> (settings_.layer_gap_m);
-  auto by_radius = [] (const Point &a, const Point &b) {
-    return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
-  };
-  auto by_index = [] (const Point &a, const Point &b) { return a.index < b.index; };
-  layers.clear ();
-  entries.clear ();
-  occupied = shared = 0;
-  std::uint32_t begin = 0;
-  for (std::uint32_t unit = 0; unit + 1 < begin_.size (); unit++) {
-    const std::uint32_t end = begin_[unit];
-    begin_[unit] = static_cast<std::uint32_t> (layers.size ());
-    if (begin == end)
-      continue;
-    Point *first = &points[begin];
-    if (is_one_layer ({first, end - begin}, gap)) {
-      add_layer (cloud, unit, begin, end);
+  Cutter (Units &owner, Slice &cut)
+      : units (owner), slice (cut), gap (static_cast<float> (owner.settings_.layer_gap_m)),
+        entry_end (cut.begin), layer_end (cut.begin)
+  {
+  }
+
+  void link (std::uint32_t entry, std::uint32_t view)
+  {
+    const std::uint64_t bit = std::uint64_t{1} << view;
+    (views & bit ? units.chain_[last[view]] : first[view]) = entry;
+    last[view] = entry;
+    views |= bit;
+  }
+
+  void close_rings ()
+  {
+    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+      const int view = std::countr_zero (rest);
+      units.chain_[last[view]] = first[view];
+    }
+  }
+
+  /* Adds up the points of each entry of the slice as if its units had one layer each. Without
+   * branches: runs of one or two points, which all here are, are what processors guess worst.
+   * @return whether they have: no unit's radii lie further apart than a gap */
+  bool sum_entries (std::uint32_t end)
+  {
+    typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    typedef std::int32_t I4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    const F4 one = {0, 0, 0, 1};
+    const I4 three = {-1, -1, -1, 0};
+    F4 sum = {};
+    float low = 0, high = 0, span = 0;
+    std::uint32_t before = UINT32_MAX, to = slice.begin - 1;
+    /* Not through the vectors: stores of vectors may alias them, for all that compilers know. */
+    const Point *points = units.points.data ();
+    UnitEntry *entries = units.entries.data ();
+    for (std::uint32_t i = slice.begin; i < end; i++) {
+      const Point &point = points[i];
+      const std::uint32_t differs = point.key ^ before;
+      before = point.key;
+      const std::int32_t goes_on = -static_cast<std::int32_t> (differs == 0);
+      to += differs != 0;
+      const I4 keep = {goes_on, goes_on, goes_on, goes_on};
+      const F4 values = (F4)((I4) * reinterpret_cast<const F4 *> (&point.radius) & three) + one;
+      sum = (F4)((I4)sum & keep) + values;
+      *reinterpret_cast<F4 *> (&entries[to].radius) = sum;
+      entries[to].key = point.key;
+      const bool new_unit = differs >= kMaxViews;
+      low = new_unit || point.radius < low ? point.radius : low;
+      high = new_unit || point.radius > high ? point.radius : high;
+      span = high - low > span ? high - low : span;
+    }
+    entry_end = to + 1;
+    return span <= gap;
+  }
+
+  /* Makes the layers of those entries. */
+  void finish_entries ()
+  {
+    std::uint32_t column_before = UINT32_MAX;
+    UnitEntry *entries = units.entries.data ();
+    UnitLayer *layers = units.layers.data ();
+    layer_end = slice.begin - 1;
+    UnitLayer layer;
+    float weight = 0, radii = 0;
+    for (std::uint32_t e = slice.begin; e < entry_end; e++) {
+      UnitEntry &entry = entries[e];
+      const std::uint32_t at = entry.key / kMaxViews;
+      const bool fresh = at != column_before;
+      column_before = at;
+      layer_end += fresh;
+      weight = (fresh ? 0 : weight) + entry.weight;
+      radii = (fresh ? 0 : radii) + entry.radius;
+      layer.views = (fresh ? 0 : layer.views) | std::uint64_t{1} << entry.view ();
+      layer.first_entry = fresh ? e : layer.first_entry;
+      layer.entry_count = e + 1 - layer.first_entry;
+      layer.column = static_cast<int> (at);
+      layer.radius = radii / weight;
+      layers[layer_end] = layer;
+      slice.occupied += fresh;
+      slice.shared += layer.entry_count == 2;
+      const float share = 1 / entry.weight;
+      entry.radius *= share;
+      entry.x *= share;
+      entry.z *= share;
+      entry.tangent[0] = entry.tangent[1] = 0;
+      entry.layer = layer_end;
+      link (e, entry.view ());
+    }
+    layer_end++;
+    slice.planes = layer_end > slice.begin;
+  }
+
+  /* Makes a layer of points, which come in the order of the cloud, so view after view.
+   * @param any  whether they may lie further apart than a gap
+   * @return whether they do; then nothing has been made */
+  bool add_layer (std::uint32_t begin, std::uint32_t end, int plane, bool any)
+  {
+    UnitLayer &layer = units.layers[layer_end];
+    layer = {0, entry_end, 0, column, plane, 0};
+    const Point *points = units.points.data ();
+    float radii = 0, low = kNowhere, high = 0;
+    std::uint32_t to = entry_end;
+    for (std::uint32_t i = begin; i < end; to++) {
+      float x = 0, z = 0, radius = 0;
+      const std::uint32_t from = i, key = points[i].key;
+      for (; i < end && points[i].key == key; i++) {
+        x += points[i].x;
+        z += points[i].z;
+        radius += points[i].radius;
+        low = std::min (low, points[i].radius);
+        high = std::max (high, points[i].radius);
+      }
+      radii += radius;
+      const auto weight = static_cast<float> (i - from);
+      const float share = 1 / weight;
+      units.entries[to] = {
+          radius * share, x * share, z * share, weight, {}, key, layer_end, from, i - from};
+      layer.views |= std::uint64_t{1} << units.entries[to].view ();
+    }
+    if (any && high - low > gap)
+      return true;
+    layer.radius = radii / static_cast<float> (end - begin);
+    layer.entry_count = to - entry_end;
+    for (; entry_end < to; entry_end++)
+      link (entry_end, units.entries[entry_end].view ());
+    layer_end++;
+    return false;
+  }
+
+  /* @return the number of layers */
+  int cut_apart (std::uint32_t begin, std::uint32_t end)
+  {
+    auto by_radius = [] (const Point &a, const Point &b) {
+      return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
+    };
+    auto by_index = [] (const Point &a, const Point &b) { return a.index < b.index; };
+    Point *points = units.points.data ();
+    std::sort (points + begin, points + end, by_radius);
+    int plane = 0;
+    for (std::uint32_t from = begin, to = begin + 1; to <= end; to++)
+      if (to == end || points[to].radius - points[to - 1].radius > gap) {
+        std::sort (points + from, points + to, by_index);
+        add_layer (from, to, plane++, false);
+        from = to;
+      }
+    return plane;
+  }
+
+  void cut_units (const std::uint32_t *ends, int columns)
+  {
+    std::uint32_t begin = slice.begin;
+    for (column = 0; column < columns; column++) {
+      const std::uint32_t end = ends[column];
+      if (begin == end)
+        continue;
+      const std::uint32_t first_layer = layer_end;
+      const int planes = add_layer (begin, end, 0, true) ? cut_apart (begin, end) : 1;
+      slice.planes = std::max (slice.planes, planes);
+      std::uint64_t all = 0;
+      for (std::uint32_t i = first_layer; i < layer_end; i++)
+        all |= units.layers[i].views;
+      slice.occupied++;
+      slice.shared += (all & (all - 1)) != 0;
+      begin = end;
+    }
+  }
+
+  void cut (const std::uint32_t *ends, int columns)
+  {
+    if (sum_entries (ends[columns - 1])) {
+      finish_entries ();
     } else {
-      std::sort (first, first + (end - begin), by_radius);
-      for (std::uint32_t from = begin, to = begin + 1; to <= end; to++)
-        if (to == end || points[to].radius - points[to - 1].radius > gap) {
-          std::sort (&points[from], &points[from] + (to - from), by_index);
-          add_layer (cloud, unit, from, to);
-          from = to;
-        }
+      entry_end = slice.begin;
+      cut_units (ends, columns);
     }
-    std::uint64_t views = 0;
-    for (std::size_t i = begin_[unit]; i < layers.size (); i++)
-      views |= layers[i].views;
-    occupied++;
-    shared += (views & (views - 1)) != 0;
-    begin = end;
+    close_rings ();
+    slice.layer_count = layer_end - slice.begin;
+    slice.entry_count = entry_end - slice.begin;
   }
-  begin_.back () = static_cast<std::uint32_t> (layers.size ());
-}
+};
 
-/* The points come in the order of the cloud, so view after view. */
 void
-Units::add_layer (
-    const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end)
+Units::cut_slice (int number)
 {
-  const auto parts = cloud.parts ();
-  UnitLayer &layer = layers.emplace_back ();
-  layer.slice = static_cast<int> (unit) / settings_.columns;
-  layer.column = static_cast<int> (unit) % settings_.columns;
-  layer.first_entry = static_cast<std::uint32_t> (entries.size ());
-  std::uint32_t view = 0;
-  float radii = 0;
-  for (std::uint32_t i = begin; i < end;) {
-    float x = 0, z = 0, radius = 0;
-    const std::uint32_t first = i;
-    while (points[i].index >= parts[view].end)
-      view++;
-    for (; i < end && points[i].index < parts[view].end; i++) {
-      x += points[i].x;
-      z += points[i].z;
-      radius += points[i].radius;
-    }
-    radii += radius;
-    const float share = 1 / static_cast<float> (i - first);
-    layer.views |= std::uint64_t{1} << view;
-    entries.push_back ({x * share, z * share, radius * share, {}, first, i - first, view});
-  }
-  layer.covering = layer.views;
-  layer.entry_count = static_cast<std::uint32_t> (entries.size ()) - layer.first_entry;
-  layer.radius = radii / static_cast<float> (end - begin);
+  Cutter cutter (*this, slices[number]);
+  cutter.cut (
+      begin_.data () + static_cast<std::size_t> (number) * settings_.columns, settings_.columns);
 }
 
-/* The layer of that unit whose radius is nearest, unless a gap lies between. */
-const UnitLayer *
-Units::find_layer (int slice, int column, float radius) const
+/* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. */
+std::uint32_t
+Units::next_entry (std::uint32_t number, int reach) const
 {
-  const std::size_t unit = static_cast<std::size_t> (slice) * settings_.columns + column;
-  const UnitLayer *best = nullptr;
-  auto least = static_cast<float> (settings_.layer_gap_m);
-  for (std::uint32_t i = begin_[unit]; i < begin_[unit + 1]; i++)
-    if (const float d = std::abs (layers[i].radius - radius); d <= least) {
-      least = d;
-      best = &layers[i];
-    }
-  return best;
-}
-
-/* Calls work for the layers of the other columns of the slice, up to `reach` columns to one side
- * (1: the way phi grows, -1) and across 2 pi, nearest first, until it returns true. Layers lie in
- * the order of their columns, so empty units cost nothing. */
-template <typename Work>
-void
-Units::along_slice (const UnitLayer &from, int reach, int side, const Work &work) const
-{
-  const int columns = settings_.columns;
-  const std::size_t unit = static_cast<std::size_t> (from.slice) * columns;
-  const UnitLayer *first = layers.data () + begin_[unit];
-  const UnitLayer *last = layers.data () + begin_[unit + columns] - 1;
-  const UnitLayer *other = &from;
-  for (;;) {
-    other = side > 0 ? (other == last ? first : other + 1) : (other == first ? last : other - 1);
-    if (other == &from)
-      return;
-    int distance = side * (other->column - from.column);
-    distance += distance < 0 ? columns : 0;
-    if (distance > reach || (distance > 0 && work (*other)))
-      return;
-  }
-}
-
-const UnitEntry *
-Units::next_entry (const UnitLayer &layer, const UnitEntry &entry) const
-{
-  const std::uint64_t bit = std::uint64_t{1} << entry.view;
+  const UnitEntry &entry = entries[number];
   const auto gap = static_cast<float> (settings_.layer_gap_m);
-  const UnitEntry *next = nullptr;
-  along_slice (layer, std::min (kReach, settings_.columns / 4), 1, [&] (const UnitLayer &other) {
-    if (!(other.views & bit) || std::abs (other.radius - entry.radius) > gap)
-      return false;
-    next = &entries[other.first_entry];
-    while (next->view != entry.view)
-      next++;
-    return true;
-  });
-  return next;
+  int column = entry.column ();
+  for (std::uint32_t next = chain_[number], before = number; next != number;
+       before = next, next = chain_[next]) {
+    const UnitEntry &other = entries[next];
+    if (next < before)
+      column -= settings_.columns;
+    const int distance = other.column () - column;
+    if (distance > reach)
+      return kNone;
+    if (distance > 0 && std::abs (layers[other.layer].radius - entry.radius) <= gap)
+      return next;
+  }
+  return kNone;
 }
 
 void
-Units::find_tangents_of (const UnitLayer &layer)
+Units::find_tangents (int number)
 {
-  for (UnitEntry &entry : entries_of (layer)) {
-    const UnitEntry *found = next_entry (layer, entry);
-    if (!found)
+  const Slice &slice = slices[number];
+  const int reach = std::min (kReach, settings_.columns / 4);
+  for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
+    const std::uint32_t found = next_entry (e, reach);
+    if (found == kNone)
       continue;
-    UnitEntry &next = entries[static_cast<std::size_t> (found - entries.data ())];
+    UnitEntry &entry = entries[e], &next = entries[found];
     const float dx = next.x - entry.x, dz = next.z - entry.z;
-    const float length = std::sqrt (dx * dx + dz * dz);
-    if (!(length > 1e-9f))
+    const float squared = dx * dx + dz * dz;
+    if (!(squared > 1e-18f))
       continue;
-    entry.tangent[0] = dx / length;
-    entry.tangent[1] = dz / length;
+    const float per_length = 1 / std::sqrt (squared);
+    entry.tangent[0] = dx * per_length;
+    entry.tangent[1] = dz * per_length;
     if (next.tangent[0] == 0 && next.tangent[1] == 0)
       std::copy_n (entry.tangent, 2, next.tangent);
   }
-}
-
-/* Runs work (layers) for the layers of each slice, several slices at a time if that is wanted. */
-template <typename Work>
-void
-Units::for_each_slice (int threads, const Work &work)
-{
-  auto some = [&] (const cv::Range &range) {
-    for (int slice = range.start; slice < range.end; slice++) {
-      const std::size_t unit = static_cast<std::size_t> (slice) * settings_.columns;
-      const std::uint32_t begin = begin_[unit], end = begin_[unit + settings_.columns];
-      work (std::span<UnitLayer> (layers.data () + begin, end - begin));
-    }
-  };
-  if (threads == 1)
-    return some ({0, slices_});
-  /* More stripes than threads: slices hold very different numbers of points. */
-  const int stripes = threads > 0 ? threads : 4 * cv::getNumThreads ();
-  cv::parallel_for_ ({0, slices_}, some, stripes);
-}
-
-void
-Units::find_tangents (int threads)
-{
-  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
-    for (const UnitLayer &layer : slice)
-      find_tangents_of (layer);
-    for (UnitLayer &layer : slice)
-      for (const UnitEntry &entry : entries_of (layer))
-        for (int k = 0; k < 2; k++)
-          layer.tangent[k] += static_cast<float> (entry.point_count) * entry.tangent[k];
-  });
-}
-
-void
-Units::sum_along_slice (UnitLayer &layer, int reach)
-{
-  const auto gap = static_cast<float> (settings_.layer_gap_m);
-  float x = layer.tangent[0], z = layer.tangent[1];
-  std::uint64_t around[2] = {};
-  for (int side : {0, 1})
-    along_slice (layer, reach, side ? 1 : -1, [&] (const UnitLayer &other) {
-      if (std::abs (other.radius - layer.radius) <= gap) {
-        x += other.tangent[0];
-        z += other.tangent[1];
-        around[side] |= other.views;
-      }
-      return false;
-    });
-  layer.covering |= around[0] & around[1];
-  sums_[static_cast<std::size_t> (&layer - layers.data ())] = {x, z};
-}
-
-void
-Units::sum_across_slices (UnitLayer &layer, int reach)
-{
-  std::array<float, 2> sum = sums_[static_cast<std::size_t> (&layer - layers.data ())];
-  std::uint64_t below = 0, above = 0;
-  const int bottom = std::max (0, layer.slice - reach);
-  const int top = std::min (slices_ - 1, layer.slice + reach);
-  for (int slice = bottom; slice <= top; slice++) {
-    if (slice == layer.slice)
+  const int planes = rows.slices ()[number].planes;
+  for (const UnitLayer &layer : layers_of (slice)) {
+    if (layer.plane >= planes)
       continue;
-    const UnitLayer *other = find_layer (slice, layer.column, layer.radius);
-    if (!other)
-      continue;
-    const auto &part = sums_[static_cast<std::size_t> (other - layers.data ())];
-    sum[0] += part[0];
-    sum[1] += part[1];
-    (slice < layer.slice ? below : above) |= other->views;
+    UnitRows::Cell cell{layer.radius, {}, layer.views};
+    const UnitEntry *entry = entries.data () + layer.first_entry;
+    for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++)
+      for (int k = 0; k < 2; k++)
+        cell.tangent[k] += entry->weight * entry->tangent[k];
+    rows.put (rows.cell (number, layer.plane, layer.column), cell);
   }
-  layer.covering |= below & above;
-  std::copy_n (sum.begin (), 2, layer.tangent);
-}
-
-void
-Units::smooth (int threads)
-{
-  if (settings_.smoothing_m <= 0)
-    return;
-  sums_.resize (std::max (sums_.size (), layers.size ()));
-  /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
-   */
-  constexpr double kMostColumns = 8, kMostSlices = 8;
-  const double most = std::min (kMostColumns, settings_.columns / 4.0);
-  const double columns_per_radian = settings_.columns / (2 * M_PI);
-  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
-    for (UnitLayer &layer : slice) {
-      const double radians = settings_.smoothing_m / std::max (1e-6, double{layer.radius});
-      sum_along_slice (layer, static_cast<int> (std::min (radians * columns_per_radian, most)));
-    }
-  });
-  const double slices = std::min (settings_.smoothing_m * slices_per_metre_, kMostSlices);
-  for_each_slice (threads, [&] (std::span<UnitLayer> slice) {
-    for (UnitLayer &layer : slice)
-      sum_across_slices (layer, static_cast<int> (slices + 0.5));
-  });
 }
 
 } // namespace rangecast

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "unit_rows.hpp"
 #include "wall.hpp"
 #include "world_points.hpp"
 
@@ -19,95 +20,124 @@ struct UnitSettings {
   double smoothing_m = 0.01;    ///< neighbours this far count in a decision, metres; 0 = none
 };
 
-/** The wall holds no more units than this; slices become higher where the points would need more.
- */
-inline constexpr int kMaxUnits = 1 << 22;
+/** The walls hold no more units than this together; slices become higher where the points would
+ * need more. */
+inline constexpr int kMaxUnits = 1 << 21;
+
+/** A run of points of one image that go onto one cylinder. */
+struct PointRun {
+  std::size_t begin = 0, end = 0; ///< in the cloud
+  std::uint32_t view = 0;         ///< number of the image in the frame set, not its view-id
+  std::uint32_t body = 0;         ///< number of the cylinder
+};
 
 /** The points of one view in one layer of one unit. */
 struct UnitEntry {
-  float x = 0, z = 0;            ///< mean of the points, cylinder coordinates, metres
-  float radius = 0;              ///< mean of the points, metres
-  float tangent[2] = {};         ///< x, z; unit vector, the way phi grows; 0, 0 if not known
-  std::uint32_t first_point = 0; ///< in Units::points
-  std::uint32_t point_count = 0;
-  std::uint32_t view = 0; ///< number of the image in the frame set, not its view-id
+  float radius = 0, x = 0, z = 0; ///< mean of the points, cylinder coordinates, metres
+  float weight = 0;               ///< number of points
+  float tangent[2] = {};          ///< x, z; unit vector, as phi grows; 0, 0 if not known
+  std::uint32_t key = 0;          ///< as in Units::Point
+  std::uint32_t layer = 0;        ///< in Units::layers
+  /** In Units::points; not known where the slice is plain. */
+  std::uint32_t first_point = 0, point_count = 0;
+
+  /** Number of the image in the frame set, not its view-id. */
+  [[nodiscard]] std::uint32_t view () const { return key % kMaxViews; }
+  [[nodiscard]] int column () const { return static_cast<int> (key / kMaxViews); }
 };
 
 /** One surface in one unit: points whose radii have no gap between them. */
 struct UnitLayer {
-  float radius = 0;              ///< mean of the points, metres
-  std::uint32_t first_entry = 0; ///< in Units::entries, one for each bit of views, in their order
+  std::uint64_t views = 0;       ///< bit i: image i has points here; one entry each, in their order
+  std::uint32_t first_entry = 0; ///< in Units::entries
   std::uint32_t entry_count = 0;
-  int slice = 0, column = 0;
-  std::uint64_t views = 0;    ///< bit i: image i has points here
-  std::uint64_t covering = 0; ///< bit i: image i has points here or around here
-  float tangent[2] = {};      ///< x, z; sum over points; after smooth() over the neighbourhood
+  int column = 0;
+  int plane = 0;    ///< number of the layer in its unit, from the axis outwards
+  float radius = 0; ///< mean of the points, metres
 };
 
-/** The points of a frame set, sorted into the units of a cylinder's inner wall. Keeps its memory
- * from frame to frame: 20 bytes a point, 4 a unit, 56 a layer and 32 an entry. */
+/** The points of a frame set, sorted into the units of the inner walls of some cylinders. Keeps its
+ * memory from frame to frame: 24 bytes a point, 4 a unit, 40 a layer, 40 an entry and what UnitRows
+ * has. */
 class Units {
 public:
   struct Point {
     float radius, x, z;
     std::uint32_t index; ///< in the cloud
+    std::uint32_t key;   ///< column * kMaxViews + number of the image
   };
 
-  /** Sorts the cloud (in cylinder coordinates, with radius and column as to_wall() gives them) into
-   *  units and layers. Points of images in the order of the cloud's parts. */
+  /** Sorts points (in cylinder coordinates, with radius and column as to_wall() gives them) into
+   *  units and layers, and makes room for them in the rows.
+   *  @param runs    ordered by view
+   *  @param ranges  heights of each body's points */
   void sort (const WorldPoints &cloud, std::span<const float> radius,
-      std::span<const std::int32_t> column, WallRange range, const UnitSettings &settings);
+      std::span<const std::int32_t> column, std::span<const PointRun> runs,
+      std::span<const WallRange> ranges, const UnitSettings &settings, int threads);
 
-  /** Gives each entry the normalised difference to the view's next entry in the slice, and each
-   *  layer the sum of its entries' tangents weighted by their points.
+  /** Gives each entry of a slice the normalised difference to the view's next entry in the slice,
+   *  and each cell of its rows the sum of its entries' tangents weighted by their points.
    *
    *  Rows of a range image need not lie along slices, and a unit often holds one point of a view or
    *  none. So "successive" means: the view's mean points in successive occupied units of the slice,
    *  at most kReach columns apart and not across a layer gap, in the order of phi, across 2 pi too.
-   *  The last one of such a run has the tangent of the one before it.
-   *  @param threads  slices worked on at the same time; 0 = number of cores */
-  void find_tangents (int threads);
-
-  /** Adds up tangents over the neighbourhood of each layer (smoothing_m each way along the slice,
-   *  then across slices, not across layer gaps), so that winners do not change from unit to unit by
-   *  chance; and finds the views that cover a layer without a point in it: those with points on
-   *  both sides of it (in angle or in height) in that neighbourhood. */
-  void smooth (int threads);
+   *  The last one of such a run has the tangent of the one before it. */
+  void find_tangents (int slice);
 
   /** Columns over which a view's points are still successive. */
   static constexpr int kReach = 6;
 
-  std::vector<Point> points;
-  std::vector<UnitEntry> entries;
-  std::vector<UnitLayer> layers;
-  std::uint64_t occupied = 0; ///< units with points
-  std::uint64_t shared = 0;   ///< units with points of more than one view
+  /** A slice's part of the lists below. Elements between the parts mean nothing. */
+  struct Slice {
+    std::uint32_t begin = 0; ///< its first point; its entries and layers begin there, too
+    std::uint32_t layer_count = 0, entry_count = 0;
+    std::uint32_t occupied = 0, shared = 0; ///< units with points; of more than one view
+    int planes = 0, body = 0, number = 0;   ///< as in UnitRows
+  };
 
-private:
-  void count_units (const WorldPoints &cloud, std::span<const std::int32_t> column);
-  void scatter (const WorldPoints &cloud, std::span<const float> radius);
-  void cut_into_layers (const WorldPoints &cloud);
-  void add_layer (
-      const WorldPoints &cloud, std::uint32_t unit, std::uint32_t begin, std::uint32_t end);
-  template <typename Work> void for_each_slice (int threads, const Work &work);
-  void find_tangents_of (const UnitLayer &layer);
-  [[nodiscard]] const UnitLayer *find_layer (int slice, int column, float radius) const;
-  template <typename Work>
-  void along_slice (const UnitLayer &from, int reach, int side, const Work &work) const;
-  [[nodiscard]] const UnitEntry *next_entry (const UnitLayer &layer, const UnitEntry &entry) const;
-  void sum_along_slice (UnitLayer &layer, int reach);
-  void sum_across_slices (UnitLayer &layer, int reach);
-  [[nodiscard]] std::span<UnitEntry> entries_of (const UnitLayer &layer)
+  [[nodiscard]] std::span<const UnitLayer> layers_of (const Slice &slice) const
   {
-    return {entries.data () + layer.first_entry, layer.entry_count};
+    return {layers.data () + slice.begin, slice.layer_count};
+  }
+  /** Whether a layer is in the rows: the fifth and further ones of a unit are not. */
+  [[nodiscard]] bool has_cell (int slice, const UnitLayer &layer) const
+  {
+    return layer.plane < rows.slices ()[slice].planes;
   }
 
+  /** Whether a slice has one layer in each unit, all of them in the rows. */
+  [[nodiscard]] bool is_plain (std::uint32_t slice) const
+  {
+    return slices[slice].planes == 1 && rows.slices ()[slice].planes == 1;
+  }
+
+  std::vector<Point> points;
+  std::vector<std::uint32_t> slice_of; ///< of each point of the cloud
+  std::vector<UnitEntry> entries;
+  std::vector<UnitLayer> layers;
+  std::vector<Slice> slices;
+  double slice_height_m = 0;
+  UnitRows rows;
+
+private:
+  struct Stack { /* the slices of a body */
+    int first_slice = 0, count = 0;
+    float first_y = 0;
+  };
+
+  void lay_out (std::span<const WallRange> ranges);
+  void count_units (const WorldPoints &cloud, std::span<const std::int32_t> column,
+      std::span<const PointRun> runs);
+  void scatter (const WorldPoints &cloud, std::span<const float> radius,
+      std::span<const std::int32_t> column, std::span<const PointRun> runs);
+  void cut_slice (int slice);
+  struct Cutter;
+  [[nodiscard]] std::uint32_t next_entry (std::uint32_t number, int reach) const;
+
   UnitSettings settings_;
-  int slices_ = 0;
-  float first_y_ = 0, slices_per_metre_ = 0;
-  std::vector<std::uint32_t> unit_of_;     /* of each point of the cloud */
-  std::vector<std::uint32_t> begin_;       /* of each unit in points; then in layers */
-  std::vector<std::array<float, 2>> sums_; /* of each layer, between the passes of smooth () */
+  std::array<Stack, kMaxBodies> stacks_;
+  std::vector<std::uint32_t> begin_; /* of each unit in points; after scatter () its end */
+  std::vector<std::uint32_t> chain_; /* of each entry: the view's next one, in a ring */
 };
 
 } // namespace rangecast

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <opencv2/core/hal/intrin.hpp>
+
+#include "isa.hpp"
 
 namespace rangecast {
 
@@ -54,50 +55,78 @@ struct ToWall {
   }
 };
 
-#if CV_SIMD128
-/* Four points at a time; the same operations in the same order as ToWall. */
-static std::size_t
-to_wall_4 (const ToWall &to, float *x, float *y, float *z, float *radius, std::int32_t *column,
-    std::size_t n, WallRange &range)
-{
-  using cv::v_float32x4;
-  auto all = [] (float value) { return cv::v_setall_f32 (value); };
-  const v_float32x4 ox = all (to.origin[0]), oy = all (to.origin[1]), oz = all (to.origin[2]);
-  const v_float32x4 m0 = all (to.rotation[0]), m1 = all (to.rotation[1]), m2 = all (to.rotation[2]);
-  const v_float32x4 m3 = all (to.rotation[3]), m4 = all (to.rotation[4]), m5 = all (to.rotation[5]);
-  const v_float32x4 m6 = all (to.rotation[6]), m7 = all (to.rotation[7]), m8 = all (to.rotation[8]);
-  const v_float32x4 zero = all (0), tiny = all (std::numeric_limits<float>::min ());
-  const v_float32x4 scale = all (to.columns_per_radian);
-  const cv::v_int32x4 last = cv::v_setall_s32 (to.last_column);
-  v_float32x4 lowest = all (range.y_min), highest = all (range.y_max);
-  std::size_t i = 0;
-  for (; i + 4 <= n; i += 4) {
-    const v_float32x4 wx = cv::v_load (x + i) - ox, wy = cv::v_load (y + i) - oy,
-                      wz = cv::v_load (z + i) - oz;
-    const v_float32x4 px = m0 * wx + m1 * wy + m2 * wz, py = m3 * wx + m4 * wy + m5 * wz,
-                      pz = m6 * wx + m7 * wy + m8 * wz;
-    cv::v_store (x + i, px);
-    cv::v_store (y + i, py);
-    cv::v_store (z + i, pz);
-    lowest = cv::v_min (lowest, py);
-    highest = cv::v_max (highest, py);
-    cv::v_store (radius + i, cv::v_sqrt (px * px + pz * pz));
-    const v_float32x4 ax = cv::v_abs (px), az = cv::v_abs (pz);
-    const v_float32x4 q = cv::v_min (ax, az) / cv::v_max (cv::v_max (ax, az), tiny), s = q * q;
-    v_float32x4 a = all (kAtan[5]);
+/* Some points at a time; the same operations in the same order as ToWall. */
+template <typename L> struct ToWallLoop {
+  using F = typename L::F;
+  using I = typename L::I;
+  static constexpr int kLanes = L::kLanes;
+
+  const ToWall &to;
+  float *x, *y, *z, *radius;
+  std::int32_t *column;
+  std::size_t n;
+
+  static void find_angle (F &a, const F &px, const F &pz)
+  {
+    F ax = px, az = pz;
+    L::make_positive (ax);
+    L::make_positive (az);
+    const F tiny = std::numeric_limits<float>::min () + F{};
+    const F high = ax > az ? ax : az, low = ax > az ? az : ax;
+    const F q = low / (high > tiny ? high : tiny), s = q * q;
+    a = kAtan[5] + F{};
     for (int k = 4; k >= 0; k--)
-      a = a * s + all (kAtan[k]);
-    a = a * q;
-    a = cv::v_select (az > ax, all (kPi / 2) - a, a);
-    a = cv::v_select (px < zero, all (kPi) - a, a);
-    a = cv::v_select (pz < zero, all (2 * kPi) - a, a);
-    cv::v_store (column + i, cv::v_min (cv::v_trunc (a * scale), last));
+      a = a * s + kAtan[k];
+    a *= q;
+    a = az > ax ? kPi / 2 - a : a;
+    a = px < 0 ? kPi - a : a;
+    a = pz < 0 ? 2 * kPi - a : a;
   }
-  range.y_min = cv::v_reduce_min (lowest);
-  range.y_max = cv::v_reduce_max (highest);
-  return i;
+
+  std::size_t run (WallRange &range) const
+  {
+    const float *m = to.rotation;
+    F lowest = range.y_min + F{}, highest = range.y_max + F{};
+    const I last = to.last_column + I{};
+    std::size_t i = 0;
+    for (; i + kLanes <= n; i += kLanes) {
+      const F wx = L::at (x + i) - to.origin[0], wy = L::at (y + i) - to.origin[1],
+              wz = L::at (z + i) - to.origin[2];
+      const F px = m[0] * wx + m[1] * wy + m[2] * wz, py = m[3] * wx + m[4] * wy + m[5] * wz,
+              pz = m[6] * wx + m[7] * wy + m[8] * wz;
+      L::at (x + i) = px;
+      L::at (y + i) = py;
+      L::at (z + i) = pz;
+      lowest = py < lowest ? py : lowest;
+      highest = py > highest ? py : highest;
+      F r = px * px + pz * pz;
+      L::make_root (r);
+      L::at (radius + i) = r;
+      F angle;
+      find_angle (angle, px, pz);
+      const F at = angle * to.columns_per_radian;
+      const I c = __builtin_convertvector(at, I);
+      L::at (column + i) = c < last ? c : last;
+    }
+    for (int l = 0; l < kLanes && i > 0; l++) {
+      range.y_min = std::min (range.y_min, lowest[l]);
+      range.y_max = std::max (range.y_max, highest[l]);
+    }
+    return i;
+  }
+};
+
+[[RANGECAST_CYLINDER_ANY]] static std::size_t
+run_loop (const ToWallLoop<Narrow> &loop, WallRange &range)
+{
+  return loop.run (range);
 }
-#endif
+
+[[RANGECAST_CYLINDER_AVX2]] static std::size_t
+run_loop (const ToWallLoop<Wide> &loop, WallRange &range)
+{
+  return loop.run (range);
+}
 
 WallRange
 to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame, int columns,
@@ -116,11 +145,11 @@ to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame,
         *z = cloud.z.data () + part.begin;
   radius += part.begin;
   column += part.begin;
-  std::size_t i = 0;
-#if CV_SIMD128
-  i = to_wall_4 (to, x, y, z, radius, column, part.size (), range);
-#endif
-  for (; i < part.size (); i++) {
+  const std::size_t n = part.size ();
+  std::size_t i = cpu_level () >= CpuLevel::kAvx2
+                      ? run_loop (ToWallLoop<Wide>{to, x, y, z, radius, column, n}, range)
+                      : run_loop (ToWallLoop<Narrow>{to, x, y, z, radius, column, n}, range);
+  for (; i < n; i++) {
     to (x[i], y[i], z[i], radius[i], column[i]);
     range.y_min = std::min (range.y_min, y[i]);
     range.y_max = std::max (range.y_max, y[i]);

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "world_points.hpp"
 
+#include <cstring>
+
+#include "isa.hpp"
+
 namespace rangecast {
 
 static void
@@ -61,45 +65,93 @@ WorldPoints::reset (std::span<const RangeImage> images)
   return {};
 }
 
-/* Appends the valid pixels of a row: their place, and their depth as a number. */
-static std::size_t
-compact_row (
-    const std::uint16_t *depth, int width, std::uint32_t row, std::uint32_t *pixel, float *depths)
-{
-  std::size_t n = 0;
-  for (int u = 0; u < width; u++) {
-    /* Always written, kept only if valid: a branch here would be a coin toss at every edge. At
-     * most `width` elements, so this never leaves the part. */
-    pixel[n] = row << 16 | static_cast<std::uint32_t> (u);
-    depths[n] = depth[u];
-    n += depth[u] != kInvalidDepth;
+/* Makes points of an image's valid pixels. */
+struct FillLoop {
+  const ConstRangeImage &image;
+  const PixelRays &rays;
+  float *x, *y, *z;
+  std::uint32_t *pixel;
+
+  static constexpr int kBlock = 16;
+  typedef std::uint16_t Block __attribute__ ((vector_size (2 * kBlock), aligned (2), may_alias));
+  typedef std::int16_t Mask __attribute__ ((vector_size (2 * kBlock)));
+
+  /* Of most pictures a person fills a small part, and most of that without holes. */
+  static bool all_are (const Mask &mask)
+  {
+    std::uint64_t four[4];
+    std::memcpy (four, &mask, sizeof four);
+    return (four[0] & four[1] & four[2] & four[3]) == ~std::uint64_t{0};
   }
-  return n;
-}
+
+  /* The valid pixels of a row: their place, and their depth as a number. */
+  std::size_t compact_row (const std::uint16_t *depth, int width, std::uint32_t row,
+      std::uint32_t *to, float *depths) const
+  {
+    std::size_t n = 0;
+    const auto take = [&] (int u) {
+      /* Always written, kept only if valid: a branch here would be a coin toss at every edge. At
+       * most `width` elements, so this never leaves the part. */
+      to[n] = row << 16 | static_cast<std::uint32_t> (u);
+      depths[n] = depth[u];
+      n += depth[u] != kInvalidDepth;
+    };
+    int u = 0;
+    for (; u + kBlock <= width; u += kBlock) {
+      const Mask invalid = *reinterpret_cast<const Block *> (depth + u) == kInvalidDepth;
+      if (all_are (invalid))
+        continue;
+      if (all_are (~invalid)) {
+        for (int k = 0; k < kBlock; k++) {
+          to[n + k] = row << 16 | static_cast<std::uint32_t> (u + k);
+          depths[n + k] = depth[u + k];
+        }
+        n += kBlock;
+      } else {
+        for (int k = 0; k < kBlock; k++)
+          take (u + k);
+      }
+    }
+    for (; u < width; u++)
+      take (u);
+    return n;
+  }
+
+  std::size_t run () const
+  {
+    std::size_t end = 0;
+    for (int row = 0; row < image.depth.height && !image.depth.empty (); row++) {
+      float *__restrict px = x + end, *__restrict py = y + end, *__restrict pz = z + end;
+      const std::uint32_t *__restrict place = pixel + end;
+      const std::size_t n = compact_row (image.depth.row (row), image.depth.width,
+          static_cast<std::uint32_t> (row), pixel + end, px);
+      const float v = static_cast<float> (image.roi.y + row), u0 = static_cast<float> (image.roi.x);
+      float base[3];
+      for (int k = 0; k < 3; k++)
+        base[k] = rays.corner[k] + v * rays.down[k] + u0 * rays.right[k];
+      for (std::size_t i = 0; i < n; i++) {
+        const float d = px[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
+        px[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
+        py[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
+        pz[i] = rays.origin[2] + d * (base[2] + u * rays.right[2]);
+      }
+      end += n;
+    }
+    return end;
+  }
+
+  [[RANGECAST_CYLINDER_ANY]] std::size_t run_any () const { return run (); }
+  [[RANGECAST_CYLINDER_AVX2]] std::size_t run_avx2 () const { return run (); }
+};
 
 void
 WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)
 {
   Part &part = parts_[index];
-  part.end = part.begin;
-  for (int row = 0; row < image.depth.height && !image.depth.empty (); row++) {
-    float *__restrict px = x.data () + part.end, *__restrict py = y.data () + part.end,
-                      *__restrict pz = z.data () + part.end;
-    const std::uint32_t *__restrict place = pixel.data () + part.end;
-    const auto n = static_cast<int> (compact_row (image.depth.row (row), image.depth.width,
-        static_cast<std::uint32_t> (row), pixel.data () + part.end, px));
-    const float v = static_cast<float> (image.roi.y + row), u0 = static_cast<float> (image.roi.x);
-    float base[3];
-    for (int k = 0; k < 3; k++)
-      base[k] = rays.corner[k] + v * rays.down[k] + u0 * rays.right[k];
-    for (int i = 0; i < n; i++) {
-      const float d = px[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
-      px[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
-      py[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
-      pz[i] = rays.origin[2] + d * (base[2] + u * rays.right[2]);
-    }
-    part.end += static_cast<std::size_t> (n);
-  }
+  const std::size_t begin = part.begin;
+  const FillLoop loop{
+      image, rays, x.data () + begin, y.data () + begin, z.data () + begin, pixel.data () + begin};
+  part.end = begin + (cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 () : loop.run_any ());
 }
 
 std::size_t

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+
+namespace rangecast {
+
+/** The radius of a cell without points, metres: further than any layer gap from all others. */
+inline constexpr float kNowhere = 1e30f;
+/** Cylinders at a time, at most. */
+inline constexpr int kMaxBodies = 8;
+
+/** How units are decided from their neighbours. Lengths in metres. */
+struct RowRules {
+  float layer_gap = 0;
+  float smoothing_columns = 0; ///< columns at a radius of 1 m; at radius r this divided by r
+  float most_columns = 0;      ///< but never more than so many, 0 .. UnitRows::kPad
+  int smoothing_slices = 0;
+  float hysteresis = 0; ///< what last frame's winner has for nothing, 0 .. 2 (a cosine)
+  float agreement = 0;  ///< what a view gets if all neighbours are its own, 0 .. 2 (a cosine)
+  int images = 0;
+  /** x, z of each image's optical axis in each body's cylinder. */
+  std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxBodies> optical;
+};
+
+/** What decide() counted. */
+struct RowCounts {
+  std::uint64_t held = 0;    ///< layers that had a winner in the frame before
+  std::uint64_t changed = 0; ///< of those, layers that have another one now
+};
+
+/** The layers of all units as numbers in rows, one for each slice and each layer of its units, one
+ *  number a column, so that neighbours are worked on eight at a time. The first layer of a unit
+ *  lies in plane 0 of its slice, the next in plane 1 and so on; a slice has as many planes as its
+ *  units need, a slice without points none.
+ *
+ *  Order of calls for a frame: begin(), add_slice() and layers into cells(), sum_along() of all
+ *  slices, sum_across() of all, decide(), remember(). Calls for different slices may be made at the
+ *  same time. All planes have pads of columns repeated from the other end of the row. */
+class UnitRows {
+public:
+  static constexpr int kPad = 8;
+  static constexpr int kPlanes = 4;
+
+  struct Slice {
+    std::uint32_t first_row = 0;
+    int planes = 0;
+    int body = 0;
+    int number = 0; ///< floor (height / slice height), counted from the axis' own origin
+  };
+
+  /** Of one layer. */
+  struct Cell {
+    float radius = kNowhere;
+    float tangent[2] = {}; ///< x, z; unit vector after sum_across()
+    std::uint64_t views = 0;
+  };
+
+  void begin (int columns, int images, std::size_t slices);
+  /** Appends a slice with room for so many planes; slices of a body are consecutive. */
+  void add_slice (int body, int number, int planes);
+  /** Makes room for the slices' rows, and empties them. */
+  void make_room ();
+
+  [[nodiscard]] std::uint32_t cell (int slice, int plane, int column) const
+  {
+    return (slices_[slice].first_row + static_cast<std::uint32_t> (plane)) * width_ + kPad +
+           static_cast<std::uint32_t> (column);
+  }
+  void put (std::uint32_t cell, const Cell &layer)
+  {
+    radius_[cell] = layer.radius;
+    tangent_[0][cell] = layer.tangent[0];
+    tangent_[1][cell] = layer.tangent[1];
+    views_[0][cell] = static_cast<std::uint32_t> (layer.views);
+    if (words_ > 1)
+      views_[1][cell] = static_cast<std::uint32_t> (layer.views >> 32);
+  }
+  [[nodiscard]] std::uint64_t covering (std::uint32_t cell) const
+  {
+    return covering_[0][cell] | (words_ > 1 ? std::uint64_t{covering_[1][cell]} << 32 : 0);
+  }
+  /** The image that won the cell; -1 if it is empty. */
+  [[nodiscard]] int winner (std::uint32_t cell) const { return first_[cell]; }
+  /** The image that looks squarely at its other side and stays, too; -1 if there is none. */
+  [[nodiscard]] int second (std::uint32_t cell) const { return second_[cell]; }
+
+  [[nodiscard]] const std::vector<Slice> &slices () const { return slices_; }
+  [[nodiscard]] int columns () const { return columns_; }
+
+  /** Adds up tangents over the neighbourhood of each layer (smoothing each way along the slice,
+   *  then across slices, not across layer gaps), so that winners do not change from unit to unit by
+   *  chance; and finds the views that cover a layer without a point in it: those with points on
+   *  both sides of it (in angle or in height) in that neighbourhood. */
+  void sum_along (const RowRules &rules, int slice);
+  void sum_across (const RowRules &rules, int slice);
+
+  /** Chooses winners, with a word from last frame's and, in kSweeps sweeps, from neighbours'. */
+  RowCounts decide (const RowRules &rules, int threads);
+  static constexpr int kSweeps = 2;
+
+  /** Keeps the winners for the next frame's hysteresis.
+   *  @param ids  view-id of each image */
+  void remember (const RowRules &rules, const std::array<int, kMaxViews> &ids);
+  /** Before the next decide(): what images the winners kept have now. */
+  void recall (const std::array<int, kMaxViews> &ids, int images);
+  void forget ();
+
+  /** What remember() kept: the slices, and the view-id of the winner of a unit's outermost layer,
+   * -1 if it has none. */
+  [[nodiscard]] int old_slices () const { return static_cast<int> (old_slices_.size ()); }
+  [[nodiscard]] int old_winner (int slice, int column) const;
+
+private:
+  template <typename L> struct Loops; /* over some columns at a time */
+  struct Twins;
+  enum class Pass { kAlone, kAskNeighbours };
+
+  [[nodiscard]] const Slice *old_slice (const Slice &slice) const;
+  void count_slice (const Slice &slice, RowCounts &counts) const;
+
+  template <typename Number> using Plane = std::vector<Number>;
+
+  int columns_ = 0, words_ = 1;
+  std::uint32_t width_ = 0, rows_ = 0;
+  std::vector<Slice> slices_;
+  Plane<float> radius_;
+  std::array<Plane<float>, 2> tangent_, sum_;
+  std::array<Plane<std::uint32_t>, 2> views_, covering_;
+  Plane<std::int32_t> first_, next_, second_, held_;
+  std::array<std::vector<float>, 2> wall_; /* tangent of the wall in each column */
+
+  /* Of the frame before. */
+  std::vector<Slice> old_slices_;
+  std::array<std::uint32_t, kMaxBodies + 1> old_begin_{}; /* of each body in old_slices_ */
+  std::uint32_t old_width_ = 0;
+  int old_columns_ = 0, old_images_ = 0;
+  std::array<int, kMaxViews> old_ids_{};
+  Plane<float> old_radius_;
+  Plane<std::int32_t> old_first_;
+};
+
+} // namespace rangecast
