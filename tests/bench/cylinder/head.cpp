@@ -110,6 +110,23 @@ match (
   return {};
 }
 
+/* The pictures with noise. */
+Status
+take_pictures (const HeadSettings &settings, Head &head)
+{
+  std::unique_ptr<Scene> scene;
+  if (Status s = Scene::create (scene_settings (settings, settings.colour_noise), scene); !s.ok ())
+    return s;
+  for (std::size_t i = 0; i < head.rig.views.size (); i++) {
+    const View &view = head.rig.views[i];
+    if (Status s = scene->render (
+            view.id, SceneCamera::kLeft, 0, false, view_of (head.set.colour[i], view), {}, {});
+        !s.ok ())
+      return s;
+  }
+  return {};
+}
+
 /* Turns each camera about itself, and moves it. */
 void
 disturb (Rig &rig, double move_m, double turn_deg)
@@ -157,6 +174,9 @@ make_head (const HeadSettings &settings, Head &head)
   }
   head.set.depth = head.depth;
   head.set.colour = head.colour;
+  if (settings.colour_noise > 0)
+    if (Status s = take_pictures (settings, head); !s.ok ())
+      return s;
   if (settings.noise == DepthNoise::kStereo)
     if (Status s = match (settings, head, masks); !s.ok ())
       return s;

@@ -21,6 +21,7 @@ struct HeadSettings {
   std::string model; ///< glTF or OBJ; empty: the built-in figure
   int views = 4, width = 320, height = 240;
   DepthNoise noise = DepthNoise::kExact;
+  double colour_noise = 0;          ///< of the pictures, grey levels
   double pose_mm = 0, pose_deg = 0; ///< what the rig is told wrong of each camera, any direction
 };
 

@@ -5,6 +5,7 @@
 #include <opencv2/core/utils/logger.hpp>
 
 #include "../options.hpp"
+#include "colour.hpp"
 #include "speed.hpp"
 #include "truth_run.hpp"
 
@@ -18,7 +19,8 @@ const char *const kUsage =
     "       cylinder_bench --truth [--model FILE] [--views N] [--size WxH] [--noise KIND]\n"
     "                      [--pose-mm MM] [--pose-deg DEGREES] [--rounds N] [--json FILE]\n"
     "       cylinder_bench --truth --bunny DIR --mesh FILE [--rounds N] [--json FILE]\n"
-    "       cylinder_bench --picture FILE.png [as --truth]\n"
+    "       cylinder_bench --colour [as --truth] [--blend-width M]\n"
+    "       cylinder_bench --picture FILE.png [as --truth or --colour]\n"
     "Without --truth: milliseconds of the filter, of the published rule written straight down, "
     "and\n"
     "of a voxel grid.\n"
@@ -46,7 +48,19 @@ const char *const kUsage =
     "                  95 %; uncovered: share of the true visible surface with no point within 2\n"
     "                  pixels; new_holes: that, less what was before; strips, isolated: as\n"
     "                  striprender draws what is left; ms\n"
-    "  --picture FILE  draws that slice, points in their views' colours, before and after\n";
+    "  --picture FILE  draws that slice, points in their views' colours, before and after; with\n"
+    "                  --colour the head between two cameras: winner, balanced, and blended\n"
+    "With --colour: the same head, by cameras that do not agree on colour (error: none; gains, up "
+    "to\n"
+    "10 % for each channel; light, the same before an sRGB curve; vignette, gains and 20 % darker\n"
+    "corners), with 1 grey level of noise; times on one thread.\n"
+    "  --blend-width M of mode=blend, metres (default 0.02)\n"
+    "  --json FILE     scene; views; noise; pose_mm; pose_deg; error; method; psnr_db: of the "
+    "points\n"
+    "                  left, against their true colour; seam_levels: mean step in colour between\n"
+    "                  points of two views within 4 mm, less the true step; seam_psnr_db: of "
+    "points\n"
+    "                  within 10 mm of another view's; balance_ms, filter_ms, blend_ms\n";
 
 void
 run_speed (const std::string &only, const FrameSet *bunny, int rounds)
@@ -79,15 +93,30 @@ take_noise (const std::string &value, std::optional<DepthNoise> &noise)
 
 struct Job {
   TruthJob truth;
-  bool want_truth = false;
+  bool want_truth = false, want_colour = false;
+  double blend_width = 0;
   int rounds = 0;
   std::string only, json, picture;
 };
 
 Status
+run_colours (const Job &job)
+{
+  const ColourJob colour{job.truth, job.blend_width};
+  if (!job.picture.empty ())
+    return draw_colours (colour, job.picture);
+  std::vector<ColourRow> rows;
+  if (Status s = run_colour (colour, rows); !s.ok ())
+    return s;
+  return job.json.empty () ? Status{} : write_json (job.json, rows);
+}
+
+Status
 run (Job &job)
 {
   TruthJob &truth = job.truth;
+  if (job.want_colour)
+    return run_colours (job);
   if (!job.picture.empty ())
     if (Status s = run_picture (truth, job.picture); !s.ok () || !job.want_truth)
       return s;
@@ -120,6 +149,8 @@ main (int argc, char **argv)
   options.text ("--bunny", truth.bunny);
   options.text ("--picture", job.picture);
   options.flag ("--truth", job.want_truth);
+  options.flag ("--colour", job.want_colour);
+  options.number ("--blend-width", job.blend_width, 0.001, 1.0);
   options.text ("--model", truth.model);
   options.text ("--mesh", truth.mesh);
   options.number ("--views", truth.views, 2, kMaxViews);
@@ -135,8 +166,10 @@ main (int argc, char **argv)
     return *status;
   if (job.want_truth && truth.bunny.empty () != truth.mesh.empty ())
     return options.refuse ("--truth with --bunny: expected --mesh, too, and only then");
-  if (!job.want_truth && !job.json.empty ())
-    return options.refuse ("--json: expected --truth, too");
+  if (!job.want_truth && !job.want_colour && !job.json.empty ())
+    return options.refuse ("--json: expected --truth or --colour, too");
+  if (job.want_colour && (job.want_truth || !truth.bunny.empty ()))
+    return options.refuse ("--colour: expected neither --truth nor --bunny");
   if (const Status s = run (job); !s.ok ()) {
     std::fprintf (stderr, "cylinder_bench: %s\n", s.message ().c_str ());
     return 1;

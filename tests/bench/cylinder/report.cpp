@@ -11,7 +11,7 @@ namespace bench {
 void
 print_header ()
 {
-  std::printf ("%-34s %-20s %8s %8s %8s %13s %13s %8s %9s %7s %8s %8s\n", "scene", "method",
+  std::printf ("%-35s %-20s %8s %8s %8s %13s %13s %8s %9s %7s %8s %8s\n", "scene", "method",
       "points", "removed", "doubles", "thick mm/95", "off mm/95", "open", "new holes", "strips",
       "isolated", "ms");
 }
@@ -23,7 +23,7 @@ print_row (const TruthRow &r)
   std::snprintf (scene, sizeof scene, "%s, %d views, %s, %g mm %g deg", r.scene.c_str (), r.views,
       r.noise.c_str (), r.pose_mm, r.pose_deg);
   const Verdict &v = r.verdict;
-  std::printf ("%-34s %-20s %8zu %6.1f %% %6.2f %% %6.2f %6.2f %6.2f %6.2f %6.2f %% %7.2f %% %7zu "
+  std::printf ("%-35s %-20s %8zu %6.1f %% %6.2f %% %6.2f %6.2f %6.2f %6.2f %6.2f %% %7.2f %% %7zu "
                "%8zu %8.2f\n",
       scene, r.method.c_str (), v.points, 100 * v.removed, 100 * v.units_double, v.thickness_mm,
       v.thickness95_mm, v.distance_mm, v.distance95_mm, 100 * v.uncovered, 100 * r.new_holes,

@@ -99,7 +99,8 @@ run_bunny (const TruthJob &job, std::vector<TruthRow> &rows)
   return {};
 }
 
-/* Every head that the job asks for. */
+} // namespace
+
 std::vector<HeadSettings>
 heads_of (const TruthJob &job)
 {
@@ -125,8 +126,6 @@ heads_of (const TruthJob &job)
       }
   return heads;
 }
-
-} // namespace
 
 Status
 run_truth (const TruthJob &job, std::vector<TruthRow> &rows)

@@ -22,6 +22,9 @@ struct TruthJob {
   rangecast::CylinderSettings settings; ///< of the filter
 };
 
+/** Every head that the job asks for. */
+std::vector<HeadSettings> heads_of (const TruthJob &job);
+
 /** Runs the filter and its peers on all that the job asks for, and prints the table. */
 rangecast::Status run_truth (const TruthJob &job, std::vector<TruthRow> &rows);
 
