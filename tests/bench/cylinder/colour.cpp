@@ -413,7 +413,7 @@ draw_colours (const ColourJob &job, const std::string &path)
     left += kSide;
   }
   try {
-    if (cv::imwrite (path, picture))
+    if (cv::imwrite (path, picture, {cv::IMWRITE_PNG_COMPRESSION, 9, cv::IMWRITE_JPEG_QUALITY, 90}))
       return {};
   } catch (const cv::Exception &) { /* no such kind of picture */
   }

@@ -12,7 +12,7 @@ namespace bench {
 
 namespace {
 
-constexpr int kSide = 640, kTitle = 40;
+constexpr int kSide = 640, kLower = 400, kTitle = 40;
 constexpr double kHalfHeight = 0.004; ///< metres
 constexpr double kZoom = 4;
 
@@ -39,7 +39,7 @@ draw_points (const std::vector<Spot> &spots, const Window &window, double radius
   constexpr int kBits = 4;
   for (const Spot &s : spots) {
     const double x = (0.5 + (s.point.x - window.x) / window.size) * kSide,
-                 y = (0.5 + (s.point.z - window.z) / window.size) * kSide;
+                 y = square.rows / 2.0 + (s.point.z - window.z) / window.size * kSide;
     if (x > -9 && y > -9 && x < kSide + 9 && y < kSide + 9)
       cv::circle (square, cv::Point (int (x * (1 << kBits)), int (y * (1 << kBits))),
           int (radius * (1 << kBits)), colours[s.view % 8], cv::FILLED, cv::LINE_AA, kBits);
@@ -53,14 +53,15 @@ draw_column (const std::vector<Spot> &spots, const Window &all, const Window &pa
   const std::string text = std::string (title) + ": " + std::to_string (spots.size ()) + " points";
   cv::putText (column, text, {12, 28}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {40, 40, 40}, 1, cv::LINE_AA);
   cv::Mat upper = column.rowRange (kTitle, kTitle + kSide),
-          lower = column.rowRange (kTitle + kSide, kTitle + 2 * kSide);
+          lower = column.rowRange (kTitle + kSide, kTitle + kSide + kLower);
   draw_points (spots, all, 1.6, upper);
   draw_points (spots, part, 3.5, lower);
   const double scale = kSide / all.size;
-  const int half = int (part.size / 2 * scale), x = int (kSide / 2 + (part.x - all.x) * scale),
+  const int half = int (part.size / 2 * scale), flat = half * kLower / kSide,
+            x = int (kSide / 2 + (part.x - all.x) * scale),
             y = int (kSide / 2 + (part.z - all.z) * scale);
-  cv::rectangle (upper, {x - half, y - half}, {x + half, y + half}, {120, 120, 120}, 1);
-  cv::rectangle (lower, {0, 0}, {kSide - 1, kSide - 1}, {120, 120, 120}, 1);
+  cv::rectangle (upper, {x - half, y - flat}, {x + half, y + flat}, {120, 120, 120}, 1);
+  cv::rectangle (lower, {0, 0}, {kSide - 1, kLower - 1}, {120, 120, 120}, 1);
 }
 
 } // namespace
@@ -87,12 +88,12 @@ draw_slice (FrameSet &set, double y, const std::string &path)
   const Window all{
       (left + right) / 2, (back + front) / 2, 1.15 * std::max (right - left, front - back)};
   /* The front: the nose. */
-  const Window part{all.x, front - 0.45 * all.size / kZoom, all.size / kZoom};
-  cv::Mat picture (kTitle + 2 * kSide, 2 * kSide, CV_8UC3, cv::Scalar (255, 255, 255));
+  const Window part{all.x, front - 0.25 * all.size / kZoom, all.size / kZoom};
+  cv::Mat picture (kTitle + kSide + kLower, 2 * kSide, CV_8UC3, cv::Scalar (255, 255, 255));
   draw_column (before, all, part, "before", picture.colRange (0, kSide));
   draw_column (after, all, part, "after", picture.colRange (kSide, 2 * kSide));
   try {
-    if (cv::imwrite (path, picture))
+    if (cv::imwrite (path, picture, {cv::IMWRITE_PNG_COMPRESSION, 9, cv::IMWRITE_JPEG_QUALITY, 90}))
       return {};
   } catch (const cv::Exception &) { /* no such kind of picture */
   }

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstdlib>
 #include <random>
 #include <sstream>
 #include <zlib.h>
@@ -15,6 +15,7 @@ namespace bench {
 namespace {
 
 constexpr double kCell = 0.01; ///< metres
+constexpr double kLargest = 5; ///< metres from the origin; bounds the cells
 
 /* The point of a triangle that is nearest to p, by the region of its plane that p lies over
  * (Ericson, Real-Time Collision Detection, 5.1.5). */
@@ -197,9 +198,9 @@ load_ply (const std::string &path, double scale, std::vector<Vec3> &vertices,
   while (std::getline (in, line) && line != "end_header") {
     ascii |= line == "format ascii 1.0";
     if (line.starts_with ("element vertex "))
-      points = std::stoul (line.substr (15));
+      points = std::strtoul (line.c_str () + 15, nullptr, 10);
     if (line.starts_with ("element face "))
-      faces = std::stoul (line.substr (13));
+      faces = std::strtoul (line.c_str () + 13, nullptr, 10);
   }
   if (!ascii || !points || !faces || points > text.size () || faces > text.size ())
     return bad;
@@ -207,6 +208,8 @@ load_ply (const std::string &path, double scale, std::vector<Vec3> &vertices,
     Vec3 v;
     if (!(std::istringstream (line) >> v.x >> v.y >> v.z))
       return bad;
+    if (!(scale * norm (v) < kLargest))
+      return {StatusCode::kBadData, path + ": reaches beyond 5 metres"};
     vertices.push_back (scale * v);
   }
   for (std::size_t i = 0; i < faces; i++) {
