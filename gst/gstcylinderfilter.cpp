@@ -33,6 +33,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
 enum {
   PROP_0,
   PROP_MODE,
+  PROP_COLOUR_BALANCE,
+  PROP_BLEND_WIDTH,
   PROP_AXIS,
   PROP_AXIS_POSITION,
   PROP_AXIS_DIRECTION,
@@ -41,8 +43,6 @@ enum {
   PROP_LAYER_GAP,
   PROP_SMOOTHING,
   PROP_HIDDEN_GAP,
-  PROP_COLOUR_BALANCE,
-  PROP_BLEND_WIDTH,
   PROP_N_THREADS,
   PROP_STATS,
 };
@@ -54,9 +54,9 @@ enum GstCylinderFilterMode {
 };
 enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
+static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006,
-                        kDefaultBlendWidth = 0.02;
+                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006;
 static constexpr int kDefaultColumns = 360;
 
 struct CylinderCounts {
@@ -295,6 +295,12 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_MODE: /* before_transform sets passthrough to match */
       self->priv->mode = static_cast<GstCylinderFilterMode> (g_value_get_enum (value));
       break;
+    case PROP_COLOUR_BALANCE:
+      self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
+      break;
+    case PROP_BLEND_WIDTH:
+      self->priv->blend_width = g_value_get_double (value);
+      break;
     case PROP_AXIS:
       settings.axis = static_cast<rangecast::AxisMode> (g_value_get_enum (value));
       break;
@@ -312,12 +318,6 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
       break;
     case PROP_HIDDEN_GAP:
       settings.hidden_gap_m = g_value_get_double (value);
-      break;
-    case PROP_COLOUR_BALANCE:
-      self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
-      break;
-    case PROP_BLEND_WIDTH:
-      self->priv->blend_width = g_value_get_double (value);
       break;
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
@@ -355,6 +355,12 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
     case PROP_MODE:
       g_value_set_enum (value, priv->mode);
       break;
+    case PROP_COLOUR_BALANCE:
+      g_value_set_enum (value, priv->balance);
+      break;
+    case PROP_BLEND_WIDTH:
+      g_value_set_double (value, priv->blend_width);
+      break;
     case PROP_AXIS:
       g_value_set_enum (value, int (settings.axis));
       break;
@@ -378,12 +384,6 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
       break;
     case PROP_HIDDEN_GAP:
       g_value_set_double (value, settings.hidden_gap_m);
-      break;
-    case PROP_COLOUR_BALANCE:
-      g_value_set_enum (value, priv->balance);
-      break;
-    case PROP_BLEND_WIDTH:
-      g_value_set_double (value, priv->blend_width);
       break;
     case PROP_N_THREADS:
       g_value_set_int (value, settings.threads);
@@ -423,6 +423,20 @@ vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags 
       g_param_spec_double ("number", "Number", "One of x, y, z", -G_MAXDOUBLE, G_MAXDOUBLE, 0,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
       flags);
+}
+
+static void
+install_colour_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
+      g_param_spec_enum ("colour-balance", "Colour balance",
+          "How colours of different cameras are made to agree (default: auto)",
+          GST_TYPE_CYLINDER_FILTER_BALANCE, GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
+  g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
+      g_param_spec_double ("blend-width", "Blend width",
+          "For mode=blend: how far from a seam colours are blended, metres, 0 to 1 (default: 0.02)",
+          0, 1, kDefaultBlendWidth, controllable));
 }
 
 static void
@@ -475,20 +489,6 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
 }
 
 static void
-install_colour_properties (GObjectClass *object_class, GParamFlags flags)
-{
-  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
-      g_param_spec_enum ("colour-balance", "Colour balance",
-          "How colours of different cameras are made to agree (default: auto)",
-          GST_TYPE_CYLINDER_FILTER_BALANCE, GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
-  g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
-      g_param_spec_double ("blend-width", "Blend width",
-          "For mode=blend: how far from a seam colours are blended, metres, 0 to 1 (default: 0.02)",
-          0, 1, kDefaultBlendWidth, controllable));
-}
-
-static void
 gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -501,9 +501,9 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   object_class->get_property = gst_cylinder_filter_get_property;
   object_class->finalize = gst_cylinder_filter_finalize;
 
+  install_colour_properties (object_class, flags);
   install_axis_properties (object_class, flags);
   install_unit_properties (object_class, flags);
-  install_colour_properties (object_class, flags);
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
           "Views and slices worked on at the same time, 0 to 64; 0 = number of cores (default: 0)",
