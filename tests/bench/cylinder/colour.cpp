@@ -245,7 +245,7 @@ run_way (Head &head, const Way &way, const CylinderSettings &settings, ColourRow
   for (int frame = 0; frame < kFrames; frame++) {
     head.set.restore ();
     CylinderResult result;
-    const std::vector<RangeImage> images = head.set.images ();
+    const std::vector<RangeImage> images = head.set.images_in_boxes ();
     auto begin = std::chrono::steady_clock::now ();
     const auto lap = [&] (std::vector<double> &times) {
       times.push_back (ms_since (begin));

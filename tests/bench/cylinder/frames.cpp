@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 using namespace rangecast;
 
@@ -19,6 +20,21 @@ FrameSet::images ()
         {depth[i].data (), v.width, v.height, v.width * 2}, {}, 0});
     if (!colour.empty ())
       all.back ().colour = {colour[i].data (), v.width, v.height, v.width * 4};
+  }
+  return all;
+}
+
+std::vector<RangeImage>
+FrameSet::images_in_boxes ()
+{
+  std::vector<RangeImage> all = images ();
+  for (std::size_t i = 0; i < all.size (); i++) {
+    const cv::Mat plane (rig.views[i].height, rig.views[i].width, CV_16U, fresh[i].data ());
+    const cv::Rect box = cv::boundingRect (plane != 0);
+    all[i].roi = {box.x, box.y, box.width, box.height};
+    all[i].depth = all[i].depth.crop (box.x, box.y, box.width, box.height);
+    if (!colour.empty ())
+      all[i].colour = all[i].colour.crop (box.x, box.y, box.width, box.height);
   }
   return all;
 }

@@ -18,6 +18,8 @@ struct FrameSet {
   std::vector<std::vector<rangecast::Rgbx>> colour, fresh_colour; ///< empty: without colour
 
   std::vector<rangecast::RangeImage> images ();
+  /** The same pixels, cut to the boxes of what was valid, as roiextract does. */
+  std::vector<rangecast::RangeImage> images_in_boxes ();
   void restore ()
   {
     depth = fresh;
