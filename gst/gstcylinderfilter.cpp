@@ -70,10 +70,10 @@ struct GstCylinderFilterPrivate {
   rangecast::CylinderSettings settings;
   GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
   double blend_width = kDefaultBlendWidth;
+  rangecast::ColourMatch colours; /* streaming thread only */
   CylinderCounts counts;
 
   rangecast::CylinderFilter core; /* streaming thread only */
-  rangecast::ColourMatch colours; /* streaming thread only */
 };
 
 struct _GstCylinderFilter {
@@ -221,9 +221,9 @@ gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   const std::lock_guard guard (priv->lock);
+  priv->colours.reset ();
   priv->counts = {};
   priv->core.reset ();
-  priv->colours.reset ();
   return TRUE;
 }
 
