@@ -170,6 +170,8 @@ TEST (ColourBalance, cameras_that_agree_are_left_alone_bit_by_bit)
   ColourBalance balance;
   ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
   ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
+  for (int id = 0; id < 4; id++)
+    EXPECT_EQ (balance.gains (id), (ColourBalance::Gains{1, 1, 1}));
   for (std::size_t i = 0; i < kArc.size (); i++)
     for (std::size_t k = 0; k < frame.colour[i].size (); k++) {
       ASSERT_EQ (frame.colour[i][k].r, before.colour[i][k].r);
@@ -231,14 +233,17 @@ TEST (ColourBalance, no_gain_is_larger_than_the_bound)
 TEST (ColourBalance, gains_follow_a_change_slowly_but_come_there)
 {
   ColourBalance balance;
-  Frame frame = ball (kArc, {kOne, kOne, kOne, kOne});
-  ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
   const std::vector<Rgb> wrong = {{0.8, 0.8, 0.8}, kOne, kOne, kOne};
-  for (int i = 0; i < 20; i++)
+  const Frame right = ball (kArc, {kOne, kOne, kOne, kOne}), changed = ball (kArc, wrong);
+  Frame frame = right;
+  ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
+  for (int i = 0; i < 60; i++) {
+    frame.colour = right.colour;
     ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
+  }
   float after_one = 0;
-  for (int i = 0; i < 80; i++) {
-    frame = ball (kArc, wrong);
+  for (int i = 0; i < 60; i++) { /* no more than before: what was long ago must not count */
+    frame.colour = changed.colour;
     ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
     if (i == 0)
       after_one = balance.gains (0)[0];
