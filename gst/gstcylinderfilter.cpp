@@ -4,7 +4,8 @@
  * @title: cylinderfilter
  *
  * Clears the points that several views of a frame set see of the same place, all but those of the
- * view that sees it most squarely. No point ever moves or changes colour.
+ * view that sees it most squarely. No point ever moves. Colours of the views are made to agree, and
+ * may be blended along the seams.
  *
  * ## Example launch line
  * |[
@@ -21,6 +22,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
 
 #include "controlledvalues.hpp"
@@ -31,6 +33,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
 enum {
   PROP_0,
   PROP_MODE,
+  PROP_COLOUR_BALANCE,
+  PROP_BLEND_WIDTH,
   PROP_AXIS,
   PROP_AXIS_POSITION,
   PROP_AXIS_DIRECTION,
@@ -46,8 +50,14 @@ enum {
   PROP_STATS,
 };
 
-enum GstCylinderFilterMode { GST_CYLINDER_FILTER_OFF, GST_CYLINDER_FILTER_WINNER };
+enum GstCylinderFilterMode {
+  GST_CYLINDER_FILTER_OFF,
+  GST_CYLINDER_FILTER_WINNER,
+  GST_CYLINDER_FILTER_BLEND
+};
+enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
+static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
                         kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006,
                         kDefaultHysteresis = 0.2, kDefaultAgreement = 0.1;
@@ -61,9 +71,12 @@ struct CylinderCounts {
 };
 
 struct GstCylinderFilterPrivate {
-  std::mutex lock; /* guards mode, settings and counts; never held while working on a frame */
+  std::mutex lock; /* guards all settings and counts; never held while working on a frame */
   GstCylinderFilterMode mode = GST_CYLINDER_FILTER_WINNER;
   rangecast::CylinderSettings settings;
+  GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
+  double blend_width = kDefaultBlendWidth;
+  rangecast::ColourMatch colours; /* streaming thread only */
   CylinderCounts counts;
 
   /* Streaming thread only. */
@@ -94,9 +107,23 @@ gst_cylinder_filter_mode_get_type (void)
   static const GEnumValue values[] = {
       {GST_CYLINDER_FILTER_OFF, "Let everything pass", "off"},
       {GST_CYLINDER_FILTER_WINNER, "One view keeps its points, the others' are cleared", "winner"},
+      {GST_CYLINDER_FILTER_BLEND, "As winner, and colours are blended along the seams", "blend"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_BALANCE (gst_cylinder_filter_balance_get_type ())
+static GType
+gst_cylinder_filter_balance_get_type (void)
+{
+  static const GEnumValue values[] = {
+      {GST_CYLINDER_FILTER_BALANCE_OFF, "Leave colours as the cameras see them", "off"},
+      {GST_CYLINDER_FILTER_BALANCE_AUTO, "Gains from what several cameras see", "auto"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterBalance", values);
   return type;
 }
 
@@ -126,6 +153,8 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   rangecast::Status status = gstrange::parse_caps (in, info);
   if (status.ok ())
     status = self->priv->core.set_rig (info.rig);
+  if (status.ok ())
+    status = self->priv->colours.set_rig (info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
@@ -177,6 +206,8 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   std::unique_lock guard (priv->lock);
   const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
   const rangecast::CylinderSettings settings = priv->settings;
+  const rangecast::ColourSettings colours = {priv->balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
+      priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
   guard.unlock ();
   if (off)
     return GST_FLOW_OK;
@@ -187,7 +218,11 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   rangecast::CylinderResult result;
   rangecast::Status status = frame.status ();
   if (status.ok ())
+    status = priv->colours.before (frame.views (), colours);
+  if (status.ok ())
     status = priv->core.process (frame.views (), settings, result);
+  if (status.ok ())
+    status = priv->colours.after (frame.views (), colours);
   if (status.ok ())
     gst_cylinder_filter_count (priv, result);
   GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
@@ -198,9 +233,11 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 static gboolean
 gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  /* Serialised with the data: the axis starts anew after a seek. */
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+  /* Serialised with the data: axis and gains start anew after a seek. */
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     GST_CYLINDER_FILTER (base)->priv->core.reset ();
+    GST_CYLINDER_FILTER (base)->priv->colours.reset ();
+  }
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
 }
 
@@ -209,6 +246,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   const std::lock_guard guard (priv->lock);
+  priv->colours.reset ();
   priv->counts = {};
   priv->core.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
@@ -220,6 +258,7 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
 {
   /* With the stream its memory goes too. */
   GST_CYLINDER_FILTER (base)->priv->core = {};
+  GST_CYLINDER_FILTER (base)->priv->colours = {};
   return TRUE;
 }
 
@@ -281,6 +320,12 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
   switch (id) {
     case PROP_MODE: /* before_transform sets passthrough to match */
       self->priv->mode = static_cast<GstCylinderFilterMode> (g_value_get_enum (value));
+      break;
+    case PROP_COLOUR_BALANCE:
+      self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
+      break;
+    case PROP_BLEND_WIDTH:
+      self->priv->blend_width = g_value_get_double (value);
       break;
     case PROP_AXIS:
       settings.axis = static_cast<rangecast::AxisMode> (g_value_get_enum (value));
@@ -346,6 +391,12 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
   switch (id) {
     case PROP_MODE:
       g_value_set_enum (value, priv->mode);
+      break;
+    case PROP_COLOUR_BALANCE:
+      g_value_set_enum (value, priv->balance);
+      break;
+    case PROP_BLEND_WIDTH:
+      g_value_set_double (value, priv->blend_width);
       break;
     case PROP_AXIS:
       g_value_set_enum (value, int (settings.axis));
@@ -421,6 +472,20 @@ vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags 
       g_param_spec_double ("number", "Number", "One of x, y, z", -G_MAXDOUBLE, G_MAXDOUBLE, 0,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
       flags);
+}
+
+static void
+install_colour_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
+      g_param_spec_enum ("colour-balance", "Colour balance",
+          "How colours of different cameras are made to agree (default: auto)",
+          GST_TYPE_CYLINDER_FILTER_BALANCE, GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
+  g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
+      g_param_spec_double ("blend-width", "Blend width",
+          "For mode=blend: how far from a seam colours are blended, metres, 0 to 1 (default: 0.02)",
+          0, 1, kDefaultBlendWidth, controllable));
 }
 
 static void
@@ -505,6 +570,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   object_class->get_property = gst_cylinder_filter_get_property;
   object_class->finalize = gst_cylinder_filter_finalize;
 
+  install_colour_properties (object_class, flags);
   install_axis_properties (object_class, flags);
   install_unit_properties (object_class, flags);
   install_steadiness_properties (object_class, flags);
@@ -525,6 +591,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_BALANCE, GstPluginAPIFlags (0));
 
   transform_class->set_caps = gst_cylinder_filter_set_caps;
   transform_class->before_transform = gst_cylinder_filter_before_transform;

@@ -1,0 +1,311 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "colour_balance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/hal/hal.hpp>
+
+#include "../parallel.hpp"
+
+namespace rangecast {
+
+namespace {
+
+constexpr int kSamples = 8192;       ///< grid pixels of all images together
+constexpr int kFirstSamples = 65536; ///< in the first frame
+constexpr float kBinsPerLog = 400;   ///< so histograms reach from -0.8 to 0.8: 0.45 to 2.2
+constexpr float kFewest = 30;        ///< shared pixels that tell something of a pair
+constexpr float kKept = 0.9f;        ///< share of what was counted that counts in the next frame
+/* Of kSameSurface. Where stereo is wrong on a shaded surface the colours are always wrong the same
+ * way, so places that it has right tell more than many that it has nearly right. */
+constexpr float kSamePlace = 0.3f;
+constexpr double kMany = 300; ///< more than so many do not count more
+/* Pulls gains towards 1 where overlaps say little: as 6 shared pixels. */
+constexpr double kPrior = 0.02;
+
+const std::array<float, 256> &
+log_table ()
+{
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (int i = 1; i < 256; i++)
+      t[static_cast<std::size_t> (i)] = std::log (static_cast<float> (i));
+    return t;
+  }();
+  return table;
+}
+
+/* Dark pixels have no colour to speak of, bright ones may be clipped. Asked of both together, so
+ * that it does not favour the ratios of one side. */
+bool
+is_usable (int a, int b)
+{
+  return a + b >= 50 && a + b <= 450 && a >= 8 && b >= 8 && a < 250 && b < 250;
+}
+
+/* Whether the surface about a pixel is seen well enough: all round it, and no more than 60 degrees
+ * off. Where a view looks along a surface, or at its edge, stereo errs most, and always the same
+ * way: that would pass for a difference in colour.
+ *  @param steepest  ColourCameras::Camera::steepest */
+bool
+is_steady (const RangeImage &image, int x, int y, float steepest)
+{
+  constexpr int kReach = 2;
+  if (x < kReach || y < kReach || x + kReach >= image.depth.width ||
+      y + kReach >= image.depth.height)
+    return false;
+  const int left = image.depth.at (x - kReach, y), right = image.depth.at (x + kReach, y),
+            above = image.depth.at (x, y - kReach), below = image.depth.at (x, y + kReach);
+  if (!left || !right || !above || !below)
+    return false;
+  const float most = steepest * image.depth.at (x, y) * 2 * kReach;
+  return static_cast<float> (std::abs (right - left)) < most &&
+         static_cast<float> (std::abs (below - above)) < most;
+}
+
+/* The median of a histogram, linear within its bin. */
+float
+median_of (std::span<const float> bins, float count)
+{
+  const float half = count / 2;
+  float before = 0;
+  std::size_t at = 0;
+  while (at + 1 < bins.size () && before + bins[at] < half)
+    before += bins[at++];
+  const float share = bins[at] > 0 ? (half - before) / bins[at] : 0.5f;
+  return (static_cast<float> (at) + share - static_cast<float> (bins.size ()) / 2) / kBinsPerLog;
+}
+
+} // namespace
+
+Status
+ColourBalance::set_rig (const Rig &rig)
+{
+  reset ();
+  return cameras_.set (rig);
+}
+
+void
+ColourBalance::reset ()
+{
+  started_ = 0;
+  ratios_.clear ();
+}
+
+/* What was counted fades; it is of no use for other views. */
+void
+ColourBalance::age (std::span<const RangeImage> images)
+{
+  const std::size_t pairs = 3 * images_ * (images_ - 1) / 2;
+  bool same = ratios_.size () == pairs;
+  for (std::size_t i = 0; i < images_; i++) {
+    same = same && ids_[i] == images[i].view_id;
+    ids_[i] = images[i].view_id;
+  }
+  fresh_ = !same;
+  if (fresh_)
+    ratios_.assign (pairs, {});
+  else
+    for (Histogram &bins : ratios_)
+      for (float &bin : bins)
+        bin *= kKept;
+}
+
+/* Of images i < j. */
+std::size_t
+ColourBalance::pair (std::size_t i, std::size_t j, std::size_t channel) const
+{
+  return 3 * (i * (2 * images_ - i - 1) / 2 + j - i - 1) + channel;
+}
+
+void
+ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, int x, int y)
+{
+  const RangeImage &image = images[from];
+  const std::uint16_t depth = image.depth.at (x, y);
+  if (depth == kInvalidDepth)
+    return;
+  if (!is_steady (image, x, y, cameras_.of[static_cast<std::size_t> (image.view_id)].steepest))
+    return;
+  float point[3];
+  cameras_.point (image, x, y, depth, point);
+  const Rgbx mine = image.colour.at (x, y);
+  const auto &logs = log_table ();
+  for (std::size_t j = 0; j < images.size (); j++) {
+    const RangeImage &other = images[j];
+    ColourCameras::Place place;
+    if (j == from || !has_colour (other) || !cameras_.find (other, point, place))
+      continue;
+    const int column = ColourCameras::column (place), row = ColourCameras::row (place);
+    const std::uint16_t there = other.depth.at (column, row);
+    const float same = cameras_.of[static_cast<std::size_t> (other.view_id)].same_surface;
+    if (there == kInvalidDepth || !(std::abs (place.depth - there) < kSamePlace * same))
+      continue;
+    if (!is_steady (
+            other, column, row, cameras_.of[static_cast<std::size_t> (other.view_id)].steepest))
+      continue;
+    const Rgbx theirs = other.colour.at (column, row);
+    const Rgbx &first = from < j ? mine : theirs, &second = from < j ? theirs : mine;
+    const std::uint8_t a[] = {first.r, first.g, first.b}, b[] = {second.r, second.g, second.b};
+    for (std::size_t c = 0; c < 3; c++) {
+      if (!is_usable (a[c], b[c]))
+        continue;
+      const float bin = (logs[a[c]] - logs[b[c]]) * kBinsPerLog + kBins / 2.0f;
+      if (bin >= 0 && bin < kBins)
+        ratios_[pair (std::min (from, j), std::max (from, j), c)][static_cast<std::size_t> (bin)]++;
+    }
+  }
+}
+
+/* Every step-th pixel each way, another one in each frame. */
+void
+ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t from)
+{
+  const RangeImage &image = images[from];
+  if (!has_colour (image))
+    return;
+  const double share = double (image.depth.width) * image.depth.height /
+                       (double (fresh_ ? kFirstSamples : kSamples) / double (images.size ()));
+  const int step = std::max (1, static_cast<int> (std::ceil (std::sqrt (share))));
+  const auto steps = static_cast<std::uint32_t> (step);
+  /* Any order that comes to all places of a step x step square soon. */
+  const int left = static_cast<int> (frame_ * 5 % steps),
+            top = static_cast<int> ((frame_ * 3 + frame_ / steps) % steps);
+  for (int y = top; y < image.depth.height; y += step)
+    for (int x = left; x < image.depth.width; x += step)
+      compare (images, from, x, y);
+}
+
+/* Least squares: for each pair the difference of both log gains is minus the median. The same
+ * matrix for all channels, the graph's Laplacian. */
+void
+ColourBalance::solve (std::span<const RangeImage> images)
+{
+  const std::size_t n = images.size ();
+  linked_ = 0;
+  for (std::size_t c = 0; c < 3; c++) {
+    matrix_.assign (n * n, 0);
+    right_.assign (n, 0);
+    for (std::size_t i = 0; i < n; i++)
+      matrix_[i * n + i] = kPrior;
+    for (std::size_t i = 0; i < n; i++)
+      for (std::size_t j = i + 1; j < n; j++) {
+        const Histogram &bins = ratios_[pair (i, j, c)];
+        float count = 0;
+        for (float bin : bins)
+          count += bin;
+        if (count < kFewest)
+          continue;
+        linked_ |= std::uint64_t{1} << i | std::uint64_t{1} << j;
+        const double weight = std::min (1.0, double{count} / kMany),
+                     ratio = median_of (bins, count);
+        matrix_[i * n + i] += weight;
+        matrix_[j * n + j] += weight;
+        matrix_[i * n + j] -= weight;
+        matrix_[j * n + i] -= weight;
+        right_[i] -= weight * ratio;
+        right_[j] += weight * ratio;
+      }
+    if (!cv::hal::Cholesky64f (matrix_.data (), n * sizeof (double), static_cast<int> (n),
+            right_.data (), sizeof (double), 1))
+      std::fill (right_.begin (), right_.end (), 0); /* never: the prior makes it definite */
+    for (std::size_t i = 0; i < n; i++)
+      measured_[i][c] = static_cast<float> (right_[i]);
+  }
+}
+
+void
+ColourBalance::follow (std::span<const RangeImage> images)
+{
+  const float most = std::log (kMostGain);
+  for (std::size_t i = 0; i < images.size (); i++) {
+    if (!(linked_ >> i & 1)) /* what it shared before still holds */
+      continue;
+    const auto id = static_cast<std::size_t> (images[i].view_id);
+    if (!(started_ >> id & 1))
+      frames_[id] = 0;
+    started_ |= std::uint64_t{1} << id;
+    frames_[id] = std::min (frames_[id] + 1, 1000);
+    const float share = std::max (kShareOfNew, 1 / static_cast<float> (frames_[id]));
+    for (std::size_t c = 0; c < 3; c++) {
+      float &gain = log_gains_[id][c];
+      gain += share * (std::clamp (measured_[i][c], -most, most) - gain);
+    }
+  }
+}
+
+ColourBalance::Gains
+ColourBalance::gains (int view_id) const
+{
+  Gains gains{1, 1, 1};
+  if (view_id < 0 || view_id >= kMaxViews || !(started_ >> view_id & 1))
+    return gains;
+  for (std::size_t c = 0; c < 3; c++) {
+    const float g = log_gains_[static_cast<std::size_t> (view_id)][c];
+    gains[c] = std::exp (std::copysign (std::max (std::abs (g) - kLeftUndone, 0.0f), g));
+  }
+  return gains;
+}
+
+/* In 1/32768 and 16 bits, which compilers do several at a time. */
+static void
+multiply_row (Rgbx *pixels, int count, const std::uint16_t (&factors)[4])
+{
+  auto *__restrict bytes = reinterpret_cast<std::uint8_t *> (pixels);
+  for (int x = 0; x < 4 * count; x += 4)
+    for (int c = 0; c < 4; c++) {
+      const auto wide = static_cast<std::uint16_t> (bytes[x + c] << 8);
+      const auto product = static_cast<std::uint16_t> ((std::uint32_t{wide} * factors[c]) >> 16);
+      const auto rounded = static_cast<std::uint16_t> ((product + 64) >> 7);
+      bytes[x + c] = static_cast<std::uint8_t> (std::min<std::uint16_t> (rounded, 255));
+    }
+}
+
+/* Of each row only what lies between its first and its last valid pixel. */
+static void
+multiply (const RangeImage &image, const ColourBalance::Gains &gains)
+{
+  static_assert (ColourBalance::kMostGain < 2);
+  if (gains == ColourBalance::Gains{1, 1, 1})
+    return;
+  std::uint16_t factors[4] = {};
+  for (std::size_t c = 0; c < 3; c++)
+    factors[c] = static_cast<std::uint16_t> (std::lround (gains[c] * 32768));
+  for (int y = 0; y < image.depth.height; y++) {
+    const std::uint16_t *depth = image.depth.row (y);
+    int first = 0, end = image.depth.width;
+    while (first < end && depth[first] == kInvalidDepth)
+      first++;
+    while (end > first && depth[end - 1] == kInvalidDepth)
+      end--;
+    multiply_row (image.colour.row (y) + first, end - first, factors);
+  }
+}
+
+Status
+ColourBalance::process (std::span<const RangeImage> images, int threads)
+{
+  if (Status status = cameras_.check (images); !status.ok ())
+    return status;
+  images_ = images.size ();
+  frame_++;
+  if (images_ < 2)
+    return {};
+  try {
+    age (images);
+    for (std::size_t i = 0; i < images_; i++)
+      count_ratios (images, i);
+    fresh_ = false;
+    solve (images);
+    follow (images);
+    in_parallel (images_, threads, [&] (std::size_t i) {
+      if (has_colour (images[i]))
+        multiply (images[i], gains (images[i].view_id));
+    });
+  } catch (const std::exception &error) { /* memory; OpenCV's threads */
+    return {StatusCode::kNoSpace, std::string ("colour balance: ") + error.what ()};
+  }
+  return {};
+}
+
+} // namespace rangecast

@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The cylinder filter beside its peers in the same run: milliseconds, and what is left against the
+ * true surface. */
+#include <cstdio>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "../options.hpp"
+#include "colour.hpp"
+#include "speed.hpp"
+#include "truth_run.hpp"
+
+using namespace rangecast;
+using namespace bench;
+
+namespace {
+
+const char *const kUsage =
+    "usage: cylinder_bench [--rounds N] [--only NAME] [--bunny DIR]\n"
+    "       cylinder_bench --truth [--model FILE] [--views N] [--size WxH] [--noise KIND]\n"
+    "                      [--pose-mm MM] [--pose-deg DEGREES] [--rounds N] [--json FILE]\n"
+    "       cylinder_bench --truth --bunny DIR --mesh FILE [--rounds N] [--json FILE]\n"
+    "       cylinder_bench --colour [as --truth] [--blend-width M]\n"
+    "       cylinder_bench --picture FILE.png [as --truth or --colour]\n"
+    "Without --truth: milliseconds of the filter, of the published rule written straight down, "
+    "and\n"
+    "of a voxel grid.\n"
+    "  --rounds N      times are medians of so many (default 50; with --truth 5)\n"
+    "  --only NAME     only the scenes whose name begins so\n"
+    "  --bunny DIR     also what pipelines/bunny-to-range.py wrote there (--truth: that alone)\n"
+    "With --truth: a head of known surface, seen by cameras on a ring, before and after.\n"
+    "  --model FILE    glTF or OBJ (default: the built-in figure)\n"
+    "  --views N       cameras, 2 to 64 (default: 4, then 8)\n"
+    "  --size WxH      of their pictures (default 320x240)\n"
+    "  --noise KIND    of depth: exact; smooth, normal with 3 mm and alike over some 10 pixels;\n"
+    "                  stereo, two pictures matched as stereodepth does (default: each in turn)\n"
+    "  --pose-mm MM, --pose-deg DEGREES  what the rig is told wrong of each camera's place and\n"
+    "                  direction (default: nothing, 2 mm, 5 mm and 0.5 degrees in turn)\n"
+    "  --hidden-gap M, --smoothing M  of the filter (default: its own)\n"
+    "  --mesh FILE     the bunny's merged mesh, PLY\n"
+    "  --json FILE     an array of objects. scene; views; noise; pose_mm; pose_deg; method;\n"
+    "                  points: left; removed: share of the points that were there; units_double:\n"
+    "                  share of the units (4 mm x 1 degree) where points of several views share a\n"
+    "                  surface; thickness_mm, thickness95_mm: of the surface in a slice through "
+    "the\n"
+    "                  nose, 10 % to 90 % of heights in each 5 degrees, mean and 95 % of angles;\n"
+    "                  distance_mm, distance95_mm: of what is left to the true surface, median "
+    "and\n"
+    "                  95 %; uncovered: share of the true visible surface with no point within 2\n"
+    "                  pixels; new_holes: that, less what was before; strips, isolated: as\n"
+    "                  striprender draws what is left; ms\n"
+    "  --picture FILE  draws that slice, points in their views' colours, before and after; with\n"
+    "                  --colour the head between two cameras: winner, balanced, and blended\n"
+    "With --colour: the same head, by cameras that do not agree on colour (error: none; gains, up "
+    "to\n"
+    "10 % for each channel; light, the same before an sRGB curve; vignette, gains and 20 % darker\n"
+    "corners), with 1 grey level of noise; times on one thread.\n"
+    "  --blend-width M of mode=blend, metres (default 0.02)\n"
+    "  --json FILE     scene; views; noise; pose_mm; pose_deg; error; method; psnr_db: of the "
+    "points\n"
+    "                  left, against their true colour; seam_levels: mean step in colour between\n"
+    "                  points of two views within 4 mm, less the true step; seam_psnr_db: of "
+    "points\n"
+    "                  within 10 mm of another view's; balance_ms, filter_ms, blend_ms\n";
+
+void
+run_speed (const std::string &only, const FrameSet *bunny, int rounds)
+{
+  auto wanted = [&] (const std::string &name) { return name.starts_with (only); };
+  if (bunny && wanted ("bunny"))
+    measure_speed ("bunny, 6 x 320x240", *bunny, rounds);
+  for (int views : {4, 8})
+    for (int width : {320, 640}) {
+      const int height = width * 3 / 4;
+      const std::string size =
+          std::to_string (views) + " x " + std::to_string (width) + "x" + std::to_string (height);
+      if (wanted ("bust, " + size))
+        measure_speed ("bust, " + size, render_bust (views, width, height), rounds);
+      if (wanted ("all pixels, " + size))
+        measure_speed ("all pixels, " + size, render_pillar (views, width, height), rounds);
+    }
+}
+
+std::string
+take_noise (const std::string &value, std::optional<DepthNoise> &noise)
+{
+  for (DepthNoise kind : {DepthNoise::kExact, DepthNoise::kSmooth, DepthNoise::kStereo})
+    if (value == name_of (kind)) {
+      noise = kind;
+      return {};
+    }
+  return "exact, smooth or stereo";
+}
+
+struct Job {
+  TruthJob truth;
+  bool want_truth = false, want_colour = false;
+  double blend_width = 0;
+  int rounds = 0;
+  std::string only, json, picture;
+};
+
+Status
+run_colours (const Job &job)
+{
+  const ColourJob colour{job.truth, job.blend_width};
+  if (!job.picture.empty ())
+    return draw_colours (colour, job.picture);
+  std::vector<ColourRow> rows;
+  if (Status s = run_colour (colour, rows); !s.ok ())
+    return s;
+  return job.json.empty () ? Status{} : write_json (job.json, rows);
+}
+
+Status
+run (Job &job)
+{
+  TruthJob &truth = job.truth;
+  if (job.want_colour)
+    return run_colours (job);
+  if (!job.picture.empty ())
+    if (Status s = run_picture (truth, job.picture); !s.ok () || !job.want_truth)
+      return s;
+  if (job.want_truth) {
+    truth.rounds = job.rounds ? job.rounds : truth.rounds;
+    std::vector<TruthRow> rows;
+    if (Status s = run_truth (truth, rows); !s.ok ())
+      return s;
+    return job.json.empty () ? Status{} : write_json (job.json, rows);
+  }
+  FrameSet bunny;
+  if (!truth.bunny.empty ())
+    if (Status s = load_bunny (truth.bunny, bunny); !s.ok ())
+      return s;
+  run_speed (job.only, truth.bunny.empty () ? nullptr : &bunny, job.rounds ? job.rounds : 50);
+  return {};
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  cv::utils::logging::setLogLevel (cv::utils::logging::LOG_LEVEL_SILENT);
+  Job job;
+  TruthJob &truth = job.truth;
+  Options options ("cylinder_bench", kUsage);
+  options.number ("--rounds", job.rounds, 1, 100000);
+  options.text ("--only", job.only);
+  options.text ("--bunny", truth.bunny);
+  options.text ("--picture", job.picture);
+  options.flag ("--truth", job.want_truth);
+  options.flag ("--colour", job.want_colour);
+  options.number ("--blend-width", job.blend_width, 0.001, 1.0);
+  options.text ("--model", truth.model);
+  options.text ("--mesh", truth.mesh);
+  options.number ("--views", truth.views, 2, kMaxViews);
+  options.size ("--size", truth.width, truth.height, 64, 4096);
+  options.value (
+      "--noise", [&] (const std::string &value) { return take_noise (value, truth.noise); });
+  options.number ("--pose-mm", truth.pose_mm, 0.0, 100.0);
+  options.number ("--pose-deg", truth.pose_deg, 0.0, 20.0);
+  options.number ("--hidden-gap", truth.settings.hidden_gap_m, 0.0, 100.0);
+  options.number ("--smoothing", truth.settings.units.smoothing_m, 0.0, 1.0);
+  options.text ("--json", job.json);
+  if (const auto status = options.parse (argc, argv))
+    return *status;
+  if (job.want_truth && truth.bunny.empty () != truth.mesh.empty ())
+    return options.refuse ("--truth with --bunny: expected --mesh, too, and only then");
+  if (!job.want_truth && !job.want_colour && !job.json.empty ())
+    return options.refuse ("--json: expected --truth or --colour, too");
+  if (job.want_colour && (job.want_truth || !truth.bunny.empty ()))
+    return options.refuse ("--colour: expected neither --truth nor --bunny");
+  if (const Status s = run (job); !s.ok ()) {
+    std::fprintf (stderr, "cylinder_bench: %s\n", s.message ().c_str ());
+    return 1;
+  }
+  return 0;
+}
