@@ -303,7 +303,8 @@ make_picture (
   picture.pixels_per_unit = float (height / (2 * std::tan (fov * M_PI / 360)));
   picture.mode = settings.strips.mode;
   picture.depth_step = settings.strips.depth_step;
-  picture.back_faces = settings.back_faces;
+  /* what one camera sees is open at the back: there is nothing else to look at from there */
+  picture.back_faces = settings.back_faces || priv->info.rig.views.size () == 1;
   picture.view_gap_m = settings.view_gap_m;
   picture.width = width;
   picture.height = height;

@@ -246,6 +246,22 @@ GST_START_TEST (test_surfaces_seen_from_behind_are_left_out_unless_wanted)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_one_camera_is_drawn_from_behind_too)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig, "azimuth=180 field-of-view=60");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rendered picture = render (h, wall (rig));
+  int drawn = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      drawn += !is_background (picture, x, y);
+  fail_unless (drawn > 5000, "%d pixels", drawn);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 /* A wall through the origin that two cameras see, 40 degrees apart, in red and in green; what the
  * first one sees is rough. */
 static GstBuffer *
@@ -447,6 +463,7 @@ strippicture_suite ()
   tcase_add_test (tc, test_colours_come_out_as_they_go_in);
   tcase_add_test (tc, test_samples_smooth_edges_and_may_change_any_time);
   tcase_add_test (tc, test_surfaces_seen_from_behind_are_left_out_unless_wanted);
+  tcase_add_test (tc, test_one_camera_is_drawn_from_behind_too);
   tcase_add_test (tc, test_views_of_one_surface_do_not_shine_through_each_other);
   tcase_add_test (tc, test_strips_stop_at_depth_steps);
   tcase_add_test (tc, test_uploads_the_planes_of_the_roi_and_vertices_alone);

@@ -26,8 +26,8 @@ struct StripSettings {
   double merge = 1;
 };
 
-inline constexpr double kMergeDepth = 0.001; ///< share of the depth
-inline constexpr double kMergeColour = 2;    ///< levels
+inline constexpr double kMergeDepth = 0.0007; ///< share of the depth
+inline constexpr double kMergeColour = 1.5;   ///< levels
 inline constexpr double kMergeCopyDepth = 0.004;
 inline constexpr double kMergeCopyColour = 12;
 

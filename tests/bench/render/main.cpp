@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <list>
 #include <opencv2/imgcodecs.hpp>
 #include <rangecast/strips/orbit.hpp>
 
@@ -131,32 +132,23 @@ make_ways (Job &job, Kind &kind)
   return {};
 }
 
+/* A frame set of one kind of depth, and of exact depth also what the neighbour code makes of it. */
 Status
-make_kinds (Job &job, std::vector<Kind> &kinds)
+make_kind (Job &job, const char *depth, Kind &kind)
 {
-  kinds.resize (3);
-  kinds[0].depth = "exact";
-  kinds[1].depth = "stereo";
-  kinds[2].depth = "noise";
-  Status status = exact_frames (job.scene, kinds[0].set);
-  if (status.ok ())
-    status = exact_frames (job.scene, kinds[0].coded);
-  if (status.ok ()) {
+  const std::string name = kind.depth = depth;
+  Status status =
+      name == "stereo" ? stereo_frames (job.scene, kind.set) : exact_frames (job.scene, kind.set);
+  if (status.ok () && name == "exact") {
     EncoderSettings settings;
     settings.colour_threshold = 8;
-    status = code (kinds[0].coded, settings);
+    status = exact_frames (job.scene, kind.coded);
+    if (status.ok ())
+      status = code (kind.coded, settings);
   }
-  if (status.ok ())
-    status = stereo_frames (job.scene, kinds[1].set);
-  if (status.ok ())
-    status = exact_frames (job.scene, kinds[2].set);
-  if (!status.ok ())
-    return status;
-  add_smooth_noise (kinds[2].set, 0.003);
-  for (Kind &kind : kinds)
-    if (status = make_ways (job, kind); !status.ok ())
-      return status;
-  return {};
+  if (status.ok () && name == "noise")
+    add_smooth_noise (kind.set, 0.003);
+  return status.ok () ? make_ways (job, kind) : status;
 }
 
 /* In turns, so that whatever else the machine does hits all of them alike. */
@@ -234,9 +226,12 @@ run (Job &job)
     g_clear_error (&error);
     return {StatusCode::kUnsupported, why};
   }
-  std::vector<Kind> kinds;
+  std::list<Kind> kinds; /* which stay where they are */
   std::vector<Shot> shots[std::size (kAngles)];
-  Status status = make_kinds (job, kinds);
+  Status status;
+  for (const char *depth : {"exact", "stereo", "noise"})
+    if (status.ok () && (job.depth.empty () || job.depth == depth))
+      status = make_kind (job, depth, kinds.emplace_back ());
   for (std::size_t i = 0; i < std::size (kAngles) && status.ok (); i++)
     status = make_truth (job.scene, kAngles[i], shots[i]);
   Target target (job.context);
@@ -245,10 +240,8 @@ run (Job &job)
   if (status.ok ())
     print_head ();
   for (Kind &kind : kinds)
-    std::erase_if (kind.ways, [&] (const auto &way) {
-      return (!job.mode.empty () && job.mode != way->name ()) ||
-             (!job.depth.empty () && job.depth != kind.depth);
-    });
+    std::erase_if (kind.ways,
+        [&] (const auto &way) { return !job.mode.empty () && job.mode != way->name (); });
   for (const Kind &kind : kinds)
     for (std::size_t i = 0; i < std::size (kAngles) && status.ok (); i++)
       measure (job, kind, target, kAngles[i], shots[i]);
