@@ -43,7 +43,7 @@ static const NumberRow kNumbers[] = {
         -3600, 3600, 0, [] (Settings &s) -> double & { return s.camera.auto_orbit; }},
     {"depth-step", "Depth step",
         "Neighbours that differ by more than this share of their depth are not joined (0 to 1, "
-        "default 0.02)",
+        "default 0.03)",
         0, 1, kDefaults.depth_step, [] (Settings &s) -> double & { return s.strips.depth_step; }},
     {"merge", "Merge",
         "Strips leave out pixels that are off the surface between others by less than this times "
