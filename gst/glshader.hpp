@@ -2,6 +2,7 @@
 #pragma once
 
 #include <gst/gl/gl.h>
+#include <gst/gl/gstglfuncs.h>
 
 /** Writes the colour that the vertex shader gives as v_colour. */
 inline constexpr const char *kColourFragmentShader = R"(

@@ -33,6 +33,7 @@
 
 #include "camerapainter.hpp"
 #include "controlledvalues.hpp"
+#include "multisampler.hpp"
 #include "strippainter.hpp"
 #include "stripsettings.hpp"
 
@@ -64,6 +65,7 @@ struct GstStripRenderPrivate {
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
   StripPainter painter;
   CameraPainter camera_painter;
+  Multisampler multisampler;
   std::array<std::vector<StripVertex>, rangecast::kMaxViews> vertices; /* by number in the buffer */
 };
 
@@ -216,6 +218,7 @@ gst_strip_render_gl_stop (GstGLBaseFilter *filter)
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   priv->painter.stop ();
   priv->camera_painter.stop ();
+  priv->multisampler.stop ();
   gst_clear_object (&priv->framebuffer);
 }
 
@@ -237,6 +240,7 @@ struct DrawJob {
   StripPainter::Picture picture;
   std::span<const StripPainter::Layer> layers;
   bool show_cameras;
+  int samples;
   GstGLMemory *target;
   GstGLSyncMeta *sync; /* nullptr where downstream wants none */
   guint64 uploaded = 0;
@@ -248,10 +252,14 @@ draw_bound (gpointer user_data)
 {
   auto job = static_cast<DrawJob *> (user_data);
   GstStripRenderPrivate *priv = job->self->priv;
+  GstGLContext *context = GST_GL_BASE_FILTER (job->self)->context;
+  const bool antialiased =
+      priv->multisampler.begin (context, job->picture.width, job->picture.height, job->samples);
   job->uploaded = priv->painter.draw (job->picture, job->layers);
   if (job->show_cameras)
-    priv->camera_painter.draw (
-        GST_GL_BASE_FILTER (job->self)->context, priv->info.rig, job->picture.clip_from_world);
+    priv->camera_painter.draw (context, priv->info.rig, job->picture.clip_from_world);
+  if (antialiased)
+    priv->multisampler.end ();
   return TRUE;
 }
 
@@ -295,6 +303,9 @@ make_picture (
   picture.pixels_per_unit = float (height / (2 * std::tan (fov * M_PI / 360)));
   picture.mode = settings.strips.mode;
   picture.depth_step = settings.strips.depth_step;
+  /* what one camera sees is open at the back: there is nothing else to look at from there */
+  picture.back_faces = settings.back_faces || priv->info.rig.views.size () == 1;
+  picture.view_gap_m = settings.view_gap_m;
   picture.width = width;
   picture.height = height;
   std::lock_guard guard (priv->lock);
@@ -364,6 +375,7 @@ draw_frame (GstStripRender *self, const gstrange::RangeFrameMap &frame, GstBuffe
   job.picture = make_picture (priv, settings, running);
   job.layers = {layers.data (), count};
   job.show_cameras = settings.show_cameras;
+  job.samples = settings.samples;
   if (!draw_into (self, out, job))
     return GST_FLOW_ERROR;
   stats.uploaded_bytes = job.uploaded;

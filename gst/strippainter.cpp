@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "strippainter.hpp"
 
-#include <cstring>
+#include <string>
 
 #include "glshader.hpp"
 
+using rangecast::Mat4;
 using rangecast::StripMode;
 using rangecast::StripVertex;
 
@@ -22,7 +23,7 @@ using rangecast::StripVertex;
 #endif
 
 /* A vertex names its pixel; depth and colour are fetched here, and the pixel's ray unprojected.
- * Vertices that lie beside their pixel follow the plane through it and its neighbours. */
+ * Vertices that lie beside their pixel follow the surface that it and its neighbours make. */
 static const char *const kVertexShader = R"(
 precision highp float;
 precision highp int;
@@ -30,52 +31,70 @@ precision highp usampler2D;
 uniform usampler2D u_depth;
 uniform sampler2D u_colour;
 uniform ivec2 u_size; /* of the ROI; beyond it the textures hold older frames */
-uniform mat4 u_clip_from_world;
-uniform mat4 u_world_from_view;
-uniform vec4 u_intrinsics; /* fx, fy, cx, cy of the ROI */
+uniform mat4 u_clip_from_pixel; /* column, row and 1, all times depth, and 1 */
+uniform float u_focal; /* pixels */
 uniform float u_unit;
 uniform float u_step;
 uniform float u_point_size;
-in uint a_vertex;
+layout (location = 0) in uint a_vertex;
 out vec3 v_colour;
 
-float depth_at (ivec2 p)
+#if WITH_OFFSETS
+/* What depth grows by on the way from a neighbour, if there is one on the surface. */
+bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
 {
-  bool inside = all (greaterThanEqual (p, ivec2 (0))) && all (lessThan (p, u_size));
-  return inside ? float (texelFetch (u_depth, p, 0).r) : 0.0;
+  ivec2 from = clamp (p - way, ivec2 (0), u_size - 1);
+  float before = float (texelFetch (u_depth, from, 0).r);
+  rise = depth - before;
+  return from != p && before > 0.0 && abs (rise) <= u_step * depth;
 }
 /* Edges of a surface go on no steeper than 45 degrees: where it is seen at a grazing angle, depth
  * rises too fast there to be trusted, and spikes would stand out from it. */
 const float kSteepest = 1.0;
-float slope (ivec2 p, ivec2 way, float depth)
+float slope (ivec2 p, ivec2 way, float offset, float depth)
 {
-  float before = depth_at (p - way), after = depth_at (p + way), limit = u_step * depth;
-  bool has_before = before > 0.0 && abs (before - depth) <= limit;
-  bool has_after = after > 0.0 && abs (after - depth) <= limit;
+  float most = kSteepest * depth / u_focal, rise;
+#if BOTH_SIDES
+  float fall;
+  bool has_before = has_rise (p, way, depth, rise), has_after = has_rise (p, -way, depth, fall);
   if (has_before && has_after)
-    return (after - before) * 0.5;
-  float edge = has_after ? after - depth : has_before ? depth - before : 0.0;
-  float most = kSteepest * depth / u_intrinsics.x;
-  return clamp (edge, -most, most);
+    return (rise - fall) * 0.5;
+  return clamp (has_before ? rise : has_after ? -fall : 0.0, -most, most);
+#else
+  int outward = offset > 0.0 ? 1 : -1;
+  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -most, most) : 0.0;
+#endif
 }
-float place (uint n)
-{
-  return n == 0u ? 0.0 : n == 1u ? -0.5 : n == 2u ? 0.5 : n == 3u ? -0.75 : n == 4u ? 0.75 : 1.0;
-}
+#endif
+
 void main ()
 {
   ivec2 pixel = ivec2 (int (a_vertex & 8191u), int (a_vertex >> 13u & 8191u));
-  vec2 offset = vec2 (place (a_vertex >> 26u & 7u), place (a_vertex >> 29u));
-  float depth = depth_at (pixel);
-  if (offset != vec2 (0.0))
-    depth += offset.x * slope (pixel, ivec2 (1, 0), depth) + offset.y * slope (pixel, ivec2 (0, 1), depth);
-  float z = depth * u_unit;
-  vec2 ray = (vec2 (pixel) + offset - u_intrinsics.zw) / u_intrinsics.xy;
-  gl_Position = u_clip_from_world * (u_world_from_view * vec4 (ray * z, z, 1.0));
-  gl_PointSize = max (1.0, u_point_size * z / (u_intrinsics.x * gl_Position.w));
+  vec2 at = vec2 (pixel);
+  float depth = float (texelFetch (u_depth, pixel, 0).r);
+#if WITH_OFFSETS
+  vec2 offset = vec2 (ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u)) - 3) * 0.25;
+  at += offset;
+  if (offset.x != 0.0)
+    depth += offset.x * slope (pixel, ivec2 (1, 0), offset.x, depth);
+  if (offset.y != 0.0)
+    depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
+#endif
+  gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
+  gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
 }
 )";
+
+/* What the shader of a mode has beyond pixels in their places: bands reach beyond their ends, in
+ * the direction away from them; rectangles have all four sides. */
+static const char *const kVariants[] = {
+    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
+    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
+    "#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
+};
+static_assert (int (StripMode::kStrips) == 0 && int (StripMode::kRectangles) == 1 &&
+               int (StripMode::kPoints) == 2);
 
 bool
 StripPainter::start (GstGLContext *context, GError **error)
@@ -94,8 +113,13 @@ StripPainter::start (GstGLContext *context, GError **error)
         "OpenGL has no glVertexAttribIPointer");
     return false;
   }
-  shader_ = make_shader (context, kVertexShader, kColourFragmentShader, error);
-  return shader_ != nullptr;
+  for (std::size_t i = 0; i < shaders_.size (); i++) {
+    const std::string source = std::string (kVariants[i]) + kVertexShader;
+    shaders_[i] = make_shader (context, source.c_str (), kColourFragmentShader, error);
+    if (!shaders_[i])
+      return false;
+  }
+  return true;
 }
 
 void
@@ -104,16 +128,18 @@ StripPainter::stop ()
   if (!context_)
     return;
   const GstGLFuncs *gl = context_->gl_vtable;
-  for (ViewObjects &objects : objects_) {
-    if (objects.depth) {
-      const guint textures[] = {objects.depth, objects.colour};
-      gl->DeleteTextures (2, textures);
-      gl->DeleteBuffers (1, &objects.vertices);
-      gl->DeleteVertexArrays (1, &objects.array);
+  for (auto &turn : objects_)
+    for (ViewObjects &objects : turn) {
+      if (objects.depth) {
+        const guint textures[] = {objects.depth, objects.colour};
+        gl->DeleteTextures (2, textures);
+        gl->DeleteBuffers (1, &objects.vertices);
+        gl->DeleteVertexArrays (1, &objects.array);
+      }
+      objects = {};
     }
-    objects = {};
-  }
-  gst_clear_object (&shader_);
+  for (GstGLShader *&shader : shaders_)
+    gst_clear_object (&shader);
   context_ = nullptr;
 }
 
@@ -129,9 +155,8 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
     gl->GenVertexArrays (1, &objects.array);
     gl->BindVertexArray (objects.array);
     gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
-    const gint attribute = gst_gl_shader_get_attribute_location (shader_, "a_vertex");
-    gl->EnableVertexAttribArray (guint (attribute));
-    attribute_pointer_ (guint (attribute), 1, GL_UNSIGNED_INT, sizeof (StripVertex), nullptr);
+    gl->EnableVertexAttribArray (0); /* as the shaders' layout says */
+    attribute_pointer_ (0, 1, GL_UNSIGNED_INT, sizeof (StripVertex), nullptr);
   }
   if (objects.width == width && objects.height == height)
     return;
@@ -173,28 +198,62 @@ StripPainter::upload (ViewObjects &objects, const Layer &layer)
   return guint64 (depth.width) * guint64 (depth.height) * 6 + layer.vertices.size_bytes ();
 }
 
-void
-StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture)
+/* Column-major: clip coordinates of (column, row, 1) times depth, and 1. */
+static Mat4
+clip_from_pixel (const Mat4 &clip_from_world, const StripPainter::Layer &layer)
 {
-  const GstGLFuncs *gl = context_->gl_vtable;
   const rangecast::View &view = *layer.view;
   const rangecast::Mat3 &r = view.world_from_view.rotation;
   const rangecast::Vec3 &t = view.world_from_view.translation;
-  gfloat world_from_view[16] = {};
-  for (int row = 0; row < 3; row++)
-    for (int column = 0; column < 3; column++)
-      world_from_view[4 * column + row] = gfloat (r[3 * row + column]);
-  world_from_view[12] = gfloat (t.x);
-  world_from_view[13] = gfloat (t.y);
-  world_from_view[14] = gfloat (t.z);
-  world_from_view[15] = 1;
-  gst_gl_shader_set_uniform_matrix_4fv (shader_, "u_world_from_view", 1, FALSE, world_from_view);
-  gst_gl_shader_set_uniform_4f (shader_, "u_intrinsics", gfloat (view.intrinsics.fx),
-      gfloat (view.intrinsics.fy), gfloat (view.intrinsics.cx - layer.image.roi.x),
-      gfloat (view.intrinsics.cy - layer.image.roi.y));
-  gst_gl_shader_set_uniform_1f (shader_, "u_unit", gfloat (view.depth_unit_m));
+  const rangecast::Intrinsics &lens = view.intrinsics;
+  const double unit = view.depth_unit_m, x = unit / lens.fx, y = unit / lens.fy;
+  const double cx = lens.cx - layer.image.roi.x, cy = lens.cy - layer.image.roi.y;
+  Mat4 product;
+  for (int i = 0; i < 4; i++) {
+    const auto clip = [&] (double wx, double wy, double wz, double w) {
+      return clip_from_world[i] * wx + clip_from_world[4 + i] * wy + clip_from_world[8 + i] * wz +
+             clip_from_world[12 + i] * w;
+    };
+    const double right = x * clip (r[0], r[3], r[6], 0), down = y * clip (r[1], r[4], r[7], 0);
+    product[i] = float (right);
+    product[4 + i] = float (down);
+    product[8 + i] = float (unit * clip (r[2], r[5], r[8], 0) - cx * right - cy * down);
+    product[12 + i] = float (clip (t.x, t.y, t.z, 1));
+  }
+  return product;
+}
+
+/* Row of the matrix that makes one clip coordinate. */
+static rangecast::Vec3
+row_of (const Mat4 &m, int i)
+{
+  return {m[i], m[4 + i], m[8 + i]};
+}
+
+void
+StripPainter::draw_layer (
+    const ViewObjects &objects, const Layer &layer, const Picture &picture, Side side)
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  GstGLShader *shader = shaders_[std::size_t (picture.mode)];
+  Mat4 matrix = clip_from_pixel (picture.clip_from_world, layer);
+  /* Where two views see one surface, the one that looks more as the viewer does is before the
+   * other: what it sees has more pixels there, and noise must not let both shine through. */
+  const rangecast::Vec3 forward = row_of (picture.clip_from_world, 3);
+  const rangecast::Mat3 &r = layer.view->world_from_view.rotation;
+  const double length = norm (forward);
+  const double along = dot (forward, {r[2], r[5], r[8]}) / length;
+  const double behind_m = picture.view_gap_m * (1 - along);
+  matrix[14] += float (behind_m * dot (row_of (picture.clip_from_world, 2), forward) / length);
+  if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
+    for (std::size_t i = 0; i < 4; i++)
+      matrix[4 * i + 2] =
+          (matrix[4 * i + 2] + (side == Side::kBack ? 1 : -1) * matrix[4 * i + 3]) / 2;
+  gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
+  gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
+  gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
-      shader_, "u_size", layer.image.depth.width, layer.image.depth.height);
+      shader, "u_size", layer.image.depth.width, layer.image.depth.height);
   gl->ActiveTexture (GL_TEXTURE1);
   gl->BindTexture (GL_TEXTURE_2D, objects.colour);
   gl->ActiveTexture (GL_TEXTURE0);
@@ -204,40 +263,78 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
       GLsizei (layer.vertices.size ()));
 }
 
-guint64
-StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
+/* Lets through one side of all surfaces. Pieces are counter-clockwise in their view's picture,
+ * whose y points down; which way round that is for OpenGL follows from whether the matrix mirrors.
+ */
+static void
+show_side (const GstGLFuncs *gl, const Mat4 &m, bool back)
+{
+  const bool mirrors = dot (cross (row_of (m, 0), row_of (m, 1)), row_of (m, 3)) > 0;
+  gl->Enable (GL_CULL_FACE);
+  gl->CullFace (mirrors != back ? GL_FRONT : GL_BACK);
+}
+
+/* What all modes set in OpenGL, and what goes back to its default afterwards. */
+void
+StripPainter::begin (const Picture &picture)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const float *c = picture.background;
-  guint64 uploaded = 0;
   gl->Viewport (0, 0, picture.width, picture.height);
   gl->ClearColor (c[0], c[1], c[2], c[3]);
   gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   gl->Enable (GL_DEPTH_TEST);
-  const bool switched_point_size = gst_gl_context_get_gl_api (context_) != GST_GL_API_GLES2;
-  if (switched_point_size) /* OpenGL ES always takes it from the shader */
+  if (!is_gles (context_)) /* OpenGL ES always takes it from the shader */
     gl->Enable (GL_PROGRAM_POINT_SIZE);
-  gst_gl_shader_use (shader_);
-  gst_gl_shader_set_uniform_matrix_4fv (
-      shader_, "u_clip_from_world", 1, FALSE, picture.clip_from_world.data ());
-  gst_gl_shader_set_uniform_1i (shader_, "u_depth", 0);
-  gst_gl_shader_set_uniform_1i (shader_, "u_colour", 1);
-  gst_gl_shader_set_uniform_1f (shader_, "u_step", gfloat (picture.depth_step));
+  GstGLShader *shader = shaders_[std::size_t (picture.mode)];
+  gst_gl_shader_use (shader);
+  gst_gl_shader_set_uniform_1i (shader, "u_depth", 0);
+  gst_gl_shader_set_uniform_1i (shader, "u_colour", 1);
+  gst_gl_shader_set_uniform_1f (shader, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
-      shader_, "u_point_size", picture.point_size * picture.pixels_per_unit);
-  for (const Layer &layer : layers) {
-    if (layer.vertices.empty ())
-      continue;
-    ViewObjects &objects = objects_[layer.image.view_id];
-    gl->ActiveTexture (GL_TEXTURE0);
-    uploaded += upload (objects, layer);
-    draw_layer (objects, layer, picture);
-  }
+      shader, "u_point_size", picture.point_size * picture.pixels_per_unit);
+}
+
+void
+StripPainter::end ()
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gl->Disable (GL_DEPTH_TEST);
-  if (switched_point_size)
+  gl->Disable (GL_CULL_FACE);
+  gl->CullFace (GL_BACK);
+  if (!is_gles (context_))
     gl->Disable (GL_PROGRAM_POINT_SIZE);
   gst_gl_context_clear_shader (context_);
+}
+
+guint64
+StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  /* Noise turns many a single rectangle over: they have two sides, as points have. */
+  const bool sided = picture.mode == StripMode::kStrips;
+  guint64 uploaded = 0;
+  turn_ = (turn_ + 1) % objects_.size ();
+  begin (picture);
+  if (sided)
+    show_side (gl, picture.clip_from_world, false);
+  for (const Layer &layer : layers) {
+    if (layer.vertices.empty ())
+      continue;
+    ViewObjects &objects = objects_[turn_][std::size_t (layer.image.view_id)];
+    gl->ActiveTexture (GL_TEXTURE0);
+    uploaded += upload (objects, layer);
+    draw_layer (objects, layer, picture, Side::kFront);
+  }
+  if (sided && picture.back_faces) {
+    show_side (gl, picture.clip_from_world, true);
+    for (const Layer &layer : layers)
+      if (!layer.vertices.empty ())
+        draw_layer (
+            objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, Side::kBack);
+  }
+  end ();
   return uploaded;
 }

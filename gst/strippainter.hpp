@@ -25,6 +25,11 @@ public:
     float pixels_per_unit; ///< pixels that a length of 1 at a distance of 1 covers
     rangecast::StripMode mode;
     double depth_step;
+    bool back_faces = false; ///< of strips, where no front is
+
+    /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
+     *  between the two's directions. */
+    double view_gap_m = 0.004;
     int width, height;
   };
   struct Layer {
@@ -42,7 +47,11 @@ private:
   };
   void prepare (ViewObjects &objects, int width, int height);
   guint64 upload (ViewObjects &objects, const Layer &layer);
-  void draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture);
+  void begin (const Picture &picture);
+  void end ();
+  enum class Side { kFront, kBack };
+  void draw_layer (
+      const ViewObjects &objects, const Layer &layer, const Picture &picture, Side side);
 
   /* glVertexAttribIPointer, which GStreamer's table of functions lacks */
   using AttributePointer = void (GSTGLAPI *) (
@@ -50,6 +59,8 @@ private:
 
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
-  GstGLShader *shader_ = nullptr;
-  std::array<ViewObjects, rangecast::kMaxViews> objects_{};
+  std::array<GstGLShader *, 3> shaders_{}; /* by mode */
+  /* In turns: what the last picture reads may still be in use while this one's is written. */
+  std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
+  std::size_t turn_ = 0;
 };

@@ -43,8 +43,17 @@ static const NumberRow kNumbers[] = {
         -3600, 3600, 0, [] (Settings &s) -> double & { return s.camera.auto_orbit; }},
     {"depth-step", "Depth step",
         "Neighbours that differ by more than this share of their depth are not joined (0 to 1, "
-        "default 0.02)",
+        "default 0.03)",
         0, 1, kDefaults.depth_step, [] (Settings &s) -> double & { return s.strips.depth_step; }},
+    {"merge", "Merge",
+        "Strips leave out pixels that are off the surface between others by less than this times "
+        "0.07 % of their depth and 1.5 levels of colour; copies: 0.4 % and 12 levels (0 = none, "
+        "to 100, default 1)",
+        0, 100, kDefaults.merge, [] (Settings &s) -> double & { return s.strips.merge; }},
+    {"view-gap", "View gap",
+        "Metres by which what a view sees moves behind what others see, times 1 - cosine of the "
+        "angle between its direction and the picture's (0 to 1, default 0.004)",
+        0, 1, 0.004, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
 };
@@ -54,7 +63,10 @@ enum : guint {
   PROP_MODE = PROP_NUMBERS + std::size (kNumbers),
   PROP_BACKGROUND,
   PROP_MAX_GAP,
-  PROP_SHOW_CAMERAS
+  PROP_SHOW_CAMERAS,
+  PROP_BACK_FACES,
+  PROP_SAMPLES,
+  PROP_LAST = PROP_SAMPLES
 };
 
 GType
@@ -88,14 +100,24 @@ install_strip_settings (GObjectClass *object_class)
           Settings::kDefaultBackground, kFlags));
   g_object_class_install_property (object_class, PROP_MAX_GAP,
       g_param_spec_int ("max-gap", "Maximum gap",
-          "Invalid pixels of a row that a strip bridges (0 to 1000, default 3)", 0, 1000,
+          "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 6)", 0, 1000,
           kDefaults.max_gap, kFlags));
   g_object_class_install_property (object_class, PROP_SHOW_CAMERAS,
       g_param_spec_boolean ("show-cameras", "Show cameras",
           "Also draw where the rig's cameras stand, and their frusta from near to far (default "
           "false)",
           FALSE, kFlags));
-  return PROP_SHOW_CAMERAS;
+  g_object_class_install_property (object_class, PROP_BACK_FACES,
+      g_param_spec_boolean ("back-faces", "Back faces",
+          "Strips also show surfaces from behind, from inside a body, where no front is (default "
+          "false; always with one camera)",
+          FALSE, kFlags));
+  g_object_class_install_property (object_class, PROP_SAMPLES,
+      g_param_spec_int ("samples", "Samples",
+          "Samples of a pixel, for antialiasing (0 or 1 = none, to 64, default 0); less where "
+          "OpenGL has no more",
+          0, 64, 0, kFlags));
+  return PROP_LAST;
 }
 
 static double
@@ -125,6 +147,10 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.strips.max_gap = g_value_get_int (value);
   else if (id == PROP_SHOW_CAMERAS)
     settings.show_cameras = g_value_get_boolean (value);
+  else if (id == PROP_BACK_FACES)
+    settings.back_faces = g_value_get_boolean (value);
+  else if (id == PROP_SAMPLES)
+    settings.samples = g_value_get_int (value);
   else
     return false;
   return true;
@@ -143,6 +169,10 @@ get_strip_setting (const Settings &settings, guint id, GValue *value)
     g_value_set_int (value, settings.strips.max_gap);
   else if (id == PROP_SHOW_CAMERAS)
     g_value_set_boolean (value, settings.show_cameras);
+  else if (id == PROP_BACK_FACES)
+    g_value_set_boolean (value, settings.back_faces);
+  else if (id == PROP_SAMPLES)
+    g_value_set_int (value, settings.samples);
   else
     return false;
   return true;

@@ -15,6 +15,9 @@ struct StripRenderSettings {
   guint background = kDefaultBackground; ///< ARGB
   double point_size = 1;                 ///< footprints of a pixel
   bool show_cameras = false;
+  bool back_faces = false;
+  double view_gap_m = 0.004;
+  int samples = 0; ///< a pixel; below 2: no antialiasing
   rangecast::StripSettings strips;
 };
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "rangecast-check.hpp"
+#include "render-check.hpp"
 
 #include <gst/controller/controller.h>
-#include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
 #include <gst/video/navigation.h>
 
@@ -12,91 +11,6 @@
 
 using namespace rangecast;
 using namespace rangecast::testing;
-
-/* striprender and gldownload, 320x240 out; nullptr where there is no OpenGL. */
-static GstHarness *
-render_harness (const Rig &rig, const char *properties = "")
-{
-  GError *error = nullptr;
-  GstElement *probe = gst_parse_launch ("gltestsrc num-buffers=1 ! gldownload ! fakesink", &error);
-  g_clear_error (&error);
-  if (!probe)
-    return nullptr;
-  gst_element_set_state (probe, GST_STATE_PAUSED);
-  const bool usable =
-      gst_element_get_state (probe, nullptr, nullptr, 60 * GST_SECOND) == GST_STATE_CHANGE_SUCCESS;
-  gst_element_set_state (probe, GST_STATE_NULL);
-  gst_object_unref (probe);
-  if (!usable)
-    return nullptr;
-  const std::string launch =
-      std::string ("striprender name=r ") + properties +
-      " ! capsfilter name=size caps=\"video/x-raw(memory:GLMemory),width=320,height=240\" ! "
-      "gldownload";
-  GstHarness *h = gst_harness_new_parse (launch.c_str ());
-  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBA");
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-  return h;
-}
-
-struct Rendered {
-  std::vector<guint8> rgba;
-  guint8 at (int x, int y, int channel) const { return rgba[4 * (320 * y + x) + channel]; }
-};
-
-static Rendered
-render (GstHarness *h, GstBuffer *frame_set)
-{
-  GstBuffer *buffer = gst_harness_push_and_pull (h, frame_set);
-  fail_unless (buffer != nullptr);
-  Rendered picture;
-  picture.rgba.resize (320 * 240 * 4);
-  fail_unless_equals_int (
-      gst_buffer_extract (buffer, 0, picture.rgba.data (), picture.rgba.size ()),
-      picture.rgba.size ());
-  gst_buffer_unref (buffer);
-  return picture;
-}
-
-/* A flat wall 0.8 m before the first camera, in colours that change slowly. */
-static GstBuffer *
-wall (const Rig &rig, GstClockTime pts = 0)
-{
-  GstBuffer *buffer = make_frame_set (rig, pts);
-  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-  for (const RangeImage &image : frame.views ())
-    for (int y = 0; y < 240; y++)
-      for (int x = 0; x < 320; x++) {
-        const bool inside = image.view_id == 0 && x >= 40 && x < 280 && y >= 30 && y < 210;
-        image.depth.at (x, y) = inside ? 8000 : 0;
-        image.colour.at (x, y) = {guint8 (x / 2 + 50), guint8 (y), guint8 (200 - x / 2), 0};
-      }
-  return buffer;
-}
-
-GST_START_TEST (test_default_picture_is_the_first_views_own_in_every_mode)
-{
-  const Rig rig = ring_rig (4);
-  for (const char *mode : {"mode=strips", "mode=rectangles", "mode=points point-size=1.5"}) {
-    GstHarness *h = render_harness (rig, mode);
-    if (!h)
-      RANGECAST_SKIP ("no OpenGL context");
-    const Rendered picture = render (h, wall (rig));
-    double error = 0;
-    for (int y = 35; y < 205; y++)
-      for (int x = 45; x < 275; x++) {
-        const int expected[] = {x / 2 + 50, y, 200 - x / 2};
-        for (int c = 0; c < 3; c++)
-          error += std::pow (picture.at (x, y, c) - expected[c], 2);
-      }
-    const double mse = error / (170 * 230 * 3);
-    fail_unless (mse < 4, "%s: mean square error %f", mode, mse);
-    fail_unless_equals_int (picture.at (10, 120, 0), 0x20); /* the background */
-    fail_unless_equals_int (picture.at (160, 225, 2), 0x2a);
-    gst_harness_teardown (h);
-  }
-}
-GST_END_TEST;
 
 /* Views 1 and 3 stand at the first view's sides and look across: their frusta cross the picture in
  * their own colours. Its own lines lie on the picture's very edge. */
@@ -132,25 +46,6 @@ GST_START_TEST (test_cameras_are_drawn_where_they_stand)
   for (std::size_t i = 0; i < without.rgba.size (); i += 4)
     fail_unless_equals_int (without.rgba[i], 0x20);
   gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-/* The background begins right beside the outermost pixels. */
-GST_START_TEST (test_edges_lose_no_pixel_and_gain_none)
-{
-  const Rig rig = ring_rig (1);
-  for (const char *mode : {"mode=strips", "mode=rectangles"}) {
-    GstHarness *h = render_harness (rig, mode);
-    if (!h)
-      RANGECAST_SKIP ("no OpenGL context");
-    const Rendered picture = render (h, wall (rig));
-    for (auto [x, y] :
-        {std::pair{160, 30}, {160, 209}, {40, 120}, {279, 120}, {40, 30}, {279, 209}})
-      fail_unless (picture.at (x, y, 0) >= 50 + 40 / 2, "%s: %d, %d is missing", mode, x, y);
-    for (auto [x, y] : {std::pair{160, 29}, {160, 210}, {39, 120}, {280, 120}})
-      fail_unless (picture.at (x, y, 0) == 0x20, "%s: %d, %d is drawn", mode, x, y);
-    gst_harness_teardown (h);
-  }
 }
 GST_END_TEST;
 
@@ -603,9 +498,7 @@ striprender_suite ()
   Suite *suite = suite_create ("striprender");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_default_picture_is_the_first_views_own_in_every_mode);
   tcase_add_test (tc, test_cameras_are_drawn_where_they_stand);
-  tcase_add_test (tc, test_edges_lose_no_pixel_and_gain_none);
   tcase_add_test (tc, test_edges_of_a_smaller_roi_do_not_read_the_last_frame);
   tcase_add_test (tc, test_padded_strides_give_the_same_picture);
   tcase_add_test (tc, test_empty_frame_set_is_the_background);

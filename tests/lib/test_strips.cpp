@@ -2,10 +2,12 @@
 /* Strips and the orbit camera. */
 #include "test-support.hpp"
 
+#include <cmath>
 #include <random>
 #include <rangecast/strips/camera_lines.hpp>
 #include <rangecast/strips/orbit.hpp>
 #include <rangecast/strips/strips.hpp>
+#include <set>
 
 using namespace rangecast;
 using rangecast::testing::Image;
@@ -57,7 +59,7 @@ TEST (Strips, drawing_of_6_by_5_pixels_gives_these_strips)
 {
   StripSettings settings;
   settings.max_gap = 1;
-  settings.merge = false;
+  settings.merge = 0;
   StripResult result;
   /* A band with a gap that is bridged; a depth step; an isolated pixel; rows that join and do not.
    */
@@ -72,7 +74,7 @@ TEST (Strips, drawing_of_6_by_5_pixels_gives_these_strips)
 TEST (Strips, band_has_its_pixels_in_order_and_reaches_beyond_its_ends)
 {
   StripSettings settings;
-  settings.merge = false;
+  settings.merge = 0;
   EXPECT_EQ (vertices_of (Drawing ({"55", "5."}), settings),
       (std::vector<Vertex>{{0, 0, kFarBefore, kBefore}, {0, 1, kFarBefore, kCentre},
           {0, 0, kCentre, kBefore}, {0, 1, kCentre, kCentre}, {1, 0, kCentre, kBefore},
@@ -85,9 +87,9 @@ TEST (Strips, band_has_its_pixels_in_order_and_reaches_beyond_its_ends)
 TEST (Strips, equal_successive_pixels_become_one_longer_piece)
 {
   StripSettings settings;
-  settings.merge = false;
+  settings.merge = 0;
   const auto all = vertices_of (Drawing ({"555555555555"}), settings);
-  settings.merge = true;
+  settings.merge = 1;
   StripResult result;
   const auto merged = vertices_of (Drawing ({"555555555555"}), settings, &result);
   EXPECT_EQ (all.size (), 28u);
@@ -112,7 +114,7 @@ TEST (Strips, gap_is_bridged_only_if_short_and_its_ends_are_near)
 TEST (Strips, band_starts_where_the_one_above_ends)
 {
   StripSettings settings;
-  settings.merge = false;
+  settings.merge = 0;
   const auto v = vertices_of (Drawing ({"555", "559"}), settings);
   int met = 0, open = 0;
   for (const Vertex &p : v)
@@ -125,7 +127,7 @@ TEST (Strips, band_starts_where_the_one_above_ends)
 TEST (Strips, farther_surface_goes_on_behind_a_nearer_one_below)
 {
   StripSettings settings;
-  settings.merge = false;
+  settings.merge = 0;
   int behind = 0;
   for (const Vertex &p : vertices_of (Drawing ({"777", "555", "777"}), settings)) {
     behind += p.y == 0 && p.vertical == kFullAfter;
@@ -183,8 +185,8 @@ covers (const Vertex (&t)[3], double x, double y)
   bool left = false, right = false;
   for (int i = 0; i < 3; i++) {
     const Vertex &a = t[i], &b = t[(i + 1) % 3];
-    const double ax = a.x + kStripOffsets[a.horizontal], ay = a.y + kStripOffsets[a.vertical];
-    const double bx = b.x + kStripOffsets[b.horizontal], by = b.y + kStripOffsets[b.vertical];
+    const double ax = a.x + strip_offset (a.horizontal), ay = a.y + strip_offset (a.vertical);
+    const double bx = b.x + strip_offset (b.horizontal), by = b.y + strip_offset (b.vertical);
     const double side = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
     left = left || side > 1e-9;
     right = right || side < -1e-9;
@@ -241,6 +243,125 @@ TEST (Strips, every_valid_pixel_is_drawn_and_no_triangle_spans_a_step)
       ASSERT_NO_FATAL_FAILURE (
           expect_valid_pixels_drawn (rows, vertices_of (Drawing (rows), points)));
     }
+}
+
+/* Triangles are counter-clockwise, y pointing down: renderers leave out what they see from behind.
+ */
+TEST (Strips, all_triangles_face_the_camera)
+{
+  std::mt19937 random (2);
+  for (int round = 0; round < 50; round++) {
+    const auto rows = random_rows (random, round % 2 ? "55556677" : "55555559");
+    for (StripMode mode : {StripMode::kStrips, StripMode::kRectangles}) {
+      StripSettings settings;
+      settings.mode = mode;
+      settings.depth_step = 0.21;
+      const auto v = vertices_of (Drawing (rows), settings);
+      for (std::size_t i = 2; i < v.size (); i++) {
+        const Vertex &a = v[i - 2], &b = v[i - 1 + i % 2], &c = v[i - i % 2];
+        const auto x = [] (const Vertex &p) { return p.x + strip_offset (p.horizontal); };
+        const auto y = [] (const Vertex &p) { return p.y + strip_offset (p.vertical); };
+        const double area = (x (b) - x (a)) * (y (c) - y (a)) - (x (c) - x (a)) * (y (b) - y (a));
+        ASSERT_LE (area, 1e-6) << "triangle " << i - 2 << " at " << a.x << ", " << a.y;
+      }
+    }
+  }
+}
+
+TEST (Strips, gap_of_rows_is_bridged_only_if_short_and_its_ends_are_near)
+{
+  StripSettings settings;
+  settings.max_gap = 1;
+  settings.merge = 0;
+  const auto lower_rows_of_the_first_band = [&] (const std::vector<std::string> &rows) {
+    const auto v = vertices_of (Drawing (rows), settings);
+    std::set<int> lower;
+    for (std::size_t i = 0; i + 1 < v.size (); i += 2)
+      if (v[i].y == 0 && v[i].vertical == kBefore)
+        lower.insert (v[i + 1].y);
+    return lower;
+  };
+  EXPECT_EQ (lower_rows_of_the_first_band ({"555", "...", "555"}), std::set<int>{2});
+  EXPECT_EQ (lower_rows_of_the_first_band ({"555", "...", "...", "555"}), std::set<int>{0});
+  EXPECT_EQ (lower_rows_of_the_first_band ({"555", "...", "777"}), std::set<int>{0});
+}
+
+namespace {
+
+/* Rows of depths and greys as given. */
+Drawing
+shaded (const std::vector<std::vector<int>> &depth, const std::vector<std::vector<int>> &grey)
+{
+  Drawing drawing (std::vector<std::string> (depth.size (), std::string (depth[0].size (), '5')));
+  for (int y = 0; y < drawing.height; y++)
+    for (int x = 0; x < drawing.width; x++) {
+      drawing.depth.view ().at (x, y) = static_cast<std::uint16_t> (depth[y][x]);
+      const auto g = static_cast<std::uint8_t> (grey[y][x]);
+      drawing.colour.view ().at (x, y) = {g, static_cast<std::uint8_t> (255 - g), 7, 0};
+    }
+  return drawing;
+}
+
+/* Columns of a row that vertices name: as the upper ones of its own band, or as the lower ones of
+ * the band above. */
+std::set<int>
+columns_of (const std::vector<Vertex> &v, int row, bool upper)
+{
+  std::set<int> columns;
+  for (std::size_t i = upper ? 0 : 1; i < v.size (); i += 2)
+    if (v[i].y == row && v[i].horizontal == kCentre)
+      columns.insert (v[i].x);
+  return columns;
+}
+
+} // namespace
+
+TEST (Strips, pixels_left_out_are_near_the_line_between_those_that_stay)
+{
+  std::mt19937 random (3);
+  std::vector<int> depth, grey;
+  for (int x = 0; x < 400; x++) {
+    depth.push_back (7000 + int (300 * std::sin (x / 40.0)) + int (random () % 5));
+    grey.push_back (128 + int (100 * std::sin (x / 25.0)) + int (random () % 3));
+  }
+  const auto columns = columns_of (vertices_of (shaded ({depth}, {grey}), {}), 0, true);
+  EXPECT_LT (columns.size (), 300u);
+  for (auto it = columns.begin (); std::next (it) != columns.end (); ++it) {
+    const int a = *it, b = *std::next (it);
+    EXPECT_LE (b - a, kLongestPiece);
+    for (int x = a + 1; x < b; x++) {
+      const double t = double (x - a) / (b - a);
+      EXPECT_NEAR (depth[a] + t * (depth[b] - depth[a]), depth[x], kMergeDepth * depth[x] + 0.1);
+      EXPECT_NEAR (grey[a] + t * (grey[b] - grey[a]), grey[x], kMergeColour + 0.1);
+    }
+  }
+}
+
+TEST (Strips, bands_above_and_below_a_row_leave_out_the_same_pixels)
+{
+  std::mt19937 random (4);
+  std::vector<std::vector<int>> depth (5, std::vector<int> (100)), grey = depth;
+  for (int y = 0; y < 5; y++)
+    for (int x = 0; x < 100; x++) {
+      depth[y][x] = 7000 + int (random () % 12);
+      grey[y][x] = 100 + int (random () % 7);
+    }
+  const auto v = vertices_of (shaded (depth, grey), {});
+  for (int row = 1; row < 4; row++) {
+    EXPECT_EQ (columns_of (v, row, true), columns_of (v, row, false)) << "row " << row;
+    EXPECT_LT (columns_of (v, row, true).size (), 100u);
+  }
+}
+
+/* What the neighbour code leaves of a slow ramp: runs of equal pixels. An edge is none. */
+TEST (Strips, runs_of_copies_become_a_slope_and_edges_stay_sharp)
+{
+  std::vector<int> depth (60, 7000), grey;
+  for (int x = 0; x < 60; x++)
+    grey.push_back (x < 40 ? 50 + x / 5 * 5 : 200);
+  const auto columns = columns_of (vertices_of (shaded ({depth}, {grey}), {}), 0, true);
+  EXPECT_LE (columns.size (), 12u); /* the 8 runs of the ramp are not 16 columns */
+  EXPECT_TRUE (columns.contains (39) && columns.contains (40));
 }
 
 TEST (Strips, empty_view_has_no_vertices)

@@ -2,17 +2,73 @@
 #include "strips.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 
 namespace rangecast {
 namespace {
 
+/* Depth, R, G, B of a pixel, or how far they are from another's. */
+using Lanes = float __attribute__ ((vector_size (16)));
+
+Lanes
+lanes_of (std::uint16_t depth, Rgbx colour)
+{
+  return Lanes{float (depth), float (colour.r), float (colour.g), float (colour.b)};
+}
+
+/* Whether any lane of a comparison is true. */
+bool
+any (decltype (Lanes{} < Lanes{}) test)
+{
+  using Halves = long long __attribute__ ((vector_size (16)));
+  const auto halves = reinterpret_cast<Halves> (test);
+  return (halves[0] | halves[1]) != 0;
+}
+
 bool
 same_colour (Rgbx a, Rgbx b)
 {
   return a.r == b.r && a.g == b.g && a.b == b.b;
 }
+
+/* 1 / n */
+constexpr auto kShares = [] {
+  std::array<float, kLongestPiece + 1> shares{};
+  for (int n = 1; n <= kLongestPiece; n++)
+    shares[static_cast<std::size_t> (n)] = 1 / float (n);
+  return shares;
+}();
+
+/* The straight lines from one pixel that pass all later ones within a tolerance: a range of slopes
+ * (J. Sklansky, V. Gonzalez, "Fast polygonal approximation of digitized curves", Pattern
+ * Recognition 12, 1980). */
+class Cone {
+public:
+  void begin (Lanes from)
+  {
+    from_ = from;
+    least_ = Lanes{-1e9f, -1e9f, -1e9f, -1e9f};
+    most_ = -least_;
+  }
+  /** Whether a line from the first pixel to that one, n further on, passes all between. If so, it
+   *  is one more to pass. */
+  bool take (Lanes to, int n, Lanes tolerance)
+  {
+    const float share = kShares[static_cast<std::size_t> (n)];
+    const Lanes way = to - from_, slope = way * share;
+    if (any ((slope < least_) | (slope > most_)))
+      return false;
+    const Lanes low = (way - tolerance) * share, high = (way + tolerance) * share;
+    least_ = low > least_ ? low : least_;
+    most_ = high < most_ ? high : most_;
+    return true;
+  }
+
+private:
+  Lanes from_{}, least_{}, most_{};
+};
 
 class Builder {
 public:
@@ -21,19 +77,25 @@ public:
       : image_ (image), settings_ (settings), to_ (to), result_ (result),
         width_ (std::min (image.depth.width, kMaxStripSide)),
         height_ (std::min (image.depth.height, kMaxStripSide)),
-        step_ (static_cast<int> (settings.depth_step * 65536))
+        step_ (static_cast<int> (settings.depth_step * 65536)),
+        tolerance_ (tolerances (settings.merge * kMergeDepth, settings.merge * kMergeColour)),
+        copy_tolerance_ (
+            tolerances (settings.merge * kMergeCopyDepth, settings.merge * kMergeCopyColour))
   {
   }
 
   void build ()
   {
+    if (settings_.mode == StripMode::kStrips)
+      choose_kept (0, kept_below_);
     for (int y = 0; y < height_; y++) {
       depth_ = image_.depth.row (y);
-      below_ = y + 1 < height_ ? image_.depth.row (y + 1) : nullptr;
       row_ = y;
       if (settings_.mode == StripMode::kStrips) {
-        std::swap (met_, meets_);
-        std::fill_n (meets_, width_, false);
+        std::swap (kept_, kept_below_);
+        if (y + 1 < height_)
+          choose_kept (y + 1, kept_below_);
+        look_below ();
         bands_of_row ();
       } else
         pixels_of_row ();
@@ -41,26 +103,57 @@ public:
   }
 
 private:
+  /* Lane 0 as a share of the depth. More than 0, so that rounding is within them. */
+  static Lanes tolerances (double depth, double colour)
+  {
+    const auto c = static_cast<float> (colour) + 1e-3f;
+    return Lanes{static_cast<float> (depth) + 1e-7f, c, c, c};
+  }
+
   [[nodiscard]] bool near (int a, int b) const
   {
     return static_cast<std::int64_t> (std::abs (a - b)) * 65536 <=
            static_cast<std::int64_t> (std::min (a, b)) * step_;
   }
 
-  [[nodiscard]] bool joins_below (int x) const
+  /* Where the lower vertex of a pixel is: on the pixel that many rows below, or, 0, at a place of
+   * its own. */
+  struct Lower {
+    std::uint16_t rows = 0;
+    StripPlace place = kCentre;
+    std::uint16_t depth = kInvalidDepth; /* of the pixel */
+  };
+
+  /* A farther surface goes on behind a nearer one; the other way round shards would stand up from
+   * surfaces seen at a grazing angle, whose rows are far apart in depth. */
+  [[nodiscard]] Lower lower_of (int x) const
   {
-    return below_ && below_[x] != kInvalidDepth && near (depth_[x], below_[x]);
+    const int last = std::min (height_ - 1, row_ + 1 + settings_.max_gap);
+    for (int y = row_ + 1; y <= last; y++)
+      if (const std::uint16_t depth = image_.depth.at (x, y); depth != kInvalidDepth) {
+        if (near (depth_[x], depth))
+          return {static_cast<std::uint16_t> (y - row_), kCentre, depth};
+        return {0, y == row_ + 1 && depth < depth_[x] ? kFullAfter : kFarAfter, depth_[x]};
+      }
+    return {0, kFarAfter, depth_[x]};
   }
 
-  /* Where the lower vertex of a pixel is: kCentre of the one below, or below its own centre. A
-   * farther surface goes on behind a nearer one; the other way round shards would stand up from
-   * surfaces seen at a grazing angle, whose rows are far apart in depth. */
-  [[nodiscard]] StripPlace own_lower (int x) const
+  /* What is above and below each pixel of the row. */
+  void look_below ()
   {
-    if (!below_ || below_[x] == kInvalidDepth)
-      return kFarAfter;
-    return near (depth_[x], below_[x]) ? kCentre : below_[x] < depth_[x] ? kFullAfter : kFarAfter;
+    const std::uint16_t *below = row_ + 1 < height_ ? image_.depth.row (row_ + 1) : nullptr;
+    for (int x = 0; x < width_; x++) {
+      met_[x] = row_ > 0 && reach_[x] == row_;
+      if (depth_[x] == kInvalidDepth)
+        continue;
+      if (below && below[x] != kInvalidDepth && near (depth_[x], below[x]))
+        lower_[x] = {1, kCentre, below[x]};
+      else
+        lower_[x] = lower_of (x);
+    }
   }
+
+  [[nodiscard]] bool joins_below (int x) const { return lower_[x].rows > 0; }
 
   /* The next pixel of the band after x, or -1. */
   [[nodiscard]] int next_in_band (int x) const
@@ -72,26 +165,61 @@ private:
     return -1;
   }
 
-  /* Whether the vertices of two pixels of this row are alike but for their column. */
-  [[nodiscard]] bool same_pair (int a, int b) const
+  /* How far a pixel may be off a line that leaves it out. One that equals the pixel before it may
+   * be a copy, which the neighbour code put there for something near. */
+  [[nodiscard]] Lanes tolerance (bool copy, std::uint16_t depth) const
   {
-    if (depth_[a] != depth_[b] || met_[a] != met_[b] ||
-        !same_colour (image_.colour.at (a, row_), image_.colour.at (b, row_)))
-      return false;
-    const StripPlace own = own_lower (a);
-    if (own != own_lower (b))
-      return false;
-    return own != kCentre || (below_[a] == below_[b] && same_colour (image_.colour.at (a, row_ + 1),
-                                                            image_.colour.at (b, row_ + 1)));
+    const Lanes &t = copy ? copy_tolerance_ : tolerance_;
+    return Lanes{t[0] * float (depth), t[1], t[2], t[3]};
+  }
+
+  /* Which pixels of a row stay when those on lines between them are left out. */
+  void choose_kept (int y, bool *kept) const
+  {
+    const std::uint16_t *depth = image_.depth.row (y);
+    const Rgbx *colour = image_.colour.row (y);
+    std::fill_n (kept, width_, settings_.merge <= 0);
+    if (settings_.merge <= 0)
+      return;
+    Cone cone;
+    Lanes before{};
+    int first = -1; /* where the piece begins; -1: none does */
+    for (int x = 0; x < width_; x++) {
+      const bool on = first >= 0 && near (depth[x - 1], depth[x]); /* not if invalid: 0 */
+      if (first >= 0 && !on) {
+        kept[x - 1] = true;
+        first = -1;
+      }
+      if (depth[x] == kInvalidDepth)
+        continue;
+      const Lanes here = lanes_of (depth[x], colour[x]);
+      if (!on) {
+        kept[x] = true;
+        cone.begin (here);
+        first = x;
+        before = here;
+        continue;
+      }
+      const bool copy = depth[x] == depth[x - 1] && same_colour (colour[x], colour[x - 1]);
+      const Lanes off = tolerance (copy, depth[x]);
+      if (x - first > kLongestPiece || !near (depth[first], depth[x]) ||
+          !cone.take (here, x - first, off)) {
+        kept[x - 1] = true;
+        cone.begin (before);
+        cone.take (here, 1, off);
+        first = x - 1;
+      }
+      before = here;
+    }
+    if (first >= 0)
+      kept[width_ - 1] = true;
   }
 
   /* Whether the step from pixel a to b can use what lies below them: both of its triangles then
    * have depths that are near, each to each. */
   [[nodiscard]] bool step_fits_below (int a, int b) const
   {
-    const int low_a = joins_below (a) ? below_[a] : depth_[a];
-    const int low_b = joins_below (b) ? below_[b] : depth_[b];
-    return near (low_a, depth_[b]) && near (low_a, low_b);
+    return near (lower_[a].depth, depth_[b]) && near (lower_[a].depth, lower_[b].depth);
   }
 
   /* Begins a piece at v: two equal vertices and the last one's repetition join it to what is
@@ -114,9 +242,9 @@ private:
   void pair (int x, bool joined, StripPlace horizontal = kCentre)
   {
     to_.push_back (upper (x, horizontal));
-    const StripPlace own = own_lower (x);
-    to_.push_back (joined ? strip_vertex (x, row_ + 1, horizontal, kCentre)
-                          : strip_vertex (x, row_, horizontal, own == kCentre ? kFarAfter : own));
+    to_.push_back (
+        joined ? strip_vertex (x, row_ + lower_[x].rows, horizontal, kCentre)
+               : strip_vertex (x, row_, horizontal, joins_below (x) ? kFarAfter : lower_[x].place));
   }
 
   void rectangle (int x)
@@ -136,20 +264,57 @@ private:
     bool fits_before, fits_after;
   };
 
+  /* Whether the step from a to b goes on as steps inside a surface do: along the band, both bands
+   * at the row below met or both not. */
+  [[nodiscard]] bool is_plain_step (int a, int b, bool fits) const
+  {
+    return b == a + 1 && met_[a] == met_[b] && lower_[a].rows == lower_[b].rows &&
+           lower_[a].place == lower_[b].place &&
+           (lower_[a].rows == 0 || (lower_[a].rows == 1 && fits));
+  }
+
+  /* Whether the band covers all between a pixel and the one below that it joins. */
+  [[nodiscard]] bool meets_below (const BandPixel &p) const
+  {
+    const auto as_far = [&] (int x) { return lower_[x].rows >= lower_[p.x].rows; };
+    return p.fits_before && p.fits_after &&
+           (lower_[p.x].rows == 1 || (as_far (p.before) && as_far (std::max (p.x, p.after))));
+  }
+
   void add_to_band (const BandPixel &p)
   {
     const bool joined = joins_below (p.x);
-    meets_[p.x] = joined ? p.fits_before && p.fits_after : own_lower (p.x) == kFullAfter;
-    const bool inside_piece = settings_.merge && p.before == p.x - 1 && p.after == p.x + 1 &&
-                              same_pair (p.before, p.x) && same_pair (p.x, p.after);
-    if (!inside_piece) {
-      pair (p.x, joined && p.fits_before);
-      result_.triangles += 2;
+    if (joined ? meets_below (p) : lower_[p.x].place == kFullAfter)
+      reach_[p.x] = row_ + std::max<int> (1, lower_[p.x].rows);
+    const bool inside = p.before < p.x && p.after > p.x &&
+                        is_plain_step (p.before, p.x, p.fits_before) &&
+                        is_plain_step (p.x, p.after, p.fits_after);
+    if (inside) {
+      go_on (p.x, joined);
+      return;
     }
+    pair (p.x, joined && p.fits_before);
+    result_.triangles += 2;
     if (joined && p.fits_before != p.fits_after) {
       begin_piece (upper (p.x, kCentre));
       pair (p.x, p.fits_after);
     }
+  }
+
+  /* Goes on to a pixel of which either vertex, or both, may be left out. One alone makes one
+   * triangle, and one of no size with the other repeated. */
+  void go_on (int x, bool joined)
+  {
+    const bool keeps_upper = kept_[x], keeps_lower = joined ? kept_below_[x] : kept_[x];
+    if (!keeps_upper && !keeps_lower)
+      return;
+    const StripVertex last_upper = to_[to_.size () - 2], last_lower = to_.back ();
+    pair (x, joined);
+    if (!keeps_upper)
+      to_[to_.size () - 2] = last_upper;
+    if (!keeps_lower)
+      to_.back () = last_lower;
+    result_.triangles += static_cast<std::uint64_t> (keeps_upper) + keeps_lower;
   }
 
   /* @return the column after the band */
@@ -201,11 +366,16 @@ private:
   StripResult &result_;
   const int width_, height_;
   const int step_; /* of 65536 */
-  const std::uint16_t *depth_ = nullptr, *below_ = nullptr;
+  const Lanes tolerance_, copy_tolerance_;
+  const std::uint16_t *depth_ = nullptr;
   int row_ = 0;
-  bool columns_[2][kMaxStripSide] = {};
-  bool *met_ = columns_[0];   /* columns where the row above reaches down to this one's pixels */
-  bool *meets_ = columns_[1]; /* and where this row does to the next one's */
+  /* by column */
+  bool flags_[3][kMaxStripSide] = {};
+  bool *met_ = flags_[0];  /* a band above reaches down to this row's pixel */
+  bool *kept_ = flags_[1]; /* this row's pixel is not left out */
+  bool *kept_below_ = flags_[2];
+  Lower lower_[kMaxStripSide];
+  int reach_[kMaxStripSide] = {}; /* the row to which the last band came down; 0: to none */
 };
 
 } // namespace

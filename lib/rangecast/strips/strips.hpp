@@ -16,28 +16,44 @@ enum class StripMode {
 
 struct StripSettings {
   StripMode mode = StripMode::kStrips;
-  double depth_step = 0.02; ///< neighbours that differ by more than this share of their depth do
+  double depth_step = 0.03; ///< neighbours that differ by more than this share of their depth do
                             ///< not belong to one surface
-  int max_gap = 3;   ///< invalid pixels that a strip bridges if its two ends are near in depth
-  bool merge = true; ///< equal successive pixels become one longer piece
+  int max_gap = 6; ///< invalid pixels that a strip bridges if its two ends are near in depth
+  /** Successive pixels on a straight line become one longer piece; 0: none do. Times this, depth
+   *  may be off the line by kMergeDepth and R, G, B by kMergeColour; where a pixel equals the one
+   *  before it, by kMergeCopyDepth and kMergeCopyColour: it may be a copy that the neighbour code
+   *  put there for something near. */
+  double merge = 1;
 };
+
+inline constexpr double kMergeDepth = 0.0007; ///< share of the depth
+inline constexpr double kMergeColour = 1.5;   ///< levels
+inline constexpr double kMergeCopyDepth = 0.004;
+inline constexpr double kMergeCopyColour = 12;
 
 /** A vertex that the GPU unprojects itself: the pixel whose depth and colour it has, and where
  *  about that pixel it lies. Bits 0-12: column, 13-25: row (both of the ROI), 26-28: horizontal,
  *  29-31: vertical StripPlace. */
 using StripVertex = std::uint32_t;
 
-/** Where a vertex lies about its pixel, on the surface that the pixel and its neighbours make. */
+/** Where a vertex lies about its pixel, on the surface that the pixel and its neighbours make:
+ *  quarters of a pixel, counted from 3. */
 enum StripPlace : std::uint32_t {
-  kCentre = 0,
+  kFarBefore = 0, ///< three quarters: an end of a band, so that it meets what another camera saw
   kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
-  kAfter = 2,     ///< half a pixel right or down
-  kFarBefore = 3, ///< three quarters: an end of a band, so that it meets what another camera saw
-  kFarAfter = 4,
-  kFullAfter = 5, ///< a whole pixel: behind a nearer surface that begins there
+  kCentre = 3,
+  kAfter = 5, ///< half a pixel right or down
+  kFarAfter = 6,
+  kFullAfter = 7, ///< a whole pixel: behind a nearer surface that begins there
 };
-/** Offsets in pixels, by StripPlace. */
-inline constexpr float kStripOffsets[] = {0.f, -0.5f, 0.5f, -0.75f, 0.75f, 1.f};
+/** The offset in pixels. */
+constexpr float
+strip_offset (StripPlace place)
+{
+  return 0.25f * (static_cast<float> (place) - 3);
+}
+/** Pixels in a row that one piece stands for, at most. */
+inline constexpr int kLongestPiece = 32;
 /** No image that is drawn is larger, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -58,15 +74,20 @@ struct StripResult {
 /** Makes the vertices of one view.
  *
  *  kStrips: successive valid pixels of a row form a band, one triangle strip with two vertices a
- *  pixel: its own place, and that of the pixel below if that is valid and near in depth, so that
- *  bands join and no cracks open when the view turns; else a little below on its own surface. A
- *  band that no other one comes down to begins at the upper edge of its pixels. Both ends of a band
- *  reach a little beyond their pixels. No triangle's three pixels are further apart in depth than
- *  depth_step allows. A pixel whose pair of vertices equals both neighbours' in depth and colour is
- *  left out: the piece becomes longer. A gap of invalid pixels is bridged if its ends are near in
- *  depth; a depth step ends the band; a pixel with nothing beside it becomes a rectangle of its own
- *  size. Bands are joined by degenerate triangles to one triangle strip. kRectangles: four vertices
- *  a pixel, joined likewise. kPoints: one vertex a pixel.
+ *  pixel: its own place, and that of the next valid pixel below, at most max_gap rows away and near
+ *  in depth, so that bands join and no cracks open when the view turns; else a little below on its
+ *  own surface. A band that no other one comes down to begins at the upper edge of its pixels. Both
+ *  ends of a band reach a little beyond their pixels. A gap of invalid pixels is bridged if its
+ *  ends are near in depth; a depth step ends the band; a pixel with nothing beside it becomes a
+ *  rectangle of its own size. Bands are joined by degenerate triangles to one triangle strip, whose
+ *  triangles are all counter-clockwise in the picture (y down).
+ *
+ *  Of the pixels inside a band those are left out that lie on straight lines, in depth and colour,
+ *  between others of their row; a line has at most kLongestPiece pixels, all near its first one.
+ *  The bands above and below a row leave out the same ones, so that no crack opens there. Between
+ *  pixels that stay no step is larger than depth_step allows.
+ *
+ *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn
  *  @param[out] to    replaced; keeps its memory
  *  Reentrant. */

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <rangecast/neighbourcode/access_unit.hpp>
+#include <rangecast/scene/scene.hpp>
+#include <vector>
+
+namespace bench {
+
+/** When in the scene's motion everything is looked at, seconds. */
+inline constexpr double kMoment = 0.5;
+
+/** Range images of all views, and the memory behind them: move it, do not copy it. */
+struct FrameSet {
+  rangecast::Rig rig;
+  std::vector<std::vector<std::uint16_t>> depth;
+  std::vector<std::vector<rangecast::Rgbx>> colour;
+  std::vector<rangecast::RangeImage> images; ///< cut to the figure
+
+  FrameSet () = default;
+  FrameSet (FrameSet &&) = default;
+  FrameSet &operator= (FrameSet &&) = default;
+};
+
+/** The scene's own range images: exact depth, no sensor noise. */
+rangecast::Status exact_frames (rangecast::SceneSettings settings, FrameSet &set);
+
+/** What the demo's viewer has: the scene's stereo pairs with sensor noise, matched, freed of the
+ *  background that was learnt before, through the neighbour code with its defaults, and through
+ *  the cylinder. */
+rangecast::Status stereo_frames (const rangecast::SceneSettings &settings, FrameSet &set);
+
+/** Codes and decodes, which leaves runs of equal pixels. */
+rangecast::Status code (FrameSet &set, const rangecast::EncoderSettings &settings);
+
+/** Adds noise to all valid depths: independent normal numbers, smoothed over 2 pixels and scaled to
+ *  the deviation wanted. */
+void add_smooth_noise (FrameSet &set, double deviation_m);
+
+} // namespace bench

@@ -1,0 +1,297 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* striprender's pictures and their cost, in all modes, beside peers in the same run. */
+#include <gst/gl/gl.h>
+#include <gst/gl/gstglfuncs.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <list>
+#include <opencv2/imgcodecs.hpp>
+#include <rangecast/strips/orbit.hpp>
+
+#include "../options.hpp"
+#include "report.hpp"
+#include "target.hpp"
+#include "truth.hpp"
+
+using namespace rangecast;
+using namespace bench;
+
+namespace {
+
+const char *const kUsage =
+    "usage: render_bench [--model FILE] [--size WxH] [--rounds N] [--json FILE] [--pictures DIR]\n"
+    "Draws four views of the test scene in 640x480, as striprender does, in each mode, and judges\n"
+    "the pictures by the scene rendered from the same places: 0, 20 and 45 degrees off the "
+    "nearest\n"
+    "camera, four places each. Depth is exact; or stereo: matched, freed of the background, coded\n"
+    "and decoded, filtered by the cylinder, as in the demo; or noise: exact and 3 mm of smooth\n"
+    "noise. Mode strips-merged: strips of exact depth through the neighbour code, whose runs of\n"
+    "equal pixels (colour threshold 8) become longer pieces. Peers: grid, a plain grid surface, "
+    "and\n"
+    "point-cloud, GL points; both from a vertex buffer that the CPU unprojects into.\n"
+    "  ms      one picture from depth and colour until the GPU has finished, median\n"
+    "  CPU ms  processor time of all threads for it, median: what a busy machine changes less\n"
+    "  holes   share of the figure's pixels that are not drawn\n"
+    "  spill   pixels drawn beside the figure, as a share of the figure's\n"
+    "  PSNR, SSIM  over the pixels that have both\n"
+    "  --model FILE    glTF or OBJ model (default: the built-in figure)\n"
+    "  --size WxH      of the range images (default 320x240)\n"
+    "  --rounds N      times are medians of so many (default 15)\n"
+    "  --merge N       of the strips (default 1)\n"
+    "  --mode NAME     only that row of the table\n"
+    "  --depth KIND    only that depth\n"
+    "  --json FILE     writes the rows (but noise) there\n"
+    "  --pictures DIR  writes truth, picture and difference there, as PNG\n";
+
+using Clock = std::chrono::steady_clock;
+
+double
+ms_since (Clock::time_point start)
+{
+  return std::chrono::duration<double, std::milli> (Clock::now () - start).count ();
+}
+
+/* Of all threads, those of a renderer in software too. */
+double
+processor_ms ()
+{
+  timespec now;
+  clock_gettime (CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * double (now.tv_sec) + 1e-6 * double (now.tv_nsec);
+}
+
+double
+median (std::vector<double> values)
+{
+  std::ranges::nth_element (values, values.begin () + std::ptrdiff_t (values.size () / 2));
+  return values[values.size () / 2];
+}
+
+struct Job {
+  SceneSettings scene;
+  int rounds = 15;
+  double merge = StripSettings{}.merge;
+  std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
+  std::vector<RenderRow> rows;
+  GstGLContext *context = nullptr;
+  StripPainter painter;
+  Status status;
+};
+
+/* Frame sets of one kind of depth, and the ways that draw them. */
+struct Kind {
+  const char *depth;
+  FrameSet set, coded;
+  std::vector<std::unique_ptr<Way>> ways;
+};
+
+StripPainter::Picture
+make_picture (const Rig &rig, double azimuth_deg)
+{
+  const SceneFrame frame = scene_frame (rig);
+  Orbit orbit;
+  orbit.azimuth_deg = azimuth_deg;
+  StripPainter::Picture picture = {};
+  picture.clip_from_world =
+      orbit_matrices (frame, orbit, double (kWidth) / kHeight, true).clip_from_world;
+  picture.point_size = 1;
+  picture.pixels_per_unit = float (kHeight / (2 * std::tan (frame.fov_deg * M_PI / 360)));
+  picture.back_faces = getenv ("BACK");
+  picture.width = kWidth;
+  picture.height = kHeight;
+  return picture;
+}
+
+Status
+make_ways (Job &job, Kind &kind)
+{
+  const auto strips = [&] (const char *name, const FrameSet &set, StripMode mode) {
+    StripSettings settings;
+    settings.mode = mode;
+    settings.merge = job.merge;
+    kind.ways.push_back (make_strip_way (name, job.painter, set, settings));
+  };
+  strips ("strips", kind.set, StripMode::kStrips);
+  strips ("rectangles", kind.set, StripMode::kRectangles);
+  strips ("points", kind.set, StripMode::kPoints);
+  if (!kind.coded.images.empty ())
+    strips ("strips-merged", kind.coded, StripMode::kStrips);
+  for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
+    GError *error = nullptr;
+    kind.ways.push_back (make_peer (name, peer, job.context, kind.set, &error));
+    if (!kind.ways.back ()) {
+      const std::string why = error ? error->message : "no shader";
+      g_clear_error (&error);
+      return {StatusCode::kUnsupported, why};
+    }
+  }
+  return {};
+}
+
+/* A frame set of one kind of depth, and of exact depth also what the neighbour code makes of it. */
+Status
+make_kind (Job &job, const char *depth, Kind &kind)
+{
+  const std::string name = kind.depth = depth;
+  Status status =
+      name == "stereo" ? stereo_frames (job.scene, kind.set) : exact_frames (job.scene, kind.set);
+  if (status.ok () && name == "exact") {
+    EncoderSettings settings;
+    settings.colour_threshold = 8;
+    status = exact_frames (job.scene, kind.coded);
+    if (status.ok ())
+      status = code (kind.coded, settings);
+  }
+  if (status.ok () && name == "noise")
+    add_smooth_noise (kind.set, 0.003);
+  return status.ok () ? make_ways (job, kind) : status;
+}
+
+/* In turns, so that whatever else the machine does hits all of them alike. */
+void
+time_all (
+    Job &job, const Kind &kind, Target &target, double azimuth_deg, std::vector<RenderRow> &rows)
+{
+  const StripPainter::Picture picture = make_picture (kind.set.rig, azimuth_deg);
+  std::vector<std::vector<double>> processor (rows.size ()), total (rows.size ());
+  for (int round = -1; round < job.rounds; round++) /* the first one allocates */
+    for (std::size_t i = 0; i < rows.size (); i++) {
+      Way &way = *kind.ways[i];
+      const auto begin = Clock::now ();
+      const double processor_begin = processor_ms ();
+      way.build ();
+      rows[i].bytes = target.draw (way, picture);
+      if (round < 0)
+        continue;
+      processor[i].push_back (processor_ms () - processor_begin);
+      total[i].push_back (ms_since (begin));
+    }
+  for (std::size_t i = 0; i < rows.size (); i++) {
+    rows[i].ms = median (total[i]);
+    rows[i].processor_ms = median (processor[i]);
+    rows[i].vertices = kind.ways[i]->vertices ();
+    rows[i].triangles = kind.ways[i]->triangles ();
+  }
+}
+
+void
+judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shots, std::size_t i,
+    RenderRow &row)
+{
+  Score score;
+  for (const Shot &shot : shots) {
+    target.draw (*kind.ways[i], make_picture (kind.set.rig, shot.azimuth_deg));
+    const cv::Mat rgba = target.read ();
+    score.add (shot, rgba);
+    if (!job.pictures.empty ())
+      cv::imwrite (job.pictures + "/" + row.depth + "-" + row.mode + "-" +
+                       std::to_string (int (shot.azimuth_deg)) + ".png",
+          comparison (shot, rgba));
+  }
+  row.holes = score.holes ();
+  row.spill = score.spill ();
+  row.psnr_db = score.psnr ();
+  row.ssim = score.ssim ();
+}
+
+void
+measure (Job &job, const Kind &kind, Target &target, int angle_deg, const std::vector<Shot> &shots)
+{
+  std::vector<RenderRow> rows;
+  for (const auto &way : kind.ways) {
+    rows.emplace_back ();
+    rows.back ().mode = way->name ();
+    rows.back ().depth = kind.depth;
+    rows.back ().angle_deg = angle_deg;
+  }
+  time_all (job, kind, target, shots[0].azimuth_deg, rows);
+  for (std::size_t i = 0; i < rows.size (); i++) {
+    judge (job, kind, target, shots, i, rows[i]);
+    print_row (rows[i]);
+    if (rows[i].depth != std::string ("noise"))
+      job.rows.push_back (rows[i]);
+  }
+}
+
+Status
+run (Job &job)
+{
+  GError *error = nullptr;
+  if (!job.painter.start (job.context, &error)) {
+    const std::string why = error ? error->message : "no shader";
+    g_clear_error (&error);
+    return {StatusCode::kUnsupported, why};
+  }
+  std::list<Kind> kinds; /* which stay where they are */
+  std::vector<Shot> shots[std::size (kAngles)];
+  Status status;
+  for (const char *depth : {"exact", "stereo", "noise"})
+    if (status.ok () && (job.depth.empty () || job.depth == depth))
+      status = make_kind (job, depth, kinds.emplace_back ());
+  for (std::size_t i = 0; i < std::size (kAngles) && status.ok (); i++)
+    status = make_truth (job.scene, kAngles[i], shots[i]);
+  Target target (job.context);
+  if (status.ok () && !target.usable ())
+    status = {StatusCode::kUnsupported, "OpenGL has no framebuffer to draw into"};
+  if (status.ok ())
+    print_head ();
+  for (Kind &kind : kinds)
+    std::erase_if (kind.ways,
+        [&] (const auto &way) { return !job.mode.empty () && job.mode != way->name (); });
+  for (const Kind &kind : kinds)
+    for (std::size_t i = 0; i < std::size (kAngles) && status.ok (); i++)
+      measure (job, kind, target, kAngles[i], shots[i]);
+  return status;
+}
+
+void
+run_in_gl_thread (GstGLContext *, gpointer data)
+{
+  auto &job = *static_cast<Job *> (data);
+  job.status = run (job);
+  job.painter.stop ();
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  Job job;
+  Options options ("render_bench", kUsage);
+  options.text ("--model", job.scene.model);
+  options.size ("--size", job.scene.width, job.scene.height, 16, 1920);
+  options.number ("--rounds", job.rounds, 1, 100000);
+  options.number ("--merge", job.merge, 0, 100);
+  options.text ("--mode", job.mode);
+  options.text ("--depth", job.depth);
+  options.text ("--json", job.json);
+  options.text ("--pictures", job.pictures);
+  if (const auto status = options.parse (argc, argv))
+    return *status;
+  if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY")) { /* software, if nothing is chosen */
+    g_setenv ("GST_GL_PLATFORM", "egl", FALSE);
+    g_setenv ("GST_GL_WINDOW", "egl-device", FALSE);
+  }
+  gst_init (nullptr, nullptr);
+  GstGLDisplay *display = gst_gl_display_new ();
+  job.context = gst_gl_context_new (display);
+  GError *error = nullptr;
+  if (!gst_gl_context_create (job.context, nullptr, &error)) {
+    std::fprintf (stderr, "render_bench: OpenGL cannot be used: %s\n", error->message);
+    return 1;
+  }
+  gst_gl_memory_init_once ();
+  gst_gl_context_thread_add (job.context, run_in_gl_thread, &job);
+  if (job.status.ok () && !job.json.empty ())
+    job.status = write_json (job.json, job.rows);
+  if (!job.status.ok ())
+    std::fprintf (stderr, "render_bench: %s\n", job.status.message ().c_str ());
+  gst_object_unref (job.context);
+  gst_object_unref (display);
+  return job.status.ok () ? 0 : 1;
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "ways.hpp"
+
+#include <rangecast/parallel.hpp>
+
+using namespace rangecast;
+
+namespace bench {
+namespace {
+
+class StripWay : public Way {
+public:
+  StripWay (
+      std::string name, StripPainter &painter, const FrameSet &set, const StripSettings &settings)
+      : Way (std::move (name)), painter_ (painter), set_ (set), settings_ (settings),
+        vertices_ (set.images.size ()), results_ (set.images.size ())
+  {
+  }
+
+  void build () override
+  {
+    in_parallel (vertices_.size (), 0, [&] (std::size_t i) {
+      results_[i] = {};
+      build_strips (set_.images[i], settings_, vertices_[i], results_[i]);
+    });
+  }
+
+  guint64 draw (const StripPainter::Picture &picture) override
+  {
+    StripPainter::Picture own = picture;
+    own.mode = settings_.mode;
+    own.depth_step = settings_.depth_step;
+    std::vector<StripPainter::Layer> layers;
+    for (std::size_t i = 0; i < vertices_.size (); i++)
+      layers.push_back ({set_.images[i], set_.rig.find (set_.images[i].view_id), vertices_[i]});
+    return painter_.draw (own, layers);
+  }
+
+  [[nodiscard]] std::size_t vertices () const override
+  {
+    std::size_t n = 0;
+    for (const auto &list : vertices_)
+      n += list.size ();
+    return n;
+  }
+
+  [[nodiscard]] std::size_t triangles () const override
+  {
+    std::size_t n = 0;
+    for (const StripResult &result : results_)
+      n += result.triangles;
+    return n;
+  }
+
+private:
+  StripPainter &painter_;
+  const FrameSet &set_;
+  const StripSettings settings_;
+  std::vector<std::vector<StripVertex>> vertices_;
+  std::vector<StripResult> results_;
+};
+
+} // namespace
+
+std::unique_ptr<Way>
+make_strip_way (
+    std::string name, StripPainter &painter, const FrameSet &set, const StripSettings &settings)
+{
+  return std::make_unique<StripWay> (std::move (name), painter, set, settings);
+}
+
+} // namespace bench

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "../../../gst/strippainter.hpp"
+#include "frames.hpp"
+
+namespace bench {
+
+/** One way to a picture: what the CPU prepares, what is then drawn, and counts of it. */
+class Way {
+public:
+  explicit Way (std::string name) : name_ (std::move (name)) {}
+  virtual ~Way () = default;
+  Way (const Way &) = delete;
+  Way &operator= (const Way &) = delete;
+
+  virtual void build () = 0;
+  /** Draws into the bound framebuffer, in the GL thread. @return bytes uploaded */
+  virtual guint64 draw (const StripPainter::Picture &picture) = 0;
+  [[nodiscard]] virtual std::size_t vertices () const = 0;
+  [[nodiscard]] virtual std::size_t triangles () const = 0;
+  [[nodiscard]] const std::string &name () const { return name_; }
+
+private:
+  const std::string name_;
+};
+
+/** striprender's own, in one of its modes. The frame set must stay. */
+std::unique_ptr<Way> make_strip_way (std::string name, StripPainter &painter, const FrameSet &set,
+    const rangecast::StripSettings &settings);
+
+/** What others do, from a vertex buffer of places and colours that the CPU unprojects into: one GL
+ *  point a pixel, or a grid surface: each quad of valid pixels two triangles, where its corners
+ *  differ by no more than striprender's depth-step.
+ *  @return nothing without OpenGL for it; `error` says why */
+enum class Peer { kPoints, kGrid };
+std::unique_ptr<Way> make_peer (
+    std::string name, Peer peer, GstGLContext *context, const FrameSet &set, GError **error);
+
+} // namespace bench
