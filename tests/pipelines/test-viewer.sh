@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# pipelines/viewer, on a display that nobody sees, with real events of mouse and keys.
+# pipelines/viewer and GStreamer's own players, on a display that nobody sees, with real events of mouse and keys.
 
 # Its helpers, not its tests.
 source "$source_dir/tests/pipelines/test-window.sh"
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
 
 # A figure that stands still: what changes in its pictures is the viewer's doing.
-record_still () {
-  gst-launch-1.0 -q -e avatartestsrc views=2 num-buffers=12 motion=0 noise=0 range-person-only=true \
+record_still () { # [frame sets]
+  gst-launch-1.0 -q -e avatartestsrc views=2 "num-buffers=${1:-12}" motion=0 noise=0 range-person-only=true \
     ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc ! neighbourcodeparse \
     ! application/x-neighbour-code,alignment=byte-stream ! filesink location=still.rcnc
 }
@@ -166,4 +166,34 @@ test_missing_display_is_named () {
   : >empty.rcnc
   expect_error "no display" env -u DISPLAY -u WAYLAND_DISPLAY viewer empty.rcnc
   expect_error "GST_GL_WINDOW" env DISPLAY=:99 GST_GL_WINDOW=egl-device viewer empty.rcnc
+}
+
+shows_and_turns () { # command...
+  "$@" >log.txt 2>&1 &
+  pipeline=$!
+  trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
+  wait_for first_picture
+  xdotool mousemove 160 120 mousedown 1 mousemove 120 120 mousemove 80 120 mouseup 1
+  wait_for turned
+}
+gst_play_shows () { shows_and_turns gst-play-1.0 --no-interactive still.rcnc; }
+playbin_shows () { shows_and_turns gst-launch-1.0 playbin "uri=file://$PWD/still.rcnc"; }
+decodebin_shows () { shows_and_turns gst-launch-1.0 filesrc location=still.rcnc ! decodebin ! autovideosink; }
+
+test_players_show_a_recording_and_turn_with_the_mouse () {
+  need_display
+  record_still 150
+  in_display playbin_shows
+  in_display decodebin_shows
+  command -v gst-play-1.0 >/dev/null || skip "no gst-play-1.0 (Debian package gstreamer1.0-plugins-base-apps)"
+  in_display gst_play_shows
+}
+
+test_discoverer_names_the_code () {
+  command -v gst-discoverer-1.0 >/dev/null || skip "no gst-discoverer-1.0 (Debian package gstreamer1.0-plugins-base-apps)"
+  need_gl
+  record_still
+  gst-discoverer-1.0 -v still.rcnc >found.txt
+  grep -q 'Duration: 0:00:00.[78]' found.txt || fail "$(cat found.txt)"
+  grep -q 'video codec: Neighbour code' found.txt || fail "$(cat found.txt)"
 }
