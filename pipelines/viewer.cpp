@@ -419,6 +419,10 @@ build_view (Viewer &viewer)
     gst_util_set_object_arg (G_OBJECT (viewer.render), "mode", options.mode);
   if (!viewer.is_file)
     g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
+  /* Also while a stream stalls the view turns, where striprender can do that. */
+  if (!viewer.is_file &&
+      g_object_class_find_property (G_OBJECT_GET_CLASS (viewer.render), "keep-rate"))
+    g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
   GstElement *before = viewer.first;
   if (!options.no_filter) {
     before = add (viewer, "cylinderfilter");
