@@ -21,12 +21,12 @@ open_viewer () { # arguments of the viewer
   wait_for first_picture
 }
 press () { xdotool key --window "$window" "$1"; }
-has_ended () { ! kill -0 $pipeline 2>/dev/null; }
+has_ended () { ! kill -0 "$pipeline" 2>/dev/null; }
 # The window is gone before xdotool lets the key go.
 quits_with () { # key
   press "$1" 2>/dev/null || true
   wait_for has_ended
-  wait $pipeline || fail "exit status $?: $(tail -n 5 log.txt)"
+  wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
 }
 turned () { look after.png && ! cmp -s before.png after.png; }
 
