@@ -10,7 +10,7 @@
  *
  * ## Example launch lines
  * |[
- * gst-launch-1.0 playbin uri=file:///tmp/head.rcnc
+ * gst-launch-1.0 playbin uri=file://$PWD/head.rcnc
  * ]|
  * |[
  * gst-launch-1.0 avatartestsrc ! rangerender render::auto-orbit=30 ! autovideosink

@@ -147,6 +147,28 @@ take_frame_set (Viewer &viewer)
   return viewer.frame_set ? gst_sample_ref (viewer.frame_set) : nullptr;
 }
 
+/* Says how the writing of a file ended. */
+static void
+tell_end (GstElement *pipeline, const std::string &path)
+{
+  GstBus *bus = gst_element_get_bus (pipeline);
+  GstMessage *message = gst_bus_timed_pop_filtered (
+      bus, 10 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  GError *error = nullptr;
+  if (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR)
+    gst_message_parse_error (message, &error, nullptr);
+  if (message && !error)
+    std::printf ("wrote %s\n", path.c_str ());
+  else
+    g_printerr (
+        "viewer: %s: %s\n", path.c_str (), error ? error->message : "writing takes too long");
+  std::fflush (stdout);
+  g_clear_error (&error);
+  if (message)
+    gst_message_unref (message);
+  gst_object_unref (bus);
+}
+
 /* Another pipeline, for the one frame set. */
 static void
 write_points (Viewer &viewer)
@@ -156,36 +178,27 @@ write_points (Viewer &viewer)
     g_printerr ("viewer: there are no points yet\n");
     return;
   }
-  GstElement *encoder = gst_parse_launch (
-      "appsrc name=in format=time ! plyenc normals=true view-id=true ! filesink name=out", nullptr);
-  GstElement *in = gst_bin_get_by_name (GST_BIN (encoder), "in");
-  GstElement *out = gst_bin_get_by_name (GST_BIN (encoder), "out");
-  const std::string path = free_name (viewer, "ply");
-  g_object_set (out, "location", path.c_str (), nullptr);
-  gst_element_set_state (encoder, GST_STATE_PLAYING);
-  gst_app_src_push_sample (GST_APP_SRC (in), sample);
-  gst_app_src_end_of_stream (GST_APP_SRC (in));
-  GstBus *bus = gst_element_get_bus (encoder);
-  GstMessage *message = gst_bus_timed_pop_filtered (
-      bus, 10 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  if (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
-    std::printf ("wrote %s\n", path.c_str ());
-    std::fflush (stdout);
+  GError *error = nullptr;
+  GstElement *encoder = gst_parse_launch_full (
+      "appsrc name=in format=time ! plyenc normals=true view-id=true ! filesink name=out", nullptr,
+      GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  if (encoder) {
+    GstElement *in = gst_bin_get_by_name (GST_BIN (encoder), "in");
+    GstElement *out = gst_bin_get_by_name (GST_BIN (encoder), "out");
+    const std::string path = free_name (viewer, "ply");
+    g_object_set (out, "location", path.c_str (), nullptr);
+    gst_element_set_state (encoder, GST_STATE_PLAYING);
+    gst_app_src_push_sample (GST_APP_SRC (in), sample);
+    gst_app_src_end_of_stream (GST_APP_SRC (in));
+    tell_end (encoder, path);
+    gst_element_set_state (encoder, GST_STATE_NULL);
+    gst_object_unref (in);
+    gst_object_unref (out);
+    gst_object_unref (encoder);
   } else {
-    GError *error = nullptr;
-    if (message)
-      gst_message_parse_error (message, &error, nullptr);
-    g_printerr (
-        "viewer: %s: %s\n", path.c_str (), error ? error->message : "writing takes too long");
-    g_clear_error (&error);
+    g_printerr ("viewer: no point cloud: %s\n", error->message);
   }
-  if (message)
-    gst_message_unref (message);
-  gst_element_set_state (encoder, GST_STATE_NULL);
-  gst_object_unref (bus);
-  gst_object_unref (in);
-  gst_object_unref (out);
-  gst_object_unref (encoder);
+  g_clear_error (&error);
   gst_sample_unref (sample);
 }
 
