@@ -542,8 +542,8 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
-  gst_element_class_set_static_metadata (element_class, "Neighbour code decoder",
-      "Codec/Decoder/Video", "Decodes range images from the neighbour code", "gst-rangecast");
+  gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
+      "Decodes range images from the neighbour code", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CONCEAL, GstPluginAPIFlags (0));
 
   transform_class->src_event = gst_neighbour_code_dec_src_event;

@@ -164,6 +164,15 @@ ask_for_the_least (GstBaseParse *base)
   gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kStreamPrefixSize) : 1);
 }
 
+/* For those who ask what a file holds, gst-discoverer-1.0 among them. */
+static void
+name_the_code (GstBaseParse *base)
+{
+  GstTagList *tags = gst_tag_list_new (GST_TAG_VIDEO_CODEC, "Neighbour code", nullptr);
+  gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);
+  gst_tag_list_unref (tags);
+}
+
 static bool
 set_source_caps (GstBaseParse *base)
 {
@@ -175,6 +184,7 @@ set_source_caps (GstBaseParse *base)
   stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
   gst_base_parse_set_frame_rate (base, guint (stream.info.fps_n), guint (stream.info.fps_d), 0, 0);
+  name_the_code (base);
   return stream.src_caps_set;
 }
 

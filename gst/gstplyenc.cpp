@@ -3,8 +3,8 @@
  * SECTION:element-plyenc
  * @title: plyenc
  *
- * Writes each frame set as a point cloud: one binary PLY file a buffer, in world coordinates and
- * metres, for multifilesink.
+ * Writes each frame set as a point cloud: one binary PLY (or PCD) file a buffer, in world
+ * coordinates and metres, for multifilesink.
  *
  * ## Example launch line
  * |[
@@ -24,10 +24,13 @@
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 #define GST_CAT_DEFAULT gst_ply_enc_debug
 
-enum { PROP_0, PROP_VIEW_ID };
+enum { PROP_0, PROP_VIEW_ID, PROP_NORMALS, PROP_FORMAT };
+
+using rangecast::PointCloudFormat;
 
 struct GstPlyEncPrivate {
-  std::atomic<bool> with_view_id{false};
+  std::atomic<bool> with_view_id{false}, with_normals{false};
+  std::atomic<PointCloudFormat::Kind> kind{PointCloudFormat::kPly};
   gstrange::RangeInfo info; /* streaming thread only */
 };
 
@@ -39,19 +42,34 @@ struct _GstPlyEnc {
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply"));
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply; application/x-pcd"));
 
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, GST_TYPE_PLY_ENC)
+
+#define GST_TYPE_PLY_ENC_FORMAT (gst_ply_enc_format_get_type ())
+static GType
+gst_ply_enc_format_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {{PointCloudFormat::kPly, "PLY, binary", "ply"},
+        {PointCloudFormat::kPcd, "PCD 0.7 of the Point Cloud Library, binary", "pcd"}, {}};
+    return g_enum_register_static ("GstPlyEncFormat", values);
+  }();
+  return type;
+}
 
 /* ---- streaming ---- */
 
 static GstCaps *
 gst_ply_enc_transform_caps (
-    GstBaseTransform *, GstPadDirection direction, GstCaps *, GstCaps *filter)
+    GstBaseTransform *base, GstPadDirection direction, GstCaps *, GstCaps *filter)
 {
+  const bool is_pcd = GST_PLY_ENC (base)->priv->kind == PointCloudFormat::kPcd;
   GstCaps *other =
-      gst_static_pad_template_get_caps (direction == GST_PAD_SINK ? &src_template : &sink_template);
+      direction == GST_PAD_SRC
+          ? gst_static_pad_template_get_caps (&sink_template)
+          : gst_caps_new_empty_simple (is_pcd ? "application/x-pcd" : "application/x-ply");
   if (!filter)
     return other;
   GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
@@ -77,7 +95,8 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
   if (!frame.status ().ok ())
     return gst_range_flow_return (GST_ELEMENT (self), frame.status ());
 
-  const rangecast::PlyWriter writer (self->priv->with_view_id);
+  const rangecast::PointCloudWriter writer (
+      {self->priv->kind, self->priv->with_normals, self->priv->with_view_id});
   std::size_t points = 0;
   for (const auto &view : frame.views ())
     points += rangecast::count_points (view);
@@ -86,7 +105,7 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
   if (!buffer || !gst_buffer_map (buffer, &map, GST_MAP_WRITE)) {
     gst_clear_buffer (&buffer);
     GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory for a PLY file of %" G_GSIZE_FORMAT " points", points));
+        ("no memory for a file of %" G_GSIZE_FORMAT " points", points));
     return GST_FLOW_ERROR;
   }
   const auto status = writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
@@ -107,7 +126,7 @@ gst_ply_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
   return GST_FLOW_OK; /* prepare_output_buffer has written it */
 }
 
-/* The views' places mean nothing in a PLY; when they were taken still does. */
+/* The views' places mean nothing in such a file; when they were taken still does. */
 static gboolean
 gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
 {
@@ -119,21 +138,39 @@ gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstB
 static void
 gst_ply_enc_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
-  auto self = GST_PLY_ENC (object);
-  if (id == PROP_VIEW_ID)
-    self->priv->with_view_id = g_value_get_boolean (value);
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  GstPlyEncPrivate *priv = GST_PLY_ENC (object)->priv;
+  switch (id) {
+    case PROP_VIEW_ID:
+      priv->with_view_id = g_value_get_boolean (value);
+      break;
+    case PROP_NORMALS:
+      priv->with_normals = g_value_get_boolean (value);
+      break;
+    case PROP_FORMAT:
+      priv->kind = PointCloudFormat::Kind (g_value_get_enum (value));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
 }
 
 static void
 gst_ply_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
-  auto self = GST_PLY_ENC (object);
-  if (id == PROP_VIEW_ID)
-    g_value_set_boolean (value, self->priv->with_view_id);
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  GstPlyEncPrivate *priv = GST_PLY_ENC (object)->priv;
+  switch (id) {
+    case PROP_VIEW_ID:
+      g_value_set_boolean (value, priv->with_view_id);
+      break;
+    case PROP_NORMALS:
+      g_value_set_boolean (value, priv->with_normals);
+      break;
+    case PROP_FORMAT:
+      g_value_set_enum (value, priv->kind);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
 }
 
 static void
@@ -166,11 +203,22 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
           "false)",
           FALSE,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property (object_class, PROP_NORMALS,
+      g_param_spec_boolean ("normals", "Normals",
+          "Give each point the direction, of length 1, that its surface faces: estimated from the "
+          "pixels around it, towards the camera (default: false)",
+          FALSE,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property (object_class, PROP_FORMAT,
+      g_param_spec_enum ("format", "Format", "What the files are (default: ply)",
+          GST_TYPE_PLY_ENC_FORMAT, PointCloudFormat::kPly,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
-      "Writes each range frame set as a binary PLY point cloud", "gst-rangecast");
+      "Writes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_PLY_ENC_FORMAT, GstPluginAPIFlags (0));
 
   transform_class->transform_caps = gst_ply_enc_transform_caps;
   transform_class->set_caps = gst_ply_enc_set_caps;

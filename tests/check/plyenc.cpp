@@ -1,21 +1,29 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rangecast-check.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <random>
 #include <string_view>
 #include <vector>
+
+#ifdef RANGECAST_HAVE_ASSIMP
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#endif
 
 using namespace rangecast;
 using namespace rangecast::testing;
 
 struct Ply {
   std::size_t points = 0;
-  std::vector<float> xyz;
+  std::vector<float> xyz, normals;
   std::vector<guint8> rgb, view_id;
 };
 
 static Ply
-parse_ply (GstBuffer *buffer, bool with_view_id)
+parse_ply (GstBuffer *buffer, bool with_view_id, bool with_normals = false)
 {
   GstMapInfo map;
   fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
@@ -27,15 +35,20 @@ parse_ply (GstBuffer *buffer, bool with_view_id)
   Ply ply;
   ply.points = std::strtoul (text.data () + element + 15, nullptr, 10);
   const guint8 *at = map.data + end + 11;
-  const std::size_t stride = with_view_id ? 16 : 15;
+  const std::size_t stride = (with_normals ? 27 : 15) + (with_view_id ? 1 : 0);
+  const std::size_t colour = with_normals ? 24 : 12;
   fail_unless_equals_int (map.size - (end + 11), ply.points * stride);
   for (std::size_t i = 0; i < ply.points; i++, at += stride) {
     float xyz[3];
     std::memcpy (xyz, at, sizeof xyz);
     ply.xyz.insert (ply.xyz.end (), xyz, xyz + 3);
-    ply.rgb.insert (ply.rgb.end (), at + 12, at + 15);
+    if (with_normals) {
+      std::memcpy (xyz, at + 12, sizeof xyz);
+      ply.normals.insert (ply.normals.end (), xyz, xyz + 3);
+    }
+    ply.rgb.insert (ply.rgb.end (), at + colour, at + colour + 3);
     if (with_view_id)
-      ply.view_id.push_back (at[15]);
+      ply.view_id.push_back (at[colour + 3]);
   }
   gst_buffer_unmap (buffer, &map);
   return ply;
@@ -140,6 +153,174 @@ GST_START_TEST (test_works_again_after_null)
 }
 GST_END_TEST;
 
+/* ---- normals ---- */
+
+/* A frame set of one view, its depths in units of 0.1 mm from column and row. */
+template <typename DepthAt>
+static GstBuffer *
+make_depths (const Rig &rig, DepthAt depth_at)
+{
+  GstBuffer *buffer = make_frame_set (rig);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  for (const auto &image : frame.views ())
+    for (int y = 0; y < image.depth.height; y++)
+      for (int x = 0; x < image.depth.width; x++)
+        image.depth.at (x, y) = static_cast<std::uint16_t> (depth_at (x, y));
+  return buffer;
+}
+
+static Ply
+normals_of (const Rig &rig, GstBuffer *input)
+{
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "normals", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  const Ply ply = parse_ply (output, false, true);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return ply;
+}
+
+/* The cosine between a point's normal and a direction of length 1. */
+static double
+along (const Ply &ply, std::size_t i, Vec3 direction)
+{
+  return dot ({ply.normals[3 * i], ply.normals[3 * i + 1], ply.normals[3 * i + 2]}, direction);
+}
+
+/* View 1 of three, so that the world is not the camera's frame; the plane is seen at 60 degrees. */
+GST_START_TEST (test_normals_of_a_slanted_plane_are_the_planes)
+{
+  Rig rig = ring_rig (3);
+  rig.views = {rig.views[1]};
+  const View &view = rig.views[0];
+  const Vec3 normal = {std::sin (M_PI / 3) * 0.6, std::sin (M_PI / 3) * 0.8, -0.5};
+  GstBuffer *input = make_depths (rig, [&] (int x, int y) {
+    const double z = 0.5 * 0.8 / -dot (normal, view.intrinsics.unproject (x, y, 1));
+    return z > 0.3 && z < 2 ? std::round (z / view.depth_unit_m) : 0;
+  });
+  const Ply ply = normals_of (rig, input);
+  fail_unless (ply.points > 30000);
+  const Vec3 in_world = view.world_from_view.rotation * normal;
+  double worst = 1;
+  for (std::size_t i = 0; i < ply.points; i++)
+    worst = std::min (worst, along (ply, i, in_world));
+  fail_unless (worst > 0.999, "%f", worst);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normals_do_not_mix_two_surfaces)
+{
+  const Rig rig = ring_rig (1);
+  const Ply ply = normals_of (
+      rig, make_depths (rig, [] (int x, int y) { return (x / 20 + y / 20) % 2 ? 6000 : 8000; }));
+  fail_unless_equals_int (ply.points, 320 * 240);
+  double worst = 1;
+  for (std::size_t i = 0; i < ply.points; i++)
+    worst = std::min (worst, along (ply, i, {0, 0, 1}));
+  fail_unless (worst > 0.99999, "%f", worst);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normal_of_a_lone_point_or_line_is_towards_the_camera)
+{
+  const Rig rig = ring_rig (1);
+  const Ply ply = normals_of (rig, make_depths (rig, [] (int x, int y) {
+    return (x == 10 && y == 20) || (y == 100 && x >= 50 && x < 60) ? 8000 : 0;
+  }));
+  fail_unless_equals_int (ply.points, 11);
+  for (std::size_t i = 0; i < ply.points; i++) {
+    const Vec3 to_camera =
+        Vec3{0, 0, 0.8} - Vec3{ply.xyz[3 * i], ply.xyz[3 * i + 1], ply.xyz[3 * i + 2]};
+    fail_unless (along (ply, i, 1 / norm (to_camera) * to_camera) > 0.99999);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normals_of_noise_have_length_1_and_face_the_camera)
+{
+  const Rig rig = ring_rig (1);
+  std::mt19937 random (1);
+  for (const int limit : {65535, 3}) {
+    const Ply ply =
+        normals_of (rig, make_depths (rig, [&] (int, int) { return random () % (limit + 1); }));
+    fail_unless (ply.points > 50000);
+    double length_error = 0, backwards = 0;
+    bool has_nan = false;
+    for (std::size_t i = 0; i < ply.points; i++) {
+      const Vec3 n = {ply.normals[3 * i], ply.normals[3 * i + 1], ply.normals[3 * i + 2]};
+      const Vec3 point = {ply.xyz[3 * i], ply.xyz[3 * i + 1], ply.xyz[3 * i + 2]};
+      has_nan |= std::isnan (norm (n));
+      length_error = std::max (length_error, std::abs (norm (n) - 1));
+      backwards = std::min (backwards, dot (n, Vec3{0, 0, 0.8} - point));
+    }
+    fail_if (has_nan);
+    fail_unless (length_error < 1e-5, "%g", length_error);
+    fail_unless (backwards > -1e-6, "%g", backwards);
+  }
+}
+GST_END_TEST;
+
+/* ---- formats ---- */
+
+GST_START_TEST (test_pcd_has_the_fields_that_its_header_names)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = gst_harness_new_parse ("plyenc format=pcd normals=true view-id=true");
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  gst_harness_set_sink_caps_str (h, "application/x-pcd");
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 5, 40, 30}));
+  GstMapInfo map;
+  fail_unless (gst_buffer_map (output, &map, GST_MAP_READ));
+  const std::string_view text (reinterpret_cast<const char *> (map.data), map.size);
+  for (const char *line : {"VERSION 0.7\n", "FIELDS x y z normal_x normal_y normal_z rgb view_id\n",
+           "SIZE 4 4 4 4 4 4 4 1\n", "TYPE F F F F F F F U\n", "COUNT 1 1 1 1 1 1 1 1\n",
+           "HEIGHT 1\n", "VIEWPOINT 0 0 0 1 0 0 0\n"})
+    fail_unless (text.find (line) != text.npos, "no %s", line);
+  const std::size_t points = std::strtoul (text.data () + text.find ("\nPOINTS ") + 8, nullptr, 10);
+  const std::size_t data = text.find ("DATA binary\n") + 12;
+  fail_unless (points > 500);
+  fail_unless_equals_int (map.size - data, points * 29);
+  const guint8 *last = map.data + map.size - 29; /* of view 1; x from 0 at the left of the ROI */
+  fail_unless_equals_int (last[28], 1);
+  fail_unless_equals_int (last[24], guint8 (last[26] + 2 * last[25] + 40)); /* blue, green, red */
+  fail_unless_equals_int (last[27], 0);
+  gst_buffer_unmap (output, &map);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+#ifdef RANGECAST_HAVE_ASSIMP
+GST_START_TEST (test_assimp_reads_points_colours_and_normals)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "normals", TRUE, "view-id", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+  const Ply ply = parse_ply (output, true, true);
+  GstMapInfo map;
+  fail_unless (gst_buffer_map (output, &map, GST_MAP_READ));
+  Assimp::Importer importer;
+  const aiScene *scene = importer.ReadFileFromMemory (map.data, map.size, 0, "ply");
+  gst_buffer_unmap (output, &map);
+  fail_unless (scene && scene->mNumMeshes == 1, "%s", importer.GetErrorString ());
+  const aiMesh &mesh = *scene->mMeshes[0];
+  fail_unless_equals_int (mesh.mNumVertices, ply.points);
+  fail_unless (mesh.HasNormals () && mesh.HasVertexColors (0));
+  unsigned wrong = 0;
+  for (unsigned i = 0; i < mesh.mNumVertices; i++)
+    for (unsigned k = 0; k < 3; k++)
+      wrong += mesh.mVertices[i][k] != ply.xyz[3 * i + k] ||
+               mesh.mNormals[i][k] != ply.normals[3 * i + k] ||
+               std::abs (mesh.mColors[0][i][k] * 255 - ply.rgb[3 * i + k]) > 0.01;
+  fail_unless_equals_int (wrong, 0);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+#endif
+
 static Suite *
 plyenc_suite ()
 {
@@ -151,6 +332,14 @@ plyenc_suite ()
   tcase_add_test (tc, test_empty_frame_set_is_a_file_without_points);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
   tcase_add_test (tc, test_works_again_after_null);
+  tcase_add_test (tc, test_normals_of_a_slanted_plane_are_the_planes);
+  tcase_add_test (tc, test_normals_do_not_mix_two_surfaces);
+  tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
+  tcase_add_test (tc, test_normals_of_noise_have_length_1_and_face_the_camera);
+  tcase_add_test (tc, test_pcd_has_the_fields_that_its_header_names);
+#ifdef RANGECAST_HAVE_ASSIMP
+  tcase_add_test (tc, test_assimp_reads_points_colours_and_normals);
+#endif
   return suite;
 }
 

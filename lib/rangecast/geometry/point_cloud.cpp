@@ -5,10 +5,11 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 namespace rangecast {
 
-static_assert (std::endian::native == std::endian::little, "PLY points are copied as they lie");
+static_assert (std::endian::native == std::endian::little, "points are copied as they lie");
 
 std::size_t
 count_points (const ConstRangeImage &image)
@@ -46,27 +47,176 @@ rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t n
   return {};
 }
 
-std::string
-PlyWriter::header (std::size_t points) const
+/* ---- normals ---- */
+
+/* The pixels that the plane is laid through: this far to each side. */
+static constexpr int kNormalRadius = 2;
+/* Of the depth: farther apart is another surface. */
+static constexpr double kNormalDepthStep = 0.03;
+
+/* Sums for the plane 1 / depth = a u + b v + c, u and v from the pixel in the middle. */
+struct PlaneSums {
+  double n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0, w = 0, uw = 0, vw = 0;
+
+  void add (double du, double dv, double inverse_depth)
+  {
+    n += 1;
+    u += du;
+    v += dv;
+    uu += du * du;
+    uv += du * dv;
+    vv += dv * dv;
+    w += inverse_depth;
+    uw += du * inverse_depth;
+    vw += dv * inverse_depth;
+  }
+};
+
+static PlaneSums
+sum_around (const ConstRangeImage &image, int x, int y)
+{
+  const double depth = image.depth.at (x, y);
+  const int left = std::max (x - kNormalRadius, 0), top = std::max (y - kNormalRadius, 0);
+  const int right = std::min (x + kNormalRadius, image.depth.width - 1);
+  const int bottom = std::min (y + kNormalRadius, image.depth.height - 1);
+  PlaneSums sums;
+  for (int row = top; row <= bottom; row++) {
+    const std::uint16_t *depths = image.depth.row (row);
+    for (int column = left; column <= right; column++)
+      if (depths[column] != kInvalidDepth &&
+          std::abs (depths[column] - depth) < kNormalDepthStep * depth)
+        sums.add (column - x, row - y, depth / depths[column]);
+  }
+  return sums;
+}
+
+static Vec3
+towards_camera (Vec3 point)
+{
+  return -1.0 / norm (point) * point;
+}
+
+Vec3
+surface_normal (const ConstRangeImage &image, const Intrinsics &intrinsics, int x, int y)
+{
+  const double column = image.roi.x + x, row = image.roi.y + y;
+  const Vec3 ray = intrinsics.unproject (column, row, 1);
+  const PlaneSums s = sum_around (image, x, y);
+  /* Centred, so that two equations are left. Their determinant is a whole number, at least 1 where
+   * the pixels do not all lie on one line. */
+  const double uu = s.n * s.uu - s.u * s.u, vv = s.n * s.vv - s.v * s.v,
+               uv = s.n * s.uv - s.u * s.v;
+  const double determinant = uu * vv - uv * uv;
+  if (determinant < 0.5)
+    return towards_camera (ray);
+  const double uw = s.n * s.uw - s.u * s.w, vw = s.n * s.vw - s.v * s.w;
+  const double a = (uw * vv - vw * uv) / determinant, b = (vw * uu - uw * uv) / determinant;
+  const double c = (s.w - a * s.u - b * s.v) / s.n; /* 1 / depth at the pixel itself */
+  /* N . X = 1 is the plane, so 1 / depth = N . ((u - cx) / fx, (v - cy) / fy, 1): compared term by
+   * term. N points away from the camera. */
+  const double nx = a * intrinsics.fx, ny = b * intrinsics.fy;
+  const Vec3 away = {nx, ny, c - nx * ray.x - ny * ray.y};
+  const double length = norm (away);
+  return dot (away, ray) > 0 && length > 0 ? -1.0 / length * away : towards_camera (ray);
+}
+
+/* ---- files ---- */
+
+static std::string
+ply_header (const PointCloudFormat &format, const std::string &points)
 {
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment world, metres, y up\n"
                      "element vertex " +
-                     std::to_string (points) +
-                     "\nproperty float x\nproperty float y\nproperty float z\n"
-                     "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  if (with_view_id_)
+                     points + "\nproperty float x\nproperty float y\nproperty float z\n";
+  if (format.with_normals)
+    text += "property float nx\nproperty float ny\nproperty float nz\n";
+  text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (format.with_view_id)
     text += "property uchar view_id\n";
   return text + "end_header\n";
 }
 
-std::size_t
-PlyWriter::size (std::size_t points) const
+/* rgb is a float by its name only: its bytes are blue, green, red and 0. */
+static std::string
+pcd_header (const PointCloudFormat &format, const std::string &points)
 {
-  return header (points).size () + points * (15 + (with_view_id_ ? 1 : 0));
+  std::string fields = "x y z", sizes = "4 4 4", types = "F F F", counts = "1 1 1";
+  if (format.with_normals) {
+    fields += " normal_x normal_y normal_z";
+    sizes += " 4 4 4";
+    types += " F F F";
+    counts += " 1 1 1";
+  }
+  fields += " rgb";
+  sizes += " 4";
+  types += " F";
+  counts += " 1";
+  if (format.with_view_id) {
+    fields += " view_id";
+    sizes += " 1";
+    types += " U";
+    counts += " 1";
+  }
+  return "# .PCD v0.7 - world, metres, y up\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes +
+         "\nTYPE " + types + "\nCOUNT " + counts + "\nWIDTH " + points +
+         "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA binary\n";
+}
+
+std::string
+PointCloudWriter::header (std::size_t points) const
+{
+  const std::string count = std::to_string (points);
+  return format_.kind == PointCloudFormat::kPcd ? pcd_header (format_, count)
+                                                : ply_header (format_, count);
+}
+
+std::size_t
+PointCloudWriter::point_size () const
+{
+  return 12 + (format_.with_normals ? 12 : 0) + (format_.kind == PointCloudFormat::kPcd ? 4 : 3) +
+         (format_.with_view_id ? 1 : 0);
+}
+
+std::size_t
+PointCloudWriter::size (std::size_t points) const
+{
+  return header (points).size () + points * point_size ();
+}
+
+static std::uint8_t *
+write_vector (Vec3 vector, std::uint8_t *to)
+{
+  const float xyz[] = {
+      static_cast<float> (vector.x), static_cast<float> (vector.y), static_cast<float> (vector.z)};
+  std::memcpy (to, xyz, sizeof xyz);
+  return to + sizeof xyz;
+}
+
+std::uint8_t *
+PointCloudWriter::write_point (
+    const RangeImage &image, const View &view, int x, int y, std::uint8_t *to) const
+{
+  const Vec3 point = view.intrinsics.unproject (
+      image.roi.x + x, image.roi.y + y, image.depth.at (x, y) * view.depth_unit_m);
+  to = write_vector (view.world_from_view * point, to);
+  if (format_.with_normals)
+    to = write_vector (
+        view.world_from_view.rotation * surface_normal (image, view.intrinsics, x, y), to);
+  const Rgbx colour = image.colour.at (x, y);
+  if (format_.kind == PointCloudFormat::kPcd) {
+    const std::uint8_t bgr0[] = {colour.b, colour.g, colour.r, 0};
+    to = std::copy (std::begin (bgr0), std::end (bgr0), to);
+  } else {
+    std::memcpy (to, &colour, 3);
+    to += 3;
+  }
+  if (format_.with_view_id)
+    *to++ = static_cast<std::uint8_t> (image.view_id);
+  return to;
 }
 
 Status
-PlyWriter::write (
+PointCloudWriter::write (
     std::span<const RangeImage> images, const Rig &rig, std::span<std::uint8_t> out) const
 {
   std::size_t points = 0;
@@ -74,29 +224,19 @@ PlyWriter::write (
     points += count_points (image);
   const std::string head = header (points);
   if (out.size () != size (points))
-    return {StatusCode::kBadSize, "PLY: the output does not have the size of that many points"};
+    return {
+        StatusCode::kBadSize, "point cloud: the output does not have the size of that many points"};
   std::uint8_t *to = std::copy (head.begin (), head.end (), out.data ());
 
   for (const RangeImage &image : images) {
     const View *view = rig.find (image.view_id);
     if (!view)
-      return {StatusCode::kNotFound, "PLY: the rig has no view " + std::to_string (image.view_id)};
-    for (int y = 0; y < image.depth.height; y++) {
-      for (int x = 0; x < image.depth.width; x++) {
-        const std::uint16_t depth = image.depth.at (x, y);
-        if (depth == kInvalidDepth)
-          continue;
-        const Vec3 point = view->world_from_view * view->intrinsics.unproject (image.roi.x + x,
-                                                       image.roi.y + y, depth * view->depth_unit_m);
-        const float xyz[] = {static_cast<float> (point.x), static_cast<float> (point.y),
-            static_cast<float> (point.z)};
-        std::memcpy (to, xyz, sizeof xyz);
-        std::memcpy (to + sizeof xyz, &image.colour.at (x, y), 3);
-        to += 15;
-        if (with_view_id_)
-          *to++ = static_cast<std::uint8_t> (image.view_id);
-      }
-    }
+      return {StatusCode::kNotFound,
+          "point cloud: the rig has no view " + std::to_string (image.view_id)};
+    for (int y = 0; y < image.depth.height; y++)
+      for (int x = 0; x < image.depth.width; x++)
+        if (image.depth.at (x, y) != kInvalidDepth)
+          to = write_point (image, *view, x, y, to);
   }
   return {};
 }

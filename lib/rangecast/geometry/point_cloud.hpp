@@ -26,11 +26,31 @@ std::size_t count_points (const ConstRangeImage &image);
 Status rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t near,
     std::uint16_t far, ImageView<std::uint16_t> out);
 
-/** A point cloud in binary little-endian PLY: x y z (float, world, metres), red green blue (uchar)
- *  and, if asked for, view_id (uchar). */
-class PlyWriter {
+/** Which way the surface faces at a pixel: a plane through the valid pixels of the 5x5 around it
+ * that differ by less than 3 % of its depth, by least squares. On a plane 1 / depth is linear in
+ * the pixel's column and row, so the fit is exact there, however slanted it is.
+ *  @param x, y  column and row of a valid pixel in the range image
+ *  @return length 1, in the view's frame (x right, y down, z forward), facing the camera; towards
+ * the camera where too few pixels are around it. Reentrant. */
+[[nodiscard]] Vec3 surface_normal (
+    const ConstRangeImage &image, const Intrinsics &intrinsics, int x, int y);
+
+/** What a file of points looks like, and what each of them has besides x y z (float, world, metres)
+ *  and its colour. */
+struct PointCloudFormat {
+  enum Kind {
+    kPly, ///< binary little-endian PLY: x y z [nx ny nz] red green blue (uchar) [view_id (uchar)]
+    kPcd  ///< binary PCD 0.7: x y z [normal_x normal_y normal_z] rgb (packed) [view_id (uint8)]
+  };
+  Kind kind = kPly;
+  bool with_normals = false; ///< surface_normal() in world coordinates
+  bool with_view_id = false;
+};
+
+/** Writes point clouds as files. */
+class PointCloudWriter {
 public:
-  explicit PlyWriter (bool with_view_id) : with_view_id_ (with_view_id) {}
+  explicit PointCloudWriter (PointCloudFormat format) : format_ (format) {}
 
   /** Bytes of a file of that many points. */
   [[nodiscard]] std::size_t size (std::size_t points) const;
@@ -44,7 +64,11 @@ public:
 
 private:
   [[nodiscard]] std::string header (std::size_t points) const;
-  bool with_view_id_;
+  [[nodiscard]] std::size_t point_size () const;
+  std::uint8_t *write_point (
+      const RangeImage &image, const View &view, int x, int y, std::uint8_t *to) const;
+
+  PointCloudFormat format_;
 };
 
 } // namespace rangecast

@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rangerender
+ * @title: rangerender
+ *
+ * Draws range images as ordinary video: cylinderfilter, striprender and gldownload in one. Players
+ * that put pipelines together by themselves (playbin, decodebin) find it as the decoder of range
+ * images. The picture stays in OpenGL memory where downstream takes that. The elements inside are
+ * named `cylinder` and `render`; gst-launch-1.0 sets their properties as `render::auto-orbit=30`.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 playbin uri=file://$PWD/head.rcnc
+ * ]|
+ * |[
+ * gst-launch-1.0 avatartestsrc ! rangerender render::auto-orbit=30 ! autovideosink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrangerender.h"
+
+#include <gst/video/video.h>
+#include <gstrange/gstrangecaps.h>
+
+GST_DEBUG_CATEGORY_STATIC (gst_range_render_debug);
+#define GST_CAT_DEFAULT gst_range_render_debug
+
+struct _GstRangeRender {
+  GstBin parent;
+  const char *missing; /* an element that could not be made */
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE_WITH_FEATURES (
+            "memory:GLMemory", "RGBA") "; " GST_VIDEO_CAPS_MAKE ("RGBA")));
+
+G_DEFINE_TYPE (GstRangeRender, gst_range_render, GST_TYPE_BIN)
+/* SECONDARY is enough: nobody else decodes range images. */
+GST_ELEMENT_REGISTER_DEFINE (rangerender, "rangerender", GST_RANK_SECONDARY, GST_TYPE_RANGE_RENDER)
+
+static GstElement *
+add (GstRangeRender *self, const char *factory, const char *name)
+{
+  GstElement *element = gst_element_factory_make (factory, name);
+  if (element)
+    gst_bin_add (GST_BIN (self), element);
+  else
+    self->missing = factory;
+  return element;
+}
+
+static gboolean
+keep_if_no_range_of_rates (GQuark field, GValue *value, gpointer)
+{
+  return field != g_quark_from_static_string ("framerate") || gst_value_is_fixed (value);
+}
+
+/* playsink's deinterlace takes frame rates [ 0, max/2 ] and others [ max/2, max ]. Put together,
+ * as gldownload does, in GStreamer 1.22 that is no subset of [ 0, max ], and every GstBaseTransform
+ * from here to the file warns of its neighbour. So without a range, which says nothing anyway. */
+static gboolean
+query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
+{
+  const gboolean answered = gst_pad_query_default (pad, parent, query);
+  if (!answered || GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
+    return answered;
+  GstCaps *filter = nullptr, *caps = nullptr;
+  gst_query_parse_caps (query, &filter);
+  gst_query_parse_caps_result (query, &caps);
+  caps = gst_caps_copy (caps);
+  for (guint i = 0; i < gst_caps_get_size (caps); i++)
+    gst_structure_filter_and_map_in_place (
+        gst_caps_get_structure (caps, i), keep_if_no_range_of_rates, nullptr);
+  if (filter) {
+    GstCaps *wanted = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
+    gst_caps_unref (caps);
+    caps = wanted;
+  }
+  gst_query_set_caps_result (query, caps);
+  gst_caps_unref (caps);
+  return TRUE;
+}
+
+static GstPad *
+show_pad (GstRangeRender *self, GstElement *element, const char *name, GstStaticPadTemplate *shown)
+{
+  GstPad *target = gst_element_get_static_pad (element, name);
+  GstPadTemplate *pad_template = gst_static_pad_template_get (shown);
+  GstPad *pad = gst_ghost_pad_new_from_template (name, target, pad_template);
+  gst_element_add_pad (GST_ELEMENT (self), pad);
+  gst_object_unref (pad_template);
+  gst_object_unref (target);
+  return pad;
+}
+
+static GstStateChangeReturn
+gst_range_render_change_state (GstElement *element, GstStateChange transition)
+{
+  auto self = GST_RANGE_RENDER (element);
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY && self->missing) {
+    GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN, ("There is no element %s", self->missing),
+        ("expected it among the plugins of GStreamer and gst-rangecast"));
+    return GST_STATE_CHANGE_FAILURE;
+  }
+  return GST_ELEMENT_CLASS (gst_range_render_parent_class)->change_state (element, transition);
+}
+
+static void
+gst_range_render_init (GstRangeRender *self)
+{
+  GstElement *cylinder = add (self, "cylinderfilter", "cylinder");
+  GstElement *render = add (self, "striprender", "render");
+  GstElement *download = add (self, "gldownload", "download");
+  if (self->missing)
+    return;
+  gst_element_link_many (cylinder, render, download, nullptr);
+  show_pad (self, cylinder, "sink", &sink_template);
+  GstPad *src = show_pad (self, download, "src", &src_template);
+  GstProxyPad *inner = gst_proxy_pad_get_internal (GST_PROXY_PAD (src));
+  gst_pad_set_query_function (GST_PAD (inner), query_downstream);
+  gst_object_unref (inner);
+}
+
+static void
+gst_range_render_class_init (GstRangeRenderClass *klass)
+{
+  auto element_class = GST_ELEMENT_CLASS (klass);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  /* decodebin looks for a Decoder; nothing else that turns something into raw video is tried. */
+  gst_element_class_set_static_metadata (element_class, "Range image renderer",
+      "Codec/Decoder/Video", "Draws range images as ordinary video, for playbin and decodebin",
+      "gst-rangecast");
+  element_class->change_state = gst_range_render_change_state;
+
+  GST_DEBUG_CATEGORY_INIT (gst_range_render_debug, "rangerender", 0, "Range image renderer");
+}

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "viewer-options.hpp"
+
+#include <gst/gst.h>
+
+#include <cstdio>
+#include <string>
+
+const char kViewerKeys[] =
+    "drag: turn   drag with another button: move   wheel, + and -: zoom   arrows: turn\n"
+    "r: first view again   s: picture (PNG)   p: point cloud (PLY)   space: pause (files)\n"
+    "h: these keys   q, Escape: quit\n";
+
+static bool
+bad_option (const char *option, const char *expected, const char *got)
+{
+  g_printerr ("viewer: %s: expected %s, got '%s'\n", option, expected, got);
+  return false;
+}
+
+static bool
+check_numbers (const ViewerOptions &options)
+{
+  if (options.listen < 0 || options.listen > 65535)
+    return bad_option (
+        "--listen", "a port from 1 to 65535", std::to_string (options.listen).c_str ());
+  if (options.latency_ms < 0 || options.latency_ms > 10000)
+    return bad_option ("--latency", "0 to 10000 ms", std::to_string (options.latency_ms).c_str ());
+  if (!(options.auto_orbit >= -3600 && options.auto_orbit <= 3600))
+    return bad_option ("--auto-orbit", "-3600 to 3600 degrees a second",
+        std::to_string (options.auto_orbit).c_str ());
+  return true;
+}
+
+static bool
+check_size (ViewerOptions &options)
+{
+  char more = 0;
+  if (options.size &&
+      (std::sscanf (options.size, "%5dx%5d%c", &options.width, &options.height, &more) != 2 ||
+          options.width < 16 || options.height < 16 || options.width > 8192 ||
+          options.height > 8192))
+    return bad_option ("--size", "WIDTHxHEIGHT, 16x16 to 8192x8192", options.size);
+  return true;
+}
+
+static bool
+check_background (ViewerOptions &options)
+{
+  if (!options.background)
+    return true;
+  const std::string text = options.background;
+  const bool is_hex = text.find_first_not_of ("0123456789abcdefABCDEF") == text.npos;
+  if (!is_hex || (text.size () != 6 && text.size () != 8))
+    return bad_option ("--background", "RRGGBB or AARRGGBB in hexadecimal", options.background);
+  options.background_argb = guint (std::stoul (text, nullptr, 16));
+  if (text.size () == 6)
+    options.background_argb |= 0xff000000u;
+  return true;
+}
+
+static bool
+check_mode (const ViewerOptions &options)
+{
+  const std::string mode = options.mode ? options.mode : "strips";
+  if (mode != "strips" && mode != "rectangles" && mode != "points")
+    return bad_option ("--mode", "strips, rectangles or points", options.mode);
+  return true;
+}
+
+static bool
+check_out (const ViewerOptions &options)
+{
+  if (options.out && !g_file_test (options.out, G_FILE_TEST_IS_DIR))
+    return bad_option ("--out", "a folder", options.out);
+  return true;
+}
+
+/* Not left to glimagesink: with OpenGL that needs no display it would draw where nobody sees it. */
+bool
+check_display ()
+{
+  const gchar *window = g_getenv ("GST_GL_WINDOW");
+  const bool is_seen =
+      g_strcmp0 (window, "egl-device") != 0 && g_strcmp0 (window, "surfaceless") != 0;
+  if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY"))
+    g_printerr (
+        "viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the environment; "
+        "pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
+  else if (!is_seen)
+    g_printerr (
+        "viewer: GST_GL_WINDOW=%s draws without a window: expected it not to be set\n", window);
+  else
+    return true;
+  return false;
+}
+
+bool
+parse_arguments (int *argc, char ***argv, ViewerOptions &options)
+{
+  const GOptionEntry entries[] = {{"listen", 0, 0, G_OPTION_ARG_INT, &options.listen,
+                                      "Show the RTP stream that comes to this UDP port", "PORT"},
+      {"latency", 0, 0, G_OPTION_ARG_INT, &options.latency_ms,
+          "Jitter buffer of RTP and RTSP (default 30)", "MS"},
+      {"no-filter", 0, 0, G_OPTION_ARG_NONE, &options.no_filter,
+          "Leave the points that several cameras saw", nullptr},
+      {"mode", 0, 0, G_OPTION_ARG_STRING, &options.mode, "strips (default), rectangles or points",
+          "MODE"},
+      {"background", 0, 0, G_OPTION_ARG_STRING, &options.background, "Colour behind the scene",
+          "RRGGBB"},
+      {"size", 0, 0, G_OPTION_ARG_STRING, &options.size, "Picture size (default 640x480)", "WxH"},
+      {"auto-orbit", 0, 0, G_OPTION_ARG_DOUBLE, &options.auto_orbit,
+          "Degrees a second by which the view turns by itself", "DEG"},
+      {"once", 0, 0, G_OPTION_ARG_NONE, &options.once,
+          "Quit at the end of a file (default: begin again)", nullptr},
+      {"out", 0, 0, G_OPTION_ARG_FILENAME, &options.out,
+          "Folder for pictures and point clouds (default: here)", "FOLDER"},
+      {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.inputs, nullptr, nullptr},
+      {}};
+  GOptionContext *context =
+      g_option_context_new ("FILE | URI | --listen PORT - show frame sets in a window");
+  g_option_context_set_description (context, kViewerKeys);
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  bool parsed = g_option_context_parse (context, argc, argv, &error);
+  const guint inputs = options.inputs ? g_strv_length (options.inputs) : 0;
+  if (!parsed)
+    g_printerr ("viewer: %s\n", error->message);
+  else if (inputs + (options.listen != 0) != 1) {
+    g_printerr ("viewer: expected one file, one URI, or --listen PORT, see --help\n");
+    parsed = false;
+  }
+  g_clear_error (&error);
+  g_option_context_free (context);
+  return parsed && check_numbers (options) && check_size (options) && check_background (options) &&
+         check_mode (options) && check_out (options);
+}
+
+void
+clear_options (ViewerOptions &options)
+{
+  g_free (options.background);
+  g_free (options.size);
+  g_free (options.mode);
+  g_free (options.out);
+  g_strfreev (options.inputs);
+}
