@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "stripsettings.hpp"
 
+#include <cstddef>
+#include <cstring>
 #include <iterator>
+#include <type_traits>
 
 using rangecast::StripMode;
 using Settings = StripRenderSettings;
@@ -47,6 +50,13 @@ static const NumberRow kNumbers[] = {
         0, 1, kDefaults.depth_step, [] (Settings &s) -> double & { return s.strips.depth_step; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
+    {"eye-distance", "Eye distance",
+        "Metres between the eyes of stereoscopic pictures (0 to 10, default 0.063)", 0, 10, 0.063,
+        [] (Settings &s) -> double & { return s.eye_distance_m; }},
+    {"convergence", "Convergence",
+        "Metres from the viewer to what both eyes' pictures have in the same place, the plane of "
+        "the screen (0 to 1000, default 0: what is looked at; 1000 for headsets)",
+        0, 1000, 0, [] (Settings &s) -> double & { return s.convergence_m; }},
 };
 
 enum : guint {
@@ -54,7 +64,10 @@ enum : guint {
   PROP_MODE = PROP_NUMBERS + std::size (kNumbers),
   PROP_BACKGROUND,
   PROP_MAX_GAP,
-  PROP_SHOW_CAMERAS
+  PROP_SHOW_CAMERAS,
+  PROP_SHOW_UNITS,
+  PROP_SHOW_STATS,
+  PROP_HOLD_TIME
 };
 
 GType
@@ -95,7 +108,22 @@ install_strip_settings (GObjectClass *object_class)
           "Also draw where the rig's cameras stand, and their frusta from near to far (default "
           "false)",
           FALSE, kFlags));
-  return PROP_SHOW_CAMERAS;
+  g_object_class_install_property (object_class, PROP_SHOW_UNITS,
+      g_param_spec_boolean ("show-units", "Show units",
+          "Points in shades of their camera's colour, which show-cameras has too (default false)",
+          FALSE, kFlags));
+  g_object_class_install_property (object_class, PROP_SHOW_STATS,
+      g_param_spec_boolean ("show-stats", "Show statistics",
+          "Rates, points, views, triangles and latency as text over the picture (default false)",
+          FALSE, kFlags));
+  g_object_class_install_property (object_class, PROP_HOLD_TIME,
+      g_param_spec_uint64 ("hold-time", "Hold time",
+          "ns for which the last frame set is drawn on, at the output's frame rate, when none "
+          "follows; only if that rate is not the input's (0 to 18446744073709551615, default "
+          "18446744073709551615: for ever)",
+          0, G_MAXUINT64, G_MAXUINT64,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  return PROP_HOLD_TIME;
 }
 
 static double
@@ -115,6 +143,9 @@ notify_strip_settings (GObject *object, const Settings &before, const Settings &
 bool
 set_strip_setting (Settings &settings, guint id, const GValue *value)
 {
+  static_assert (std::is_trivially_copyable_v<rangecast::StripSettings>);
+  std::byte before[sizeof settings.strips];
+  std::memcpy (before, &settings.strips, sizeof before);
   if (id >= PROP_NUMBERS && id < PROP_NUMBERS + std::size (kNumbers))
     kNumbers[id - PROP_NUMBERS].field (settings) = g_value_get_double (value);
   else if (id == PROP_MODE)
@@ -125,8 +156,16 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.strips.max_gap = g_value_get_int (value);
   else if (id == PROP_SHOW_CAMERAS)
     settings.show_cameras = g_value_get_boolean (value);
+  else if (id == PROP_SHOW_UNITS)
+    settings.show_units = g_value_get_boolean (value);
+  else if (id == PROP_SHOW_STATS)
+    settings.show_stats = g_value_get_boolean (value);
+  else if (id == PROP_HOLD_TIME)
+    settings.hold_time = g_value_get_uint64 (value);
   else
     return false;
+  if (std::memcmp (before, &settings.strips, sizeof before) != 0)
+    settings.strips_serial++;
   return true;
 }
 
@@ -143,6 +182,12 @@ get_strip_setting (const Settings &settings, guint id, GValue *value)
     g_value_set_int (value, settings.strips.max_gap);
   else if (id == PROP_SHOW_CAMERAS)
     g_value_set_boolean (value, settings.show_cameras);
+  else if (id == PROP_SHOW_UNITS)
+    g_value_set_boolean (value, settings.show_units);
+  else if (id == PROP_SHOW_STATS)
+    g_value_set_boolean (value, settings.show_stats);
+  else if (id == PROP_HOLD_TIME)
+    g_value_set_uint64 (value, settings.hold_time);
   else
     return false;
   return true;

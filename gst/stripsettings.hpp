@@ -15,7 +15,13 @@ struct StripRenderSettings {
   guint background = kDefaultBackground; ///< ARGB
   double point_size = 1;                 ///< footprints of a pixel
   bool show_cameras = false;
+  bool show_units = false;
+  bool show_stats = false;
+  double eye_distance_m = 0.063;                ///< that of most people
+  double convergence_m = 0;                     ///< 0: the target's distance
+  GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
   rangecast::StripSettings strips;
+  guint strips_serial = 0; ///< another one after each change of what strips are made with
 };
 
 /** Installs the properties of these settings, numbers 1 to the result. All may change in any state
