@@ -172,7 +172,7 @@ OrbitControl::handle (GstEvent *event)
     case GST_NAVIGATION_EVENT_MOUSE_BUTTON_PRESS:
       return press (event);
     case GST_NAVIGATION_EVENT_MOUSE_BUTTON_RELEASE:
-      release ();
+      button_ = 0;
       return true;
     case GST_NAVIGATION_EVENT_MOUSE_MOVE:
       return drag (event);

@@ -97,7 +97,7 @@ PictureThread::run (GstElement *element, Tick tick)
     guard.unlock ();
     const GstClockTime due = tick (element);
     guard.lock ();
-    if (quit_ || woken_)
+    if (quit_ || woken_ || due == 0)
       continue;
     if (GST_CLOCK_TIME_IS_VALID (due))
       wait_for_clock (guard, element, due);

@@ -239,9 +239,11 @@ draw_due (GstStripRender *self)
     base->segment.position = GST_BUFFER_PTS (out);
     flow = gst_pad_push (base->srcpad, out);
   }
-  std::lock_guard guard (priv->lock);
-  priv->flow = flow;
-  return flow == GST_FLOW_OK ? 0 : GST_CLOCK_TIME_NONE;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->flow = flow;
+  }
+  return flow == GST_FLOW_OK ? next_due (self) : GST_CLOCK_TIME_NONE;
 }
 
 static GstClockTime
