@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "stripeyes.hpp"
 
+#include <cstring>
 #include <utility>
 
 EyePlaces::EyePlaces (const GstVideoInfo &info)
 {
   const int width = GST_VIDEO_INFO_WIDTH (&info), height = GST_VIDEO_INFO_HEIGHT (&info);
-  const auto flags = GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info);
+  guint flags; /* copied: caps may have bits that are no value of the enumeration */
+  static_assert (sizeof flags == sizeof GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info));
+  std::memcpy (&flags, &GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info), sizeof flags);
   const bool half = (flags & GST_VIDEO_MULTIVIEW_FLAGS_HALF_ASPECT) != 0;
   EyePlace &first = places_[0], &second = places_[1];
   first = {0, 0, 0, 0, width, height, 1};
