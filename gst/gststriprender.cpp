@@ -77,17 +77,11 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
       !gst_video_info_from_caps (&priv->out, out))
     return FALSE;
   priv->scene.set_rig (priv->info.rig);
-  int n, d;
-  const bool own = strip_own_rate (in, out, n, d);
-  bool latency_changed;
   {
     std::lock_guard guard (priv->lock);
-    const GstClockTime before = priv->grid.period ();
-    priv->grid.set_rate (own ? n : 0, d);
-    latency_changed = priv->grid.period () != before;
+    priv->rate = strip_output_rate (in, out);
   }
-  if (latency_changed)
-    gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+  strip_apply_rate (self);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
 }
 
@@ -202,6 +196,7 @@ negotiated (GstStripRender *self)
   if (self->priv->live && strip_has_own_rate (self))
     return true; /* the thread sees to it */
   StreamLocks locks (base);
+  strip_apply_rate (self);
   return gst_base_transform_reconfigure (base) && gst_pad_has_current_caps (base->srcpad);
 }
 
@@ -222,7 +217,7 @@ gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffe
   if (strip_has_own_rate (self))
     return strip_hand_to_grid (self, in);
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (in));
-  if (strip_is_late (self, running)) {
+  if (strip_is_late (self, running) || !strip_follows_grid (self, GST_BUFFER_PTS (in))) {
     strip_drop_picture (self, GST_BUFFER_PTS (in), GST_BUFFER_DURATION (in), running);
     gst_buffer_unref (in);
     return GST_BASE_TRANSFORM_FLOW_DROPPED;
@@ -383,16 +378,17 @@ static void
 gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
-  bool hold_changed;
+  bool hold_changed, keep_changed;
   {
     std::lock_guard guard (priv->lock);
-    const GstClockTime before = priv->settings.hold_time;
+    const StripRenderSettings before = priv->settings;
     if (!set_strip_setting (priv->settings, id, value))
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    hold_changed = priv->settings.hold_time != before;
+    hold_changed = priv->settings.hold_time != before.hold_time;
+    keep_changed = priv->settings.keep_rate != before.keep_rate;
     priv->grid.set_hold (priv->settings.hold_time);
   }
-  if (hold_changed)
+  if (hold_changed || keep_changed) /* without a thread, the next frame set sees to it */
     priv->thread.wake ();
 }
 

@@ -39,10 +39,17 @@ PictureGrid::drop_first ()
 }
 
 void
-PictureGrid::reset ()
+PictureGrid::drop_frame_sets ()
 {
   while (count_ > 0)
     drop_first ();
+}
+
+void
+PictureGrid::reset ()
+{
+  drop_frame_sets ();
+  foreign_ = GST_CLOCK_TIME_NONE;
   last_ = GST_CLOCK_TIME_NONE;
 }
 
@@ -81,17 +88,24 @@ PictureGrid::first_showing (const FrameSet &set) const
   return gst_util_uint64_scale (number, guint64 (rate_d_) * GST_SECOND, guint64 (rate_n_));
 }
 
+/* A time less than a nanosecond before a picture's is that picture's, rounded. */
+GstClockTime
+PictureGrid::first_after (GstClockTime pts) const
+{
+  const guint64 second = guint64 (rate_d_) * GST_SECOND;
+  const guint64 number = gst_util_uint64_scale (pts + 1, guint64 (rate_n_), second) + 1;
+  return gst_util_uint64_scale (number, second, guint64 (rate_n_));
+}
+
 bool
 PictureGrid::find (GstClockTime &pts, std::size_t &index) const
 {
   if (!active () || count_ == 0)
     return false;
   pts = first_showing (at (0));
-  if (GST_CLOCK_TIME_IS_VALID (last_)) {
-    const guint64 second = guint64 (rate_d_) * GST_SECOND;
-    const guint64 number = gst_util_uint64_scale_round (last_, guint64 (rate_n_), second) + 1;
-    pts = std::max (pts, gst_util_uint64_scale (number, second, guint64 (rate_n_)));
-  }
+  for (GstClockTime before : {last_, foreign_})
+    if (GST_CLOCK_TIME_IS_VALID (before))
+      pts = std::max (pts, first_after (before));
   for (index = 0; index < count_; index++) {
     const bool newest = index + 1 == count_;
     if (!newest && pts + tolerance () >= at (index + 1).begin)

@@ -5,6 +5,12 @@
 
 #include <array>
 
+/** Of an output. */
+struct FrameRate {
+  int n = 0, d = 1;       ///< pictures a second; 0/1: none
+  bool is_inputs = false; ///< frame sets have the same
+};
+
 /** When an output with a frame rate of its own has pictures, and which frame set each of them
  * shows.
  *
@@ -32,6 +38,12 @@ public:
 
   /** Forgets all frame sets; the next picture may be anywhere. */
   void reset ();
+  /** Forgets all frame sets; the next picture is after the last one. */
+  void drop_frame_sets ();
+  /** There was a picture, not of this grid, at that stream position. */
+  void begin_after (GstClockTime pts) { foreign_ = pts; }
+  /** Stream position of the last picture of the grid, or GST_CLOCK_TIME_NONE */
+  [[nodiscard]] GstClockTime last () const { return last_; }
 
   /** The next frame set of the stream. Times that go back count as the last one's. The oldest one
    *  that waits gives way where too many do.
@@ -73,11 +85,13 @@ private:
   }
   void drop_first ();
   [[nodiscard]] GstClockTime first_showing (const FrameSet &set) const;
+  [[nodiscard]] GstClockTime first_after (GstClockTime pts) const;
   bool find (GstClockTime &pts, std::size_t &index) const;
 
   int rate_n_ = 0, rate_d_ = 1;
   GstClockTime hold_ = GST_CLOCK_TIME_NONE;
-  GstClockTime last_ = GST_CLOCK_TIME_NONE; /* picture that was taken */
-  std::array<FrameSet, 64> ring_{};         /* the oldest first */
+  GstClockTime last_ = GST_CLOCK_TIME_NONE;    /* picture that was taken */
+  GstClockTime foreign_ = GST_CLOCK_TIME_NONE; /* last picture that was not of the grid */
+  std::array<FrameSet, 64> ring_{};            /* the oldest first */
   std::size_t first_ = 0, count_ = 0;
 };

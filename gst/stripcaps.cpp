@@ -101,13 +101,13 @@ strip_fixate_output (GstCaps *caps, const GstCaps *input)
   return gst_caps_fixate (caps);
 }
 
-bool
-strip_own_rate (const GstCaps *input, const GstCaps *output, int &n, int &d)
+FrameRate
+strip_output_rate (const GstCaps *input, const GstCaps *output)
 {
   int in_n = 0, in_d = 1;
-  n = 0;
-  d = 1;
+  FrameRate rate;
   gst_structure_get_fraction (gst_caps_get_structure (input, 0), "framerate", &in_n, &in_d);
-  gst_structure_get_fraction (gst_caps_get_structure (output, 0), "framerate", &n, &d);
-  return n > 0 && gst_util_fraction_compare (n, d, in_n, in_d) != 0;
+  gst_structure_get_fraction (gst_caps_get_structure (output, 0), "framerate", &rate.n, &rate.d);
+  rate.is_inputs = gst_util_fraction_compare (rate.n, rate.d, in_n, in_d) == 0;
+  return rate;
 }

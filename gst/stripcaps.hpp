@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include "picturegrid.hpp"
+
 /** The output for an input: of any size and any frame rate up to 1000 a second, which the element
  *  makes itself, or the input's. Returns: (transfer full) */
 GstCaps *strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filter);
@@ -15,5 +17,5 @@ GstCaps *strip_input_caps (const GstCaps *output, GstCaps *input_template, GstCa
  *  each eye. @param caps  transfer full. Returns: (transfer full) */
 GstCaps *strip_fixate_output (GstCaps *caps, const GstCaps *input);
 
-/** Whether the output has a frame rate that the input does not have; then its numbers. */
-bool strip_own_rate (const GstCaps *input, const GstCaps *output, int &n, int &d);
+/** The output's frame rate; none if the caps have none. */
+FrameRate strip_output_rate (const GstCaps *input, const GstCaps *output);

@@ -68,6 +68,26 @@ strip_has_own_rate (GstStripRender *self)
   return self->priv->grid.active ();
 }
 
+void
+strip_apply_rate (GstStripRender *self)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  bool changed;
+  {
+    std::lock_guard guard (priv->lock);
+    const GstClockTime before = priv->grid.period ();
+    const bool own = !priv->rate.is_inputs || priv->settings.keep_rate;
+    priv->grid.set_rate (own ? priv->rate.n : 0, priv->rate.d);
+    changed = priv->grid.period () != before;
+    if (!priv->grid.active ())
+      priv->grid.drop_frame_sets ();
+  }
+  if (!changed)
+    return;
+  gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+  priv->thread.wake (); /* it may be waiting for a picture of the old rate */
+}
+
 /* The next picture, whose frame set is then the caller's. */
 static bool
 take_picture (GstStripRender *self, GstClockTime until, PictureGrid::Picture &picture)
@@ -254,6 +274,7 @@ tick (GstElement *element)
   StreamLocks locks (base);
   if (!thread_draws (self) || GST_PAD_IS_FLUSHING (base->srcpad))
     return GST_CLOCK_TIME_NONE;
+  strip_apply_rate (self);
   if (!gst_base_transform_reconfigure (base)) {
     std::lock_guard guard (self->priv->lock);
     self->priv->flow =
@@ -274,6 +295,19 @@ strip_learn_whether_live (GstStripRender *self)
   StreamLocks locks (GST_BASE_TRANSFORM (self));
   priv->live = live;
   priv->live_known = true;
+}
+
+bool
+strip_follows_grid (GstStripRender *self, GstClockTime pts)
+{
+  std::lock_guard guard (self->priv->lock);
+  PictureGrid &grid = self->priv->grid;
+  if (!GST_CLOCK_TIME_IS_VALID (pts))
+    return true;
+  if (GST_CLOCK_TIME_IS_VALID (grid.last ()) && pts < grid.last ())
+    return false;
+  grid.begin_after (pts);
+  return true;
 }
 
 /* For the grid, which takes the frame set. */

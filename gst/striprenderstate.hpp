@@ -32,6 +32,7 @@ struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows */
   StripRenderSettings settings;
   RenderStats stats;
+  FrameRate rate;                              /* of the output's caps */
   PictureGrid grid;                            /* active: the output has a rate of its own */
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is before it would be late */
   GstClockTime latency = 0;                    /* of upstream */
@@ -116,10 +117,16 @@ void strip_drop_picture (
 
 /** Times that go backwards, or are no times, have none. With either stream lock. */
 bool strip_has_own_rate (GstStripRender *self);
+/** Has pictures at the output's frame rate, or with the frame sets, as caps and properties say.
+ *  With both stream locks. */
+void strip_apply_rate (GstStripRender *self);
 /** Asks upstream, once. On the streaming thread. */
 void strip_learn_whether_live (GstStripRender *self);
 /** For later pictures. @param in  transfer full */
 GstFlowReturn strip_hand_to_grid (GstStripRender *self, GstBuffer *in);
+/** For a picture that is not of the grid: its time is the grid's last from now on.
+ *  @return false if it is before that, as when downstream has just given up a rate of its own */
+bool strip_follows_grid (GstStripRender *self, GstClockTime pts);
 /** Draws the next picture whose frame set is sure, now that none before `until` (stream position)
  *  can come, if it is in time. @return GST_FLOW_OK without a buffer if there is none */
 GstFlowReturn strip_draw_next (GstStripRender *self, GstClockTime until, GstBuffer **out);

@@ -67,6 +67,7 @@ enum : guint {
   PROP_SHOW_CAMERAS,
   PROP_SHOW_UNITS,
   PROP_SHOW_STATS,
+  PROP_KEEP_RATE,
   PROP_HOLD_TIME
 };
 
@@ -116,10 +117,17 @@ install_strip_settings (GObjectClass *object_class)
       g_param_spec_boolean ("show-stats", "Show statistics",
           "Rates, points, views, triangles and latency as text over the picture (default false)",
           FALSE, kFlags));
+  g_object_class_install_property (object_class, PROP_KEEP_RATE,
+      g_param_spec_boolean ("keep-rate", "Keep rate",
+          "Pictures at the output's frame rate even if that is the input's: without holes, and a "
+          "live stream that stalls is drawn on (default false: then one picture a frame set)",
+          FALSE,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_HOLD_TIME,
       g_param_spec_uint64 ("hold-time", "Hold time",
           "ns for which the last frame set is drawn on, at the output's frame rate, when none "
-          "follows; only if that rate is not the input's (0 to 18446744073709551615, default "
+          "follows; only if that rate is not the input's, or with keep-rate (0 to "
+          "18446744073709551615, default "
           "18446744073709551615: for ever)",
           0, G_MAXUINT64, G_MAXUINT64,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
@@ -160,6 +168,8 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.show_units = g_value_get_boolean (value);
   else if (id == PROP_SHOW_STATS)
     settings.show_stats = g_value_get_boolean (value);
+  else if (id == PROP_KEEP_RATE)
+    settings.keep_rate = g_value_get_boolean (value);
   else if (id == PROP_HOLD_TIME)
     settings.hold_time = g_value_get_uint64 (value);
   else
@@ -186,6 +196,8 @@ get_strip_setting (const Settings &settings, guint id, GValue *value)
     g_value_set_boolean (value, settings.show_units);
   else if (id == PROP_SHOW_STATS)
     g_value_set_boolean (value, settings.show_stats);
+  else if (id == PROP_KEEP_RATE)
+    g_value_set_boolean (value, settings.keep_rate);
   else if (id == PROP_HOLD_TIME)
     g_value_set_uint64 (value, settings.hold_time);
   else

@@ -19,6 +19,7 @@ struct StripRenderSettings {
   bool show_stats = false;
   double eye_distance_m = 0.063;                ///< that of most people
   double convergence_m = 0;                     ///< 0: the target's distance
+  bool keep_rate = false;                       ///< the output's, even if it is the input's
   GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
   rangecast::StripSettings strips;
   guint strips_serial = 0; ///< another one after each change of what strips are made with

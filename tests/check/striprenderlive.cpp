@@ -315,6 +315,26 @@ GST_START_TEST (test_latency_is_upstreams_where_the_rate_is_the_inputs)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change_any_time)
+{
+  Live live ("keep-rate=true", "framerate=5/1");
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  for (guint64 i = 0; i < 3; i++)
+    fail_unless_equals_uint64 (live.next ().pts, i * 200 * GST_MSECOND);
+  g_object_set (live.r, "keep-rate", FALSE, nullptr);
+  for (int tries = 0; tries < 500 && gst_harness_query_latency (live.h) > 0; tries++)
+    g_usleep (10000); /* the thread negotiates */
+  live.push (GST_SECOND + 7);
+  const RenderedPicture direct = take_rendered (gst_harness_try_pull (live.h), 320);
+  fail_unless_equals_uint64 (direct.pts, GST_SECOND + 7);
+  g_object_set (live.r, "keep-rate", TRUE, nullptr);
+  live.push (1200 * GST_MSECOND);
+  fail_unless_equals_uint64 (live.next ().pts, 1200 * GST_MSECOND);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_stalled_stream_is_drawn_no_longer_than_hold_time)
 {
   Live live ("hold-time=300000000");
@@ -553,6 +573,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_new_frame_set_is_shown_and_times_never_go_back);
   tcase_add_test (tc, test_picture_waits_for_upstreams_latency_so_that_its_frame_set_is_there);
   tcase_add_test (tc, test_latency_is_upstreams_where_the_rate_is_the_inputs);
+  tcase_add_test (tc, test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change_any_time);
   tcase_add_test (tc, test_stalled_stream_is_drawn_no_longer_than_hold_time);
   tcase_add_test (tc, test_flush_ends_holding_and_a_new_stream_begins);
   tcase_add_test (tc, test_end_of_stream_shows_the_rest_and_ends_holding);
