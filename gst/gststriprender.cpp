@@ -134,11 +134,13 @@ static gboolean
 gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
 {
   auto self = GST_STRIP_RENDER (base);
-  if (!gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base)) ||
-      !choose_pool (self, query) ||
+  GstStripRenderPrivate *priv = self->priv;
+  if (priv->no_context) /* the base class has posted why */
+    return FALSE;
+  priv->no_context = !gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base));
+  if (priv->no_context || !choose_pool (self, query) ||
       !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
     return FALSE;
-  GstStripRenderPrivate *priv = self->priv;
   if (priv->gl_error && !priv->gl_error_posted) {
     priv->gl_error_posted = true;
     GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
@@ -340,7 +342,7 @@ gst_strip_render_start (GstBaseTransform *base)
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->gl_error_posted = false;
+  priv->gl_error_posted = priv->no_context = false;
   priv->live = false;
   priv->stats_text = {};
   strip_reset_rate (self);

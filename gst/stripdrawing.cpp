@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+static constexpr GLenum kContextLost = 0x0507; /* of OpenGL 4.5 and ES 3.2 */
+
 bool
 StripDrawing::start (GstGLContext *context, GError **error)
 {
@@ -110,6 +112,25 @@ StripDrawing::draw_bound (gpointer user_data)
   return TRUE;
 }
 
+/* What no further call can mend. @return why, or nullptr */
+static const char *
+fatal_error (const GstGLFuncs *gl)
+{
+  constexpr int kMost = 8; /* more than one may be waiting; a lost context may not stop telling */
+  for (int i = 0; i < kMost; i++)
+    switch (gl->GetError ()) {
+      case GL_NO_ERROR:
+        return nullptr;
+      case kContextLost:
+        return "its context is lost";
+      case GL_OUT_OF_MEMORY:
+        return "it has no memory left";
+      default:
+        break;
+    }
+  return nullptr;
+}
+
 void
 StripDrawing::draw_in_gl_thread (GstGLContext *context, gpointer user_data)
 {
@@ -121,6 +142,8 @@ StripDrawing::draw_in_gl_thread (GstGLContext *context, gpointer user_data)
     drawn = gst_gl_framebuffer_draw_to_texture (call->self->framebuffer_,
         GST_GL_MEMORY_CAST (gst_buffer_peek_memory (call->out, i)), draw_bound, call);
   }
+  call->result.reason = drawn ? fatal_error (context->gl_vtable) : "there is no framebuffer for it";
+  drawn = drawn && !call->result.reason;
   call->result.drawn = drawn;
   GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call->out);
   if (drawn && sync) /* other contexts wait for our commands there */

@@ -29,9 +29,10 @@ public:
 
   struct Result {
     bool drawn = false;
-    guint64 uploaded = 0;              ///< bytes
-    rangecast::OrbitMatrices matrices; ///< of the first eye
-    int width = 0, height = 0;         ///< of the first eye's picture, pixels
+    const char *reason = "the output is not its memory"; ///< why it is not drawn
+    guint64 uploaded = 0;                                ///< bytes
+    rangecast::OrbitMatrices matrices;                   ///< of the first eye
+    int width = 0, height = 0;                           ///< of the first eye's picture, pixels
   };
   /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. */
   Result draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out);

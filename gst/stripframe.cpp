@@ -83,7 +83,8 @@ strip_draw_frame (
   }
   const auto result = priv->drawing.draw (GST_GL_BASE_FILTER (self)->context, job, out);
   if (!result.drawn) {
-    GST_ELEMENT_ERROR (self, RESOURCE, WRITE, ("OpenGL could not draw into the output"), (nullptr));
+    GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
+        ("OpenGL could not draw into the output: %s", result.reason), (nullptr));
     return GST_FLOW_ERROR;
   }
   std::lock_guard guard (priv->lock);

@@ -51,6 +51,7 @@ struct GstStripRenderPrivate {
   rangecast::StatsPanel stats_panel;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GError *gl_error = nullptr;                       /* why OpenGL cannot be used */
+  bool no_context = false;
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
 
   PictureThread thread;

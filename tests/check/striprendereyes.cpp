@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* striprender beside its strips: stereoscopic pictures, near and far plane, touch, overlays, alpha.
  */
+#include <gst/gl/gstglfuncs.h>
 #include <gst/video/video.h>
 
 #include <rangecast/strips/camera_lines.hpp>
@@ -317,6 +318,70 @@ GST_START_TEST (test_transparent_background_lets_video_through)
 }
 GST_END_TEST;
 
+/* ---- OpenGL that fails ---- */
+
+static GLenum GSTGLAPI
+say_lost ()
+{
+  return 0x0507; /* GL_CONTEXT_LOST */
+}
+
+static void
+lose_context (GstGLContext *context, gpointer)
+{
+  context->gl_vtable->GetError = say_lost;
+}
+
+GST_START_TEST (test_lost_context_is_one_error_that_says_so)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = opengl_works () ? gst_harness_new ("striprender") : nullptr;
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  gst_harness_set_sink_caps_str (h, "video/x-raw(memory:GLMemory),width=64,height=48");
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  gst_buffer_unref (gst_harness_push_and_pull (h, dot (rig, 8000)));
+  GstGLContext *context = nullptr;
+  g_object_get (h->element, "context", &context, nullptr);
+  gst_gl_context_thread_add (context, lose_context, nullptr);
+  gst_object_unref (context);
+  fail_unless_equals_int (gst_harness_push (h, dot (rig, 8000)), GST_FLOW_ERROR);
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("context is lost") != std::string::npos, "%s", text.c_str ());
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_no_context_at_all_is_one_error)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  g_setenv ("GST_GL_API", "gles1", TRUE); /* which no element draws with */
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc num-buffers=3 ! striprender ! fakesink", nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("gles1") != std::string::npos, "%s", text.c_str ());
+  int ours = 0;
+  while (
+      GstMessage *message = gst_bus_timed_pop_filtered (bus, GST_SECOND / 4, GST_MESSAGE_ERROR)) {
+    ours += g_str_has_prefix (GST_OBJECT_NAME (GST_MESSAGE_SRC (message)), "striprender");
+    gst_message_unref (message);
+  }
+  fail_unless_equals_int (ours, 0);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  g_unsetenv ("GST_GL_API");
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 /* ---- touch ---- */
 
 struct Touched {
@@ -405,6 +470,8 @@ striprendereyes_suite ()
   tcase_add_test (tc, test_units_are_in_their_cameras_colours);
   tcase_add_test (tc, test_statistics_are_in_a_corner_and_leave_the_rest_alone);
   tcase_add_test (tc, test_transparent_background_lets_video_through);
+  tcase_add_test (tc, test_lost_context_is_one_error_that_says_so);
+  tcase_add_test (tc, test_no_context_at_all_is_one_error);
   tcase_add_test (tc, test_one_finger_turns_two_move_and_zoom);
   tcase_add_test (tc, test_two_fingers_carry_what_is_between_them);
   return suite;
