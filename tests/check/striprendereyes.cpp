@@ -6,7 +6,7 @@
 
 #include <rangecast/strips/camera_lines.hpp>
 
-#include "render-check.hpp"
+#include "viewer-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;

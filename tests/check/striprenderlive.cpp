@@ -4,7 +4,7 @@
 #include <gst/app/gstappsrc.h>
 #include <gst/controller/controller.h>
 
-#include "render-check.hpp"
+#include "viewer-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
