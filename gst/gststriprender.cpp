@@ -220,7 +220,7 @@ gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffe
     return strip_hand_to_grid (self, in);
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (in));
   if (strip_is_late (self, running) || !strip_follows_grid (self, GST_BUFFER_PTS (in))) {
-    strip_drop_picture (self, GST_BUFFER_PTS (in), GST_BUFFER_DURATION (in), running);
+    strip_drop_pictures (self, 1, GST_BUFFER_PTS (in), GST_BUFFER_DURATION (in), running);
     gst_buffer_unref (in);
     return GST_BASE_TRANSFORM_FLOW_DROPPED;
   }

@@ -76,7 +76,7 @@ PictureGrid::add (GstBuffer *frame_set, GstClockTime duration)
   begin = std::max (begin, known_until ());
   if (count_ == ring_.size ())
     drop_first ();
-  at (count_++) = {frame_set, begin, later_by (begin, duration), false};
+  at (count_++) = {frame_set, begin, later_by (begin, duration)};
 }
 
 /* Of the pictures that may show that frame set. */
@@ -136,10 +136,8 @@ PictureGrid::take (GstClockTime until, Picture &picture)
     return false;
   for (; index > 0; index--)
     drop_first ();
-  FrameSet &set = at (0);
   const bool follows = GST_CLOCK_TIME_IS_VALID (last_) && pts <= last_ + period () + 1;
-  picture = {set.buffer, pts, period (), set.shown, !follows};
-  set.shown = true;
+  picture = {at (0).buffer, pts, period (), !follows};
   last_ = pts;
   return true;
 }

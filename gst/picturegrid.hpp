@@ -64,7 +64,6 @@ public:
     GstBuffer *frame_set = nullptr; ///< transfer none, until the next call
     GstClockTime pts = 0;           ///< stream position, ns
     GstClockTime duration = 0;      ///< ns
-    bool again = false;             ///< an earlier picture showed this frame set too
     bool gap = false;               ///< there is no picture right before this one
   };
   /** Takes the next picture if the frame set that it shows is sure, now that none before `until`
@@ -76,7 +75,6 @@ private:
   struct FrameSet {
     GstBuffer *buffer;
     GstClockTime begin, end; /* stream position */
-    bool shown;
   };
   FrameSet &at (std::size_t i) { return ring_[(first_ + i) % ring_.size ()]; }
   [[nodiscard]] const FrameSet &at (std::size_t i) const

@@ -61,7 +61,7 @@ update_panel (GstStripRender *self, std::size_t views, GstClockTime frame_set_pt
 /* Draws a frame set as it is to be seen at `running`. */
 GstFlowReturn
 strip_draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool again)
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
 {
   GstStripRenderPrivate *priv = self->priv;
   gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
@@ -75,7 +75,9 @@ strip_draw_frame (
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
+  const bool again = frame_set == priv->drawn;
   priv->scene.build (frame.views (), settings, again);
+  gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
   StripDrawingJob job = {&priv->scene, &settings, settings.camera.at (orbit_time (priv, running))};
   if (settings.show_stats) {
     job.panel_changed = update_panel (self, frame.views ().size (), GST_BUFFER_PTS (frame_set));

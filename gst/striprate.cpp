@@ -22,15 +22,15 @@ strip_take_qos (GstStripRender *self, GstEvent *event)
 
 /* Counts a picture that is not drawn because it would be late, and tells the application. */
 void
-strip_drop_picture (
-    GstStripRender *self, GstClockTime pts, GstClockTime duration, GstClockTime running)
+strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts, GstClockTime duration,
+    GstClockTime running)
 {
   GstStripRenderPrivate *priv = self->priv;
   GstClockTime earliest;
   guint64 drawn, dropped;
   {
     std::lock_guard guard (priv->lock);
-    dropped = ++priv->stats.dropped;
+    dropped = priv->stats.dropped += count;
     drawn = priv->stats.frames;
     earliest = priv->earliest;
   }
@@ -117,7 +117,7 @@ draw_picture (GstStripRender *self, const PictureGrid::Picture &picture, GstBuff
     GST_BUFFER_FLAG_UNSET (*out, GST_BUFFER_FLAG_DISCONT);
   strip_sync_values (self, picture.pts);
   const GstFlowReturn drawn = strip_draw_frame (
-      self, picture.frame_set, *out, strip_running_time (self, picture.pts), picture.again);
+      self, picture.frame_set, *out, strip_running_time (self, picture.pts), true);
   if (drawn != GST_FLOW_OK)
     gst_clear_buffer (out);
   return drawn;
@@ -134,7 +134,7 @@ strip_draw_next (GstStripRender *self, GstClockTime until, GstBuffer **out)
   while (flow == GST_FLOW_OK && !*out && take_picture (self, until, picture)) {
     const GstClockTime running = strip_running_time (self, picture.pts);
     if (strip_is_late (self, running))
-      strip_drop_picture (self, picture.pts, picture.duration, running);
+      strip_drop_pictures (self, 1, picture.pts, picture.duration, running);
     else if (GST_CLOCK_TIME_IS_VALID (running)) /* else nobody would see it */
       flow = draw_picture (self, picture, out);
     gst_buffer_unref (picture.frame_set);
@@ -163,6 +163,7 @@ strip_drain_and_reset (GstStripRender *self)
   }
   if (strip_has_own_rate (self))
     drain (self, end);
+  gst_clear_buffer (&priv->drawn);
   std::lock_guard guard (priv->lock);
   priv->grid.reset ();
 }
@@ -223,16 +224,18 @@ catch_up (GstStripRender *self, GstClockTime now)
     std::lock_guard guard (priv->lock);
     slack = priv->grid.period () / 2;
   }
+  guint64 late = 0;
   PictureGrid::Picture picture;
   for (GstClockTime due = next_due (self); GST_CLOCK_TIME_IS_VALID (due) && due + slack < now;
        due = next_due (self)) {
     if (!take_picture (self, GST_CLOCK_TIME_NONE, picture))
-      return;
-    const GstClockTime running = strip_running_time (self, picture.pts);
-    if (GST_CLOCK_TIME_IS_VALID (running))
-      strip_drop_picture (self, picture.pts, picture.duration, running);
+      break;
+    late += GST_CLOCK_TIME_IS_VALID (strip_running_time (self, picture.pts));
     gst_buffer_unref (picture.frame_set);
   }
+  if (late > 0)
+    strip_drop_pictures (
+        self, late, picture.pts, picture.duration, strip_running_time (self, picture.pts));
 }
 
 /* Draws what is due now, one picture at most. @return when to call again, running time */
@@ -361,6 +364,7 @@ strip_reset_rate (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   priv->live_known = false;
+  gst_clear_buffer (&priv->drawn);
   std::lock_guard guard (priv->lock);
   priv->grid.reset ();
   priv->earliest = GST_CLOCK_TIME_NONE;

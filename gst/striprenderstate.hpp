@@ -46,6 +46,7 @@ struct GstStripRenderPrivate {
   /* with the source pad's stream lock, or on the streaming thread where that one draws; or in the
    * GL thread while whoever has them waits for it */
   StripScene scene;
+  GstBuffer *drawn = nullptr; /* whose strips the scene has, if it may be drawn again */
   StripDrawing drawing;
   StatsText stats_text;
   rangecast::StatsPanel stats_panel;
@@ -109,9 +110,10 @@ GstFlowReturn strip_draw_frame (
 void strip_take_qos (GstStripRender *self, GstEvent *event);
 /** Whether a picture of that running time would come too late, as far as QoS events tell. */
 bool strip_is_late (GstStripRender *self, GstClockTime running);
-/** Counts a picture that is not drawn because it would be late, and tells the application. */
-void strip_drop_picture (
-    GstStripRender *self, GstClockTime pts, GstClockTime duration, GstClockTime running);
+/** Counts pictures that are not drawn because they would be late, and tells the application of the
+ *  last one. */
+void strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts,
+    GstClockTime duration, GstClockTime running);
 /** @} */
 
 /** @name striprate.cpp, an output with a frame rate of its own @{ */
