@@ -422,6 +422,16 @@ gst_strip_render_init (GstStripRender *self)
 }
 
 static void
+describe_element (GstElementClass *element_class)
+{
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
+      "Draws range images as triangle strips with OpenGL", "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_STRIP_RENDER_MODE, GstPluginAPIFlags (0));
+}
+
+static void
 gst_strip_render_class_init (GstStripRenderClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -439,11 +449,7 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
           "vertices, triangles, strips, isolated, uploaded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
-  gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
-      "Draws range images as triangle strips with OpenGL", "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_STRIP_RENDER_MODE, GstPluginAPIFlags (0));
+  describe_element (element_class);
   element_class->change_state = gst_strip_render_change_state;
 
   transform_class->start = gst_strip_render_start;
