@@ -174,6 +174,7 @@ struct Live {
   GstHarness *h;
   GstElement *r;
   GstPad *src;
+  GstTestClock *clock;
   Rig rig = ring_rig (1);
 
   explicit Live (const char *properties = "", const char *output = "framerate=10/1")
@@ -182,11 +183,13 @@ struct Live {
     h = new_render_harness (rig, {properties, caps.c_str (), 5, 1});
     r = h ? gst_bin_get_by_name (GST_BIN (h->element), "r") : nullptr;
     src = h ? gst_element_get_static_pad (r, "src") : nullptr;
+    clock = h ? gst_harness_get_testclock (h) : nullptr;
   }
   ~Live ()
   {
     gst_clear_object (&src);
     gst_clear_object (&r);
+    gst_clear_object (&clock);
     if (h)
       gst_harness_teardown (h);
   }
@@ -202,7 +205,7 @@ struct Live {
     fail_unless (gst_harness_crank_single_clock_wait (h));
     return take_rendered (gst_harness_pull (h), width);
   }
-  GstClockTime now () { return gst_clock_get_time (GST_CLOCK (gst_harness_get_testclock (h))); }
+  GstClockTime now () { return gst_clock_get_time (GST_CLOCK (clock)); }
 };
 
 GST_START_TEST (test_live_stream_that_stalls_is_drawn_on_and_turns)
@@ -344,7 +347,7 @@ GST_START_TEST (test_stalled_stream_is_drawn_no_longer_than_hold_time)
   for (int i = 0; i < 5; i++)
     live.next ();
   g_usleep (50000);
-  fail_unless_equals_int (gst_test_clock_peek_id_count (gst_harness_get_testclock (live.h)), 0);
+  fail_unless_equals_int (gst_test_clock_peek_id_count (live.clock), 0);
   fail_unless_equals_uint64 (stats_field (live.r, "frames"), 5);
   live.push (2 * GST_SECOND);
   fail_unless_equals_uint64 (live.next ().pts, 2 * GST_SECOND);
@@ -365,7 +368,7 @@ GST_START_TEST (test_flush_ends_holding_and_a_new_stream_begins)
     GstSegment segment;
     gst_segment_init (&segment, GST_FORMAT_TIME);
     gst_harness_push_event (live.h, gst_event_new_segment (&segment));
-    gst_test_clock_set_time (gst_harness_get_testclock (live.h), begin + GST_SECOND / 2);
+    gst_test_clock_set_time (live.clock, begin + GST_SECOND / 2);
     g_usleep (50000);
     fail_unless_equals_uint64 (stats_field (live.r, "frames"), round + 1);
   }
@@ -386,7 +389,7 @@ GST_START_TEST (test_end_of_stream_shows_the_rest_and_ends_holding)
     fail_unless_equals_uint64 (picture.pts, i * kPeriod);
     fail_unless_equals_uint64 (picture.shows, i / 2 * 200 * GST_MSECOND);
   }
-  gst_test_clock_advance_time (gst_harness_get_testclock (live.h), GST_SECOND);
+  gst_test_clock_advance_time (live.clock, GST_SECOND);
   g_usleep (50000);
   fail_unless (gst_harness_try_pull (live.h) == nullptr);
 }
@@ -454,10 +457,10 @@ GST_START_TEST (test_pause_and_states_twice_while_holding)
     live.push (10 * GST_SECOND * guint64 (round));
     live.next ();
     gst_element_set_state (live.h->element, GST_STATE_PAUSED);
-    gst_test_clock_advance_time (gst_harness_get_testclock (live.h), GST_SECOND / 2);
+    gst_test_clock_advance_time (live.clock, GST_SECOND / 2);
     g_usleep (30000);
     const guint64 frames = stats_field (live.r, "frames");
-    gst_test_clock_advance_time (gst_harness_get_testclock (live.h), GST_SECOND / 2);
+    gst_test_clock_advance_time (live.clock, GST_SECOND / 2);
     g_usleep (30000);
     fail_unless_equals_uint64 (stats_field (live.r, "frames"), frames);
     gst_element_set_state (live.h->element, GST_STATE_NULL);
@@ -529,7 +532,7 @@ GST_START_TEST (test_thread_that_comes_too_late_leaves_pictures_out)
   const Roi part = {100, 80, 60, 40};
   live.push (0);
   live.next ();
-  gst_test_clock_advance_time (gst_harness_get_testclock (live.h), 5 * kPeriod);
+  gst_test_clock_advance_time (live.clock, 5 * kPeriod);
   gst_harness_push (live.h, make_frame_set (live.rig, 200 * GST_MSECOND, part));
   gst_harness_crank_single_clock_wait (live.h);
   const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
