@@ -2,9 +2,8 @@
 #include "stripsettings.hpp"
 
 #include <cstddef>
-#include <cstring>
+#include <functional>
 #include <iterator>
-#include <type_traits>
 
 using rangecast::StripMode;
 using Settings = StripRenderSettings;
@@ -166,15 +165,24 @@ notify_strip_settings (GObject *object, const Settings &before, const Settings &
       g_object_notify (object, row.name);
 }
 
+template <typename Whole>
+static bool
+lies_in (const Whole &whole, const double &part)
+{
+  const auto begin = reinterpret_cast<const std::byte *> (&whole);
+  const auto at = reinterpret_cast<const std::byte *> (&part);
+  return !std::less () (at, begin) && std::less () (at, begin + sizeof whole);
+}
+
 bool
 set_strip_setting (Settings &settings, guint id, const GValue *value)
 {
-  static_assert (std::is_trivially_copyable_v<rangecast::StripSettings>);
-  std::byte before[sizeof settings.strips];
-  std::memcpy (before, &settings.strips, sizeof before);
-  if (const auto number = row_of (kNumbers, PROP_NUMBERS, id))
-    number->field (settings) = g_value_get_double (value);
-  else if (const auto on_off = row_of (kSwitches, PROP_SWITCHES, id))
+  bool of_camera = false;
+  if (const auto number = row_of (kNumbers, PROP_NUMBERS, id)) {
+    double &field = number->field (settings);
+    of_camera = lies_in (settings.camera, field);
+    field = g_value_get_double (value);
+  } else if (const auto on_off = row_of (kSwitches, PROP_SWITCHES, id))
     on_off->field (settings) = g_value_get_boolean (value);
   else if (id == PROP_MODE)
     settings.strips.mode = StripMode (g_value_get_enum (value));
@@ -186,8 +194,7 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.hold_time = g_value_get_uint64 (value);
   else
     return false;
-  if (std::memcmp (before, &settings.strips, sizeof before) != 0)
-    settings.strips_serial++;
+  settings.strips_serial += !of_camera; /* a camera on its path must not cost new strips */
   return true;
 }
 

@@ -22,7 +22,7 @@ struct StripRenderSettings {
   bool keep_rate = false;                       ///< the output's, even if it is the input's
   GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
   rangecast::StripSettings strips;
-  guint strips_serial = 0; ///< another one after each change of what strips are made with
+  guint strips_serial = 0; ///< another one after each change but the camera's
 };
 
 /** Installs the properties of these settings, numbers 1 to the result. All may change in any state
