@@ -53,24 +53,20 @@ CameraPainter::start (GstGLContext *context)
 }
 
 bool
-CameraPainter::draw (
-    GstGLContext *context, const rangecast::Rig &rig, const rangecast::Mat4 &clip_from_world)
+CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines,
+    const rangecast::Mat4 &clip_from_world)
 {
   if (!start (context))
     return false;
-  lines_.clear ();
-  for (std::size_t i = 0; i < rig.views.size (); i++)
-    rangecast::append_camera_lines (rig.views[i], rangecast::camera_colour (i), lines_);
   const GstGLFuncs *gl = context->gl_vtable;
   gst_gl_shader_use (shader_);
   gst_gl_shader_set_uniform_matrix_4fv (
       shader_, "u_clip_from_world", 1, FALSE, clip_from_world.data ());
   gl->BindVertexArray (array_);
   gl->BindBuffer (GL_ARRAY_BUFFER, vertices_);
-  gl->BufferData (GL_ARRAY_BUFFER, gsize (lines_.size () * sizeof (LineVertex)), lines_.data (),
-      GL_STREAM_DRAW);
+  gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
   gl->Enable (GL_DEPTH_TEST);
-  gl->DrawArrays (GL_LINES, 0, GLsizei (lines_.size ()));
+  gl->DrawArrays (GL_LINES, 0, GLsizei (lines.size ()));
   gl->Disable (GL_DEPTH_TEST);
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);

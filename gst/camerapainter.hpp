@@ -5,15 +5,16 @@
 
 #include <rangecast/strips/camera_lines.hpp>
 #include <rangecast/strips/orbit.hpp>
+#include <span>
 
 /** Draws where a rig's cameras stand and what they see, with OpenGL (core 3.3 or GLES 3.0). All
  *  functions in the GL thread. */
 class CameraPainter {
 public:
-  /** Draws into the bound framebuffer; makes what it needs when first called.
+  /** Draws lines into the bound framebuffer; makes what it needs when first called.
    *  @return false without a shader; the reason has been logged */
-  bool draw (
-      GstGLContext *context, const rangecast::Rig &rig, const rangecast::Mat4 &clip_from_world);
+  bool draw (GstGLContext *context, std::span<const rangecast::LineVertex> lines,
+      const rangecast::Mat4 &clip_from_world);
   /** Deletes everything that OpenGL holds for us. */
   void stop ();
 
@@ -24,5 +25,4 @@ private:
   GstGLShader *shader_ = nullptr;
   bool failed_ = false; /* to make the shader: not to be tried for each picture */
   guint vertices_ = 0, array_ = 0;
-  std::vector<rangecast::LineVertex> lines_;
 };

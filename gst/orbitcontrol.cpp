@@ -59,7 +59,20 @@ OrbitControl::press (GstEvent *event)
   return true;
 }
 
-/* Turns half a circle over the width of the picture; moves as far as the hand does. */
+/* Turns half a circle over the width of the picture, a quarter over its height. */
+void
+OrbitControl::turn_by_hand (double dx, double dy)
+{
+  turn (-180 * dx / width_, 90 * dy / height_);
+}
+
+/* Moves as far as the hand does. */
+void
+OrbitControl::move_by_hand (double dx, double dy)
+{
+  orbit.pan = orbit.pan - dx / width_ * pan_right_ - dy / height_ * pan_down_;
+}
+
 bool
 OrbitControl::drag (GstEvent *event)
 {
@@ -67,13 +80,60 @@ OrbitControl::drag (GstEvent *event)
     return false;
   double x = 0, y = 0;
   gst_navigation_event_parse_mouse_move_event (event, &x, &y);
-  const double dx = (x - x_) / width_, dy = (y - y_) / height_;
+  if (button_ == 1)
+    turn_by_hand (x - x_, y - y_);
+  else
+    move_by_hand (x - x_, y - y_);
   x_ = x;
   y_ = y;
-  if (button_ == 1)
-    turn (-180 * dx, 90 * dy);
-  else
-    orbit.pan = orbit.pan - dx * pan_right_ - dy * pan_down_;
+  return true;
+}
+
+bool
+OrbitControl::touch_down (GstEvent *event)
+{
+  Finger finger{true, 0, 0, 0};
+  gst_navigation_event_parse_touch_event (event, &finger.identifier, &finger.x, &finger.y, nullptr);
+  const auto free = std::ranges::find (fingers_, false, &Finger::down);
+  if (free != fingers_.end ())
+    *free = finger;
+  return true;
+}
+
+bool
+OrbitControl::touch_up (GstEvent *event)
+{
+  guint identifier = 0;
+  gst_navigation_event_parse_touch_up_event (event, &identifier, nullptr, nullptr);
+  for (Finger &finger : fingers_)
+    if (finger.identifier == identifier)
+      finger.down = false;
+  return true;
+}
+
+/* One finger turns; two move by where their middle goes, and zoom by their distance. */
+bool
+OrbitControl::touch_move (GstEvent *event)
+{
+  Finger to;
+  gst_navigation_event_parse_touch_event (event, &to.identifier, &to.x, &to.y, nullptr);
+  for (Finger &finger : fingers_) {
+    const Finger &other = &finger == &fingers_[0] ? fingers_[1] : fingers_[0];
+    if (!finger.down || finger.identifier != to.identifier)
+      continue;
+    const double dx = to.x - finger.x, dy = to.y - finger.y;
+    if (other.down) {
+      const double before = std::hypot (finger.x - other.x, finger.y - other.y);
+      const double after = std::hypot (to.x - other.x, to.y - other.y);
+      move_by_hand (dx / 2, dy / 2);
+      if (before > 1 && after > 1)
+        zoom (before / after);
+    } else {
+      turn_by_hand (dx, dy);
+    }
+    finger.x = to.x;
+    finger.y = to.y;
+  }
   return true;
 }
 
@@ -112,7 +172,7 @@ OrbitControl::handle (GstEvent *event)
     case GST_NAVIGATION_EVENT_MOUSE_BUTTON_PRESS:
       return press (event);
     case GST_NAVIGATION_EVENT_MOUSE_BUTTON_RELEASE:
-      release ();
+      button_ = 0;
       return true;
     case GST_NAVIGATION_EVENT_MOUSE_MOVE:
       return drag (event);
@@ -120,6 +180,15 @@ OrbitControl::handle (GstEvent *event)
       return scroll (event);
     case GST_NAVIGATION_EVENT_KEY_PRESS:
       return gst_navigation_event_parse_key_event (event, &name) && name && key (name);
+    case GST_NAVIGATION_EVENT_TOUCH_DOWN:
+      return touch_down (event);
+    case GST_NAVIGATION_EVENT_TOUCH_MOTION:
+      return touch_move (event);
+    case GST_NAVIGATION_EVENT_TOUCH_UP:
+      return touch_up (event);
+    case GST_NAVIGATION_EVENT_TOUCH_CANCEL:
+      release ();
+      return true;
     default:
       return false;
   }

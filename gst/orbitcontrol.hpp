@@ -3,10 +3,11 @@
 
 #include <gst/video/navigation.h>
 
+#include <array>
 #include <rangecast/strips/orbit.hpp>
 
-/** The orbit camera as mouse and keys (GstNavigation) and time move it. Holds no lock: whoever
- *  shares it between threads does. */
+/** The orbit camera as mouse, fingers and keys (GstNavigation) and time move it. Holds no lock:
+ * whoever shares it between threads does. */
 class OrbitControl {
 public:
   rangecast::Orbit orbit; ///< as properties show it; azimuth within 360 degrees either way
@@ -22,19 +23,35 @@ public:
   /** @return whether the event meant something to us */
   bool handle (GstEvent *event);
 
-  /** Forgets a button that is down. */
-  void release () { button_ = 0; }
+  /** Forgets buttons and fingers that are down. */
+  void release ()
+  {
+    button_ = 0;
+    fingers_ = {};
+  }
 
 private:
   bool press (GstEvent *event);
   bool drag (GstEvent *event);
   bool scroll (GstEvent *event);
   bool key (const char *name);
+  bool touch_down (GstEvent *event);
+  bool touch_up (GstEvent *event);
+  bool touch_move (GstEvent *event);
+  void turn_by_hand (double dx, double dy);
+  void move_by_hand (double dx, double dy);
   void turn (double azimuth_deg, double elevation_deg);
   void zoom (double factor);
 
-  int button_ = 0;       /* that is down; 0: none */
-  double x_ = 0, y_ = 0; /* where the mouse was, pixels */
+  struct Finger {
+    bool down = false;
+    guint identifier = 0;
+    double x = 0, y = 0; /* pixels */
+  };
+
+  int button_ = 0;                /* that is down; 0: none */
+  double x_ = 0, y_ = 0;          /* where the mouse was, pixels */
+  std::array<Finger, 2> fingers_; /* further ones do nothing */
   double distance_m_ = 1;
   rangecast::Vec3 pan_right_, pan_down_;
   int width_ = 640, height_ = 480;

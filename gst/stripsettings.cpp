@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "stripsettings.hpp"
 
+#include <cstddef>
+#include <functional>
 #include <iterator>
 
 using rangecast::StripMode;
@@ -8,6 +10,9 @@ using Settings = StripRenderSettings;
 
 static constexpr auto kFlags = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                             GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+/* Of what is decided for a stream rather than for a picture. */
+static constexpr auto kRateFlags =
+    GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 static constexpr rangecast::StripSettings kDefaults;
 
 /* The properties that are plain numbers. */
@@ -56,18 +61,60 @@ static const NumberRow kNumbers[] = {
         0, 1, 0.004, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
+    {"eye-distance", "Eye distance",
+        "Metres between the eyes of stereoscopic pictures (0 to 10, default 0.063)", 0, 10, 0.063,
+        [] (Settings &s) -> double & { return s.eye_distance_m; }},
+    {"convergence", "Convergence",
+        "Metres from the viewer to what both eyes' pictures have in the same place, the plane of "
+        "the screen (0 to 1000, default 0: what is looked at; 1000 for headsets)",
+        0, 1000, 0, [] (Settings &s) -> double & { return s.convergence_m; }},
+};
+
+/* The properties that are on or off, off at first. */
+struct SwitchRow {
+  const char *name, *nick, *blurb;
+  GParamFlags flags;
+  bool &(*field) (Settings &);
+};
+static const SwitchRow kSwitches[] = {
+    {"show-cameras", "Show cameras",
+        "Also draw where the rig's cameras stand, and their frusta from near to far (default "
+        "false)",
+        kFlags, [] (Settings &s) -> bool & { return s.show_cameras; }},
+    {"back-faces", "Back faces",
+        "Strips also show surfaces from behind, from inside a body, where no front is (default "
+        "false; always with one camera)",
+        kFlags, [] (Settings &s) -> bool & { return s.back_faces; }},
+    {"show-units", "Show units",
+        "Points in shades of their camera's colour, which show-cameras has too (default false)",
+        kFlags, [] (Settings &s) -> bool & { return s.show_units; }},
+    {"show-stats", "Show statistics",
+        "Rates, points, views, triangles and latency as text over the picture (default false)",
+        kFlags, [] (Settings &s) -> bool & { return s.show_stats; }},
+    {"keep-rate", "Keep rate",
+        "Pictures at the output's frame rate even if that is the input's: without holes, and a "
+        "live stream that stalls is drawn on (default false: then one picture a frame set)",
+        kRateFlags, [] (Settings &s) -> bool & { return s.keep_rate; }},
 };
 
 enum : guint {
   PROP_NUMBERS = 1,
-  PROP_MODE = PROP_NUMBERS + std::size (kNumbers),
+  PROP_SWITCHES = PROP_NUMBERS + std::size (kNumbers),
+  PROP_MODE = PROP_SWITCHES + std::size (kSwitches),
   PROP_BACKGROUND,
   PROP_MAX_GAP,
-  PROP_SHOW_CAMERAS,
-  PROP_BACK_FACES,
   PROP_SAMPLES,
-  PROP_LAST = PROP_SAMPLES
+  PROP_HOLD_TIME,
+  PROP_LAST = PROP_HOLD_TIME
 };
+
+/* The row of a property, or nullptr if it is not in the table. */
+template <typename Row, std::size_t n>
+static const Row *
+row_of (const Row (&rows)[n], guint first, guint id)
+{
+  return id >= first && id - first < n ? &rows[id - first] : nullptr;
+}
 
 GType
 gst_strip_render_mode_get_type (void)
@@ -91,6 +138,11 @@ install_strip_settings (GObjectClass *object_class)
         g_param_spec_double (
             row.name, row.nick, row.blurb, row.minimum, row.maximum, row.fallback, kFlags));
   }
+  for (guint i = 0; i < std::size (kSwitches); i++) {
+    const SwitchRow &row = kSwitches[i];
+    g_object_class_install_property (object_class, PROP_SWITCHES + i,
+        g_param_spec_boolean (row.name, row.nick, row.blurb, FALSE, row.flags));
+  }
   g_object_class_install_property (object_class, PROP_MODE,
       g_param_spec_enum ("mode", "Mode", "What is drawn for the points (default: strips)",
           GST_TYPE_STRIP_RENDER_MODE, int (StripMode::kStrips), kFlags));
@@ -102,26 +154,24 @@ install_strip_settings (GObjectClass *object_class)
       g_param_spec_int ("max-gap", "Maximum gap",
           "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 6)", 0, 1000,
           kDefaults.max_gap, kFlags));
-  g_object_class_install_property (object_class, PROP_SHOW_CAMERAS,
-      g_param_spec_boolean ("show-cameras", "Show cameras",
-          "Also draw where the rig's cameras stand, and their frusta from near to far (default "
-          "false)",
-          FALSE, kFlags));
-  g_object_class_install_property (object_class, PROP_BACK_FACES,
-      g_param_spec_boolean ("back-faces", "Back faces",
-          "Strips also show surfaces from behind, from inside a body, where no front is (default "
-          "false; always with one camera)",
-          FALSE, kFlags));
   g_object_class_install_property (object_class, PROP_SAMPLES,
       g_param_spec_int ("samples", "Samples",
           "Samples of a pixel, for antialiasing (0 or 1 = none, to 64, default 0); less where "
           "OpenGL has no more",
           0, 64, 0, kFlags));
+  g_object_class_install_property (object_class, PROP_HOLD_TIME,
+      g_param_spec_uint64 ("hold-time", "Hold time",
+          "ns for which the last frame set is drawn on, at the output's frame rate, when none "
+          "follows; only if that rate is not the input's, or with keep-rate (0 to "
+          "18446744073709551615, default "
+          "18446744073709551615: for ever)",
+          0, G_MAXUINT64, G_MAXUINT64, kRateFlags));
   return PROP_LAST;
 }
 
-static double
-number (Settings settings, const NumberRow &row)
+template <typename Row>
+static auto
+value_of (Settings settings, const Row &row)
 {
   return row.field (settings); /* of the copy */
 }
@@ -130,49 +180,62 @@ void
 notify_strip_settings (GObject *object, const Settings &before, const Settings &after)
 {
   for (const NumberRow &row : kNumbers)
-    if (number (before, row) != number (after, row))
+    if (value_of (before, row) != value_of (after, row))
       g_object_notify (object, row.name);
+}
+
+template <typename Whole>
+static bool
+lies_in (const Whole &whole, const double &part)
+{
+  const auto begin = reinterpret_cast<const std::byte *> (&whole);
+  const auto at = reinterpret_cast<const std::byte *> (&part);
+  return !std::less () (at, begin) && std::less () (at, begin + sizeof whole);
 }
 
 bool
 set_strip_setting (Settings &settings, guint id, const GValue *value)
 {
-  if (id >= PROP_NUMBERS && id < PROP_NUMBERS + std::size (kNumbers))
-    kNumbers[id - PROP_NUMBERS].field (settings) = g_value_get_double (value);
+  bool of_camera = false;
+  if (const auto number = row_of (kNumbers, PROP_NUMBERS, id)) {
+    double &field = number->field (settings);
+    of_camera = lies_in (settings.camera, field);
+    field = g_value_get_double (value);
+  } else if (const auto on_off = row_of (kSwitches, PROP_SWITCHES, id))
+    on_off->field (settings) = g_value_get_boolean (value);
   else if (id == PROP_MODE)
     settings.strips.mode = StripMode (g_value_get_enum (value));
   else if (id == PROP_BACKGROUND)
     settings.background = g_value_get_uint (value);
   else if (id == PROP_MAX_GAP)
     settings.strips.max_gap = g_value_get_int (value);
-  else if (id == PROP_SHOW_CAMERAS)
-    settings.show_cameras = g_value_get_boolean (value);
-  else if (id == PROP_BACK_FACES)
-    settings.back_faces = g_value_get_boolean (value);
   else if (id == PROP_SAMPLES)
     settings.samples = g_value_get_int (value);
+  else if (id == PROP_HOLD_TIME)
+    settings.hold_time = g_value_get_uint64 (value);
   else
     return false;
+  settings.strips_serial += !of_camera; /* a camera on its path must not cost new strips */
   return true;
 }
 
 bool
 get_strip_setting (const Settings &settings, guint id, GValue *value)
 {
-  if (id >= PROP_NUMBERS && id < PROP_NUMBERS + std::size (kNumbers))
-    g_value_set_double (value, number (settings, kNumbers[id - PROP_NUMBERS]));
+  if (const auto row = row_of (kNumbers, PROP_NUMBERS, id))
+    g_value_set_double (value, value_of (settings, *row));
+  else if (const auto on_off = row_of (kSwitches, PROP_SWITCHES, id))
+    g_value_set_boolean (value, value_of (settings, *on_off));
   else if (id == PROP_MODE)
     g_value_set_enum (value, int (settings.strips.mode));
   else if (id == PROP_BACKGROUND)
     g_value_set_uint (value, settings.background);
   else if (id == PROP_MAX_GAP)
     g_value_set_int (value, settings.strips.max_gap);
-  else if (id == PROP_SHOW_CAMERAS)
-    g_value_set_boolean (value, settings.show_cameras);
-  else if (id == PROP_BACK_FACES)
-    g_value_set_boolean (value, settings.back_faces);
   else if (id == PROP_SAMPLES)
     g_value_set_int (value, settings.samples);
+  else if (id == PROP_HOLD_TIME)
+    g_value_set_uint64 (value, settings.hold_time);
   else
     return false;
   return true;

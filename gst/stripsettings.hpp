@@ -18,7 +18,14 @@ struct StripRenderSettings {
   bool back_faces = false;
   double view_gap_m = 0.004;
   int samples = 0; ///< a pixel; below 2: no antialiasing
+  bool show_units = false;
+  bool show_stats = false;
+  double eye_distance_m = 0.063;                ///< that of most people
+  double convergence_m = 0;                     ///< 0: the target's distance
+  bool keep_rate = false;                       ///< the output's, even if it is the input's
+  GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
   rangecast::StripSettings strips;
+  guint strips_serial = 0; ///< another one after each change but the camera's
 };
 
 /** Installs the properties of these settings, numbers 1 to the result. All may change in any state

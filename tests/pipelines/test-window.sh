@@ -29,9 +29,15 @@ first_picture () { look before.png && [ "$(stat -c %s before.png)" -gt 10000 ]; 
 first_picture_again () { look again.png && cmp -s before.png again.png; }
 azimuth_is () { grep -q "GstStripRender:r: azimuth = $1\$" log.txt; }
 
-# Runs inside the display. The figure stands still: what changes is the mouse's doing.
-drag_in_window () {
-  local window
+# usage: in_display FUNCTION: runs it inside the display, stopped at its first failure.
+in_display () {
+  need_display
+  { declare -f; printf 'ports=%q pipelines=%q rtp_caps=%q\n' "$ports" "$pipelines" "$rtp_caps"; echo "$1"; } >"$1.sh"
+  on_display timeout 120 bash -e "$1.sh" || fail "$1: $(tail -n 5 log.txt)"
+}
+
+# A figure that stands still in a window of 320x240: what changes is the mouse's doing.
+open_window () {
   gst-launch-1.0 -v avatartestsrc is-live=true motion=0 noise=0 ! video/x-range,width=320,height=240,framerate=10/1 \
     ! striprender name=r ! 'video/x-raw(memory:GLMemory),width=320,height=240' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
@@ -39,6 +45,10 @@ drag_in_window () {
   wait_for window_id
   window=$(cat window.txt)
   wait_for first_picture
+}
+
+drag_in_window () {
+  open_window
   xdotool mousemove --window "$window" 160 120 mousedown 1
   xdotool mousemove --window "$window" 120 120
   xdotool mousemove --window "$window" 80 120 mouseup 1
@@ -51,8 +61,50 @@ drag_in_window () {
 }
 
 test_dragging_in_a_window_turns_the_view () {
-  need_display
-  { declare -f drag_in_window wait_for window_id first_picture first_picture_again azimuth_is look fail; echo drag_in_window; } >drag.sh
-  on_display timeout 120 bash -e drag.sh || fail "$(tail -n 5 log.txt)"
+  in_display drag_in_window
   ! cmp -s before.png after.png || fail "the picture stayed as it was"
+}
+
+larger_than_before () { look after.png && [ "$(stat -c %s after.png)" -gt $(($(stat -c %s before.png) * 3 / 2)) ]; }
+
+# A third of the window is a third of the picture, however large the window.
+resize_window () {
+  open_window
+  xdotool windowsize "$window" 480 360
+  wait_for larger_than_before
+  xdotool mousemove --window "$window" 240 180 mousedown 1
+  xdotool mousemove --window "$window" 160 180
+  xdotool mousemove --window "$window" 80 180 mouseup 1
+  wait_for azimuth_is '\(60\|59\)\.[09]*[0-9]\{0,3\}'
+  xdotool windowsize "$window" 320 240
+  xdotool key --window "$window" r
+  wait_for azimuth_is 0
+  wait_for first_picture_again
+}
+
+test_resized_window_shows_the_whole_picture_and_can_be_dragged () { in_display resize_window; }
+
+# The sender goes; the figure stays and turns, ten pictures a second.
+lose_the_sender () {
+  gst-launch-1.0 -q avatartestsrc is-live=true noise=0 ! video/x-range,width=160,height=120,framerate=5/1 \
+    ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink host=127.0.0.1 "port=$((ports + 70))" >sender.txt 2>&1 &
+  sender=$!
+  gst-launch-1.0 udpsrc "port=$((ports + 70))" buffer-size=4194304 "caps=$rtp_caps" ! rtpjitterbuffer latency=50 \
+    ! rtpneighbourcodedepay ! neighbourcodedec ! striprender auto-orbit=60 \
+    ! 'video/x-raw(memory:GLMemory),width=320,height=240,framerate=10/1' ! glimagesink >log.txt 2>&1 &
+  pipeline=$!
+  trap 'kill $pipeline || true; kill $sender 2>/dev/null || true' EXIT
+  wait_for window_id
+  wait_for first_picture
+  kill $sender; wait $sender || true
+  sleep 1.5
+  look silent.png
+  sleep 1
+  look turned.png
+}
+
+test_view_turns_on_when_the_network_falls_silent () {
+  in_display lose_the_sender
+  ! cmp -s silent.png turned.png || fail "the picture stands still"
+  expect_file turned.png 10000
 }

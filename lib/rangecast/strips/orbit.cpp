@@ -70,6 +70,39 @@ product (const std::array<double, 16> &a, const std::array<double, 16> &b)
   return c;
 }
 
+/* Where the camera stands, and its axes. */
+struct Stand {
+  Vec3 position, right, up, back;
+
+  [[nodiscard]] std::array<double, 16> eye_from_world () const
+  {
+    return {right.x, up.x, back.x, 0, right.y, up.y, back.y, 0, right.z, up.z, back.z, 0,
+        -dot (right, position), -dot (up, position), -dot (back, position), 1};
+  }
+};
+
+struct Planes {
+  double near_m, far_m;
+};
+
+constexpr double kMargin = 0.1;
+constexpr double kMostFarToNear = 2000;
+
+Planes
+planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m)
+{
+  double nearest = 1e30, farthest = 0;
+  for (const Vec3 &p : hull) {
+    const double depth = dot (stand.position - p, stand.back);
+    nearest = std::min (nearest, depth);
+    farthest = std::max (farthest, depth);
+  }
+  if (farthest <= 0) /* nothing, or nothing that is before the camera */
+    return {distance_m / 50, distance_m * 20};
+  const double far_m = (1 + kMargin) * farthest;
+  return {std::max ((1 - kMargin) * nearest, far_m / kMostFarToNear), far_m};
+}
+
 } // namespace
 
 SceneFrame
@@ -100,7 +133,8 @@ scene_frame (const Rig &rig)
 }
 
 OrbitMatrices
-orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y)
+orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y,
+    const Eye &eye, std::span<const Vec3> hull)
 {
   const Vec3 right = normalised (cross (scene.up, scene.to_first));
   const double azimuth = orbit.azimuth_deg * kDegree;
@@ -114,20 +148,35 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
   const double sa = std::sin (azimuth), ca = std::cos (azimuth);
   const double se = std::sin (elevation), ce = std::cos (elevation);
   const Vec3 pan_x{ca, 0, -sa}, pan_y{-se * sa, ce, -se * ca}, pan_z{ce * sa, se, ce * ca};
-  const Vec3 x = world_from_pan (pan_x), y = world_from_pan (pan_y), back = world_from_pan (pan_z);
-  const Vec3 eye = scene.target + world_from_pan (orbit.pan) + distance * back;
-  const std::array<double, 16> eye_from_world = {x.x, y.x, back.x, 0, x.y, y.y, back.y, 0, x.z, y.z,
-      back.z, 0, -dot (x, eye), -dot (y, eye), -dot (back, eye), 1};
+  Stand stand{{}, world_from_pan (pan_x), world_from_pan (pan_y), world_from_pan (pan_z)};
+  stand.position =
+      scene.target + world_from_pan (orbit.pan) + distance * stand.back + eye.right_m * stand.right;
 
   const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
   const double half = std::tan (fov / 2); /* of the picture's height, at a distance of 1 */
-  const double near = distance / 50, far = distance * 20, down = flip_y ? -1 : 1;
+  const auto [near, far] = planes_round (hull, stand, distance);
+  const double down = flip_y ? -1 : 1;
+  /* eyes look in parallel; their pictures are shifted, not turned, so that no eye's is higher */
+  const double converged = eye.convergence_m > 0 ? eye.convergence_m : distance;
+  const double shift = scene.off_centre_x / aspect + eye.right_m / (half * aspect * converged);
   const std::array<double, 16> clip_from_eye = {1 / (half * aspect), 0, 0, 0, 0, down / half, 0, 0,
-      -scene.off_centre_x / aspect, down * scene.off_centre_y, (far + near) / (near - far), -1, 0,
-      0, 2 * far * near / (near - far), 0};
+      -shift, down * scene.off_centre_y, (far + near) / (near - far), -1, 0, 0,
+      2 * far * near / (near - far), 0};
   const double height = 2 * half * distance;
-  return {
-      product (clip_from_eye, eye_from_world), distance, height * aspect * pan_x, -height * pan_y};
+  return {product (clip_from_eye, stand.eye_from_world ()), distance, height * aspect * pan_x,
+      -height * pan_y};
+}
+
+Mat4
+in_part (const Mat4 &clip_from_world, const PicturePart &part)
+{
+  Mat4 m = clip_from_world;
+  for (int column = 0; column < 4; column++) {
+    const double w = m[4 * column + 3];
+    m[4 * column] = static_cast<float> (part.width * m[4 * column] + part.x * w);
+    m[4 * column + 1] = static_cast<float> (part.height * m[4 * column + 1] + part.y * w);
+  }
+  return m;
 }
 
 } // namespace rangecast

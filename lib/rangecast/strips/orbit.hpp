@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "../geometry/rig.hpp"
 
@@ -45,9 +46,31 @@ struct OrbitMatrices {
                             ///< height, as seen at the target
 };
 
-/** @param aspect      width / height of the picture
- *  @param flip_y      the picture's first row is its top (GStreamer's GL memory) */
-OrbitMatrices orbit_matrices (
-    const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y);
+/** One of two eyes that look at the scene side by side. */
+struct Eye {
+  double right_m = 0;       ///< where it is, to the right of the camera that orbits; metres
+  double convergence_m = 0; ///< from the camera: what is there is in the same place of both eyes'
+                            ///< pictures; 0 = the target's distance
+};
+
+/** @param aspect  width / height of the picture
+ *  @param flip_y  the picture's first row is its top (GStreamer's GL memory)
+ *  @param hull    world points between whose distances the near and the far plane have room for
+ *                 all that is drawn; empty: the planes are from 1/50 to 20 times the target's
+ *                 distance. The planes have a margin of a tenth; the near one is no nearer than
+ *                 1/2000 of the far one's distance, where a depth buffer would be too coarse */
+OrbitMatrices orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect,
+    bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {});
+
+/** A part of a picture: its share of the width and height, and where its middle is, from -1 (left,
+ *  or where clip coordinates begin) to 1. */
+struct PicturePart {
+  double width = 1, height = 1;
+  double x = 0, y = 0;
+};
+
+/** The matrix that draws into that part what `clip_from_world` draws into the whole picture. What
+ *  lies beyond the part has to be cut off by scissors. */
+Mat4 in_part (const Mat4 &clip_from_world, const PicturePart &part);
 
 } // namespace rangecast

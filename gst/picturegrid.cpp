@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "picturegrid.hpp"
+
+#include <algorithm>
+
+static GstClockTime
+later_by (GstClockTime time, GstClockTime more)
+{
+  return GST_CLOCK_TIME_IS_VALID (more) && time < G_MAXINT64 && more < G_MAXINT64
+             ? time + more
+             : GST_CLOCK_TIME_NONE;
+}
+
+static GstClockTime
+earlier_by (GstClockTime time, GstClockTime less)
+{
+  return time > less ? time - less : 0;
+}
+
+void
+PictureGrid::set_rate (int n, int d)
+{
+  rate_n_ = n;
+  rate_d_ = std::max (d, 1);
+}
+
+GstClockTime
+PictureGrid::period () const
+{
+  return active () ? gst_util_uint64_scale (GST_SECOND, guint64 (rate_d_), guint64 (rate_n_)) : 0;
+}
+
+void
+PictureGrid::drop_first ()
+{
+  gst_clear_buffer (&at (0).buffer);
+  first_ = (first_ + 1) % ring_.size ();
+  count_--;
+}
+
+void
+PictureGrid::drop_frame_sets ()
+{
+  while (count_ > 0)
+    drop_first ();
+}
+
+void
+PictureGrid::reset ()
+{
+  drop_frame_sets ();
+  foreign_ = GST_CLOCK_TIME_NONE;
+  last_ = GST_CLOCK_TIME_NONE;
+}
+
+GstClockTime
+PictureGrid::known_until () const
+{
+  return count_ > 0 ? at (count_ - 1).begin : 0;
+}
+
+GstClockTime
+PictureGrid::end () const
+{
+  return count_ > 0 ? at (count_ - 1).end : 0;
+}
+
+void
+PictureGrid::add (GstBuffer *frame_set, GstClockTime duration)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
+    duration = period ();
+  GstClockTime begin = GST_BUFFER_PTS (frame_set);
+  if (!GST_CLOCK_TIME_IS_VALID (begin))
+    begin = end ();
+  begin = std::max (begin, known_until ());
+  if (count_ == ring_.size ())
+    drop_first ();
+  at (count_++) = {frame_set, begin, later_by (begin, duration)};
+}
+
+/* Of the pictures that may show that frame set. */
+GstClockTime
+PictureGrid::first_showing (const FrameSet &set) const
+{
+  const guint64 number = gst_util_uint64_scale_ceil (
+      earlier_by (set.begin, tolerance ()), guint64 (rate_n_), guint64 (rate_d_) * GST_SECOND);
+  return gst_util_uint64_scale (number, guint64 (rate_d_) * GST_SECOND, guint64 (rate_n_));
+}
+
+/* A time less than a nanosecond before a picture's is that picture's, rounded. */
+GstClockTime
+PictureGrid::first_after (GstClockTime pts) const
+{
+  const guint64 second = guint64 (rate_d_) * GST_SECOND;
+  const guint64 number = gst_util_uint64_scale (pts + 1, guint64 (rate_n_), second) + 1;
+  return gst_util_uint64_scale (number, second, guint64 (rate_n_));
+}
+
+bool
+PictureGrid::find (GstClockTime &pts, std::size_t &index) const
+{
+  if (!active () || count_ == 0)
+    return false;
+  pts = first_showing (at (0));
+  for (GstClockTime before : {last_, foreign_})
+    if (GST_CLOCK_TIME_IS_VALID (before))
+      pts = std::max (pts, first_after (before));
+  for (index = 0; index < count_; index++) {
+    const bool newest = index + 1 == count_;
+    if (!newest && pts + tolerance () >= at (index + 1).begin)
+      continue;
+    const GstClockTime limit = later_by (at (index).end, hold_);
+    if (pts + tolerance () < limit)
+      return true;
+    if (!newest)
+      pts = std::max (pts, first_showing (at (index + 1)));
+  }
+  return false;
+}
+
+GstClockTime
+PictureGrid::next_pts () const
+{
+  GstClockTime pts;
+  std::size_t index;
+  return find (pts, index) ? pts : GST_CLOCK_TIME_NONE;
+}
+
+bool
+PictureGrid::take (GstClockTime until, Picture &picture)
+{
+  GstClockTime pts;
+  std::size_t index;
+  if (!find (pts, index) || pts + tolerance () >= until)
+    return false;
+  for (; index > 0; index--)
+    drop_first ();
+  const bool follows = GST_CLOCK_TIME_IS_VALID (last_) && pts <= last_ + period () + 1;
+  picture = {at (0).buffer, pts, period (), !follows};
+  last_ = pts;
+  return true;
+}

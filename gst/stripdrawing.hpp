@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "camerapainter.hpp"
+#include "multisampler.hpp"
+#include "panelpainter.hpp"
+#include "stripeyes.hpp"
+#include "strippainter.hpp"
+#include "stripscene.hpp"
+#include "stripsettings.hpp"
+
+/** What to draw into one output buffer. */
+struct StripDrawingJob {
+  const StripScene *scene;
+  const StripRenderSettings *settings;
+  rangecast::Orbit orbit;
+  rangecast::ImageView<const rangecast::Rgbx> panel = {}; ///< over the picture; empty: none
+  bool panel_changed = false;
+};
+
+/** Draws frame sets into buffers of OpenGL memory: both eyes, cameras, statistics. What is OpenGL's
+ *  own lives from start() to stop(). */
+class StripDrawing {
+public:
+  /** @name In the GL thread @{ */
+  bool start (GstGLContext *context, GError **error);
+  void stop ();
+  bool set_output (GstGLContext *context, const GstVideoInfo &info);
+  /** @} */
+
+  struct Result {
+    bool drawn = false;
+    const char *reason = "the output is not its memory"; ///< why it is not drawn
+    guint64 uploaded = 0;                                ///< bytes
+    rangecast::OrbitMatrices matrices;                   ///< of the first eye
+    int width = 0, height = 0;                           ///< of the first eye's picture, pixels
+  };
+  /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. */
+  Result draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out);
+
+private:
+  struct Call;
+  static void draw_in_gl_thread (GstGLContext *context, gpointer call);
+  static gboolean draw_bound (gpointer call);
+  guint64 draw_eye (const StripDrawingJob &job, const EyePlace &place, Result &result);
+  StripPainter::Picture make_picture (
+      const StripDrawingJob &job, const EyePlace &place, Result &result) const;
+
+  GstGLContext *context_ = nullptr;
+  GstGLFramebuffer *framebuffer_ = nullptr;
+  int width_ = 0, height_ = 0;
+  EyePlaces eyes_;
+  StripPainter painter_;
+  CameraPainter camera_painter_;
+  PanelPainter panel_painter_;
+  Multisampler multisampler_;
+};

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <rangecast/strips/camera_lines.hpp>
+#include <rangecast/strips/orbit.hpp>
+#include <span>
+#include <vector>
+
+#include "strippainter.hpp"
+#include "stripsettings.hpp"
+#include "stripstats.hpp"
+
+/** A frame set made ready to be painted, and what its rig tells of the scene. Streaming thread.
+ *  Memory is kept from one frame set to the next. */
+class StripScene {
+public:
+  void set_rig (const rangecast::Rig &rig);
+  [[nodiscard]] const rangecast::SceneFrame &frame () const { return frame_; }
+  [[nodiscard]] std::size_t rig_views () const { return rig_->views.size (); }
+  /** Where the rig's cameras stand and what they see. */
+  [[nodiscard]] std::span<const rangecast::LineVertex> camera_lines () const { return lines_; }
+
+  /** @return kBadSize if an ROI does not lie in its view's image */
+  [[nodiscard]] rangecast::Status check (std::span<const rangecast::RangeImage> images) const;
+
+  /** Makes the strips; if it is the same frame set as the last time and nothing that strips depend
+   *  on has changed, they are still there. Colours are of the images, or tinted (show-units).
+   *  The images must stay mapped as long as the layers are used. */
+  void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,
+      bool same_frame_set);
+  /** Of all views that the rig has. */
+  [[nodiscard]] std::span<const StripPainter::Layer> layers () const
+  {
+    return {layers_.data (), count_};
+  }
+  /** World points that surround all that is to be drawn. */
+  [[nodiscard]] std::span<const rangecast::Vec3> hull () const { return hull_; }
+  /** Of the last build(). */
+  void count_into (RenderStats &stats) const;
+
+private:
+  struct ViewMemory {
+    std::vector<rangecast::StripVertex> vertices;
+    std::vector<rangecast::Rgbx> tinted;
+  };
+  void add_cameras_to_hull ();
+
+  const rangecast::Rig *rig_ = nullptr;
+  rangecast::SceneFrame frame_;
+  std::vector<rangecast::LineVertex> lines_;
+  std::array<ViewMemory, rangecast::kMaxViews> memory_; /* by number in the buffer */
+  std::array<rangecast::StripResult, rangecast::kMaxViews> results_{};
+  std::array<StripPainter::Layer, rangecast::kMaxViews> layers_;
+  std::size_t count_ = 0, images_ = 0;
+  std::vector<rangecast::Vec3> hull_;
+  guint built_with_ = 0; /* StripRenderSettings::strips_serial */
+};

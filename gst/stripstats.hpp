@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <array>
+#include <span>
+#include <string>
+
+/** What striprender counts: the property `stats`. */
+struct RenderStats {
+  /* since start */
+  guint64 frames = 0;     ///< pictures drawn
+  guint64 frame_sets = 0; ///< that came in
+  guint64 repeated = 0;   ///< pictures of a frame set that an earlier one showed
+  guint64 dropped = 0;    ///< pictures left out because they would have been late
+  /* of the last picture */
+  guint64 points = 0, vertices = 0, triangles = 0, strips = 0, isolated = 0, uploaded_bytes = 0;
+
+  /** Returns: (transfer full) */
+  [[nodiscard]] GstStructure *to_structure () const;
+};
+
+/** Statistics as lines of text, new ones twice a second: faster nobody reads. */
+class StatsText {
+public:
+  /** @param views    of the last frame set
+   *  @param latency  ns from the frame set's time to its drawing; GST_CLOCK_TIME_NONE: unknown
+   *  @param now_us   any clock, microseconds
+   *  @return whether the lines are others than before */
+  bool update (const RenderStats &stats, std::size_t views, GstClockTime latency, gint64 now_us);
+  [[nodiscard]] std::span<const std::string> lines () const { return lines_; }
+
+private:
+  std::array<std::string, 4> lines_;
+  RenderStats last_;
+  gint64 last_us_ = -1;
+};

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "scene_hull.hpp"
+
+#include <algorithm>
+
+namespace rangecast {
+
+DepthSpan
+depth_span (const ImageView<const std::uint16_t> &depth)
+{
+  /* one less than each depth: invalid ones are then the largest number, not the smallest */
+  std::uint16_t nearest = 0xffff, farthest = 0;
+  for (int y = 0; y < depth.height; y++) {
+    const std::uint16_t *row = depth.row (y);
+    for (int x = 0; x < depth.width; x++) {
+      nearest = std::min (nearest, static_cast<std::uint16_t> (row[x] - 1));
+      farthest = std::max (farthest, row[x]);
+    }
+  }
+  return {static_cast<std::uint16_t> (nearest + 1), farthest};
+}
+
+void
+append_hull (const ConstRangeImage &image, const View &view, std::vector<Vec3> &hull)
+{
+  const DepthSpan span = depth_span (image.depth);
+  if (span.farthest == 0)
+    return;
+  const Roi &roi = image.roi;
+  for (std::uint16_t depth : {span.nearest, span.farthest})
+    for (int x : {roi.x - 1, roi.x + roi.width})
+      for (int y : {roi.y - 1, roi.y + roi.height})
+        hull.push_back (
+            view.world_from_view * view.intrinsics.unproject (x, y, depth * view.depth_unit_m));
+}
+
+} // namespace rangecast

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "../geometry/image_view.hpp"
+
+namespace rangecast {
+
+/** A small picture of lines of text, light on dark, to be laid over a larger one. */
+class StatsPanel {
+public:
+  static constexpr int kMaxLines = 8;
+  static constexpr int kMaxWidth = 512; ///< pixels; longer lines are cut off
+
+  /** Draws it anew. @param lines  ASCII, kMaxLines at most; further ones are left out */
+  void draw (std::span<const std::string> lines);
+  /** What was drawn: as large as its text needs; empty before the first time. */
+  [[nodiscard]] ImageView<const Rgbx> picture () const { return picture_; }
+
+private:
+  std::vector<Rgbx> memory_;
+  ImageView<Rgbx> picture_;
+};
+
+} // namespace rangecast
