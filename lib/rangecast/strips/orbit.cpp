@@ -85,7 +85,9 @@ struct Planes {
   double near_m, far_m;
 };
 
-constexpr double kMargin = 0.1;
+/* Room for what is drawn beside its points: lines of cameras, surfaces moved behind others. Twice
+ * the range costs a bit of the depth buffer, which has 24. */
+constexpr double kRoom = 2;
 constexpr double kMostFarToNear = 2000;
 
 Planes
@@ -99,8 +101,8 @@ planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m)
   }
   if (farthest <= 0) /* nothing, or nothing that is before the camera */
     return {distance_m / 50, distance_m * 20};
-  const double far_m = (1 + kMargin) * farthest;
-  return {std::max ((1 - kMargin) * nearest, far_m / kMostFarToNear), far_m};
+  const double far_m = kRoom * farthest;
+  return {std::max (nearest / kRoom, far_m / kMostFarToNear), far_m};
 }
 
 } // namespace

@@ -55,10 +55,10 @@ struct Eye {
 
 /** @param aspect  width / height of the picture
  *  @param flip_y  the picture's first row is its top (GStreamer's GL memory)
- *  @param hull    world points between whose distances the near and the far plane have room for
- *                 all that is drawn; empty: the planes are from 1/50 to 20 times the target's
- *                 distance. The planes have a margin of a tenth; the near one is no nearer than
- *                 1/2000 of the far one's distance, where a depth buffer would be too coarse */
+ *  @param hull    world points that surround all that is drawn: the near plane is at half the
+ *                 distance of the nearest, the far plane at twice that of the farthest; empty: at
+ *                 1/50 and 20 times the target's. The near plane is no nearer than 1/2000 of the
+ * far one's distance, where a depth buffer would be too coarse */
 OrbitMatrices orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect,
     bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {});
 
