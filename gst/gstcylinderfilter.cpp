@@ -59,7 +59,7 @@ enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FI
 
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.006,
+                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.015,
                         kDefaultHysteresis = 0.2, kDefaultAgreement = 0.1;
 static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
@@ -538,7 +538,7 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
   g_object_class_install_property (object_class, PROP_HIDDEN_GAP,
       g_param_spec_double ("hidden-gap", "Hidden gap",
           "A point this far behind what the winning view sees is hidden from it and stays, metres, "
-          "0 to 100; 0 clears all points of losers (default: 0.006)",
+          "0 to 100; 0 clears all points of losers (default: 0.015)",
           0, 100, kDefaultHiddenGap, controllable));
 }
 

@@ -130,10 +130,11 @@ TEST (Rig, place_to_write_to_is_tried_and_left_as_it_was)
       std::string::npos);
   EXPECT_EQ (
       check_output_path (temporary ("rig.txt"), kRigExtensions).code (), StatusCode::kBadValue);
-  if (std::filesystem::is_directory ("/proc"))
+  if (std::filesystem::is_directory ("/proc")) {
     EXPECT_NE (
         check_output_path ("/proc/rig.yaml", kRigExtensions).message ().find ("cannot be opened"),
         std::string::npos);
+  }
 }
 
 TEST (Rig, blob_round_trips_bit_for_bit)

@@ -22,7 +22,7 @@ struct CylinderSettings {
   UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
   /** A point further behind what the winner sees, along the winner's optical axis, is hidden from
    *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
-  double hidden_gap_m = 0.006;
+  double hidden_gap_m = 0.015;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
   /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
    *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
