@@ -543,6 +543,23 @@ GST_START_TEST (test_thread_that_comes_too_late_leaves_pictures_out)
 }
 GST_END_TEST;
 
+/* A sink holds the thread until a picture's time, which is the pipeline's latency after its own. */
+GST_START_TEST (test_thread_that_is_held_by_the_sink_leaves_nothing_out)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  live.next ();
+  gst_pad_send_event (live.src, gst_event_new_latency (5 * kPeriod));
+  gst_test_clock_advance_time (live.clock, 5 * kPeriod);
+  gst_harness_crank_single_clock_wait (live.h);
+  for (guint64 i = 1; i < 6; i++)
+    fail_unless_equals_uint64 (take_rendered (gst_harness_pull (live.h), 320).pts, i * kPeriod);
+  fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 0);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own)
 {
   Live live ("", "framerate=5/1");
@@ -591,6 +608,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_flow_of_the_drawing_thread_comes_back_upstream);
   tcase_add_test (tc, test_late_pictures_of_a_held_frame_set_are_left_out_and_counted);
   tcase_add_test (tc, test_thread_that_comes_too_late_leaves_pictures_out);
+  tcase_add_test (tc, test_thread_that_is_held_by_the_sink_leaves_nothing_out);
   tcase_add_test (tc, test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own);
   return suite;
 }
