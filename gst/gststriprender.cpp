@@ -331,6 +331,8 @@ gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_QOS)
     strip_take_qos (self, event);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
+    strip_take_latency (self, event);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->src_event (base, event);
 }
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <algorithm>
+
 #include "striprenderstate.hpp"
 
 /* ---- late pictures ---- */
@@ -168,6 +170,15 @@ strip_drain_and_reset (GstStripRender *self)
   priv->grid.reset ();
 }
 
+void
+strip_take_latency (GstStripRender *self, GstEvent *event)
+{
+  GstClockTime latency;
+  gst_event_parse_latency (event, &latency);
+  std::lock_guard guard (self->priv->lock);
+  self->priv->pipeline_latency = GST_CLOCK_TIME_IS_VALID (latency) ? latency : 0;
+}
+
 static bool
 learn_latency (GstStripRender *self)
 {
@@ -214,7 +225,9 @@ next_due (GstStripRender *self)
   return GST_CLOCK_TIME_IS_VALID (running) ? running + wait : GST_CLOCK_TIME_NONE;
 }
 
-/* Whoever begins half a period late would be late with all that follow; leaves them out. */
+/* Leaves out what could not be in time any more. A sink without a queue before it holds the thread
+ * until a picture's time: what comes later than the pipeline's latency is late, not what comes
+ * later than its turn. */
 static void
 catch_up (GstStripRender *self, GstClockTime now)
 {
@@ -222,7 +235,8 @@ catch_up (GstStripRender *self, GstClockTime now)
   GstClockTime slack;
   {
     std::lock_guard guard (priv->lock);
-    slack = priv->grid.period () / 2;
+    const GstClockTime own = priv->latency + priv->grid.period ();
+    slack = std::max (priv->pipeline_latency, own) - priv->latency - priv->grid.tolerance ();
   }
   guint64 late = 0;
   PictureGrid::Picture picture;

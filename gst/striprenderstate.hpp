@@ -36,6 +36,7 @@ struct GstStripRenderPrivate {
   PictureGrid grid;                            /* active: the output has a rate of its own */
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is before it would be late */
   GstClockTime latency = 0;                    /* of upstream */
+  GstClockTime pipeline_latency = 0;           /* as the LATENCY event tells */
   GstFlowReturn flow = GST_FLOW_OK;            /* of the drawing thread's last push */
 
   /* written with both stream locks, read with either */
@@ -139,6 +140,8 @@ void strip_drain_and_reset (GstStripRender *self);
 bool strip_take_gap (GstStripRender *self, GstEvent *event);
 /** Forgets the stream. With both stream locks, or stopped. */
 void strip_reset_rate (GstStripRender *self);
+/** Of a LATENCY event. Any thread. */
+void strip_take_latency (GstStripRender *self, GstEvent *event);
 /** Of a LATENCY query. Any thread. */
 gboolean strip_answer_latency (GstStripRender *self, GstQuery *query);
 /** @} */

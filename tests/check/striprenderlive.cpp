@@ -205,6 +205,15 @@ struct Live {
     fail_unless (gst_harness_crank_single_clock_wait (h));
     return take_rendered (gst_harness_pull (h), width);
   }
+  /** Lets that much time go by while the thread waits, which then goes on. */
+  void sleep (GstClockTime time)
+  {
+    gst_test_clock_wait_for_next_pending_id (clock, nullptr);
+    gst_test_clock_advance_time (clock, time);
+    GstClockID id = gst_test_clock_process_next_clock_id (clock);
+    fail_unless (id != nullptr);
+    gst_clock_id_unref (id);
+  }
   GstClockTime now () { return gst_clock_get_time (GST_CLOCK (clock)); }
 };
 
@@ -532,14 +541,30 @@ GST_START_TEST (test_thread_that_comes_too_late_leaves_pictures_out)
   const Roi part = {100, 80, 60, 40};
   live.push (0);
   live.next ();
-  gst_test_clock_advance_time (live.clock, 5 * kPeriod);
   gst_harness_push (live.h, make_frame_set (live.rig, 200 * GST_MSECOND, part));
-  gst_harness_crank_single_clock_wait (live.h);
+  live.sleep (5 * kPeriod);
   const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
   fail_unless_equals_uint64 (picture.pts, 5 * kPeriod);
   fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 4);
   GstBuffer *expected = gst_harness_push_and_pull (direct.h, make_frame_set (direct.rig, 0, part));
   fail_unless (picture.rgba == take_rendered (expected, 320).rgba, "it has another's strips");
+}
+GST_END_TEST;
+
+/* A sink holds the thread until a picture's time, which is the pipeline's latency after its own. */
+GST_START_TEST (test_thread_that_is_held_by_the_sink_leaves_nothing_out)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  live.next ();
+  gst_pad_send_event (live.src, gst_event_new_latency (5 * kPeriod));
+  live.sleep (5 * kPeriod);
+  fail_unless_equals_uint64 (take_rendered (gst_harness_pull (live.h), 320).pts, kPeriod);
+  for (guint64 i = 2; i < 6; i++)
+    fail_unless_equals_uint64 (live.next ().pts, i * kPeriod);
+  fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 0);
 }
 GST_END_TEST;
 
@@ -591,6 +616,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_flow_of_the_drawing_thread_comes_back_upstream);
   tcase_add_test (tc, test_late_pictures_of_a_held_frame_set_are_left_out_and_counted);
   tcase_add_test (tc, test_thread_that_comes_too_late_leaves_pictures_out);
+  tcase_add_test (tc, test_thread_that_is_held_by_the_sink_leaves_nothing_out);
   tcase_add_test (tc, test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own);
   return suite;
 }
