@@ -29,7 +29,7 @@ public:
 
     /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
      *  between the two's directions. */
-    double view_gap_m = 0.004;
+    double view_gap_m = 0.012;
     int width, height;
   };
   struct Layer {

@@ -57,8 +57,8 @@ static const NumberRow kNumbers[] = {
         0, 100, kDefaults.merge, [] (Settings &s) -> double & { return s.strips.merge; }},
     {"view-gap", "View gap",
         "Metres by which what a view sees moves behind what others see, times 1 - cosine of the "
-        "angle between its direction and the picture's (0 to 1, default 0.004)",
-        0, 1, 0.004, [] (Settings &s) -> double & { return s.view_gap_m; }},
+        "angle between its direction and the picture's (0 to 1, default 0.012)",
+        0, 1, 0.012, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
     {"eye-distance", "Eye distance",

@@ -16,7 +16,7 @@ struct StripRenderSettings {
   double point_size = 1;                 ///< footprints of a pixel
   bool show_cameras = false;
   bool back_faces = false;
-  double view_gap_m = 0.004;
+  double view_gap_m = 0.012;
   int samples = 0; ///< a pixel; below 2: no antialiasing
   bool show_units = false;
   bool show_stats = false;

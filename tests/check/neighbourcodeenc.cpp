@@ -548,7 +548,8 @@ GST_START_TEST (test_a_controller_may_set_what_costs_no_new_tables)
           "choice colour-threshold depth-threshold key-interval max-colour-threshold "
           "max-depth-threshold max-slice-size min-force-key-unit-interval refresh-period "
           "target-bitrate"},
-      {"cylinderfilter", "axis columns hidden-gap layer-gap mode smoothing unit-height"},
+      {"cylinderfilter", "agreement axis blend-width bodies colour-balance columns hidden-gap "
+                         "hysteresis layer-gap mode smoothing unit-height"},
       {"neighbourcodedec", ""}, {"neighbourcodeparse", ""}, {"rtpneighbourcodepay", ""},
       {"rtpneighbourcodedepay", ""}, {"rangemux", ""}, {"rangesplit", ""}, {"plyenc", ""},
       {"avatartestsrc", ""}, {"stereodepth", ""}, {"rangecombine", ""}};

@@ -11,6 +11,7 @@
 #include <list>
 #include <opencv2/imgcodecs.hpp>
 #include <rangecast/strips/orbit.hpp>
+#include <rangecast/strips/scene_hull.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -42,6 +43,7 @@ const char *const kUsage =
     "  --size WxH      of the range images (default 320x240)\n"
     "  --rounds N      times are medians of so many (default 15)\n"
     "  --merge N       of the strips (default 1)\n"
+    "  --view-gap M    of the strips, metres (default 0.012)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
     "  --json FILE     writes the rows (but noise) there\n"
@@ -75,6 +77,7 @@ struct Job {
   SceneSettings scene;
   int rounds = 15;
   double merge = StripSettings{}.merge;
+  double view_gap_m = StripPainter::Picture{}.view_gap_m;
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
   std::vector<RenderRow> rows;
   GstGLContext *context = nullptr;
@@ -90,17 +93,20 @@ struct Kind {
 };
 
 StripPainter::Picture
-make_picture (const Rig &rig, double azimuth_deg)
+make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
 {
-  const SceneFrame frame = scene_frame (rig);
+  const SceneFrame frame = scene_frame (set.rig);
+  std::vector<Vec3> hull;
+  for (const RangeImage &image : set.images)
+    append_hull (image, *set.rig.find (image.view_id), hull);
   Orbit orbit;
   orbit.azimuth_deg = azimuth_deg;
   StripPainter::Picture picture = {};
   picture.clip_from_world =
-      orbit_matrices (frame, orbit, double (kWidth) / kHeight, true).clip_from_world;
+      orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
   picture.point_size = 1;
   picture.pixels_per_unit = float (kHeight / (2 * std::tan (frame.fov_deg * M_PI / 360)));
-  picture.back_faces = getenv ("BACK");
+  picture.view_gap_m = view_gap_m;
   picture.width = kWidth;
   picture.height = kHeight;
   return picture;
@@ -156,7 +162,7 @@ void
 time_all (
     Job &job, const Kind &kind, Target &target, double azimuth_deg, std::vector<RenderRow> &rows)
 {
-  const StripPainter::Picture picture = make_picture (kind.set.rig, azimuth_deg);
+  const StripPainter::Picture picture = make_picture (kind.set, azimuth_deg, job.view_gap_m);
   std::vector<std::vector<double>> processor (rows.size ()), total (rows.size ());
   for (int round = -1; round < job.rounds; round++) /* the first one allocates */
     for (std::size_t i = 0; i < rows.size (); i++) {
@@ -184,7 +190,7 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
 {
   Score score;
   for (const Shot &shot : shots) {
-    target.draw (*kind.ways[i], make_picture (kind.set.rig, shot.azimuth_deg));
+    target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg, job.view_gap_m));
     const cv::Mat rgba = target.read ();
     score.add (shot, rgba);
     if (!job.pictures.empty ())
@@ -267,6 +273,7 @@ main (int argc, char **argv)
   options.size ("--size", job.scene.width, job.scene.height, 16, 1920);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.number ("--merge", job.merge, 0, 100);
+  options.number ("--view-gap", job.view_gap_m, 0, 1);
   options.text ("--mode", job.mode);
   options.text ("--depth", job.depth);
   options.text ("--json", job.json);
