@@ -95,7 +95,7 @@ static const NumberRow<int> kIntegers[] = {
     {"silhouette-radius", "Silhouette radius",
         "Near a silhouette, points whose colour is that of the other side are cleared: pixels "
         "around "
-        "that are looked at (0 = off, to 64, default 10)",
+        "that are looked at (0 = off, to 64, default 8)",
         0, 64, kDefaults.silhouette_radius,
         [] (Settings &s) -> int & { return s.core.silhouette_radius; }},
     {"gap-width", "Gap width",

@@ -16,7 +16,7 @@ struct StereoSettings {
   MatchSettings match;
   double patch_tolerance = 1;      ///< share of its contrast that a patch may differ by; 0 = off
   double flying_pixel_step = 0.02; ///< share of the depth that neighbours may differ; 0 = off
-  int silhouette_radius = 10;      ///< pixels around that say what is beside a silhouette; 0 = off
+  int silhouette_radius = 8;      ///< pixels around that say what is beside a silhouette; 0 = off
   int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
   /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
    *  matched so as not to be taken for something nearer. */

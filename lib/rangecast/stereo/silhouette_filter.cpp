@@ -128,7 +128,8 @@ SilhouetteFilter::for_window (
       cv::v_expand ((most - unlike) & inside, low, high);
       const std::int16_t *depth = samples_.row (v) + x0 + u;
       count (cv::v_reinterpret_as_s16 (low), cv::v_load (depth));
-      count (cv::v_reinterpret_as_s16 (high), cv::v_load (depth + 8));
+      if (radius - u > kLanes / 2)
+        count (cv::v_reinterpret_as_s16 (high), cv::v_load (depth + 8));
     }
   }
 }

@@ -17,7 +17,7 @@ namespace rangecast {
 class SilhouetteFilter {
 public:
   struct Settings {
-    int radius = 10;  ///< pixels, > 0
+    int radius = 8;   ///< pixels, > 0
     double step = 0;  ///< share of the depth that pixels of one surface may differ
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
     int least = 0;    ///< 1/16 pixel; less = none, least - 16 is what is written
