@@ -64,9 +64,7 @@ record_stereo
 near="azimuth=20 distance=0.4 elevation=8 pan-y=0.03"
 sheet gallery-overlap.jpg stereo.rcnc "off|$near" "winner|$near"
 sheet gallery-modes.jpg exact.rcnc "winner|$near mode=points" "winner|$near mode=rectangles" "winner|$near mode=strips"
-if gst-inspect-1.0 striprender | grep -q show-units; then
-  sheet gallery-units.jpg exact.rcnc "off|azimuth=20 elevation=8 show-units=true" "winner|azimuth=20 elevation=8 show-units=true"
-fi
+sheet gallery-units.jpg exact.rcnc "off|azimuth=20 elevation=8 show-units=true" "winner|azimuth=20 elevation=8 show-units=true"
 if command -v ffmpeg >/dev/null; then
   film gallery-orbit.webp
 else
