@@ -212,8 +212,10 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     return GST_FLOW_OK;
 
-  if (gst_cylinder_filter_begins_anew (priv, buffer))
+  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
     priv->core.reset ();
+    priv->colours.reset ();
+  }
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
   rangecast::CylinderResult result;
   rangecast::Status status = frame.status ();

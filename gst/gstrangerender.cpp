@@ -56,12 +56,32 @@ add (GstRangeRender *self, const char *factory, const char *name)
 static gboolean
 keep_if_no_range_of_rates (GQuark field, GValue *value, gpointer)
 {
-  return field != g_quark_from_static_string ("framerate") || gst_value_is_fixed (value);
+  return field != g_quark_from_static_string ("framerate") ||
+         !GST_VALUE_HOLDS_FRACTION_RANGE (value);
+}
+
+/* Whether ranges of frame rates in the caps begin at 0 and end at the greatest number: together
+ * they are no limit. */
+static bool
+all_rates_are_in (const GstCaps *caps)
+{
+  bool from_none = false, to_all = false;
+  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
+    const GValue *rate = gst_structure_get_value (gst_caps_get_structure (caps, i), "framerate");
+    if (!rate || !GST_VALUE_HOLDS_FRACTION_RANGE (rate))
+      continue;
+    const GValue *least = gst_value_get_fraction_range_min (rate),
+                 *most = gst_value_get_fraction_range_max (rate);
+    from_none |= gst_value_get_fraction_numerator (least) == 0;
+    to_all |= gst_value_get_fraction_numerator (most) == G_MAXINT &&
+              gst_value_get_fraction_denominator (most) == 1;
+  }
+  return from_none && to_all;
 }
 
 /* playsink's deinterlace takes frame rates [ 0, max/2 ] and others [ max/2, max ]. Put together,
  * as gldownload does, in GStreamer 1.22 that is no subset of [ 0, max ], and every GstBaseTransform
- * from here to the file warns of its neighbour. So without a range, which says nothing anyway. */
+ * from here to the file warns of its neighbour. So without ranges where they are no limit. */
 static gboolean
 query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
 {
@@ -72,7 +92,8 @@ query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
   gst_query_parse_caps (query, &filter);
   gst_query_parse_caps_result (query, &caps);
   caps = gst_caps_copy (caps);
-  for (guint i = 0; i < gst_caps_get_size (caps); i++)
+  const bool unlimited = all_rates_are_in (caps);
+  for (guint i = 0; unlimited && i < gst_caps_get_size (caps); i++)
     gst_structure_filter_and_map_in_place (
         gst_caps_get_structure (caps, i), keep_if_no_range_of_rates, nullptr);
   if (filter) {

@@ -273,7 +273,7 @@ gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
       break;
     case GST_EVENT_CAPS:
       if (is_other_input (base, event))
-        strip_drain_and_reset (self);
+        strip_drain (self);
       break;
     case GST_EVENT_SEGMENT:
     case GST_EVENT_STREAM_START:

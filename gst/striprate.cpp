@@ -154,8 +154,9 @@ drain (GstStripRender *self, GstClockTime until)
       break;
 }
 
-void
-strip_drain_and_reset (GstStripRender *self)
+/* Draws what is still to come of all frame sets. */
+static void
+drain_all (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   GstClockTime end;
@@ -166,8 +167,22 @@ strip_drain_and_reset (GstStripRender *self)
   if (strip_has_own_rate (self))
     drain (self, end);
   gst_clear_buffer (&priv->drawn);
-  std::lock_guard guard (priv->lock);
-  priv->grid.reset ();
+}
+
+void
+strip_drain (GstStripRender *self)
+{
+  drain_all (self);
+  std::lock_guard guard (self->priv->lock);
+  self->priv->grid.drop_frame_sets ();
+}
+
+void
+strip_drain_and_reset (GstStripRender *self)
+{
+  drain_all (self);
+  std::lock_guard guard (self->priv->lock);
+  self->priv->grid.reset ();
 }
 
 void
@@ -369,7 +384,9 @@ strip_take_gap (GstStripRender *self, GstEvent *event)
   if (!strip_has_own_rate (self))
     return false;
   if (!priv->live)
-    drain (self, GST_CLOCK_TIME_IS_VALID (duration) ? begin + duration : begin);
+    drain (self, GST_CLOCK_TIME_IS_VALID (duration) && duration < G_MAXUINT64 - begin
+                     ? begin + duration
+                     : begin);
   return true;
 }
 

@@ -101,7 +101,7 @@ GstClockTime strip_running_now (GstStripRender *self);
  *  the first frame set after a seek to between two of them, is no stream time: values stay. */
 void strip_sync_values (GstStripRender *self, GstClockTime pts);
 /** Draws a frame set as it is to be seen at `running`. Posts what goes wrong.
- *  @param again  it is the one that was drawn last */
+ *  @param keep  more pictures may be drawn of it: what was made of it stays */
 GstFlowReturn strip_draw_frame (
     GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool again);
 /** @} */
@@ -136,6 +136,8 @@ bool strip_follows_grid (GstStripRender *self, GstClockTime pts);
 GstFlowReturn strip_draw_next (GstStripRender *self, GstClockTime until, GstBuffer **out);
 /** Draws and pushes what frame sets there are, and forgets them. With both stream locks. */
 void strip_drain_and_reset (GstStripRender *self);
+/** The same, and the stream goes on: pictures to come are later than those that went. */
+void strip_drain (GstStripRender *self);
 /** @return whether the gap is filled with pictures, or will be. With both stream locks. */
 bool strip_take_gap (GstStripRender *self, GstEvent *event);
 /** Forgets the stream. With both stream locks, or stopped. */

@@ -213,6 +213,19 @@ GST_START_TEST (test_properties_inside_can_be_set)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_rate_that_downstream_limits_is_kept_to)
+{
+  if (!have_gl ())
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *pipeline = gst_parse_launch (
+      "avatartestsrc num-buffers=4 views=1 ! video/x-range,width=64,height=48,framerate=30/1 ! "
+      "rangerender ! video/x-raw,framerate=[1/1,15/1] ! fakesink",
+      nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 static Suite *
 rangerender_suite ()
 {
@@ -226,6 +239,7 @@ rangerender_suite ()
   tcase_add_test (tc, test_playbin_shows_a_recording_to_a_sink_of_plain_video);
   tcase_add_test (tc, test_playbin_seeks_to_the_frame_set_at_a_time);
   tcase_add_test (tc, test_properties_inside_can_be_set);
+  tcase_add_test (tc, test_rate_that_downstream_limits_is_kept_to);
   return suite;
 }
 

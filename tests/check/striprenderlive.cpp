@@ -586,12 +586,30 @@ GST_START_TEST (test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_o
 }
 GST_END_TEST;
 
+GST_START_TEST (test_absurd_rate_of_a_sender_is_no_rate_to_keep)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "avatartestsrc is-live=true num-buffers=5 views=1 ! video/x-range,width=64,height=48,"
+      "framerate=30/1 ! capssetter caps=video/x-range,framerate=2147483647/1 ! "
+      "striprender keep-rate=true ! fakesink",
+      nullptr);
+  if (!pipeline)
+    RANGECAST_SKIP ("no capssetter");
+  Live live ("", "framerate=5/1");
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 static Suite *
 striprenderlive_suite ()
 {
   Suite *suite = suite_create ("striprenderlive");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_absurd_rate_of_a_sender_is_no_rate_to_keep);
   tcase_add_test (tc, test_faster_output_shows_frame_sets_several_times);
   tcase_add_test (tc, test_slower_output_leaves_frame_sets_out);
   tcase_add_test (tc, test_uneven_times_neither_repeat_a_frame_set_nor_skip_one);

@@ -485,6 +485,20 @@ TEST (Degenerate, views_of_one_pixel)
   }
 }
 
+TEST (Degenerate, focal_lengths_at_their_limits)
+{
+  for (const double focal : {1e-3, 1e6}) {
+    Rig rig;
+    for (int i = 0; i < 3; i++) {
+      rig.views.push_back (small_view (i, 120.0 * i, 9, 33));
+      rig.views.back ().intrinsics.fx = rig.views.back ().intrinsics.fy = focal;
+    }
+    ASSERT_TRUE (validate (rig).ok ());
+    for (const std::uint16_t depth : {1, 8000, 65535})
+      expect_sane (rig, [=] (int, int, int) { return depth; }, {});
+  }
+}
+
 TEST (Degenerate, all_points_on_the_axis)
 {
   /* The middle column of each view, 0.8 m away: x = z = 0 but for rounding. */

@@ -229,6 +229,9 @@ TEST (Rig, validate_names_view_and_field)
   rig.views[0].intrinsics.fx = std::numeric_limits<double>::quiet_NaN ();
   EXPECT_NE (validate (rig).message ().find ("intrinsics"), std::string::npos);
   rig = ring_rig (1);
+  rig.views[0].intrinsics.fy = 1e-38; // would put points beyond all floats
+  EXPECT_NE (validate (rig).message ().find ("0.001"), std::string::npos);
+  rig = ring_rig (1);
   rig.views[0].world_from_view.rotation[0] = 2;
   EXPECT_NE (validate (rig).message ().find ("rotation"), std::string::npos);
   rig = ring_rig (1);

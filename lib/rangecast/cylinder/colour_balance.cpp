@@ -289,15 +289,15 @@ ColourBalance::process (std::span<const RangeImage> images, int threads)
     return status;
   images_ = images.size ();
   frame_++;
-  if (images_ < 2)
-    return {};
   try {
-    age (images);
-    for (std::size_t i = 0; i < images_; i++)
-      count_ratios (images, i);
-    fresh_ = false;
-    solve (images);
-    follow (images);
+    if (images_ > 1) { /* one alone teaches nothing, and keeps the gains that it had */
+      age (images);
+      for (std::size_t i = 0; i < images_; i++)
+        count_ratios (images, i);
+      fresh_ = false;
+      solve (images);
+      follow (images);
+    }
     in_parallel (images_, threads, [&] (std::size_t i) {
       if (has_colour (images[i]))
         multiply (images[i], gains (images[i].view_id));

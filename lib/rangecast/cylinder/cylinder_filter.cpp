@@ -326,7 +326,7 @@ CylinderFilter::find_cells ()
   const UnitRows &rows = units_.rows;
   for (std::size_t s = 0; s < units_.slices.size (); s++) {
     const auto number = static_cast<int> (s);
-    if (units_.slices[s].planes < 2)
+    if (units_.is_plain (static_cast<std::uint32_t> (s)))
       continue;
     for (const UnitLayer &layer : units_.layers_of (units_.slices[s])) {
       const std::uint32_t cell =

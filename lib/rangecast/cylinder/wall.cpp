@@ -50,8 +50,8 @@ struct ToWall {
     py = m[3] * x + m[4] * y + m[5] * z;
     pz = m[6] * x + m[7] * y + m[8] * z;
     radius = std::sqrt (px * px + pz * pz);
-    column = std::min (
-        static_cast<std::int32_t> (fast_atan2 (pz, px) * columns_per_radian), last_column);
+    column = std::clamp (
+        static_cast<std::int32_t> (fast_atan2 (pz, px) * columns_per_radian), 0, last_column);
   }
 };
 
@@ -106,7 +106,8 @@ template <typename L> struct ToWallLoop {
       find_angle (angle, px, pz);
       const F at = angle * to.columns_per_radian;
       const I c = __builtin_convertvector(at, I);
-      L::at (column + i) = c < last ? c : last;
+      const I below = c < last ? c : last;
+      L::at (column + i) = below > 0 ? below : I{};
     }
     for (int l = 0; l < kLanes && i > 0; l++) {
       range.y_min = std::min (range.y_min, lowest[l]);

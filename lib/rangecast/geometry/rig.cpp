@@ -56,9 +56,11 @@ check_lens (
     const View &view, const Intrinsics &k, const Distortion &distortion, const std::string &name)
 {
   const double values[] = {k.fx, k.fy, k.cx, k.cy};
-  if (!all_finite (values) || !(k.fx > 0) || !(k.fy > 0) || k.fx > 1e6 || k.fy > 1e6 ||
-      std::abs (k.cx) > 1e6 || std::abs (k.cy) > 1e6)
-    return bad_field (view, name + "intrinsics: expected finite fx, fy > 0 and cx, cy, in pixels");
+  constexpr double kLeastFocal = 1e-3; /* less, and points lie beyond what a float can hold */
+  if (!all_finite (values) || !(k.fx >= kLeastFocal) || !(k.fy >= kLeastFocal) || k.fx > 1e6 ||
+      k.fy > 1e6 || std::abs (k.cx) > 1e6 || std::abs (k.cy) > 1e6)
+    return bad_field (view,
+        name + "intrinsics: expected fx, fy from 0.001 to 1e6 and cx, cy within 1e6, in pixels");
   static constexpr std::size_t kSizes[] = {0, 4, 5, 8, 12, 14};
   if (std::ranges::find (kSizes, distortion.size ()) == std::end (kSizes))
     return bad_field (view, name + "distortion: expected 0, 4, 5, 8, 12 or 14 coefficients, got " +
