@@ -199,7 +199,7 @@ TEST (StereoScene, who_moves_far_within_the_wanted_part_is_found_as_in_the_whole
       of_whole.add (shot, depth);
   }
   EXPECT_GT (of_part.judgement ().found, 0.99 * of_whole.judgement ().found);
-  EXPECT_LT (of_part.judgement ().off, 0.01);
+  EXPECT_LT (of_part.judgement ().off, 0.005);
 }
 
 TEST (StereoScene, third_camera_adds_no_rim_of_the_wall)

@@ -159,8 +159,8 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  SilhouetteFilter::Settings rims = {
-      settings_.silhouette_radius, settings_.flying_pixel_step, 0, kLeast};
+  const int radius = settings_.silhouette_radius * 5 / 4; /* such rims are wider */
+  SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kLeast};
   rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
   rims.only_beyond = true;
   rims.look_near = rims.nearest - 1;
