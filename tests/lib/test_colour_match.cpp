@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <functional>
 #include <new>
 #include <random>
@@ -266,6 +267,24 @@ TEST (ColourBalance, view_that_is_missing_keeps_its_gains)
   three.pop_back ();
   ASSERT_TRUE (balance.process (three, 1).ok ());
   EXPECT_EQ (balance.gains (3), gains);
+}
+
+TEST (ColourBalance, view_that_comes_alone_is_multiplied_by_the_gain_that_it_had)
+{
+  Frame frame = ball (kArc, kWrong);
+  ColourBalance balance;
+  ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
+  ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
+  const auto is_same = [] (const std::vector<Rgbx> &a, const std::vector<Rgbx> &b) {
+    return std::memcmp (a.data (), b.data (), a.size () * sizeof (Rgbx)) == 0;
+  };
+  const std::vector<Rgbx> with_others = frame.colour[0];
+  frame = ball (kArc, kWrong);
+  ASSERT_FALSE (is_same (frame.colour[0], with_others));
+  std::vector<RangeImage> alone = frame.images ();
+  alone.resize (1);
+  ASSERT_TRUE (balance.process (alone, 1).ok ());
+  EXPECT_TRUE (is_same (frame.colour[0], with_others));
 }
 
 TEST (ColourBalance, images_without_pixels_or_colour_are_left_out)
