@@ -52,32 +52,36 @@ CameraPainter::start (GstGLContext *context)
   return true;
 }
 
-bool
-CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines,
+guint64
+CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines, guint64 serial,
     const rangecast::Mat4 &clip_from_world)
 {
   if (!start (context))
-    return false;
+    return 0;
   const GstGLFuncs *gl = context->gl_vtable;
   gst_gl_shader_use (shader_);
   gst_gl_shader_set_uniform_matrix_4fv (
       shader_, "u_clip_from_world", 1, FALSE, clip_from_world.data ());
   gl->BindVertexArray (array_);
   gl->BindBuffer (GL_ARRAY_BUFFER, vertices_);
-  gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
+  const bool changed = uploaded_ != serial;
+  if (changed)
+    gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
+  uploaded_ = serial;
   gl->Enable (GL_DEPTH_TEST);
   gl->DrawArrays (GL_LINES, 0, GLsizei (lines.size ()));
   gl->Disable (GL_DEPTH_TEST);
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gst_gl_context_clear_shader (context);
-  return true;
+  return changed ? lines.size_bytes () : 0;
 }
 
 void
 CameraPainter::stop ()
 {
   failed_ = false;
+  uploaded_ = 0;
   if (!context_)
     return;
   const GstGLFuncs *gl = context_->gl_vtable;

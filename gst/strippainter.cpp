@@ -175,7 +175,7 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
 }
 
 guint64
-StripPainter::upload (ViewObjects &objects, const Layer &layer)
+StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
@@ -310,31 +310,33 @@ StripPainter::end ()
 }
 
 guint64
+StripPainter::upload (std::span<const Layer> layers)
+{
+  guint64 uploaded = 0;
+  turn_ = (turn_ + 1) % objects_.size ();
+  context_->gl_vtable->ActiveTexture (GL_TEXTURE0);
+  for (const Layer &layer : layers)
+    if (!layer.vertices.empty ())
+      uploaded += upload_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer);
+  return uploaded;
+}
+
+void
 StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   /* Noise turns many a single rectangle over: they have two sides, as points have. */
   const bool sided = picture.mode == StripMode::kStrips;
-  guint64 uploaded = 0;
-  turn_ = (turn_ + 1) % objects_.size ();
-  begin (picture);
-  if (sided)
-    show_side (gl, picture.clip_from_world, false);
-  for (const Layer &layer : layers) {
-    if (layer.vertices.empty ())
-      continue;
-    ViewObjects &objects = objects_[turn_][std::size_t (layer.image.view_id)];
-    gl->ActiveTexture (GL_TEXTURE0);
-    uploaded += upload (objects, layer);
-    draw_layer (objects, layer, picture, Side::kFront);
-  }
-  if (sided && picture.back_faces) {
-    show_side (gl, picture.clip_from_world, true);
+  const auto draw_all = [&] (Side side) {
+    if (sided)
+      show_side (gl, picture.clip_from_world, side == Side::kBack);
     for (const Layer &layer : layers)
       if (!layer.vertices.empty ())
-        draw_layer (
-            objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, Side::kBack);
-  }
+        draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, side);
+  };
+  begin (picture);
+  draw_all (Side::kFront);
+  if (sided && picture.back_faces)
+    draw_all (Side::kBack);
   end ();
-  return uploaded;
 }

@@ -37,8 +37,12 @@ public:
     const rangecast::View *view;
     std::span<const rangecast::StripVertex> vertices;
   };
-  /** Draws one picture into the bound framebuffer. @return bytes uploaded */
-  guint64 draw (const Picture &picture, std::span<const Layer> layers);
+  /** Hands a frame set to OpenGL: depth, colour and vertices of its layers. @return their bytes */
+  guint64 upload (std::span<const Layer> layers);
+  /** Draws one picture of what was uploaded last into the bound framebuffer. May be called as often
+   *  as there are pictures of it: of two eyes, or of a camera that moves.
+   *  @param layers  those that were uploaded; of images only the ROI's place and size are read */
+  void draw (const Picture &picture, std::span<const Layer> layers);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */
@@ -46,7 +50,7 @@ private:
     int width = 0, height = 0;
   };
   void prepare (ViewObjects &objects, int width, int height);
-  guint64 upload (ViewObjects &objects, const Layer &layer);
+  guint64 upload_layer (ViewObjects &objects, const Layer &layer);
   void begin (const Picture &picture);
   void end ();
   enum class Side { kFront, kBack };
@@ -60,7 +64,7 @@ private:
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
   std::array<GstGLShader *, 3> shaders_{}; /* by mode */
-  /* In turns: what the last picture reads may still be in use while this one's is written. */
+  /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;
 };

@@ -19,6 +19,7 @@ StripScene::set_rig (const rangecast::Rig &rig)
   for (std::size_t i = 0; i < rig.views.size (); i++)
     rangecast::append_camera_lines (rig.views[i], rangecast::camera_colour (i), lines_);
   count_ = images_ = 0;
+  complete_ = false;
 }
 
 Status
@@ -35,40 +36,56 @@ StripScene::check (std::span<const RangeImage> images) const
   return {};
 }
 
-void
-StripScene::add_cameras_to_hull ()
+bool
+StripScene::is_built (std::size_t images, const StripRenderSettings &settings) const
 {
-  for (const rangecast::LineVertex &end : lines_)
-    hull_.push_back ({end.x, end.y, end.z});
+  return complete_ && images_ == images && built_with_ == settings.strips_serial;
+}
+
+/* What is to be seen, with the layers that are there. */
+void
+StripScene::surround (const StripRenderSettings &settings)
+{
+  hull_.clear ();
+  for (const StripPainter::Layer &layer : layers ())
+    rangecast::append_hull (layer.image, *layer.view, hull_);
+  if (settings.show_cameras)
+    for (const rangecast::LineVertex &end : lines_)
+      hull_.push_back ({end.x, end.y, end.z});
 }
 
 void
 StripScene::build (
     std::span<const RangeImage> images, const StripRenderSettings &settings, bool same_frame_set)
 {
-  const bool built =
-      same_frame_set && built_with_ == settings.strips_serial && images_ == images.size ();
-  built_with_ = settings.strips_serial;
-  images_ = images.size ();
+  const bool built = same_frame_set && is_built (images.size (), settings);
+  complete_ = false; /* memory may end halfway */
   rangecast::in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) {
     results_[i] = {};
     rangecast::build_strips (images[i], settings.strips, memory_[i].vertices, results_[i]);
   });
-  hull_.clear ();
   count_ = 0;
   for (std::size_t i = 0; i < images.size (); i++) {
     const rangecast::View *view = rig_->find (images[i].view_id);
     if (!view)
       continue;
     StripPainter::Layer &layer = layers_[count_++];
+    const auto tinted = layer.image.colour;
     layer = {images[i], view, memory_[i].vertices};
-    rangecast::append_hull (images[i], *view, hull_);
     if (settings.show_units)
-      layer.image.colour = rangecast::tinted (images[i].colour,
-          rangecast::camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
+      layer.image.colour =
+          built ? tinted
+                : rangecast::tinted (images[i].colour,
+                      rangecast::camera_colour (std::size_t (view - rig_->views.data ())),
+                      memory_[i].tinted);
   }
-  if (settings.show_cameras)
-    add_cameras_to_hull ();
+  if (!built) {
+    surround (settings);
+    serial_++;
+  }
+  built_with_ = settings.strips_serial;
+  images_ = images.size ();
+  complete_ = true;
 }
 
 void

@@ -25,10 +25,12 @@ public:
   [[nodiscard]] rangecast::Status check (std::span<const rangecast::RangeImage> images) const;
 
   /** Makes the strips; if it is the same frame set as the last time and nothing that strips depend
-   *  on has changed, they are still there. Colours are of the images, or tinted (show-units).
+   *  on has changed, all is still there. Colours are of the images, or tinted (show-units).
    *  The images must stay mapped as long as the layers are used. */
   void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,
       bool same_frame_set);
+  /** Another one after each build() that made something else than the one before; never 0. */
+  [[nodiscard]] guint64 serial () const { return serial_; }
   /** Of all views that the rig has. */
   [[nodiscard]] std::span<const StripPainter::Layer> layers () const
   {
@@ -44,7 +46,8 @@ private:
     std::vector<rangecast::StripVertex> vertices;
     std::vector<rangecast::Rgbx> tinted;
   };
-  void add_cameras_to_hull ();
+  bool is_built (std::size_t images, const StripRenderSettings &settings) const;
+  void surround (const StripRenderSettings &settings);
 
   const rangecast::Rig *rig_ = nullptr;
   rangecast::SceneFrame frame_;
@@ -54,5 +57,7 @@ private:
   std::array<StripPainter::Layer, rangecast::kMaxViews> layers_;
   std::size_t count_ = 0, images_ = 0;
   std::vector<rangecast::Vec3> hull_;
-  guint built_with_ = 0; /* StripRenderSettings::strips_serial */
+  guint built_with_ = 0;  /* StripRenderSettings::strips_serial */
+  bool complete_ = false; /* the last build() was not broken off, and the rig is still that one */
+  guint64 serial_ = 1;
 };

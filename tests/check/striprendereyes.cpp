@@ -6,7 +6,7 @@
 
 #include <rangecast/strips/camera_lines.hpp>
 
-#include "viewer-check.hpp"
+#include "render-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -50,18 +50,12 @@ bright (const RenderedPicture &picture)
   return spot;
 }
 
-static RenderedPicture
-render (GstHarness *h, GstBuffer *frame_set, int width)
-{
-  return take_rendered (gst_harness_push_and_pull (h, frame_set), width);
-}
-
 /* One picture of a dot in caps of that multiview-mode. */
 static RenderedPicture
 eyes (const char *properties, const std::string &output, int width, int depth)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig, {properties, output.c_str ()});
+  GstHarness *h = render_harness (rig, {properties, output.c_str ()});
   RenderedPicture picture = render (h, dot (rig, depth), width);
   gst_harness_teardown (h);
   return picture;
@@ -130,6 +124,25 @@ GST_START_TEST (test_all_packings_hold_the_same_two_pictures)
       "multiview-flags=(GstVideoMultiviewFlagsSet)1:1:right-view-first",
       640, 8000);
   fail_unless_equals_int (pixels_that_differ (swapped.part (0, 0, 320, 240), right), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_two_eyes_cost_one_upload)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (2);
+  guint64 uploaded[2] = {};
+  for (const bool two : {false, true}) {
+    GstHarness *h = render_harness (
+        rig, {"show-cameras=true", two ? "width=640,height=240,multiview-mode=side-by-side"
+                                       : "width=640,height=240,multiview-mode=mono"});
+    render (h, make_frame_set (rig), 640);
+    uploaded[two] = stats_field (h, "uploaded-bytes");
+    gst_harness_teardown (h);
+  }
+  fail_unless (uploaded[0] > 2 * 320 * 240 * (2 + 4));
+  fail_unless_equals_uint64 (uploaded[1], uploaded[0]);
 }
 GST_END_TEST;
 
@@ -205,7 +218,7 @@ GST_START_TEST (test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_cl
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig, {"distance=0.05"});
+  GstHarness *h = render_harness (rig, {"distance=0.05"});
   /* the camera that orbits stands 0.45 m before the view's; the far plane was at 1 m */
   fail_unless (bright (render (h, dot (rig, 40000), 320)).pixels > 50, "4 m are clipped");
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
@@ -223,7 +236,7 @@ GST_START_TEST (test_units_are_in_their_cameras_colours)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (4);
-  GstHarness *h = new_render_harness (rig, {"show-units=true"});
+  GstHarness *h = render_harness (rig, {"show-units=true"});
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   for (guint i = 0; i < 4; i++) {
     g_object_set (r, "azimuth", 90.0 * i, nullptr);
@@ -254,7 +267,7 @@ GST_START_TEST (test_statistics_are_in_a_corner_and_leave_the_rest_alone)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (2);
-  GstHarness *h = new_render_harness (rig);
+  GstHarness *h = render_harness (rig);
   const RenderedPicture plain = render (h, make_frame_set (rig), 320);
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   g_object_set (r, "show-stats", TRUE, nullptr);
@@ -438,7 +451,7 @@ GST_START_TEST (test_two_fingers_carry_what_is_between_them)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig);
+  GstHarness *h = render_harness (rig);
   const Spot before = bright (render (h, dot (rig, 5000), 320));
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   GstPad *src = gst_element_get_static_pad (r, "src");
@@ -464,6 +477,7 @@ striprendereyes_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_known_point_has_the_disparity_of_its_distance);
   tcase_add_test (tc, test_all_packings_hold_the_same_two_pictures);
+  tcase_add_test (tc, test_two_eyes_cost_one_upload);
   tcase_add_test (tc, test_half_aspect_squeezes_each_eyes_picture);
   tcase_add_test (tc, test_separated_pictures_are_memories_of_one_buffer);
   tcase_add_test (tc, test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_clipped);

@@ -4,12 +4,10 @@
 #include <gst/app/gstappsrc.h>
 #include <gst/controller/controller.h>
 
-#include "viewer-check.hpp"
+#include "render-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
-
-static constexpr GstClockTime kPeriod = GST_SECOND / 10; /* of most outputs here */
 
 /* ---- a stream that is not live: all in one go ---- */
 
@@ -170,53 +168,6 @@ GST_END_TEST;
 
 /* ---- live ---- */
 
-struct Live {
-  GstHarness *h;
-  GstElement *r;
-  GstPad *src;
-  GstTestClock *clock;
-  Rig rig = ring_rig (1);
-
-  explicit Live (const char *properties = "", const char *output = "framerate=10/1")
-  {
-    const std::string caps = std::string ("width=320,height=240,") + output;
-    h = new_render_harness (rig, {properties, caps.c_str (), 5, 1});
-    r = h ? gst_bin_get_by_name (GST_BIN (h->element), "r") : nullptr;
-    src = h ? gst_element_get_static_pad (r, "src") : nullptr;
-    clock = h ? gst_harness_get_testclock (h) : nullptr;
-  }
-  ~Live ()
-  {
-    gst_clear_object (&src);
-    gst_clear_object (&r);
-    gst_clear_object (&clock);
-    if (h)
-      gst_harness_teardown (h);
-  }
-  void push (GstClockTime pts)
-  {
-    GstBuffer *set = make_frame_set (rig, pts);
-    GST_BUFFER_DURATION (set) = 200 * GST_MSECOND;
-    fail_unless_equals_int (gst_harness_push (h, set), GST_FLOW_OK);
-  }
-  /* Lets the clock go on to what the element waits for, and takes the picture. */
-  RenderedPicture next (int width = 320)
-  {
-    fail_unless (gst_harness_crank_single_clock_wait (h));
-    return take_rendered (gst_harness_pull (h), width);
-  }
-  /** Lets that much time go by while the thread waits, which then goes on. */
-  void sleep (GstClockTime time)
-  {
-    gst_test_clock_wait_for_next_pending_id (clock, nullptr);
-    gst_test_clock_advance_time (clock, time);
-    GstClockID id = gst_test_clock_process_next_clock_id (clock);
-    fail_unless (id != nullptr);
-    gst_clock_id_unref (id);
-  }
-  GstClockTime now () { return gst_clock_get_time (GST_CLOCK (clock)); }
-};
-
 GST_START_TEST (test_live_stream_that_stalls_is_drawn_on_and_turns)
 {
   Live live ("auto-orbit=45");
@@ -234,6 +185,31 @@ GST_START_TEST (test_live_stream_that_stalls_is_drawn_on_and_turns)
   fail_unless_equals_uint64 (stats_field (live.r, "frames"), 12);
   fail_unless_equals_uint64 (stats_field (live.r, "frame-sets"), 1);
   fail_unless_equals_uint64 (stats_field (live.r, "repeated"), 11);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
+{
+  Live live ("auto-orbit=45 show-cameras=true show-units=true");
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  live.next ();
+  const guint64 once = stats_field (live.r, "uploaded-total");
+  fail_unless (once > 320 * 240 * (2 + 4));
+  fail_unless_equals_uint64 (stats_field (live.r, "uploaded-bytes"), once);
+  for (int i = 0; i < 3; i++)
+    live.next ();
+  fail_unless_equals_uint64 (stats_field (live.r, "uploaded-bytes"), 0);
+  fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), once);
+  g_object_set (live.r, "merge", 0.0, nullptr); /* other strips */
+  live.next ();
+  fail_unless (stats_field (live.r, "uploaded-bytes") > once);
+  live.push (600 * GST_MSECOND);
+  live.next ();
+  live.next ();
+  const guint64 with_next = stats_field (live.r, "uploaded-total");
+  fail_unless (with_next > 2 * once);
 }
 GST_END_TEST;
 
@@ -618,6 +594,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_without_a_request_every_frame_set_keeps_its_time);
   tcase_add_test (tc, test_times_that_go_back_or_lack_do_no_harm);
   tcase_add_test (tc, test_live_stream_that_stalls_is_drawn_on_and_turns);
+  tcase_add_test (tc, test_held_frame_set_that_turns_is_uploaded_once);
   tcase_add_test (tc, test_held_picture_follows_keys_and_properties);
   tcase_add_test (tc, test_controlled_path_goes_on_over_a_held_frame_set);
   tcase_add_test (tc, test_new_frame_set_is_shown_and_times_never_go_back);
