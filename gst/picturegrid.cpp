@@ -54,6 +54,7 @@ PictureGrid::reset ()
   drop_frame_sets ();
   foreign_ = GST_CLOCK_TIME_NONE;
   last_ = GST_CLOCK_TIME_NONE;
+  covered_ = 0;
 }
 
 GstClockTime
@@ -77,9 +78,13 @@ PictureGrid::add (GstBuffer *frame_set, GstClockTime duration)
   if (!GST_CLOCK_TIME_IS_VALID (begin))
     begin = end ();
   begin = std::max (begin, known_until ());
+  if (begin >= G_MAXINT64) {
+    gst_buffer_unref (frame_set);
+    return;
+  }
   if (count_ == ring_.size ())
     drop_first ();
-  at (count_++) = {frame_set, begin, later_by (begin, duration)};
+  at (count_++) = {frame_set, begin, later_by (begin, std::min (duration, kLongest))};
 }
 
 /* Of the pictures that may show that frame set. */
@@ -113,8 +118,8 @@ PictureGrid::find (GstClockTime &pts, std::size_t &index) const
     const bool newest = index + 1 == count_;
     if (!newest && pts + tolerance () >= at (index + 1).begin)
       continue;
-    const GstClockTime limit = later_by (at (index).end, hold_);
-    if (pts + tolerance () < limit)
+    const GstClockTime limit = later_by (at (index).end, hold ());
+    if (pts < G_MAXINT64 && pts + tolerance () < limit)
       return true;
     if (!newest)
       pts = std::max (pts, first_showing (at (index + 1)));
@@ -142,5 +147,6 @@ PictureGrid::take (GstClockTime until, Picture &picture)
   const bool follows = GST_CLOCK_TIME_IS_VALID (last_) && pts <= last_ + period () + 1;
   picture = {at (0).buffer, pts, period (), !follows};
   last_ = pts;
+  covered_ = pts + period ();
   return true;
 }

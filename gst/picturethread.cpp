@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "picturethread.hpp"
 
-#include <system_error>
+#include <exception>
 
 bool
 PictureThread::start (GstElement *element, Tick tick)
@@ -12,7 +12,7 @@ PictureThread::start (GstElement *element, Tick tick)
   quit_ = false;
   try {
     thread_ = std::thread ([this, element, tick] { run (element, tick); });
-  } catch (const std::system_error &error) {
+  } catch (const std::exception &error) {
     GST_WARNING ("no thread: %s", error.what ());
     return false;
   }

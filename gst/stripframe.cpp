@@ -58,9 +58,9 @@ update_panel (GstStripRender *self, std::size_t views, GstClockTime frame_set_pt
   return true;
 }
 
-/* Draws a frame set as it is to be seen at `running`. */
-GstFlowReturn
-strip_draw_frame (
+/* May throw. */
+static GstFlowReturn
+draw_frame (
     GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
 {
   GstStripRenderPrivate *priv = self->priv;
@@ -93,9 +93,18 @@ strip_draw_frame (
   priv->settings.camera.shown (result.matrices, result.width, result.height);
   priv->scene.count_into (priv->stats);
   priv->stats.uploaded_bytes = result.uploaded;
+  priv->stats.uploaded_total += result.uploaded;
   priv->stats.frames++;
   priv->stats.repeated += again;
   return GST_FLOW_OK;
+}
+
+/* Draws a frame set as it is to be seen at `running`. */
+GstFlowReturn
+strip_draw_frame (
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
+{
+  return strip_guarded (self, [&] { return draw_frame (self, frame_set, out, running, keep); });
 }
 
 /* Gives controlled properties their values of that time. A time outside the segment, as of the

@@ -28,6 +28,12 @@
 #include "stripsettings.hpp"
 #include "stripstats.hpp"
 
+/** A stretch of the stream without frame sets. */
+struct StreamGap {
+  GstClockTime begin = 0, end = 0; /* stream position; end == begin: there is none */
+  GstGapFlags flags = GstGapFlags (0);
+};
+
 struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows */
   StripRenderSettings settings;
@@ -55,6 +61,7 @@ struct GstStripRenderPrivate {
   GError *gl_error = nullptr;                       /* why OpenGL cannot be used */
   bool no_context = false;
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
+  StreamGap gap; /* to go downstream between pictures, as far as they do not fill it */
 
   PictureThread thread;
 };
@@ -90,6 +97,26 @@ private:
   GstBaseTransform *base_;
   bool has_sink_ = true;
 };
+
+/** @name stripguard.cpp @{ */
+
+/** In a handler of all exceptions: posts the element's error for the one at hand.
+ *  @return GST_FLOW_ERROR */
+GstFlowReturn strip_flow_of_exception (GstStripRender *self);
+
+/** Does what may throw, where C has called. @return what `work` returns; GST_FLOW_ERROR after an
+ *  exception, which has been posted. Call without a lock but those of streams. */
+template <typename Work>
+GstFlowReturn
+strip_guarded (GstStripRender *self, const Work &work)
+{
+  try {
+    return work ();
+  } catch (...) {
+    return strip_flow_of_exception (self);
+  }
+}
+/** @} */
 
 /** @name stripframe.cpp: with the source pad's stream lock, or on the streaming thread @{ */
 
@@ -138,8 +165,13 @@ GstFlowReturn strip_draw_next (GstStripRender *self, GstClockTime until, GstBuff
 void strip_drain_and_reset (GstStripRender *self);
 /** The same, and the stream goes on: pictures to come are later than those that went. */
 void strip_drain (GstStripRender *self);
-/** @return whether the gap is filled with pictures, or will be. With both stream locks. */
+/** Fills a gap of the stream with pictures of what is held, and has the rest of it go downstream in
+ *  its turn. With both stream locks.
+ *  @return false if there is nothing to fill it with: the event itself is to go on */
 bool strip_take_gap (GstStripRender *self, GstEvent *event);
+/** Has copies of all frame sets that are held in place of those that came in, so that whoever owns
+ *  their memory has it back. With both stream locks. */
+void strip_give_back (GstStripRender *self);
 /** Forgets the stream. With both stream locks, or stopped. */
 void strip_reset_rate (GstStripRender *self);
 /** Of a LATENCY event. Any thread. */
