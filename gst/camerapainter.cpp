@@ -15,10 +15,27 @@ uniform mat4 u_clip_from_world;
 in vec3 a_position;
 in vec3 a_colour;
 out vec3 v_colour;
+out vec2 v_depth;
 void main ()
 {
   gl_Position = u_clip_from_world * vec4 (a_position, 1.0);
+  v_depth = gl_Position.zw;
+  gl_Position.z = 0.0;
   v_colour = a_colour;
+}
+)";
+
+/* Near and far plane are those of the points. Lines go on beyond them: they keep their depth beside
+ * the points, but nothing clips them. */
+static const char *const kFragmentShader = R"(
+precision highp float;
+in vec3 v_colour;
+in vec2 v_depth;
+out vec4 fragment;
+void main ()
+{
+  fragment = vec4 (v_colour, 1.0);
+  gl_FragDepth = clamp (0.5 + 0.5 * v_depth.x / v_depth.y, 0.0, 1.0);
 }
 )";
 
@@ -28,7 +45,7 @@ CameraPainter::start (GstGLContext *context)
   if (shader_ || failed_)
     return shader_ != nullptr;
   GError *error = nullptr;
-  shader_ = make_shader (context, kVertexShader, kColourFragmentShader, &error);
+  shader_ = make_shader (context, kVertexShader, kFragmentShader, &error);
   if (!shader_) {
     failed_ = true;
     GST_WARNING ("cameras cannot be drawn: %s", error ? error->message : "no shader");

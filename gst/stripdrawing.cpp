@@ -122,8 +122,10 @@ StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
   }
   painter_.draw (picture, job.scene->layers ());
   if (job.settings->show_cameras)
-    call.result.uploaded += camera_painter_.draw (
-        context_, job.scene->camera_lines (), job.scene->serial (), picture.clip_from_world);
+    call.result.uploaded +=
+        camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),
+            picture.back_faces ? StripPainter::in_half_of_depths (picture.clip_from_world, false)
+                               : picture.clip_from_world);
   if (!job.panel.empty ())
     call.result.uploaded +=
         panel_painter_.draw (context_, job.panel, std::exchange (call.panel_changed, false),

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "strippainter.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "glshader.hpp"
@@ -36,6 +37,7 @@ uniform float u_focal; /* pixels */
 uniform float u_unit;
 uniform float u_step;
 uniform float u_point_size;
+uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
 out vec3 v_colour;
 
@@ -81,6 +83,8 @@ void main ()
     depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
 #endif
   gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
+  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
+  gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
 }
@@ -223,11 +227,34 @@ clip_from_pixel (const Mat4 &clip_from_world, const StripPainter::Layer &layer)
   return product;
 }
 
+Mat4
+StripPainter::in_half_of_depths (Mat4 clip_matrix, bool farther)
+{
+  for (std::size_t i = 0; i < 4; i++)
+    clip_matrix[4 * i + 2] =
+        (clip_matrix[4 * i + 2] + (farther ? 1 : -1) * clip_matrix[4 * i + 3]) / 2;
+  return clip_matrix;
+}
+
 /* Row of the matrix that makes one clip coordinate. */
 static rangecast::Vec3
 row_of (const Mat4 &m, int i)
 {
   return {m[i], m[4 + i], m[8 + i]};
+}
+
+/* What u_behind has to be. Clip z is a w + b for all points, w their distance in metres along the
+ * viewer's direction: g metres farther b / w becomes b / (w + g), which never leaves the far plane
+ * as a shift of z by the like would, where the near plane is close. */
+static std::array<float, 2>
+behind (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double gap_m)
+{
+  const rangecast::Vec3 forward = row_of (clip_from_world, 3);
+  const double a = dot (row_of (clip_from_pixel, 2), row_of (clip_from_pixel, 3)) /
+                   dot (row_of (clip_from_pixel, 3), row_of (clip_from_pixel, 3));
+  const double b = clip_from_pixel[14] - a * clip_from_pixel[15];
+  const double g = std::max (gap_m * norm (forward), 1e-6);
+  return {float (b * g), float (g)};
 }
 
 void
@@ -241,15 +268,12 @@ StripPainter::draw_layer (
    * other: what it sees has more pixels there, and noise must not let both shine through. */
   const rangecast::Vec3 forward = row_of (picture.clip_from_world, 3);
   const rangecast::Mat3 &r = layer.view->world_from_view.rotation;
-  const double length = norm (forward);
-  const double along = dot (forward, {r[2], r[5], r[8]}) / length;
-  const double behind_m = picture.view_gap_m * (1 - along);
-  matrix[14] += float (behind_m * dot (row_of (picture.clip_from_world, 2), forward) / length);
+  const double along = dot (forward, {r[2], r[5], r[8]}) / norm (forward);
   if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
-    for (std::size_t i = 0; i < 4; i++)
-      matrix[4 * i + 2] =
-          (matrix[4 * i + 2] + (side == Side::kBack ? 1 : -1) * matrix[4 * i + 3]) / 2;
+    matrix = in_half_of_depths (matrix, side == Side::kBack);
+  const auto moved = behind (matrix, picture.clip_from_world, picture.view_gap_m * (1 - along));
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
+  gst_gl_shader_set_uniform_2f (shader, "u_behind", moved[0], moved[1]);
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (

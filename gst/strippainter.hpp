@@ -43,6 +43,9 @@ public:
    *  as there are pictures of it: of two eyes, or of a camera that moves.
    *  @param layers  those that were uploaded; of images only the ROI's place and size are read */
   void draw (const Picture &picture, std::span<const Layer> layers);
+  /** The matrix whose depths are all in the nearer half of the depth buffer, where fronts are with
+   *  back_faces, or in the farther one. */
+  static rangecast::Mat4 in_half_of_depths (rangecast::Mat4 clip_matrix, bool farther);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */

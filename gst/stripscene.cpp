@@ -42,16 +42,12 @@ StripScene::is_built (std::size_t images, const StripRenderSettings &settings) c
   return complete_ && images_ == images && built_with_ == settings.strips_serial;
 }
 
-/* What is to be seen, with the layers that are there. */
 void
-StripScene::surround (const StripRenderSettings &settings)
+StripScene::surround ()
 {
   hull_.clear ();
   for (const StripPainter::Layer &layer : layers ())
     rangecast::append_hull (layer.image, *layer.view, hull_);
-  if (settings.show_cameras)
-    for (const rangecast::LineVertex &end : lines_)
-      hull_.push_back ({end.x, end.y, end.z});
 }
 
 void
@@ -80,7 +76,7 @@ StripScene::build (
                       memory_[i].tinted);
   }
   if (!built) {
-    surround (settings);
+    surround ();
     serial_++;
   }
   built_with_ = settings.strips_serial;

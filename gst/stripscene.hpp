@@ -36,7 +36,7 @@ public:
   {
     return {layers_.data (), count_};
   }
-  /** World points that surround all that is to be drawn. */
+  /** World points that surround all points of the frame set. */
   [[nodiscard]] std::span<const rangecast::Vec3> hull () const { return hull_; }
   /** Of the last build(). */
   void count_into (RenderStats &stats) const;
@@ -47,7 +47,7 @@ private:
     std::vector<rangecast::Rgbx> tinted;
   };
   bool is_built (std::size_t images, const StripRenderSettings &settings) const;
-  void surround (const StripRenderSettings &settings);
+  void surround ();
 
   const rangecast::Rig *rig_ = nullptr;
   rangecast::SceneFrame frame_;

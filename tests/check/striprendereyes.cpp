@@ -229,7 +229,105 @@ GST_START_TEST (test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_cl
 }
 GST_END_TEST;
 
+/* What a view sees is shifted behind what others see (view-gap): with the near plane close to the
+ * viewer, too, that throws nothing out of the picture. */
+GST_START_TEST (test_viewer_among_the_points_still_sees_what_other_views_see)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (4);
+  RenderedPicture pictures[2];
+  for (const bool among : {false, true}) {
+    GstHarness *h = render_harness (rig, {"distance=0.4 azimuth=10 pan-z=-0.05"});
+    GstBuffer *set = make_frame_set (rig);
+    {
+      gstrange::RangeFrameMap frame (set, GST_MAP_READWRITE);
+      for (const RangeImage &image : frame.views ())
+        for (int y = 0; y < 240; y++)
+          for (int x = 0; x < 320; x++) {
+            const bool beside = image.view_id == 0 && x == 0 && y == 0; /* behind the viewer */
+            image.depth.at (x, y) = image.view_id == 1 && image.depth.at (x, y) > 0 ? 8000
+                                    : beside && among                               ? 3000
+                                                                                    : 0;
+          }
+    }
+    pictures[among] = render (h, set, 320);
+    gst_harness_teardown (h);
+  }
+  int drawn = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      drawn += pictures[0].at (x, y, 0) != 0x20;
+  fail_unless (drawn > 500, "%d pixels", drawn);
+  fail_unless_equals_int (pixels_that_differ (pictures[0], pictures[1]), 0);
+}
+GST_END_TEST;
+
 /* ---- overlays ---- */
+
+static bool
+is_camera_line (const guint8 *pixel)
+{
+  for (std::size_t i = 0; i < 4; i++) {
+    const LineColour c = camera_colour (i);
+    const bool near = pixel[0] == c.red && pixel[1] == c.green && pixel[2] == c.blue;
+    const bool far = pixel[0] == c.red / 2 && pixel[1] == c.green / 2 && pixel[2] == c.blue / 2;
+    if (near || far)
+      return true;
+  }
+  return false;
+}
+
+GST_START_TEST (test_cameras_are_lines_and_change_nothing_else)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (4);
+  for (const char *camera : {"", "azimuth=90", "azimuth=20 back-faces=true", "elevation=40"}) {
+    RenderedPicture pictures[2];
+    for (const bool cameras : {false, true}) {
+      GstHarness *h = render_harness (rig,
+          RenderOptions{
+              (std::string ("show-cameras=") + (cameras ? "true " : "false ") + camera).c_str ()});
+      pictures[cameras] = render (h, make_frame_set (rig), 320);
+      gst_harness_teardown (h);
+    }
+    int lines = 0;
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const guint8 *with = pictures[1].at (x, y);
+        const bool line = is_camera_line (with);
+        lines += line;
+        fail_unless (line || memcmp (with, pictures[0].at (x, y), 4) == 0,
+            "%s: %d, %d is another one", camera, x, y);
+      }
+    fail_unless (lines > 100, "%s: %d pixels", camera, lines);
+  }
+}
+GST_END_TEST;
+
+/* A line before a surface is to be seen, one behind it is not. */
+GST_START_TEST (test_camera_lines_are_before_or_behind_surfaces)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (2); /* the other camera is 1.6 m away and looks this way */
+  for (const char *properties : {"show-cameras=true", "show-cameras=true back-faces=true"}) {
+    GstHarness *h = render_harness (rig, RenderOptions{properties});
+    const auto blue = [&] (int depth) {
+      const RenderedPicture picture = render (h, dot (rig, depth), 320);
+      int lines = 0;
+      for (int y = 117; y < 124; y++)
+        for (int x = 157; x < 164; x++)
+          lines += is_camera_line (picture.at (x, y));
+      return lines;
+    };
+    fail_unless_equals_int (blue (7000), 0); /* its tip is behind the dot */
+    fail_unless (blue (17000) > 0, "%s", properties);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
 
 GST_START_TEST (test_units_are_in_their_cameras_colours)
 {
@@ -481,6 +579,9 @@ striprendereyes_suite ()
   tcase_add_test (tc, test_half_aspect_squeezes_each_eyes_picture);
   tcase_add_test (tc, test_separated_pictures_are_memories_of_one_buffer);
   tcase_add_test (tc, test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_clipped);
+  tcase_add_test (tc, test_viewer_among_the_points_still_sees_what_other_views_see);
+  tcase_add_test (tc, test_cameras_are_lines_and_change_nothing_else);
+  tcase_add_test (tc, test_camera_lines_are_before_or_behind_surfaces);
   tcase_add_test (tc, test_units_are_in_their_cameras_colours);
   tcase_add_test (tc, test_statistics_are_in_a_corner_and_leave_the_rest_alone);
   tcase_add_test (tc, test_transparent_background_lets_video_through);

@@ -85,7 +85,7 @@ struct Planes {
   double near_m, far_m;
 };
 
-/* Room for what is drawn beside its points: lines of cameras, surfaces moved behind others. Twice
+/* Room for what is drawn beside its points: bands' ends, surfaces moved behind others. Twice
  * the range costs a bit of the depth buffer, which has 24. */
 constexpr double kRoom = 2;
 constexpr double kMostFarToNear = 2000;
