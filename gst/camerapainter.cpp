@@ -15,10 +15,27 @@ uniform mat4 u_clip_from_world;
 in vec3 a_position;
 in vec3 a_colour;
 out vec3 v_colour;
+out vec2 v_depth;
 void main ()
 {
   gl_Position = u_clip_from_world * vec4 (a_position, 1.0);
+  v_depth = gl_Position.zw;
+  gl_Position.z = 0.0;
   v_colour = a_colour;
+}
+)";
+
+/* Near and far plane are those of the points. Lines go on beyond them: they keep their depth beside
+ * the points, but nothing clips them. */
+static const char *const kFragmentShader = R"(
+precision highp float;
+in vec3 v_colour;
+in vec2 v_depth;
+out vec4 fragment;
+void main ()
+{
+  fragment = vec4 (v_colour, 1.0);
+  gl_FragDepth = clamp (0.5 + 0.5 * v_depth.x / v_depth.y, 0.0, 1.0);
 }
 )";
 
@@ -28,7 +45,7 @@ CameraPainter::start (GstGLContext *context)
   if (shader_ || failed_)
     return shader_ != nullptr;
   GError *error = nullptr;
-  shader_ = make_shader (context, kVertexShader, kColourFragmentShader, &error);
+  shader_ = make_shader (context, kVertexShader, kFragmentShader, &error);
   if (!shader_) {
     failed_ = true;
     GST_WARNING ("cameras cannot be drawn: %s", error ? error->message : "no shader");
@@ -52,32 +69,36 @@ CameraPainter::start (GstGLContext *context)
   return true;
 }
 
-bool
-CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines,
+guint64
+CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines, guint64 serial,
     const rangecast::Mat4 &clip_from_world)
 {
   if (!start (context))
-    return false;
+    return 0;
   const GstGLFuncs *gl = context->gl_vtable;
   gst_gl_shader_use (shader_);
   gst_gl_shader_set_uniform_matrix_4fv (
       shader_, "u_clip_from_world", 1, FALSE, clip_from_world.data ());
   gl->BindVertexArray (array_);
   gl->BindBuffer (GL_ARRAY_BUFFER, vertices_);
-  gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
+  const bool changed = uploaded_ != serial;
+  if (changed)
+    gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
+  uploaded_ = serial;
   gl->Enable (GL_DEPTH_TEST);
   gl->DrawArrays (GL_LINES, 0, GLsizei (lines.size ()));
   gl->Disable (GL_DEPTH_TEST);
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gst_gl_context_clear_shader (context);
-  return true;
+  return changed ? lines.size_bytes () : 0;
 }
 
 void
 CameraPainter::stop ()
 {
   failed_ = false;
+  uploaded_ = 0;
   if (!context_)
     return;
   const GstGLFuncs *gl = context_->gl_vtable;

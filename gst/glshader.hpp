@@ -15,6 +15,14 @@ void main ()
 }
 )";
 
+/** Covers the viewport with one triangle, drawn without vertex buffers. */
+inline constexpr const char *kCoveringVertexShader = R"(
+void main ()
+{
+  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}
+)";
+
 /** Whether the context is one of OpenGL ES 3.0 or later. */
 inline bool
 is_gles (GstGLContext *context)

@@ -23,7 +23,10 @@
 
 #include "gststriprender.h"
 
+#include <algorithm>
+#include <exception>
 #include <gstrange/gstrangestatus.hpp>
+#include <utility>
 
 #include "stripcaps.hpp"
 #include "striprenderstate.hpp"
@@ -67,16 +70,33 @@ gst_strip_render_fixate_caps (
   return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
 }
 
+/* May throw. */
+static GstFlowReturn
+take_input_caps (GstStripRender *self, GstCaps *in)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  const Status status = gstrange::parse_caps (in, priv->info);
+  const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
+  if (told && !status.ok ())
+    return GST_FLOW_ERROR;
+  if (status.ok ())
+    priv->scene.set_rig (priv->info.rig);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
 static gboolean
 gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
-  const Status status = gstrange::parse_caps (in, priv->info);
-  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK ||
+  if (strip_has_flags_as_text (out)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("The caps' multiview-flags are text, expected (GstVideoMultiviewFlagsSet)"), (nullptr));
+    return FALSE;
+  }
+  if (strip_guarded (self, [&] { return take_input_caps (self, in); }) != GST_FLOW_OK ||
       !gst_video_info_from_caps (&priv->out, out))
     return FALSE;
-  priv->scene.set_rig (priv->info.rig);
   {
     std::lock_guard guard (priv->lock);
     priv->rate = strip_output_rate (in, out);
@@ -99,35 +119,72 @@ gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
   return TRUE;
 }
 
-/* A pool of OpenGL's buffers in our context: downstream's if it offers one. */
-static gboolean
-choose_pool (GstStripRender *self, GstQuery *query)
+struct PoolSizes {
+  guint size = 0, min = 0, max = 0; /* bytes of a buffer; numbers of buffers */
+};
+
+/* Has a pool make OpenGL's buffers of those caps. A pool may want more than it is asked for: it
+ * then refuses, and has in its configuration what it would take. @return whether it will do */
+static bool
+configure_pool (GstBufferPool *pool, GstQuery *query, PoolSizes &sizes)
 {
   GstCaps *caps;
-  GstBufferPool *pool = nullptr;
-  guint size = 0, min = 0, max = 0;
   gst_query_parse_allocation (query, &caps, nullptr);
-  const bool offered = gst_query_get_n_allocation_pools (query) > 0;
-  if (offered)
-    gst_query_parse_nth_allocation_pool (query, 0, &pool, &size, &min, &max);
-  if (pool && !GST_IS_GL_BUFFER_POOL (pool))
-    gst_clear_object (&pool);
-  if (!pool)
-    pool = gst_gl_buffer_pool_new (GST_GL_BASE_FILTER (self)->context);
-  size = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
-
   GstStructure *config = gst_buffer_pool_get_config (pool);
-  gst_buffer_pool_config_set_params (config, caps, size, min, max);
+  gst_buffer_pool_config_set_params (config, caps, sizes.size, sizes.min, sizes.max);
   gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
   if (gst_query_find_allocation_meta (query, GST_GL_SYNC_META_API_TYPE, nullptr))
     gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_GL_SYNC_META);
-  const gboolean configured = gst_buffer_pool_set_config (pool, config);
+  bool taken = gst_buffer_pool_set_config (pool, config);
+  config = gst_buffer_pool_get_config (pool);
+  const bool enough =
+      gst_buffer_pool_config_validate_params (config, caps, sizes.size, sizes.min, sizes.max);
+  gst_buffer_pool_config_get_params (config, nullptr, &sizes.size, &sizes.min, &sizes.max);
+  if (taken || !enough) {
+    gst_structure_free (config);
+    return taken;
+  }
+  return gst_buffer_pool_set_config (pool, config);
+}
+
+/* Whether that pool's buffers can be drawn into from our context. */
+static bool
+is_usable (GstBufferPool *pool, GstGLContext *context)
+{
+  return pool && GST_IS_GL_BUFFER_POOL (pool) &&
+         gst_gl_context_can_share (GST_GL_BUFFER_POOL (pool)->context, context);
+}
+
+/* A pool of OpenGL's buffers: downstream's if it offers one that will do, else one of ours. */
+static bool
+choose_pool (GstStripRender *self, GstQuery *query)
+{
+  GstGLContext *context = GST_GL_BASE_FILTER (self)->context;
+  const guint least = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
+  GstBufferPool *pool = nullptr;
+  PoolSizes offer;
+  const bool offered = gst_query_get_n_allocation_pools (query) > 0;
   if (offered)
-    gst_query_set_nth_allocation_pool (query, 0, pool, size, min, max);
+    gst_query_parse_nth_allocation_pool (query, 0, &pool, &offer.size, &offer.min, &offer.max);
+  offer.size = std::max (offer.size, least);
+  PoolSizes sizes = offer;
+  if (!is_usable (pool, context) || !configure_pool (pool, query, sizes)) {
+    if (pool)
+      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " does not suit us: a pool of our own", pool);
+    gst_clear_object (&pool);
+    pool = gst_gl_buffer_pool_new (context);
+    sizes = {least, offer.min, 0};
+    if (!configure_pool (pool, query, sizes)) {
+      gst_object_unref (pool);
+      return false;
+    }
+  }
+  if (offered)
+    gst_query_set_nth_allocation_pool (query, 0, pool, sizes.size, sizes.min, sizes.max);
   else
-    gst_query_add_allocation_pool (query, pool, size, min, max);
+    gst_query_add_allocation_pool (query, pool, sizes.size, sizes.min, sizes.max);
   gst_object_unref (pool);
-  return configured;
+  return true;
 }
 
 static gboolean
@@ -141,12 +198,12 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
   if (priv->no_context || !choose_pool (self, query) ||
       !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
     return FALSE;
-  if (priv->gl_error && !priv->gl_error_posted) {
-    priv->gl_error_posted = true;
-    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-        ("OpenGL cannot be used: %s", priv->gl_error->message), (nullptr));
-  }
-  return priv->gl_error == nullptr;
+  const GError *error = priv->gl_error ? priv->gl_error : priv->output_error;
+  if (error && !priv->gl_error_posted)
+    GST_ELEMENT_ERROR (
+        self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
+  priv->gl_error_posted = error != nullptr;
+  return error == nullptr;
 }
 
 /* ---- OpenGL's life ---- */
@@ -158,7 +215,12 @@ gst_strip_render_gl_start (GstGLBaseFilter *filter)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   g_clear_error (&priv->gl_error);
-  priv->drawing.start (filter->context, &priv->gl_error);
+  try {
+    priv->drawing.start (filter->context, &priv->gl_error);
+  } catch (const std::exception &error) {
+    g_set_error_literal (
+        &priv->gl_error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, error.what ());
+  }
   return TRUE;
 }
 
@@ -172,7 +234,9 @@ static gboolean
 gst_strip_render_gl_set_caps (GstGLBaseFilter *filter, GstCaps *, GstCaps *)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
-  return priv->drawing.set_output (filter->context, priv->out);
+  g_clear_error (&priv->output_error);
+  priv->drawing.set_output (filter->context, priv->out, &priv->output_error);
+  return TRUE;
 }
 
 static GstFlowReturn
@@ -180,6 +244,7 @@ gst_strip_render_transform (GstBaseTransform *base, GstBuffer *in, GstBuffer *ou
 {
   auto self = GST_STRIP_RENDER (base);
   strip_sync_values (self, GST_BUFFER_PTS (in));
+  strip_mark_discont (self, out);
   return strip_draw_frame (self, in, out, strip_running_time (self, GST_BUFFER_PTS (in)), false);
 }
 
@@ -276,6 +341,7 @@ gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
         strip_drain (self);
       break;
     case GST_EVENT_SEGMENT:
+    case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_STREAM_START:
     case GST_EVENT_EOS:
       strip_drain_and_reset (self);
@@ -302,6 +368,8 @@ gst_strip_render_query (GstBaseTransform *base, GstPadDirection direction, GstQu
       !(gst_query_type_get_flags (GST_QUERY_TYPE (query)) & GST_QUERY_TYPE_SERIALIZED))
     return pass (base, direction, query);
   StreamLocks locks (base); /* the base class may negotiate */
+  if (GST_QUERY_TYPE (query) == GST_QUERY_DRAIN)
+    strip_give_back (GST_STRIP_RENDER (base));
   return pass (base, direction, query);
 }
 
@@ -344,7 +412,7 @@ gst_strip_render_start (GstBaseTransform *base)
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->gl_error_posted = priv->no_context = false;
+  priv->gl_error_posted = priv->no_context = priv->caps_refused = false;
   priv->live = false;
   priv->stats_text = {};
   strip_reset_rate (self);
@@ -412,6 +480,7 @@ gst_strip_render_finalize (GObject *object)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   g_clear_error (&priv->gl_error);
+  g_clear_error (&priv->output_error);
   delete priv;
   G_OBJECT_CLASS (gst_strip_render_parent_class)->finalize (object);
 }
@@ -447,7 +516,8 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   prop_stats = install_strip_settings (object_class) + 1;
   g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
-          "Since start: frames, frame-sets, repeated, dropped; and of the last frame: points, "
+          "Since start: frames, frame-sets, repeated, dropped, uploaded-total; and of the last "
+          "frame: points, "
           "vertices, triangles, strips, isolated, uploaded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 

@@ -5,13 +5,6 @@
 
 #include "glshader.hpp"
 
-/* One triangle that covers the viewport, which is the panel's place. */
-static const char *const kVertexShader = R"(
-void main ()
-{
-  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
-}
-)";
 static const char *const kFragmentShader = R"(
 precision highp float;
 precision highp int;
@@ -33,7 +26,7 @@ PanelPainter::start (GstGLContext *context)
   if (shader_ || failed_)
     return shader_ != nullptr;
   GError *error = nullptr;
-  shader_ = make_shader (context, kVertexShader, kFragmentShader, &error);
+  shader_ = make_shader (context, kCoveringVertexShader, kFragmentShader, &error);
   if (!shader_) {
     failed_ = true;
     GST_WARNING ("statistics cannot be drawn: %s", error ? error->message : "no shader");
@@ -50,26 +43,26 @@ PanelPainter::start (GstGLContext *context)
   return true;
 }
 
-void
+guint64
 PanelPainter::upload (const rangecast::ImageView<const rangecast::Rgbx> &panel)
 {
   context_->gl_vtable->PixelStorei (GL_UNPACK_ALIGNMENT, 4);
   context_->gl_vtable->TexImage2D (GL_TEXTURE_2D, 0, GL_RGBA8, panel.width, panel.height, 0,
       GL_RGBA, GL_UNSIGNED_BYTE, panel.data);
   uploaded_ = true;
+  return guint64 (panel.width) * guint64 (panel.height) * sizeof (rangecast::Rgbx);
 }
 
-void
+guint64
 PanelPainter::draw (GstGLContext *context, const rangecast::ImageView<const rangecast::Rgbx> &panel,
     bool changed, int x, int y, int scale)
 {
   if (panel.empty () || !start (context))
-    return;
+    return 0;
   const GstGLFuncs *gl = context->gl_vtable;
   gl->ActiveTexture (GL_TEXTURE0);
   gl->BindTexture (GL_TEXTURE_2D, texture_);
-  if (changed || !uploaded_)
-    upload (panel);
+  const guint64 uploaded = changed || !uploaded_ ? upload (panel) : 0;
   const int left = x + kBorder * scale, top = y + kBorder * scale;
   gl->Viewport (left, top, panel.width * scale, panel.height * scale);
   gst_gl_shader_use (shader_);
@@ -80,6 +73,7 @@ PanelPainter::draw (GstGLContext *context, const rangecast::ImageView<const rang
   gl->DrawArrays (GL_TRIANGLES, 0, 3);
   gl->BindVertexArray (0);
   gst_gl_context_clear_shader (context);
+  return uploaded;
 }
 
 void

@@ -13,15 +13,16 @@ public:
    *  @param panel    R, G, B, unused; at most 4096 pixels wide and high
    *  @param changed  it is another one than the last time
    *  @param x, y     pixels, where the picture begins that it is laid over
-   *  @param scale    pixels a pixel of the panel becomes, each way */
-  void draw (GstGLContext *context, const rangecast::ImageView<const rangecast::Rgbx> &panel,
+   *  @param scale    pixels a pixel of the panel becomes, each way
+   *  @return bytes uploaded */
+  guint64 draw (GstGLContext *context, const rangecast::ImageView<const rangecast::Rgbx> &panel,
       bool changed, int x, int y, int scale);
   /** Deletes everything that OpenGL holds for us. */
   void stop ();
 
 private:
   bool start (GstGLContext *context);
-  void upload (const rangecast::ImageView<const rangecast::Rgbx> &panel);
+  guint64 upload (const rangecast::ImageView<const rangecast::Rgbx> &panel);
 
   GstGLContext *context_ = nullptr;
   GstGLShader *shader_ = nullptr;

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "picturethread.hpp"
 
-#include <system_error>
+#include <pthread.h>
+
+#include <exception>
 
 bool
 PictureThread::start (GstElement *element, Tick tick)
@@ -12,7 +14,7 @@ PictureThread::start (GstElement *element, Tick tick)
   quit_ = false;
   try {
     thread_ = std::thread ([this, element, tick] { run (element, tick); });
-  } catch (const std::system_error &error) {
+  } catch (const std::exception &error) {
     GST_WARNING ("no thread: %s", error.what ());
     return false;
   }
@@ -85,8 +87,27 @@ PictureThread::wait_for_clock (
   waiting_ = false;
 }
 
+/* Applications give threads their priorities then. */
+static void
+tell (GstElement *element, GstStreamStatusType type)
+{
+  gst_element_post_message (
+      element, gst_message_new_stream_status (GST_OBJECT (element), type, element));
+}
+
 void
 PictureThread::run (GstElement *element, Tick tick)
+{
+#ifdef __GLIBC__
+  pthread_setname_np (pthread_self (), "rangecast:draw");
+#endif
+  tell (element, GST_STREAM_STATUS_TYPE_ENTER);
+  draw (element, tick);
+  tell (element, GST_STREAM_STATUS_TYPE_LEAVE);
+}
+
+void
+PictureThread::draw (GstElement *element, Tick tick)
 {
   std::unique_lock guard (lock_);
   while (!quit_) {

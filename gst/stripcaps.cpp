@@ -3,7 +3,9 @@
 
 #include <gst/video/video.h>
 
-static constexpr int kMostPicturesASecond = 1000;
+#include "picturegrid.hpp"
+
+static constexpr int kMostPicturesASecond = PictureGrid::kMostRate;
 
 /* The frame rate of caps that are one structure, else nullptr. */
 static const GValue *
@@ -64,7 +66,7 @@ fixate_rate (GstStructure *s, const GstCaps *input)
   g_value_init (&none, GST_TYPE_FRACTION);
   gst_value_set_fraction (&none, 0, 1);
   const GValue *wanted = gst_structure_get_value (s, "framerate");
-  if (n == 0 && wanted && !gst_value_can_intersect (wanted, &none))
+  if (n == 0 && wanted && !gst_value_intersect (nullptr, wanted, &none))
     n = 30;
   g_value_unset (&none);
   gst_structure_fixate_field_nearest_fraction (s, "framerate", n, d);
@@ -99,6 +101,13 @@ strip_fixate_output (GstCaps *caps, const GstCaps *input)
   else
     gst_structure_set (s, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
   return gst_caps_fixate (caps);
+}
+
+bool
+strip_has_flags_as_text (const GstCaps *output)
+{
+  const GstStructure *s = gst_caps_get_structure (output, 0);
+  return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
 }
 
 FrameRate

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <utility>
 
 static constexpr GLenum kContextLost = 0x0507; /* of OpenGL 4.5 and ES 3.2 */
 
@@ -27,19 +29,33 @@ StripDrawing::stop ()
   panel_painter_.stop ();
   multisampler_.stop ();
   gst_clear_object (&framebuffer_);
+  uploaded_ = 0;
   context_ = nullptr;
 }
 
 bool
-StripDrawing::set_output (GstGLContext *context, const GstVideoInfo &info)
+StripDrawing::set_output (GstGLContext *context, const GstVideoInfo &info, GError **error)
 {
   gst_clear_object (&framebuffer_);
   width_ = GST_VIDEO_INFO_WIDTH (&info);
   height_ = GST_VIDEO_INFO_HEIGHT (&info);
   eyes_ = EyePlaces (info);
-  framebuffer_ =
-      gst_gl_framebuffer_new_with_default_depth (context, guint (width_), guint (height_));
+  gint largest = 0;
+  context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest);
+  if (std::max (width_, height_) <= largest)
+    framebuffer_ =
+        gst_gl_framebuffer_new_with_default_depth (context, guint (width_), guint (height_));
+  if (!framebuffer_)
+    g_set_error (error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED,
+        "pictures of %dx%d pixels, expected no more than %dx%d", width_, height_, largest, largest);
   return framebuffer_ != nullptr;
+}
+
+/* R, G, B, A of ARGB */
+static float
+background_channel (const StripRenderSettings &settings, int i)
+{
+  return float (settings.background >> (i == 3 ? 24 : 16 - 8 * i) & 0xff) / 255.f;
 }
 
 StripPainter::Picture
@@ -48,8 +64,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   const StripRenderSettings &settings = *job.settings;
   const rangecast::SceneFrame &frame = job.scene->frame ();
   const rangecast::Eye eye = {place.side * settings.eye_distance_m / 2, settings.convergence_m};
-  const auto matrices =
-      rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye, job.scene->hull ());
+  const auto matrices = rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye,
+      job.scene->hull (), 2 * settings.view_gap_m /* of a view that looks the other way */);
   if (result.width == 0) {
     result.matrices = matrices;
     result.width = place.width;
@@ -61,9 +77,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   const double fov = job.orbit.fov_deg > 0 ? job.orbit.fov_deg : frame.fov_deg;
   StripPainter::Picture picture = {};
   picture.clip_from_world = rangecast::in_part (matrices.clip_from_world, part);
-  for (int i = 0; i < 4; i++) /* ARGB to R, G, B, A */
-    picture.background[i] =
-        float (settings.background >> (i == 3 ? 24 : 16 - 8 * i) & 0xff) / 255.f;
+  for (int i = 0; i < 4; i++)
+    picture.background[i] = background_channel (settings, i);
   picture.point_size = float (settings.point_size);
   picture.pixels_per_unit = float (place.height / (2 * std::tan (fov * M_PI / 360)));
   picture.mode = settings.strips.mode;
@@ -76,49 +91,82 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   return picture;
 }
 
-/* Scissors keep the painter, which clears and draws whole pictures, to this eye's part. */
-guint64
-StripDrawing::draw_eye (const StripDrawingJob &job, const EyePlace &place, Result &result)
+struct StripDrawing::Call {
+  StripDrawing *self;
+  const StripDrawingJob *job;
+  GstBuffer *out;
+  bool panel_changed;
+  guint memory = 0; /* that is drawn into now */
+  Result result = {};
+  std::exception_ptr exception = {}; /* which must not go through C, nor end the GL thread */
+};
+
+/* Once for all pictures of a scene: for both eyes, and for as long as it is held. */
+bool
+StripDrawing::upload (Call &call)
 {
+  const StripScene &scene = *call.job->scene;
+  if (uploaded_ == scene.serial ())
+    return true;
+  if (!painter_.fits (scene.layers ()))
+    return false;
+  call.result.uploaded += painter_.upload (scene.layers ());
+  uploaded_ = scene.serial ();
+  return true;
+}
+
+/* Scissors keep the painter, which clears and draws whole pictures, to this eye's part. */
+void
+StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
+{
+  const StripDrawingJob &job = *call.job;
   const GstGLFuncs *gl = context_->gl_vtable;
-  const StripPainter::Picture picture = make_picture (job, place, result);
+  StripPainter::Picture picture = make_picture (job, place, call.result);
+  if (antialiased && picture.background[3] < 1) /* it comes behind the means of the samples */
+    std::ranges::fill (picture.background, 0.f);
   const bool whole = place.width == width_ && place.height == height_;
   if (!whole) {
     gl->Enable (GL_SCISSOR_TEST);
     gl->Scissor (place.x, place.y, place.width, place.height);
   }
-  const guint64 uploaded = painter_.draw (picture, job.scene->layers ());
+  painter_.draw (picture, job.scene->layers ());
   if (job.settings->show_cameras)
-    camera_painter_.draw (context_, job.scene->camera_lines (), picture.clip_from_world);
+    call.result.uploaded +=
+        camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),
+            picture.back_faces ? StripPainter::in_half_of_depths (picture.clip_from_world, false)
+                               : picture.clip_from_world);
   if (!job.panel.empty ())
-    panel_painter_.draw (context_, job.panel, job.panel_changed, place.x, place.y,
-        std::max (1, (place.height + 240) / 480));
+    call.result.uploaded +=
+        panel_painter_.draw (context_, job.panel, std::exchange (call.panel_changed, false),
+            place.x, place.y, std::max (1, (place.height + 240) / 480));
   if (!whole)
     gl->Disable (GL_SCISSOR_TEST);
-  return uploaded;
 }
 
-struct StripDrawing::Call {
-  StripDrawing *self;
-  const StripDrawingJob *job;
-  GstBuffer *out;
-  guint memory; /* that is drawn into now */
-  Result result;
-};
+/* All that one memory of the buffer shows. */
+void
+StripDrawing::draw_memory (Call &call)
+{
+  const StripRenderSettings &settings = *call.job->settings;
+  const bool antialiased = multisampler_.begin (context_, width_, height_, settings.samples);
+  for (const EyePlace &place : eyes_.all ())
+    if (place.memory == call.memory)
+      draw_eye (call, place, antialiased);
+  if (antialiased)
+    multisampler_.end ({background_channel (settings, 0), background_channel (settings, 1),
+        background_channel (settings, 2), background_channel (settings, 3)});
+}
 
 gboolean
 StripDrawing::draw_bound (gpointer user_data)
 {
   auto call = static_cast<Call *> (user_data);
-  StripDrawing *self = call->self;
-  const bool antialiased = self->multisampler_.begin (
-      self->context_, self->width_, self->height_, call->job->settings->samples);
-  for (const EyePlace &place : self->eyes_.all ())
-    if (place.memory == call->memory)
-      call->result.uploaded += self->draw_eye (*call->job, place, call->result);
-  if (antialiased)
-    self->multisampler_.end ();
-  return TRUE;
+  try {
+    call->self->draw_memory (*call);
+  } catch (...) {
+    call->exception = std::current_exception ();
+  }
+  return !call->exception;
 }
 
 /* What no further call can mend. @return why, or nullptr */
@@ -141,28 +189,41 @@ fatal_error (const GstGLFuncs *gl)
 }
 
 void
-StripDrawing::draw_in_gl_thread (GstGLContext *context, gpointer user_data)
+StripDrawing::draw_memories (Call &call)
+{
+  const guint memories = eyes_.all ().back ().memory + 1;
+  bool drawn = true;
+  if (!upload (call)) {
+    call.result.reason = "a view is larger than its textures can be";
+    return;
+  }
+  for (guint i = 0; i < memories && drawn; i++) {
+    call.memory = i;
+    drawn = gst_gl_framebuffer_draw_to_texture (
+        framebuffer_, GST_GL_MEMORY_CAST (gst_buffer_peek_memory (call.out, i)), draw_bound, &call);
+  }
+  call.result.reason = drawn ? fatal_error (context_->gl_vtable) : "there is no framebuffer for it";
+  call.result.drawn = drawn && !call.result.reason;
+  GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call.out);
+  if (call.result.drawn && sync) /* other contexts wait for our commands there */
+    gst_gl_sync_meta_set_sync_point (sync, context_);
+}
+
+void
+StripDrawing::draw_in_gl_thread (GstGLContext *, gpointer user_data)
 {
   auto call = static_cast<Call *> (user_data);
-  const guint memories = call->self->eyes_.all ().back ().memory + 1;
-  bool drawn = true;
-  for (guint i = 0; i < memories && drawn; i++) {
-    call->memory = i;
-    drawn = gst_gl_framebuffer_draw_to_texture (call->self->framebuffer_,
-        GST_GL_MEMORY_CAST (gst_buffer_peek_memory (call->out, i)), draw_bound, call);
+  try {
+    call->self->draw_memories (*call);
+  } catch (...) {
+    call->exception = std::current_exception ();
   }
-  call->result.reason = drawn ? fatal_error (context->gl_vtable) : "there is no framebuffer for it";
-  drawn = drawn && !call->result.reason;
-  call->result.drawn = drawn;
-  GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call->out);
-  if (drawn && sync) /* other contexts wait for our commands there */
-    gst_gl_sync_meta_set_sync_point (sync, context);
 }
 
 StripDrawing::Result
 StripDrawing::draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out)
 {
-  Call call{this, &job, out, 0, {}};
+  Call call = {.self = this, .job = &job, .out = out, .panel_changed = job.panel_changed};
   const guint memories = eyes_.all ().back ().memory + 1;
   std::array<GstMapInfo, 2> maps; /* tell whoever reads it on the CPU that it has changed */
   guint mapped = 0;
@@ -177,5 +238,7 @@ StripDrawing::draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer
     gst_gl_context_thread_add (context, draw_in_gl_thread, &call);
   for (guint i = 0; i < mapped; i++)
     gst_memory_unmap (gst_buffer_peek_memory (out, i), &maps[i]);
+  if (call.exception)
+    std::rethrow_exception (call.exception);
   return call.result;
 }

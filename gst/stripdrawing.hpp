@@ -25,24 +25,29 @@ public:
   /** @name In the GL thread @{ */
   bool start (GstGLContext *context, GError **error);
   void stop ();
-  bool set_output (GstGLContext *context, const GstVideoInfo &info);
+  /** @return false if OpenGL has no framebuffer as large as the pictures; `error` names sizes */
+  bool set_output (GstGLContext *context, const GstVideoInfo &info, GError **error);
   /** @} */
 
   struct Result {
     bool drawn = false;
     const char *reason = "the output is not its memory"; ///< why it is not drawn
-    guint64 uploaded = 0;                                ///< bytes
-    rangecast::OrbitMatrices matrices;                   ///< of the first eye
-    int width = 0, height = 0;                           ///< of the first eye's picture, pixels
+    guint64 uploaded = 0;              ///< bytes; a scene that is there already costs none
+    rangecast::OrbitMatrices matrices; ///< of the first eye
+    int width = 0, height = 0;         ///< of the first eye's picture, pixels
   };
-  /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. */
+  /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. Exceptions of the
+   *  GL thread are thrown here. */
   Result draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out);
 
 private:
   struct Call;
   static void draw_in_gl_thread (GstGLContext *context, gpointer call);
   static gboolean draw_bound (gpointer call);
-  guint64 draw_eye (const StripDrawingJob &job, const EyePlace &place, Result &result);
+  bool upload (Call &call);
+  void draw_memory (Call &call);
+  void draw_memories (Call &call);
+  void draw_eye (Call &call, const EyePlace &place, bool antialiased);
   StripPainter::Picture make_picture (
       const StripDrawingJob &job, const EyePlace &place, Result &result) const;
 
@@ -50,6 +55,7 @@ private:
   GstGLFramebuffer *framebuffer_ = nullptr;
   int width_ = 0, height_ = 0;
   EyePlaces eyes_;
+  guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;
   CameraPainter camera_painter_;
   PanelPainter panel_painter_;

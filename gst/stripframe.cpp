@@ -20,7 +20,19 @@ orbit_time (GstStripRenderPrivate *priv, GstClockTime running)
 GstClockTime
 strip_running_time (GstStripRender *self, GstClockTime pts)
 {
-  return gst_segment_to_running_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  if (segment.format != GST_FORMAT_TIME) /* then nothing has a time */
+    return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
+}
+
+GstClockTime
+strip_stream_time (GstStripRender *self, GstClockTime pts)
+{
+  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  if (segment.format != GST_FORMAT_TIME)
+    return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
 }
 
 /* Running time of the clock, or GST_CLOCK_TIME_NONE. */
@@ -58,9 +70,9 @@ update_panel (GstStripRender *self, std::size_t views, GstClockTime frame_set_pt
   return true;
 }
 
-/* Draws a frame set as it is to be seen at `running`. */
-GstFlowReturn
-strip_draw_frame (
+/* May throw. */
+static GstFlowReturn
+draw_frame (
     GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
 {
   GstStripRenderPrivate *priv = self->priv;
@@ -90,12 +102,21 @@ strip_draw_frame (
     return GST_FLOW_ERROR;
   }
   std::lock_guard guard (priv->lock);
-  priv->settings.camera.shown (result.matrices, result.width, result.height);
+  priv->settings.camera.shown (result.matrices, priv->scene.frame (), result.width, result.height);
   priv->scene.count_into (priv->stats);
   priv->stats.uploaded_bytes = result.uploaded;
+  priv->stats.uploaded_total += result.uploaded;
   priv->stats.frames++;
   priv->stats.repeated += again;
   return GST_FLOW_OK;
+}
+
+/* Draws a frame set as it is to be seen at `running`. */
+GstFlowReturn
+strip_draw_frame (
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
+{
+  return strip_guarded (self, [&] { return draw_frame (self, frame_set, out, running, keep); });
 }
 
 /* Gives controlled properties their values of that time. A time outside the segment, as of the
@@ -103,8 +124,7 @@ strip_draw_frame (
 void
 strip_sync_values (GstStripRender *self, GstClockTime pts)
 {
-  const GstClockTime time =
-      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstClockTime time = strip_stream_time (self, pts);
   if (GST_CLOCK_TIME_IS_VALID (time))
     gst_object_sync_values (GST_OBJECT (self), time);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "strippainter.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "glshader.hpp"
@@ -36,6 +37,7 @@ uniform float u_focal; /* pixels */
 uniform float u_unit;
 uniform float u_step;
 uniform float u_point_size;
+uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
 out vec3 v_colour;
 
@@ -81,6 +83,8 @@ void main ()
     depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
 #endif
   gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
+  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
+  gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
 }
@@ -113,6 +117,7 @@ StripPainter::start (GstGLContext *context, GError **error)
         "OpenGL has no glVertexAttribIPointer");
     return false;
   }
+  context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
   for (std::size_t i = 0; i < shaders_.size (); i++) {
     const std::string source = std::string (kVariants[i]) + kVertexShader;
     shaders_[i] = make_shader (context, source.c_str (), kColourFragmentShader, error);
@@ -143,7 +148,23 @@ StripPainter::stop ()
   context_ = nullptr;
 }
 
-/* Makes the objects of a view, or larger textures. */
+bool
+StripPainter::fits (std::span<const Layer> layers) const
+{
+  return std::ranges::all_of (layers, [&] (const Layer &layer) {
+    return std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
+  });
+}
+
+/* A ROI that follows somebody about shall not cost new textures in each picture. */
+static int
+rounded_up (int pixels, int most)
+{
+  constexpr int kStep = 64;
+  return std::min ((pixels + kStep - 1) / kStep * kStep, most);
+}
+
+/* Makes the objects of a view, or larger textures, which stay that large. */
 void
 StripPainter::prepare (ViewObjects &objects, int width, int height)
 {
@@ -158,10 +179,10 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
     gl->EnableVertexAttribArray (0); /* as the shaders' layout says */
     attribute_pointer_ (0, 1, GL_UNSIGNED_INT, sizeof (StripVertex), nullptr);
   }
-  if (objects.width == width && objects.height == height)
+  if (objects.width >= width && objects.height >= height)
     return;
-  objects.width = width;
-  objects.height = height;
+  objects.width = width = std::max (objects.width, rounded_up (width, largest_));
+  objects.height = height = std::max (objects.height, rounded_up (height, largest_));
   const auto allocate = [&] (guint texture, guint internal, guint format, guint type) {
     gl->BindTexture (GL_TEXTURE_2D, texture);
     gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -175,12 +196,12 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
 }
 
 guint64
-StripPainter::upload (ViewObjects &objects, const Layer &layer)
+StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
   const auto &colour = layer.image.colour;
-  prepare (objects, layer.view->width, layer.view->height);
+  prepare (objects, depth.width, depth.height);
   gl->PixelStorei (GL_UNPACK_ALIGNMENT, 2);
   gl->PixelStorei (GL_UNPACK_ROW_LENGTH, gint (depth.stride / 2));
   gl->BindTexture (GL_TEXTURE_2D, objects.depth);
@@ -223,11 +244,34 @@ clip_from_pixel (const Mat4 &clip_from_world, const StripPainter::Layer &layer)
   return product;
 }
 
+Mat4
+StripPainter::in_half_of_depths (Mat4 clip_matrix, bool farther)
+{
+  for (std::size_t i = 0; i < 4; i++)
+    clip_matrix[4 * i + 2] =
+        (clip_matrix[4 * i + 2] + (farther ? 1 : -1) * clip_matrix[4 * i + 3]) / 2;
+  return clip_matrix;
+}
+
 /* Row of the matrix that makes one clip coordinate. */
 static rangecast::Vec3
 row_of (const Mat4 &m, int i)
 {
   return {m[i], m[4 + i], m[8 + i]};
+}
+
+/* What u_behind has to be. Clip z is a w + b for all points, w their distance in metres along the
+ * viewer's direction: g metres farther b / w becomes b / (w + g), which never leaves the far plane
+ * as a shift of z by the like would, where the near plane is close. */
+static std::array<float, 2>
+behind (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double gap_m)
+{
+  const rangecast::Vec3 forward = row_of (clip_from_world, 3);
+  const double a = dot (row_of (clip_from_pixel, 2), row_of (clip_from_pixel, 3)) /
+                   dot (row_of (clip_from_pixel, 3), row_of (clip_from_pixel, 3));
+  const double b = clip_from_pixel[14] - a * clip_from_pixel[15];
+  const double g = std::max (gap_m * norm (forward), 1e-6);
+  return {float (b * g), float (g)};
 }
 
 void
@@ -241,15 +285,12 @@ StripPainter::draw_layer (
    * other: what it sees has more pixels there, and noise must not let both shine through. */
   const rangecast::Vec3 forward = row_of (picture.clip_from_world, 3);
   const rangecast::Mat3 &r = layer.view->world_from_view.rotation;
-  const double length = norm (forward);
-  const double along = dot (forward, {r[2], r[5], r[8]}) / length;
-  const double behind_m = picture.view_gap_m * (1 - along);
-  matrix[14] += float (behind_m * dot (row_of (picture.clip_from_world, 2), forward) / length);
+  const double along = dot (forward, {r[2], r[5], r[8]}) / norm (forward);
   if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
-    for (std::size_t i = 0; i < 4; i++)
-      matrix[4 * i + 2] =
-          (matrix[4 * i + 2] + (side == Side::kBack ? 1 : -1) * matrix[4 * i + 3]) / 2;
+    matrix = in_half_of_depths (matrix, side == Side::kBack);
+  const auto moved = behind (matrix, picture.clip_from_world, picture.view_gap_m * (1 - along));
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
+  gst_gl_shader_set_uniform_2f (shader, "u_behind", moved[0], moved[1]);
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
@@ -310,31 +351,33 @@ StripPainter::end ()
 }
 
 guint64
+StripPainter::upload (std::span<const Layer> layers)
+{
+  guint64 uploaded = 0;
+  turn_ = (turn_ + 1) % objects_.size ();
+  context_->gl_vtable->ActiveTexture (GL_TEXTURE0);
+  for (const Layer &layer : layers)
+    if (!layer.vertices.empty ())
+      uploaded += upload_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer);
+  return uploaded;
+}
+
+void
 StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   /* Noise turns many a single rectangle over: they have two sides, as points have. */
   const bool sided = picture.mode == StripMode::kStrips;
-  guint64 uploaded = 0;
-  turn_ = (turn_ + 1) % objects_.size ();
-  begin (picture);
-  if (sided)
-    show_side (gl, picture.clip_from_world, false);
-  for (const Layer &layer : layers) {
-    if (layer.vertices.empty ())
-      continue;
-    ViewObjects &objects = objects_[turn_][std::size_t (layer.image.view_id)];
-    gl->ActiveTexture (GL_TEXTURE0);
-    uploaded += upload (objects, layer);
-    draw_layer (objects, layer, picture, Side::kFront);
-  }
-  if (sided && picture.back_faces) {
-    show_side (gl, picture.clip_from_world, true);
+  const auto draw_all = [&] (Side side) {
+    if (sided)
+      show_side (gl, picture.clip_from_world, side == Side::kBack);
     for (const Layer &layer : layers)
       if (!layer.vertices.empty ())
-        draw_layer (
-            objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, Side::kBack);
-  }
+        draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, side);
+  };
+  begin (picture);
+  draw_all (Side::kFront);
+  if (sided && picture.back_faces)
+    draw_all (Side::kBack);
   end ();
-  return uploaded;
 }

@@ -37,16 +37,26 @@ public:
     const rangecast::View *view;
     std::span<const rangecast::StripVertex> vertices;
   };
-  /** Draws one picture into the bound framebuffer. @return bytes uploaded */
-  guint64 draw (const Picture &picture, std::span<const Layer> layers);
+  /** Whether OpenGL's textures can be as large as the layers' ROIs. */
+  [[nodiscard]] bool fits (std::span<const Layer> layers) const;
+  /** Hands a frame set to OpenGL: depth, colour and vertices of its layers, which must fit.
+   *  @return their bytes */
+  guint64 upload (std::span<const Layer> layers);
+  /** Draws one picture of what was uploaded last into the bound framebuffer. May be called as often
+   *  as there are pictures of it: of two eyes, or of a camera that moves.
+   *  @param layers  those that were uploaded; of images only the ROI's place and size are read */
+  void draw (const Picture &picture, std::span<const Layer> layers);
+  /** The matrix whose depths are all in the nearer half of the depth buffer, where fronts are with
+   *  back_faces, or in the farther one. */
+  static rangecast::Mat4 in_half_of_depths (rangecast::Mat4 clip_matrix, bool farther);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */
     guint depth = 0, colour = 0, vertices = 0, array = 0;
-    int width = 0, height = 0;
+    int width = 0, height = 0; /* of the textures, pixels */
   };
   void prepare (ViewObjects &objects, int width, int height);
-  guint64 upload (ViewObjects &objects, const Layer &layer);
+  guint64 upload_layer (ViewObjects &objects, const Layer &layer);
   void begin (const Picture &picture);
   void end ();
   enum class Side { kFront, kBack };
@@ -59,8 +69,9 @@ private:
 
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
+  gint largest_ = 0;                       /* side of a texture, pixels */
   std::array<GstGLShader *, 3> shaders_{}; /* by mode */
-  /* In turns: what the last picture reads may still be in use while this one's is written. */
+  /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;
 };

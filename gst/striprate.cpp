@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include <algorithm>
+#include <utility>
 
 #include "striprenderstate.hpp"
 
@@ -33,17 +34,25 @@ strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts, GstC
   {
     std::lock_guard guard (priv->lock);
     dropped = priv->stats.dropped += count;
+    priv->discont = true;
     drawn = priv->stats.frames;
     earliest = priv->earliest;
   }
-  const GstClockTime stream =
-      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstClockTime stream = strip_stream_time (self, pts);
   GstMessage *message =
       gst_message_new_qos (GST_OBJECT (self), priv->live, running, stream, pts, duration);
   if (GST_CLOCK_TIME_IS_VALID (earliest))
     gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), 1.0, 1000000);
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, drawn, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
+}
+
+void
+strip_mark_discont (GstStripRender *self, GstBuffer *out)
+{
+  std::lock_guard guard (self->priv->lock);
+  if (std::exchange (self->priv->discont, false))
+    GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
 }
 
 bool
@@ -70,6 +79,30 @@ strip_has_own_rate (GstStripRender *self)
   return self->priv->grid.active ();
 }
 
+/* Has go downstream what pictures do not fill of a gap before the one at `next`, stream position,
+ * or GST_CLOCK_TIME_NONE if there is none to come. With the source pad's stream lock. */
+static void
+pass_gap (GstStripRender *self, GstClockTime next)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  StreamGap &gap = priv->gap;
+  GstClockTime covered, tolerance;
+  {
+    std::lock_guard guard (priv->lock);
+    covered = priv->grid.covered ();
+    tolerance = covered > gap.begin ? priv->grid.tolerance () : 0; /* times are not quite even */
+  }
+  const GstClockTime begin = std::max (gap.begin, covered), end = std::min (gap.end, next);
+  if (begin >= gap.end) /* it is filled, or there is none */
+    gap = {};
+  if (begin + tolerance >= end)
+    return;
+  GstEvent *event = gst_event_new_gap (begin, end - begin);
+  gst_event_set_gap_flags (event, gap.flags);
+  gap.begin = end;
+  gst_pad_push_event (GST_BASE_TRANSFORM (self)->srcpad, event);
+}
+
 void
 strip_apply_rate (GstStripRender *self)
 {
@@ -86,6 +119,8 @@ strip_apply_rate (GstStripRender *self)
   }
   if (!changed)
     return;
+  if (!strip_has_own_rate (self))
+    pass_gap (self, GST_CLOCK_TIME_NONE);
   gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
   priv->thread.wake (); /* it may be waiting for a picture of the old rate */
 }
@@ -117,6 +152,7 @@ draw_picture (GstStripRender *self, const PictureGrid::Picture &picture, GstBuff
     GST_BUFFER_FLAG_SET (*out, GST_BUFFER_FLAG_DISCONT);
   else
     GST_BUFFER_FLAG_UNSET (*out, GST_BUFFER_FLAG_DISCONT);
+  strip_mark_discont (self, *out);
   strip_sync_values (self, picture.pts);
   const GstFlowReturn drawn = strip_draw_frame (
       self, picture.frame_set, *out, strip_running_time (self, picture.pts), true);
@@ -162,10 +198,11 @@ drain_all (GstStripRender *self)
   GstClockTime end;
   {
     std::lock_guard guard (priv->lock);
-    end = priv->grid.end ();
+    end = priv->grid.until_the_end ();
   }
   if (strip_has_own_rate (self))
     drain (self, end);
+  pass_gap (self, GST_CLOCK_TIME_NONE);
   gst_clear_buffer (&priv->drawn);
 }
 
@@ -183,6 +220,7 @@ strip_drain_and_reset (GstStripRender *self)
   drain_all (self);
   std::lock_guard guard (self->priv->lock);
   self->priv->grid.reset ();
+  self->priv->flow = GST_FLOW_OK; /* what comes is another stream: it may be let in */
 }
 
 void
@@ -218,6 +256,14 @@ thread_draws (GstStripRender *self)
     return false;
   std::lock_guard guard (priv->lock);
   return priv->flow == GST_FLOW_OK;
+}
+
+/* Stream position of the next picture, or GST_CLOCK_TIME_NONE. */
+static GstClockTime
+next_pts (GstStripRender *self)
+{
+  std::lock_guard guard (self->priv->lock);
+  return self->priv->grid.next_pts ();
 }
 
 /* When the next picture is to be begun: as soon as its frame set is sure. Running time. */
@@ -267,6 +313,24 @@ catch_up (GstStripRender *self, GstClockTime now)
         self, late, picture.pts, picture.duration, strip_running_time (self, picture.pts));
 }
 
+static void
+set_flow (GstStripRender *self, GstFlowReturn flow)
+{
+  std::lock_guard guard (self->priv->lock);
+  self->priv->flow = flow;
+}
+
+/* Of the drawing thread, which ends its work, as a source does: upstream hears of it with its next
+ * frame set, which a stream that stalls does not have. */
+static void
+tell_flow (GstStripRender *self, GstFlowReturn flow)
+{
+  if (flow != GST_FLOW_NOT_LINKED && flow >= GST_FLOW_EOS) /* FLUSHING is no failure either */
+    return;
+  GST_ELEMENT_FLOW_ERROR (self, flow);
+  gst_pad_push_event (GST_BASE_TRANSFORM (self)->srcpad, gst_event_new_eos ());
+}
+
 /* Draws what is due now, one picture at most. @return when to call again, running time */
 static GstClockTime
 draw_due (GstStripRender *self)
@@ -277,6 +341,7 @@ draw_due (GstStripRender *self)
   if (!GST_CLOCK_TIME_IS_VALID (now))
     return GST_CLOCK_TIME_NONE;
   catch_up (self, now);
+  pass_gap (self, next_pts (self));
   const GstClockTime due = next_due (self);
   if (!GST_CLOCK_TIME_IS_VALID (due) || due > now)
     return due;
@@ -287,15 +352,34 @@ draw_due (GstStripRender *self)
   }
   GstBuffer *out = nullptr;
   GstFlowReturn flow = strip_draw_next (self, after_it, &out);
+  const bool pushed = out;
   if (out) {
     base->segment.position = GST_BUFFER_PTS (out);
     flow = gst_pad_push (base->srcpad, out);
   }
-  {
-    std::lock_guard guard (priv->lock);
-    priv->flow = flow;
-  }
-  return flow == GST_FLOW_OK ? next_due (self) : GST_CLOCK_TIME_NONE;
+  set_flow (self, flow);
+  if (pushed)
+    tell_flow (self, flow);
+  if (flow != GST_FLOW_OK)
+    return GST_CLOCK_TIME_NONE;
+  pass_gap (self, next_pts (self)); /* if this was the last picture before it */
+  return next_due (self);
+}
+
+/* Negotiates anew where downstream wants that. @return whether there are pictures to draw */
+static bool
+renegotiate (GstStripRender *self)
+{
+  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
+  strip_apply_rate (self);
+  if (gst_base_transform_reconfigure (base))
+    return thread_draws (self);
+  const bool flushing = GST_PAD_IS_FLUSHING (base->srcpad);
+  const bool told = self->priv->no_context || self->priv->gl_error_posted;
+  set_flow (self, flushing ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED);
+  if (!flushing && !told)
+    tell_flow (self, GST_FLOW_NOT_NEGOTIATED);
+  return false;
 }
 
 static GstClockTime
@@ -306,14 +390,19 @@ tick (GstElement *element)
   StreamLocks locks (base);
   if (!thread_draws (self) || GST_PAD_IS_FLUSHING (base->srcpad))
     return GST_CLOCK_TIME_NONE;
-  strip_apply_rate (self);
-  if (!gst_base_transform_reconfigure (base)) {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->flow =
-        GST_PAD_IS_FLUSHING (base->srcpad) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
-  }
+  const bool draws = renegotiate (self);
   locks.give_up_sink ();
-  return thread_draws (self) ? draw_due (self) : GST_CLOCK_TIME_NONE;
+  return draws ? draw_due (self) : GST_CLOCK_TIME_NONE;
+}
+
+/* With both stream locks. */
+static void
+set_live (GstStripRender *self, bool live)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  std::lock_guard guard (priv->lock);
+  priv->live = live;
+  priv->grid.set_live (live);
 }
 
 /* On the streaming thread. Live without a clock, there is nothing to draw by. */
@@ -325,7 +414,7 @@ strip_learn_whether_live (GstStripRender *self)
     return;
   const bool live = learn_latency (self) && GST_CLOCK_TIME_IS_VALID (strip_running_now (self));
   StreamLocks locks (GST_BASE_TRANSFORM (self));
-  priv->live = live;
+  set_live (self, live);
   priv->live_known = true;
 }
 
@@ -352,7 +441,7 @@ strip_hand_to_grid (GstStripRender *self, GstBuffer *in)
     duration = priv->info.frame_duration ();
   if (priv->live && !priv->thread.start (GST_ELEMENT (self), tick)) {
     StreamLocks locks (GST_BASE_TRANSFORM (self));
-    priv->live = false; /* then pictures come with the frame sets */
+    set_live (self, false); /* then pictures come with the frame sets */
   }
   bool idle;
   {
@@ -369,25 +458,63 @@ strip_hand_to_grid (GstStripRender *self, GstBuffer *in)
   return GST_FLOW_OK;
 }
 
-/* The grid fills gaps itself. @return whether that is all that is to be done */
 bool
 strip_take_gap (GstStripRender *self, GstEvent *event)
 {
   GstStripRenderPrivate *priv = self->priv;
-  GstClockTime begin, duration;
-  gst_event_parse_gap (event, &begin, &duration);
+  StreamGap gap;
+  GstClockTime duration;
+  gst_event_parse_gap (event, &gap.begin, &duration);
+  gst_event_parse_gap_flags (event, &gap.flags);
+  if (gap.begin >= G_MAXINT64) /* there are no pictures so late */
+    return false;
+  const bool endless = !GST_CLOCK_TIME_IS_VALID (duration); /* nobody knows how long */
+  gap.end = gap.begin + (endless ? 0 : std::min<GstClockTime> (duration, G_MAXINT64));
+  bool held;
   {
     std::lock_guard guard (priv->lock);
-    if (!priv->grid.holds_any ())
-      return false;
+    held = priv->grid.holds_any ();
   }
-  if (!strip_has_own_rate (self))
+  if (!held || !strip_has_own_rate (self))
     return false;
   if (!priv->live)
-    drain (self, GST_CLOCK_TIME_IS_VALID (duration) && duration < G_MAXUINT64 - begin
-                     ? begin + duration
-                     : begin);
+    drain (self, gap.end);
+  const GstClockTime next = next_pts (self);
+  if (endless)
+    return GST_CLOCK_TIME_IS_VALID (next);
+  if (priv->gap.end > priv->gap.begin) /* the one before waits for pictures before it */
+    gap.begin = priv->gap.begin;
+  priv->gap = gap;
+  pass_gap (self, next);
+  if (priv->live)
+    priv->thread.wake ();
   return true;
+}
+
+void
+strip_give_back (GstStripRender *self)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  bool drawn_is_held = false;
+  const auto frame_set = [&] (std::size_t i) -> GstBuffer * {
+    std::lock_guard guard (priv->lock);
+    return i < priv->grid.frame_sets () ? priv->grid.frame_set (i) : nullptr;
+  };
+  std::size_t i = 0;
+  while (GstBuffer *theirs = frame_set (i)) { /* which nobody changes while we have both locks */
+    GstBuffer *copy = gst_buffer_copy_deep (theirs);
+    if (theirs == priv->drawn) {
+      gst_buffer_replace (&priv->drawn, copy);
+      drawn_is_held = true;
+    }
+    {
+      std::lock_guard guard (priv->lock);
+      priv->grid.exchange_frame_set (i++, copy);
+    }
+    gst_buffer_unref (theirs);
+  }
+  if (!drawn_is_held)
+    gst_clear_buffer (&priv->drawn);
 }
 
 void
@@ -395,11 +522,13 @@ strip_reset_rate (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   priv->live_known = false;
+  priv->gap = {};
   gst_clear_buffer (&priv->drawn);
   std::lock_guard guard (priv->lock);
   priv->grid.reset ();
   priv->earliest = GST_CLOCK_TIME_NONE;
   priv->flow = GST_FLOW_OK;
+  priv->discont = false;
 }
 
 /* A live picture is begun when its frame set is sure, a quarter of a period after its time, and has

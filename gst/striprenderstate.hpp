@@ -28,6 +28,12 @@
 #include "stripsettings.hpp"
 #include "stripstats.hpp"
 
+/** A stretch of the stream without frame sets. */
+struct StreamGap {
+  GstClockTime begin = 0, end = 0; /* stream position; end == begin: there is none */
+  GstGapFlags flags = GstGapFlags (0);
+};
+
 struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows */
   StripRenderSettings settings;
@@ -38,11 +44,13 @@ struct GstStripRenderPrivate {
   GstClockTime latency = 0;                    /* of upstream */
   GstClockTime pipeline_latency = 0;           /* as the LATENCY event tells */
   GstFlowReturn flow = GST_FLOW_OK;            /* of the drawing thread's last push */
+  bool discont = false;                        /* pictures before the next one were left out */
 
   /* written with both stream locks, read with either */
   gstrange::RangeInfo info;
   GstVideoInfo out;
   bool live = false, live_known = false;
+  bool caps_refused = false; /* the last ones, with an error */
 
   /* with the source pad's stream lock, or on the streaming thread where that one draws; or in the
    * GL thread while whoever has them waits for it */
@@ -53,8 +61,10 @@ struct GstStripRenderPrivate {
   rangecast::StatsPanel stats_panel;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GError *gl_error = nullptr;                       /* why OpenGL cannot be used */
+  GError *output_error = nullptr;                   /* why it cannot have pictures of that size */
   bool no_context = false;
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
+  StreamGap gap; /* to go downstream between pictures, as far as they do not fill it */
 
   PictureThread thread;
 };
@@ -91,10 +101,32 @@ private:
   bool has_sink_ = true;
 };
 
+/** @name stripguard.cpp @{ */
+
+/** In a handler of all exceptions: posts the element's error for the one at hand.
+ *  @return GST_FLOW_ERROR */
+GstFlowReturn strip_flow_of_exception (GstStripRender *self);
+
+/** Does what may throw, where C has called. @return what `work` returns; GST_FLOW_ERROR after an
+ *  exception, which has been posted. Call without a lock but those of streams. */
+template <typename Work>
+GstFlowReturn
+strip_guarded (GstStripRender *self, const Work &work)
+{
+  try {
+    return work ();
+  } catch (...) {
+    return strip_flow_of_exception (self);
+  }
+}
+/** @} */
+
 /** @name stripframe.cpp: with the source pad's stream lock, or on the streaming thread @{ */
 
 /** Running time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
 GstClockTime strip_running_time (GstStripRender *self, GstClockTime pts);
+/** Stream time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
+GstClockTime strip_stream_time (GstStripRender *self, GstClockTime pts);
 /** Running time of the clock, or GST_CLOCK_TIME_NONE without a clock. Any thread. */
 GstClockTime strip_running_now (GstStripRender *self);
 /** Gives controlled properties their values of that stream position. One outside the segment, as of
@@ -103,7 +135,7 @@ void strip_sync_values (GstStripRender *self, GstClockTime pts);
 /** Draws a frame set as it is to be seen at `running`. Posts what goes wrong.
  *  @param keep  more pictures may be drawn of it: what was made of it stays */
 GstFlowReturn strip_draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool again);
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep);
 /** @} */
 
 /** @name striprate.cpp, late pictures @{ */
@@ -115,6 +147,8 @@ bool strip_is_late (GstStripRender *self, GstClockTime running);
  *  last one. */
 void strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts,
     GstClockTime duration, GstClockTime running);
+/** Flags the next picture that is drawn after such ones. */
+void strip_mark_discont (GstStripRender *self, GstBuffer *out);
 /** @} */
 
 /** @name striprate.cpp, an output with a frame rate of its own @{ */
@@ -138,8 +172,13 @@ GstFlowReturn strip_draw_next (GstStripRender *self, GstClockTime until, GstBuff
 void strip_drain_and_reset (GstStripRender *self);
 /** The same, and the stream goes on: pictures to come are later than those that went. */
 void strip_drain (GstStripRender *self);
-/** @return whether the gap is filled with pictures, or will be. With both stream locks. */
+/** Fills a gap of the stream with pictures of what is held, and has the rest of it go downstream in
+ *  its turn. With both stream locks.
+ *  @return false if there is nothing to fill it with: the event itself is to go on */
 bool strip_take_gap (GstStripRender *self, GstEvent *event);
+/** Has copies of all frame sets that are held in place of those that came in, so that whoever owns
+ *  their memory has it back. With both stream locks. */
+void strip_give_back (GstStripRender *self);
 /** Forgets the stream. With both stream locks, or stopped. */
 void strip_reset_rate (GstStripRender *self);
 /** Of a LATENCY event. Any thread. */

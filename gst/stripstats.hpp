@@ -10,10 +10,11 @@
 /** What striprender counts: the property `stats`. */
 struct RenderStats {
   /* since start */
-  guint64 frames = 0;     ///< pictures drawn
-  guint64 frame_sets = 0; ///< that came in
-  guint64 repeated = 0;   ///< pictures of a frame set that an earlier one showed
-  guint64 dropped = 0;    ///< pictures left out because they would have been late
+  guint64 frames = 0;         ///< pictures drawn
+  guint64 frame_sets = 0;     ///< that came in
+  guint64 repeated = 0;       ///< pictures of a frame set that an earlier one showed
+  guint64 dropped = 0;        ///< pictures left out because they would have been late
+  guint64 uploaded_total = 0; ///< bytes
   /* of the last picture */
   guint64 points = 0, vertices = 0, triangles = 0, strips = 0, isolated = 0, uploaded_bytes = 0;
 
@@ -32,7 +33,7 @@ public:
   [[nodiscard]] std::span<const std::string> lines () const { return lines_; }
 
 private:
-  std::array<std::string, 4> lines_;
+  std::array<std::string, 5> lines_;
   RenderStats last_;
   gint64 last_us_ = -1;
 };

@@ -6,7 +6,7 @@
 
 #include <rangecast/strips/camera_lines.hpp>
 
-#include "viewer-check.hpp"
+#include "render-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -50,18 +50,12 @@ bright (const RenderedPicture &picture)
   return spot;
 }
 
-static RenderedPicture
-render (GstHarness *h, GstBuffer *frame_set, int width)
-{
-  return take_rendered (gst_harness_push_and_pull (h, frame_set), width);
-}
-
 /* One picture of a dot in caps of that multiview-mode. */
 static RenderedPicture
 eyes (const char *properties, const std::string &output, int width, int depth)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig, {properties, output.c_str ()});
+  GstHarness *h = render_harness (rig, {properties, output.c_str ()});
   RenderedPicture picture = render (h, dot (rig, depth), width);
   gst_harness_teardown (h);
   return picture;
@@ -133,6 +127,25 @@ GST_START_TEST (test_all_packings_hold_the_same_two_pictures)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_two_eyes_cost_one_upload)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (2);
+  guint64 uploaded[2] = {};
+  for (const bool two : {false, true}) {
+    GstHarness *h = render_harness (
+        rig, {"show-cameras=true", two ? "width=640,height=240,multiview-mode=side-by-side"
+                                       : "width=640,height=240,multiview-mode=mono"});
+    render (h, make_frame_set (rig), 640);
+    uploaded[two] = stats_field (h, "uploaded-bytes");
+    gst_harness_teardown (h);
+  }
+  fail_unless (uploaded[0] > 2 * 320 * 240 * (2 + 4));
+  fail_unless_equals_uint64 (uploaded[1], uploaded[0]);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_half_aspect_squeezes_each_eyes_picture)
 {
   if (!opengl_works ())
@@ -152,6 +165,24 @@ GST_START_TEST (test_half_aspect_squeezes_each_eyes_picture)
       }
   fail_unless (std::abs ((max_y - min_y + 1) - 2 * (max_x - min_x + 1)) <= 1, "%d x %d",
       max_x - min_x + 1, max_y - min_y + 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flags_as_text_are_one_error)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc num-buffers=1 ! striprender ! video/x-raw(memory:GLMemory),"
+                        "multiview-mode=side-by-side,multiview-flags=half-aspect ! fakesink",
+          nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("multiview-flags") != std::string::npos, "'%s'", text.c_str ());
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
 }
 GST_END_TEST;
 
@@ -205,7 +236,7 @@ GST_START_TEST (test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_cl
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig, {"distance=0.05"});
+  GstHarness *h = render_harness (rig, {"distance=0.05"});
   /* the camera that orbits stands 0.45 m before the view's; the far plane was at 1 m */
   fail_unless (bright (render (h, dot (rig, 40000), 320)).pixels > 50, "4 m are clipped");
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
@@ -216,14 +247,112 @@ GST_START_TEST (test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_cl
 }
 GST_END_TEST;
 
+/* What a view sees is shifted behind what others see (view-gap): with the near plane close to the
+ * viewer, too, that throws nothing out of the picture. */
+GST_START_TEST (test_viewer_among_the_points_still_sees_what_other_views_see)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (4);
+  RenderedPicture pictures[2];
+  for (const bool among : {false, true}) {
+    GstHarness *h = render_harness (rig, {"distance=0.4 azimuth=10 pan-z=-0.05"});
+    GstBuffer *set = make_frame_set (rig);
+    {
+      gstrange::RangeFrameMap frame (set, GST_MAP_READWRITE);
+      for (const RangeImage &image : frame.views ())
+        for (int y = 0; y < 240; y++)
+          for (int x = 0; x < 320; x++) {
+            const bool beside = image.view_id == 0 && x == 0 && y == 0; /* behind the viewer */
+            image.depth.at (x, y) = image.view_id == 1 && image.depth.at (x, y) > 0 ? 8000
+                                    : beside && among                               ? 3000
+                                                                                    : 0;
+          }
+    }
+    pictures[among] = render (h, set, 320);
+    gst_harness_teardown (h);
+  }
+  int drawn = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      drawn += pictures[0].at (x, y, 0) != 0x20;
+  fail_unless (drawn > 500, "%d pixels", drawn);
+  fail_unless_equals_int (pixels_that_differ (pictures[0], pictures[1]), 0);
+}
+GST_END_TEST;
+
 /* ---- overlays ---- */
+
+static bool
+is_camera_line (const guint8 *pixel)
+{
+  for (std::size_t i = 0; i < 4; i++) {
+    const LineColour c = camera_colour (i);
+    const bool near = pixel[0] == c.red && pixel[1] == c.green && pixel[2] == c.blue;
+    const bool far = pixel[0] == c.red / 2 && pixel[1] == c.green / 2 && pixel[2] == c.blue / 2;
+    if (near || far)
+      return true;
+  }
+  return false;
+}
+
+GST_START_TEST (test_cameras_are_lines_and_change_nothing_else)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (4);
+  for (const char *camera : {"", "azimuth=90", "azimuth=20 back-faces=true", "elevation=40"}) {
+    RenderedPicture pictures[2];
+    for (const bool cameras : {false, true}) {
+      GstHarness *h = render_harness (rig,
+          RenderOptions{
+              (std::string ("show-cameras=") + (cameras ? "true " : "false ") + camera).c_str ()});
+      pictures[cameras] = render (h, make_frame_set (rig), 320);
+      gst_harness_teardown (h);
+    }
+    int lines = 0;
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const guint8 *with = pictures[1].at (x, y);
+        const bool line = is_camera_line (with);
+        lines += line;
+        fail_unless (line || memcmp (with, pictures[0].at (x, y), 4) == 0,
+            "%s: %d, %d is another one", camera, x, y);
+      }
+    fail_unless (lines > 100, "%s: %d pixels", camera, lines);
+  }
+}
+GST_END_TEST;
+
+/* A line before a surface is to be seen, one behind it is not. */
+GST_START_TEST (test_camera_lines_are_before_or_behind_surfaces)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (2); /* the other camera is 1.6 m away and looks this way */
+  for (const char *properties : {"show-cameras=true", "show-cameras=true back-faces=true"}) {
+    GstHarness *h = render_harness (rig, RenderOptions{properties});
+    const auto blue = [&] (int depth) {
+      const RenderedPicture picture = render (h, dot (rig, depth), 320);
+      int lines = 0;
+      for (int y = 117; y < 124; y++)
+        for (int x = 157; x < 164; x++)
+          lines += is_camera_line (picture.at (x, y));
+      return lines;
+    };
+    fail_unless_equals_int (blue (7000), 0); /* its tip is behind the dot */
+    fail_unless (blue (17000) > 0, "%s", properties);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
 
 GST_START_TEST (test_units_are_in_their_cameras_colours)
 {
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (4);
-  GstHarness *h = new_render_harness (rig, {"show-units=true"});
+  GstHarness *h = render_harness (rig, {"show-units=true"});
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   for (guint i = 0; i < 4; i++) {
     g_object_set (r, "azimuth", 90.0 * i, nullptr);
@@ -254,7 +383,7 @@ GST_START_TEST (test_statistics_are_in_a_corner_and_leave_the_rest_alone)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (2);
-  GstHarness *h = new_render_harness (rig);
+  GstHarness *h = render_harness (rig);
   const RenderedPicture plain = render (h, make_frame_set (rig), 320);
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   g_object_set (r, "show-stats", TRUE, nullptr);
@@ -438,7 +567,7 @@ GST_START_TEST (test_two_fingers_carry_what_is_between_them)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (1);
-  GstHarness *h = new_render_harness (rig);
+  GstHarness *h = render_harness (rig);
   const Spot before = bright (render (h, dot (rig, 5000), 320));
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   GstPad *src = gst_element_get_static_pad (r, "src");
@@ -464,9 +593,14 @@ striprendereyes_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_known_point_has_the_disparity_of_its_distance);
   tcase_add_test (tc, test_all_packings_hold_the_same_two_pictures);
+  tcase_add_test (tc, test_two_eyes_cost_one_upload);
   tcase_add_test (tc, test_half_aspect_squeezes_each_eyes_picture);
+  tcase_add_test (tc, test_flags_as_text_are_one_error);
   tcase_add_test (tc, test_separated_pictures_are_memories_of_one_buffer);
   tcase_add_test (tc, test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_clipped);
+  tcase_add_test (tc, test_viewer_among_the_points_still_sees_what_other_views_see);
+  tcase_add_test (tc, test_cameras_are_lines_and_change_nothing_else);
+  tcase_add_test (tc, test_camera_lines_are_before_or_behind_surfaces);
   tcase_add_test (tc, test_units_are_in_their_cameras_colours);
   tcase_add_test (tc, test_statistics_are_in_a_corner_and_leave_the_rest_alone);
   tcase_add_test (tc, test_transparent_background_lets_video_through);

@@ -31,9 +31,10 @@ const char *const kUsage =
     "camera, four places each. Depth is exact; or stereo: matched, freed of the background, coded\n"
     "and decoded, filtered by the cylinder, as in the demo; or noise: exact and 3 mm of smooth\n"
     "noise. Mode strips-merged: strips of exact depth through the neighbour code, whose runs of\n"
-    "equal pixels (colour threshold 8) become longer pieces. Peers: grid, a plain grid surface, "
-    "and\n"
-    "point-cloud, GL points; both from a vertex buffer that the CPU unprojects into.\n"
+    "equal pixels (colour threshold 8) become longer pieces; strips-held: strips of a frame set "
+    "that\n"
+    "is there already, as the second eye's, or while a stream stalls. Peers: grid, a plain grid\n"
+    "surface, and point-cloud, GL points; both from a vertex buffer that the CPU unprojects into.\n"
     "  ms      one picture from depth and colour until the GPU has finished, median\n"
     "  CPU ms  processor time of all threads for it, median: what a busy machine changes less\n"
     "  holes   share of the figure's pixels that are not drawn\n"
@@ -81,7 +82,7 @@ struct Job {
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
   std::vector<RenderRow> rows;
   GstGLContext *context = nullptr;
-  StripPainter painter;
+  StripPainter painter, held_painter;
   Status status;
 };
 
@@ -124,8 +125,13 @@ make_ways (Job &job, Kind &kind)
   strips ("strips", kind.set, StripMode::kStrips);
   strips ("rectangles", kind.set, StripMode::kRectangles);
   strips ("points", kind.set, StripMode::kPoints);
-  if (!kind.coded.images.empty ())
+  if (!kind.coded.images.empty ()) { /* of exact depth */
     strips ("strips-merged", kind.coded, StripMode::kStrips);
+    StripSettings settings;
+    settings.merge = job.merge;
+    kind.ways.push_back (
+        make_strip_way ("strips-held", job.held_painter, kind.set, settings, true));
+  }
   for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
     GError *error = nullptr;
     kind.ways.push_back (make_peer (name, peer, job.context, kind.set, &error));
@@ -227,7 +233,7 @@ Status
 run (Job &job)
 {
   GError *error = nullptr;
-  if (!job.painter.start (job.context, &error)) {
+  if (!job.painter.start (job.context, &error) || !job.held_painter.start (job.context, &error)) {
     const std::string why = error ? error->message : "no shader";
     g_clear_error (&error);
     return {StatusCode::kUnsupported, why};
@@ -260,6 +266,7 @@ run_in_gl_thread (GstGLContext *, gpointer data)
   auto &job = *static_cast<Job *> (data);
   job.status = run (job);
   job.painter.stop ();
+  job.held_painter.stop ();
 }
 
 } // namespace

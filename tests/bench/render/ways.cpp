@@ -10,15 +10,17 @@ namespace {
 
 class StripWay : public Way {
 public:
-  StripWay (
-      std::string name, StripPainter &painter, const FrameSet &set, const StripSettings &settings)
-      : Way (std::move (name)), painter_ (painter), set_ (set), settings_ (settings),
+  StripWay (std::string name, StripPainter &painter, const FrameSet &set,
+      const StripSettings &settings, bool held)
+      : Way (std::move (name)), painter_ (painter), set_ (set), settings_ (settings), held_ (held),
         vertices_ (set.images.size ()), results_ (set.images.size ())
   {
   }
 
   void build () override
   {
+    if (held_ && uploaded_)
+      return;
     in_parallel (vertices_.size (), 0, [&] (std::size_t i) {
       results_[i] = {};
       build_strips (set_.images[i], settings_, vertices_[i], results_[i]);
@@ -33,7 +35,10 @@ public:
     std::vector<StripPainter::Layer> layers;
     for (std::size_t i = 0; i < vertices_.size (); i++)
       layers.push_back ({set_.images[i], set_.rig.find (set_.images[i].view_id), vertices_[i]});
-    return painter_.draw (own, layers);
+    const guint64 bytes = held_ && uploaded_ ? 0 : painter_.upload (layers);
+    uploaded_ = true;
+    painter_.draw (own, layers);
+    return bytes;
   }
 
   [[nodiscard]] std::size_t vertices () const override
@@ -56,6 +61,8 @@ private:
   StripPainter &painter_;
   const FrameSet &set_;
   const StripSettings settings_;
+  const bool held_;
+  bool uploaded_ = false;
   std::vector<std::vector<StripVertex>> vertices_;
   std::vector<StripResult> results_;
 };
@@ -63,10 +70,10 @@ private:
 } // namespace
 
 std::unique_ptr<Way>
-make_strip_way (
-    std::string name, StripPainter &painter, const FrameSet &set, const StripSettings &settings)
+make_strip_way (std::string name, StripPainter &painter, const FrameSet &set,
+    const StripSettings &settings, bool held)
 {
-  return std::make_unique<StripWay> (std::move (name), painter, set, settings);
+  return std::make_unique<StripWay> (std::move (name), painter, set, settings, held);
 }
 
 } // namespace bench

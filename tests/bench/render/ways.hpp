@@ -28,9 +28,11 @@ private:
   const std::string name_;
 };
 
-/** striprender's own, in one of its modes. The frame set must stay. */
+/** striprender's own, in one of its modes. The frame set must stay.
+ *  @param held  only the first picture is of a new frame set: later ones are what a stream that
+ *               stalls, or the second eye, costs. Nobody else may use that painter. */
 std::unique_ptr<Way> make_strip_way (std::string name, StripPainter &painter, const FrameSet &set,
-    const rangecast::StripSettings &settings);
+    const rangecast::StripSettings &settings, bool held = false);
 
 /** What others do, from a vertex buffer of places and colours that the CPU unprojects into: one GL
  *  point a pixel, or a grid surface: each quad of valid pixels two triangles, where its corners
