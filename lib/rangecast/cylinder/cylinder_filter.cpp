@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../guarded.hpp"
 #include "../parallel.hpp"
 #include "isa.hpp"
 
@@ -30,29 +31,32 @@ check (const CylinderSettings &settings)
   if (settings.bodies < 1 || settings.bodies > kMaxBodies)
     return bad ("cylinder: bodies, expected 1 to 8");
   const double length = norm (settings.fixed_axis.direction);
-  if (settings.axis == AxisMode::kFixed &&
-      !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
-    return bad ("cylinder: fixed axis, expected a direction that is not 0, 0, 0");
+  if (settings.axis == AxisMode::kFixed && !(length > 1e-9 && length < 1e9))
+    return bad ("cylinder: direction of the fixed axis, expected a length of 1e-9 to 1e9");
+  if (settings.axis == AxisMode::kFixed && !(norm (settings.fixed_axis.position) < 1e6))
+    return bad ("cylinder: position of the fixed axis, expected less than 1000 km");
   return {};
 }
 
 Status
 CylinderFilter::set_rig (const Rig &rig)
 {
-  if (Status status = validate (rig); !status.ok ())
-    return status;
   rig_views_ = 0;
-  for (const View &view : rig.views) {
-    if (!view.is_range_view ())
-      return {StatusCode::kBadValue,
-          "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
-    rig_rays_[view.id] = PixelRays (view);
-    rig_lookups_[view.id] = PixelLookup (view);
-    rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
-    rig_views_ |= std::uint64_t{1} << view.id;
-  }
   reset ();
-  return {};
+  return guarded ("rig", [&] () -> Status {
+    if (Status status = validate (rig); !status.ok ())
+      return status;
+    for (const View &view : rig.views) {
+      if (!view.is_range_view ())
+        return {StatusCode::kBadValue,
+            "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
+      rig_rays_[view.id] = PixelRays (view);
+      rig_lookups_[view.id] = PixelLookup (view);
+      rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
+      rig_views_ |= std::uint64_t{1} << view.id;
+    }
+    return {};
+  });
 }
 
 void
@@ -61,6 +65,22 @@ CylinderFilter::reset ()
   for (AxisTracker &tracker : trackers_)
     tracker.reset ();
   units_.rows.forget ();
+  decided_ = false;
+}
+
+/* Units about an axis found by another rule are other units. So are those about one that was set
+ * elsewhere; but one that is set a little further on in each frame follows somebody. */
+void
+CylinderFilter::forget_other_geometry (const CylinderSettings &settings)
+{
+  constexpr double kNear = 0.05, kAlike = 0.996; /* metres; cosine of 5 degrees */
+  const Vec3 a = settings.fixed_axis.direction, b = fixed_axis_.direction;
+  const bool stays = norm (settings.fixed_axis.position - fixed_axis_.position) < kNear &&
+                     std::abs (dot (a, b)) > kAlike * norm (a) * norm (b);
+  if (settings.axis != axis_mode_ || (settings.axis == AxisMode::kFixed && !stays))
+    reset ();
+  axis_mode_ = settings.axis;
+  fixed_axis_ = settings.fixed_axis;
 }
 
 Status
@@ -206,7 +226,7 @@ CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
     frames[slot] = CylinderFrame (axes_[slot]);
     look_from (slot, frames[slot], images);
   }
-  if (radius_.size () < cloud_.x.size ()) {
+  if (column_.size () < cloud_.x.size ()) { /* the last to grow: all have grown */
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
@@ -239,24 +259,30 @@ CylinderFilter::process (
     std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
 {
   result = {};
-  if (Status status = check (settings); !status.ok ())
-    return status;
-  if (Status status = take_cameras (images); !status.ok ())
-    return status;
-  /* No exception leaves the core: neither ours for memory nor OpenCV's. */
-  try {
+  bool began = false;
+  const Status status = guarded ("cylinder", [&] () -> Status {
+    if (Status bad = check (settings); !bad.ok ())
+      return bad;
+    if (Status bad = take_cameras (images); !bad.ok ())
+      return bad;
+    began = true;
     return work (images, settings, result);
-  } catch (const std::exception &error) {
-    return {StatusCode::kNoSpace, std::string ("cylinder: ") + error.what ()};
+  });
+  if (began && !status.ok ()) {
+    reset (); /* what is half done is of no use */
+    result = {};
   }
+  return status;
 }
 
 Status
 CylinderFilter::work (
     std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
 {
+  decided_ = false;
   if (Status status = cloud_.reset (images); !status.ok ())
     return status;
+  forget_other_geometry (settings);
   make_points (images, settings.threads);
   result.points_in = result.points_out = cloud_.size ();
   if (result.points_in > 0) {
@@ -277,6 +303,7 @@ CylinderFilter::work (
     keep_uncovered (images, settings);
   clear_losers (images);
   units_.rows.remember (rules_, ids_);
+  decided_ = true;
   result.points_out -= losers_.size ();
   return {};
 }

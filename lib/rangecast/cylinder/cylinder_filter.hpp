@@ -87,17 +87,18 @@ public:
   /** Clears depths in place. A frame set of less than two images with points is left alone.
    *  Nothing is allocated once the largest frame set has been seen.
    *  @return kBadValue for settings out of range, kNotFound for a view that the rig has not,
-   *  kBadSize for more than kMaxViews images; depth is then untouched. */
+   *  kBadSize for more than kMaxViews images, kNoSpace without memory; depth is then untouched. */
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
   /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
-   *  the other, from the lowest up. */
-  [[nodiscard]] int unit_slices () const { return units_.rows.old_slices (); }
-  /** The view-id of the winner of a unit's outermost surface; -1 where there is none. */
+   *  the other, from the lowest up. None if it had points of fewer than two views. */
+  [[nodiscard]] int unit_slices () const { return decided_ ? units_.rows.old_slices () : 0; }
+  /** The view-id of the winner of a unit's outermost surface; -1 where the frame set has no points.
+   */
   [[nodiscard]] int unit_winner (int slice, int column) const
   {
-    return units_.rows.old_winner (slice, column);
+    return decided_ ? units_.rows.old_winner (slice, column) : -1;
   }
 
 private:
@@ -112,6 +113,7 @@ private:
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
+  void forget_other_geometry (const CylinderSettings &settings);
   void make_points (std::span<const RangeImage> images, int threads);
   void find_bodies (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);
@@ -137,6 +139,9 @@ private:
   /* Of each body. A body keeps its place in these as long as it is there. */
   std::array<AxisTracker, kMaxBodies> trackers_;
   Bodies bodies_;
+  AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set, and its */
+  Axis fixed_axis_;
+  bool decided_ = false; /* it had winners */
 
   /* Of the present frame; kept for their memory. By number of the image. */
   std::array<PixelRays, kMaxViews> rays_;

@@ -24,7 +24,7 @@ Units::sort (const WorldPoints &cloud, std::span<const float> radius,
   scatter (cloud, radius, column, runs);
   in_parallel (slices.size (), threads, [&] (std::size_t s) { cut_slice (static_cast<int> (s)); });
   const auto images = static_cast<int> (cloud.parts ().size ());
-  rows.begin (settings.columns, images, slices.size ());
+  rows.begin (settings.columns, slice_height_m, images, slices.size ());
   int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
   for (const Slice &slice : slices) {
     const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
@@ -97,7 +97,7 @@ Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
       total += count;
     }
   }
-  if (points.size () < total) {
+  if (chain_.size () < total) { /* the last to grow: all have grown */
     points.resize (total);
     entries.resize (total);
     layers.resize (total);
@@ -316,7 +316,8 @@ Units::cut_slice (int number)
       begin_.data () + static_cast<std::size_t> (number) * settings_.columns, settings_.columns);
 }
 
-/* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. */
+/* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
+ * slices of one layer a unit, where each step goes a column further. */
 std::uint32_t
 Units::next_entry (std::uint32_t number, int reach) const
 {
@@ -331,10 +332,86 @@ Units::next_entry (std::uint32_t number, int reach) const
     const int distance = other.column () - column;
     if (distance > reach)
       return kNone;
-    if (distance > 0 && std::abs (layers[other.layer].radius - entry.radius) <= gap)
+    if (std::abs (layers[other.layer].radius - entry.radius) <= gap)
       return next;
   }
   return kNone;
+}
+
+/* The same for slices of several layers. A unit may have as many as a view has points, and going
+ * through all of them for each of them would take minutes. But both a view's entries in a unit and
+ * those in the units after it come from the axis outwards: where the search for one entry ended the
+ * one for the next begins. */
+struct Units::Followers {
+  int column = -1;               /* of the view's entries asked for */
+  int count = 0;                 /* columns with entries of the view that follow it within reach */
+  std::uint32_t entry[kReach]{}; /* of each, the next to be looked at; kNone after its last */
+
+  void begin_column (const Units &units, std::uint32_t number, int reach)
+  {
+    const int columns = units.settings_.columns;
+    int at = column = units.entries[number].column ();
+    count = 0;
+    for (std::uint32_t next = units.chain_[number]; next != number; next = units.chain_[next]) {
+      const int found = units.entries[next].column ();
+      const int distance = found - column + (found < column ? columns : 0);
+      if (distance > reach)
+        return;
+      if (found != at)
+        entry[count++] = next;
+      at = found;
+    }
+  }
+
+  std::uint32_t find (const Units &units, std::uint32_t number)
+  {
+    const float radius = units.entries[number].radius;
+    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    for (int k = 0; k < count; k++) {
+      while (entry[k] != kNone && radius_of (units, entry[k]) - radius < -gap) {
+        const std::uint32_t next = units.chain_[entry[k]];
+        const bool same = units.entries[next].column () == units.entries[entry[k]].column ();
+        entry[k] = same ? next : kNone;
+      }
+      if (entry[k] != kNone && std::abs (radius_of (units, entry[k]) - radius) <= gap)
+        return entry[k];
+    }
+    return kNone;
+  }
+
+  static float radius_of (const Units &units, std::uint32_t number)
+  {
+    return units.layers[units.entries[number].layer].radius;
+  }
+};
+
+void
+Units::find_layered_tangents (const Slice &slice, int reach)
+{
+  std::array<Followers, kMaxViews> followers;
+  for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
+    Followers &of_view = followers[entries[e].view ()];
+    if (of_view.column != entries[e].column ())
+      of_view.begin_column (*this, e, reach);
+    point_at (e, of_view.find (*this, e));
+  }
+}
+
+void
+Units::point_at (std::uint32_t number, std::uint32_t found)
+{
+  if (found == kNone)
+    return;
+  UnitEntry &entry = entries[number], &next = entries[found];
+  const float dx = next.x - entry.x, dz = next.z - entry.z;
+  const float squared = dx * dx + dz * dz;
+  if (!(squared > 1e-18f))
+    return;
+  const float per_length = 1 / std::sqrt (squared);
+  entry.tangent[0] = dx * per_length;
+  entry.tangent[1] = dz * per_length;
+  if (next.tangent[0] == 0 && next.tangent[1] == 0)
+    std::copy_n (entry.tangent, 2, next.tangent);
 }
 
 void
@@ -342,23 +419,19 @@ Units::find_tangents (int number)
 {
   const Slice &slice = slices[number];
   const int reach = std::min (kReach, settings_.columns / 4);
-  for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
-    const std::uint32_t found = next_entry (e, reach);
-    if (found == kNone)
-      continue;
-    UnitEntry &entry = entries[e], &next = entries[found];
-    const float dx = next.x - entry.x, dz = next.z - entry.z;
-    const float squared = dx * dx + dz * dz;
-    if (!(squared > 1e-18f))
-      continue;
-    const float per_length = 1 / std::sqrt (squared);
-    entry.tangent[0] = dx * per_length;
-    entry.tangent[1] = dz * per_length;
-    if (next.tangent[0] == 0 && next.tangent[1] == 0)
-      std::copy_n (entry.tangent, 2, next.tangent);
-  }
+  if (slice.planes > 1)
+    find_layered_tangents (slice, reach);
+  else
+    for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++)
+      point_at (e, next_entry (e, reach));
+  sum_tangents (number);
+}
+
+void
+Units::sum_tangents (int number)
+{
   const int planes = rows.slices ()[number].planes;
-  for (const UnitLayer &layer : layers_of (slice)) {
+  for (const UnitLayer &layer : layers_of (slices[number])) {
     if (layer.plane >= planes)
       continue;
     UnitRows::Cell cell{layer.radius, {}, layer.views};

@@ -132,7 +132,11 @@ private:
       std::span<const std::int32_t> column, std::span<const PointRun> runs);
   void cut_slice (int slice);
   struct Cutter;
+  struct Followers;
   [[nodiscard]] std::uint32_t next_entry (std::uint32_t number, int reach) const;
+  void point_at (std::uint32_t number, std::uint32_t next);
+  void find_layered_tangents (const Slice &slice, int reach);
+  void sum_tangents (int number);
 
   UnitSettings settings_;
   std::array<Stack, kMaxBodies> stacks_;

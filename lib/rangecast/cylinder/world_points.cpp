@@ -57,7 +57,7 @@ WorldPoints::reset (std::span<const RangeImage> images)
     return {StatusCode::kBadSize,
         "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
   }
-  if (x.size () < pixels) {
+  if (pixel.size () < pixels) { /* the last to grow: all have grown */
     for (auto *array : {&x, &y, &z})
       array->resize (pixels);
     pixel.resize (pixels);
