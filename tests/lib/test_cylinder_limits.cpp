@@ -80,9 +80,9 @@ TEST (Limits, with_layers_tangents_are_those_of_each_surface)
     return near (o + Vec3{0, 0, 0.08}, d);
   };
   Frame frame (rig, near);
-  const Frame behind (rig, far);
+  Frame behind (rig, far);
   for (std::size_t i = 0; i < 2; i++) {
-    auto to = frame.depth[i].view (), from = Image<std::uint16_t> (behind.depth[i]).view ();
+    auto to = frame.depth[i].view (), from = behind.depth[i].view ();
     for (int v = 0; v < kHeight; v += 2) /* every other row sees the wall behind */
       std::copy_n (from.row (v), kWidth, to.row (v));
   }

@@ -91,6 +91,7 @@ void
 ColourBalance::reset ()
 {
   started_ = 0;
+  frame_ = 0;
   pairs_.clear ();
   slots_.fill (-1);
 }
