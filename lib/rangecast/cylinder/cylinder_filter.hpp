@@ -11,6 +11,7 @@
 #include "../status.hpp"
 #include "axis.hpp"
 #include "bodies.hpp"
+#include "losers.hpp"
 #include "units.hpp"
 #include "world_points.hpp"
 
@@ -102,14 +103,6 @@ public:
   }
 
 private:
-  /* A point in a unit that another view won. */
-  struct Loser {
-    std::uint32_t point; /* in the cloud */
-    std::uint32_t place; /* in lost_ */
-    std::uint32_t cell;  /* in the rows */
-    std::uint8_t image, body;
-  };
-
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
@@ -122,15 +115,7 @@ private:
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_units (const CylinderSettings &settings, CylinderResult &result);
-  void find_cells ();
-  void list_losers (std::span<const RangeImage> images);
-  void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
-  [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
-  [[nodiscard]] bool is_covered_by (
-      std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const;
-  [[nodiscard]] bool covers (
-      std::size_t i, const RangeImage &image, float u, float v, float z) const;
-  void clear_losers (std::span<const RangeImage> images) const;
+  void clear_losers (std::span<const RangeImage> images, const CylinderSettings &settings);
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
@@ -161,15 +146,7 @@ private:
   std::vector<std::int32_t> column_;
   Units units_;
   RowRules rules_;
-
-  /* Of each point of the cloud in a slice of several planes; kNoCell for the fifth and further
-   * surfaces of a unit, whose points all stay. */
-  std::vector<std::uint32_t> cell_of_;
-  static constexpr std::uint32_t kNoCell = UINT32_MAX;
-  std::vector<Loser> losers_;      /* in the order of the cloud */
-  std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
-  /* How far a point may lie behind, or before, what the image has there; in its depth units. */
-  std::array<float, kMaxViews> behind_{}, before_{};
+  Losers losers_;
 };
 
 } // namespace rangecast
