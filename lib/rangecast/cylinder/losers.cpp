@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 #include "isa.hpp"
 
@@ -66,141 +67,204 @@ Losers::list (const DecidedFrame &frame)
   count_ = static_cast<std::size_t> (to - losers_.data ());
 }
 
-struct Losers::CoverLoop {
-  using I = Narrow::I;
-
-  /* Where an image sees a point: the pixel to the upper left, and depth in the image's units. */
-  struct Place {
-    int left, top; /* on the plane; nowhere near it if the image does not see the point */
-    int nearest;   /* of the four pixels round it: bit 0 the right one, bit 1 the lower one */
-    float z;
-  };
+/* Some losers at a time. What a view has where it sees a point is, in full: in the pixel on which
+ * that falls the same surface, and in the pixels beside it (of the four round the place) none of
+ * the same surface that goes: where two regions meet they overlap by a pixel. */
+template <typename L> struct Losers::CoverLoop {
+  using F = typename L::F;
+  using I = typename L::I;
+  using U = typename L::U;
+  static constexpr int kLanes = L::kLanes;
 
   Losers &losers;
   const DecidedFrame &frame;
 
-  [[nodiscard]] Place find (const Loser &loser, std::size_t rival) const
-  {
-    const WorldPoints &cloud = frame.cloud;
-    const float point[] = {cloud.x[loser.point], cloud.y[loser.point], cloud.z[loser.point]};
-    float u, v, z;
-    frame.lookups[loser.body][rival].find (point, u, v, z);
-    const RangeImage &image = frame.images[rival];
-    const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
-    const bool inside = (z > 0) & (x > -1) & (y > -1) &
-                        (x < static_cast<float> (image.depth.width)) &
-                        (y < static_cast<float> (image.depth.height));
-    if (!inside)
-      return {-2, -2, 0, 0};
-    const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
-    const int nearest =
-        (y - static_cast<float> (top) >= 0.5f) * 2 + (x - static_cast<float> (left) >= 0.5f);
-    return {left, top, nearest, z};
-  }
-
-  /* What will be asked for at a place is mostly in no cache: losers come in the order of their own
-   * view, and the winner's pixels are far from those of the last view's losers. */
-  void fetch (const Place &place, std::size_t rival) const
-  {
-    const RangeImage &image = frame.images[rival];
-    const int x = std::max (place.left, 0), y = std::max (place.top, 0);
-    const int below = std::min (y + 1, image.depth.height - 1);
-    if (place.left < -1 || y >= image.depth.height)
-      return;
-    const std::uint8_t *lost = lost_of (rival);
-    const auto width = static_cast<std::size_t> (image.depth.width);
-    __builtin_prefetch (image.depth.row (y) + x);
-    __builtin_prefetch (image.depth.row (below) + x);
-    __builtin_prefetch (lost + static_cast<std::size_t> (y) * width + x);
-    __builtin_prefetch (lost + static_cast<std::size_t> (below) * width + x);
-  }
+  /* Consecutive losers that one view won, and what it has there. Of each the four pixels round the
+   * place are four bytes: upper left, upper right, lower left, lower right. */
+  struct Batch {
+    int size = 0;
+    float x[kLanes], y[kLanes], z[kLanes];      /* the points */
+    std::uint32_t upper[kLanes], lower[kLanes]; /* depths of two pixels each */
+    std::int32_t left[kLanes], top[kLanes];     /* the first pixel, on the plane */
+    std::int32_t inside[kLanes];                /* all four are on the plane */
+    std::int32_t border[kLanes];                /* some are */
+    std::uint32_t same[kLanes]; /* ff: same surface; all 0 if the pixel it falls on is not */
+  };
 
   [[nodiscard]] const std::uint8_t *lost_of (std::size_t image) const
   {
     return losers.lost_.data () + frame.cloud.parts ()[image].begin;
   }
 
-  /* What a view has in the pixel and its neighbours where it sees a point at depth z: in that pixel
-   * the same surface, and in the pixels beside it none of the same surface that goes. Without
-   * branches but two: what neighbours have is a coin toss along every seam. */
-  [[nodiscard]] bool covers (std::size_t rival, const Place &place) const
+  void begin (Batch &batch, const Loser *first, std::size_t most) const
   {
-    const RangeImage &image = frame.images[rival];
-    const int width = image.depth.width, height = image.depth.height;
-    const std::uint8_t *lost = lost_of (rival);
-    /* Most that do not cover have lost the place themselves. */
-    const int column = place.left + (place.nearest & 1), row = place.top + (place.nearest >> 1);
-    if (column < 0 || row < 0 || column >= width || row >= height ||
-        lost[static_cast<std::size_t> (row) * width + column])
-      return false;
-    const int left = place.left, top = place.top;
-    I depth = {}, gone = {};
-    if (left >= 0 && top >= 0 && left + 1 < width && top + 1 < height) {
-      const std::uint16_t *upper = image.depth.row (top) + left,
-                          *lower = image.depth.row (top + 1) + left;
-      const std::uint8_t *flags = lost + static_cast<std::size_t> (top) * width + left;
-      depth = I{upper[0], upper[1], lower[0], lower[1]};
-      gone = I{flags[0], flags[1], flags[width], flags[width + 1]};
-    } else {
-      for (int k = 0; k < 4; k++) {
-        const int px = left + k % 2, py = top + k / 2;
-        if (px < 0 || py < 0 || px >= width || py >= height)
-          continue;
-        depth[k] = image.depth.at (px, py);
-        gone[k] = lost[static_cast<std::size_t> (py) * width + px];
-      }
+    const auto alike = [first] (const Loser &other) {
+      return other.winner == first->winner && other.body == first->body;
+    };
+    const WorldPoints &cloud = frame.cloud;
+    batch.size = 0;
+    for (std::size_t i = 0; i < kLanes; i++) {
+      const bool goes_on =
+          static_cast<std::size_t> (batch.size) == i && i < most && alike (first[i]);
+      batch.size += goes_on;
+      const std::uint32_t point = first[goes_on ? i : 0].point;
+      batch.x[i] = cloud.x[point];
+      batch.y[i] = cloud.y[point];
+      batch.z[i] = cloud.z[point];
     }
-    const Narrow::F behind = place.z - __builtin_convertvector(depth, Narrow::F);
-    const I same = (depth != kInvalidDepth) & (behind <= frame.behind[rival]) &
-                   (-behind <= frame.before[rival]);
-    /* Where the winner's region ends the two overlap by a pixel. */
-    return same[place.nearest] != 0 && !Narrow::any (same & (gone != 0));
   }
 
-  /* @param place  where the winner sees the point: most often it is the winner who covers */
-  [[nodiscard]] bool is_covered (const Loser &loser, const Place &place) const
+  void find_places (Batch &batch, const Loser &first) const
   {
-    if (covers (loser.winner, place))
+    const float (&rows)[3][4] = frame.lookups[first.body][first.winner].rows;
+    const RangeImage &image = frame.images[first.winner];
+    const F px = L::at (batch.x), py = L::at (batch.y), pz = L::at (batch.z);
+    F depth = rows[2][0] * px + rows[2][1] * py + rows[2][2] * pz + rows[2][3];
+    F x = (rows[0][0] * px + rows[0][1] * py + rows[0][2] * pz + rows[0][3]) / depth;
+    F y = (rows[1][0] * px + rows[1][1] * py + rows[1][2] * pz + rows[1][3]) / depth;
+    x -= static_cast<float> (image.roi.x);
+    y -= static_cast<float> (image.roi.y);
+    const I seen = (depth > 0) & (x > -1) & (y > -1) &
+                   (x < static_cast<float> (image.depth.width)) &
+                   (y < static_cast<float> (image.depth.height));
+    L::keep_where (x, seen);
+    L::keep_where (y, seen);
+    const I left = __builtin_convertvector(x + 1, I) - 1,
+            top = __builtin_convertvector(y + 1, I) - 1;
+    const I inside = seen & (left >= 0) & (top >= 0) & (left + 1 < image.depth.width) &
+                     (top + 1 < image.depth.height);
+    L::at (batch.left) = left;
+    L::at (batch.top) = top;
+    L::at (batch.inside) = inside;
+    L::at (batch.border) = seen & ~inside;
+    load_depths (batch, image);
+    compare_depths (batch, x, y, depth, first.winner);
+  }
+
+  void load_depths (Batch &batch, const RangeImage &image) const
+  {
+    for (int i = 0; i < kLanes; i++) {
+      batch.upper[i] = batch.lower[i] = kInvalidDepth;
+      if (!batch.inside[i])
+        continue;
+      std::memcpy (&batch.upper[i], image.depth.row (batch.top[i]) + batch.left[i], 4);
+      std::memcpy (&batch.lower[i], image.depth.row (batch.top[i] + 1) + batch.left[i], 4);
+    }
+  }
+
+  void compare_depths (Batch &batch, const F &x, const F &y, const F &z, std::size_t rival) const
+  {
+    const U upper = L::at (batch.upper), lower = L::at (batch.lower);
+    const U depths[] = {upper & 0xffff, upper >> 16, lower & 0xffff, lower >> 16};
+    I same[4];
+    for (int k = 0; k < 4; k++) {
+      const F behind = z - __builtin_convertvector((I)depths[k], F);
+      same[k] = ((I)depths[k] != kInvalidDepth) & (behind <= frame.behind[rival]) &
+                (-behind <= frame.before[rival]);
+    }
+    const I right = x - __builtin_convertvector(L::at (batch.left), F) >= 0.5f,
+            below = y - __builtin_convertvector(L::at (batch.top), F) >= 0.5f;
+    const I above_it = right ? same[1] : same[0], below_it = right ? same[3] : same[2];
+    const U bytes = ((U)same[0] & 0xffu) | ((U)same[1] & 0xff00u) | ((U)same[2] & 0xff0000u) |
+                    ((U)same[3] & 0xff000000u);
+    L::at (batch.same) = bytes & (U)(below ? below_it : above_it);
+  }
+
+  /* Whether the winner covers the batch's loser i. */
+  [[nodiscard]] bool covers (const Batch &batch, int i, const Loser &loser) const
+  {
+    if (batch.border[i])
+      return is_covered_by (loser, loser.winner);
+    if (batch.same[i] == 0)
+      return false;
+    const auto width = static_cast<std::size_t> (frame.images[loser.winner].depth.width);
+    const std::uint8_t *lost = lost_of (loser.winner) +
+                               static_cast<std::size_t> (batch.top[i]) * width +
+                               static_cast<std::size_t> (batch.left[i]);
+    std::uint16_t upper, lower;
+    std::memcpy (&upper, lost, 2);
+    std::memcpy (&lower, lost + width, 2);
+    return !((upper | std::uint32_t{lower} << 16) & batch.same[i]);
+  }
+
+  /* The same for one loser and any view, wherever that sees it. */
+  [[nodiscard]] bool is_covered_by (const Loser &loser, std::size_t rival) const
+  {
+    const WorldPoints &cloud = frame.cloud;
+    const float point[] = {cloud.x[loser.point], cloud.y[loser.point], cloud.z[loser.point]};
+    float x, y, z;
+    frame.lookups[loser.body][rival].find (point, x, y, z);
+    const RangeImage &image = frame.images[rival];
+    x -= static_cast<float> (image.roi.x);
+    y -= static_cast<float> (image.roi.y);
+    const int width = image.depth.width, height = image.depth.height;
+    if (!(z > 0 && x > -1 && y > -1 && x < static_cast<float> (width) &&
+            y < static_cast<float> (height)))
+      return false;
+    const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
+    const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
+                        (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
+    const std::uint8_t *lost = lost_of (rival);
+    const auto at = [&] (int k) { /* in lost */
+      return static_cast<std::size_t> (top + k / 2) * width +
+             static_cast<std::size_t> (left + k % 2);
+    };
+    const auto is_on = [&] (int k) {
+      return left + k % 2 >= 0 && top + k / 2 >= 0 && left + k % 2 < width && top + k / 2 < height;
+    };
+    /* Most that do not cover have lost the place themselves. */
+    if (!is_on (nearest) || lost[at (nearest)])
+      return false;
+    for (int k : {nearest, nearest ^ 1, nearest ^ 2, nearest ^ 3}) {
+      if (!is_on (k))
+        continue;
+      const std::uint16_t depth = image.depth.at (left + k % 2, top + k / 2);
+      const float behind = z - static_cast<float> (depth);
+      const bool same =
+          depth != kInvalidDepth && behind <= frame.behind[rival] && -behind <= frame.before[rival];
+      if (k == nearest ? !same : same && lost[at (k)])
+        return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool is_covered (const Batch &batch, int i, const Loser &loser) const
+  {
+    if (covers (batch, i, loser)) /* most often */
       return true;
     std::uint64_t rivals = frame.units.rows.covering (loser.cell) &
                            ~(std::uint64_t{1} << loser.image) & ~(std::uint64_t{1} << loser.winner);
-    for (; rivals; rivals &= rivals - 1) {
-      const auto rival = static_cast<std::size_t> (std::countr_zero (rivals));
-      if (covers (rival, find (loser, rival)))
+    for (; rivals; rivals &= rivals - 1)
+      if (is_covered_by (loser, static_cast<std::size_t> (std::countr_zero (rivals))))
         return true;
-    }
     return false;
   }
 
   void run () const
   {
-    constexpr std::size_t kAhead = 16;
-    std::array<Place, kAhead> places;
     Loser *all = losers.losers_.data ();
     const std::size_t count = losers.count_;
-    const auto look = [&] (std::size_t i) {
-      if (i >= count)
-        return;
-      places[i % kAhead] = find (all[i], all[i].winner);
-      fetch (places[i % kAhead], all[i].winner);
-    };
-    for (std::size_t i = 0; i < kAhead; i++)
-      look (i);
     std::size_t left = 0;
-    for (std::size_t i = 0; i < count; i++) {
-      const Loser loser = all[i];
-      const Place place = places[i % kAhead];
-      look (i + kAhead);
-      const bool goes = is_covered (loser, place);
-      losers.lost_[loser.place] = goes;
-      all[left] = loser;
-      left += goes;
+    Batch batch;
+    for (std::size_t done = 0; done < count; done += static_cast<std::size_t> (batch.size)) {
+      begin (batch, all + done, count - done);
+      find_places (batch, all[done]);
+      for (int i = 0; i < batch.size; i++) {
+        const Loser loser = all[done + static_cast<std::size_t> (i)];
+        const bool goes = is_covered (batch, i, loser);
+        losers.lost_[loser.place] = goes;
+        all[left] = loser;
+        left += goes;
+      }
     }
     losers.count_ = left;
   }
+};
 
-  [[RANGECAST_CYLINDER_ANY]] void run_any () const { run (); }
-  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 () const { run (); }
+/* What each processor runs. */
+struct Losers::Twins {
+  [[RANGECAST_CYLINDER_ANY]] static void run (const CoverLoop<Narrow> &loop) { loop.run (); }
+  [[RANGECAST_CYLINDER_AVX2]] static void run (const CoverLoop<Wide> &loop) { loop.run (); }
 };
 
 void
@@ -209,8 +273,8 @@ Losers::keep_uncovered (const DecidedFrame &frame)
   lost_.assign (frame.cloud.x.size (), 0);
   for (std::size_t i = 0; i < count_; i++)
     lost_[losers_[i].place] = 1;
-  const CoverLoop loop{*this, frame};
-  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 () : loop.run_any ();
+  cpu_level () >= CpuLevel::kAvx2 ? Twins::run (CoverLoop<Wide>{*this, frame})
+                                  : Twins::run (CoverLoop<Narrow>{*this, frame});
 }
 
 void

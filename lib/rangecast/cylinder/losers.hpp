@@ -52,7 +52,8 @@ private:
     std::uint32_t cell;  /* in the rows */
     std::uint8_t image, body, winner;
   };
-  struct CoverLoop;
+  template <typename L> struct CoverLoop; /* over some losers at a time */
+  struct Twins;
 
   void find_cells (const DecidedFrame &frame);
 
