@@ -80,7 +80,7 @@ template <typename L> struct Losers::CoverLoop {
   const DecidedFrame &frame;
 
   /* Consecutive losers that one view won, and what it has there. Of each the four pixels round the
-   * place are four bytes: upper left, upper right, lower left, lower right. */
+   * place are four bits: upper left, upper right, lower left, lower right. */
   struct Batch {
     int size = 0;
     float x[kLanes], y[kLanes], z[kLanes];      /* the points */
@@ -88,12 +88,15 @@ template <typename L> struct Losers::CoverLoop {
     std::int32_t left[kLanes], top[kLanes];     /* the first pixel, on the plane */
     std::int32_t inside[kLanes];                /* all four are on the plane */
     std::int32_t border[kLanes];                /* some are */
-    std::uint32_t same[kLanes]; /* ff: same surface; all 0 if the pixel it falls on is not */
+    std::int32_t same[kLanes]; /* 1: the same surface; all 0 if the pixel it falls on is not */
   };
 
-  [[nodiscard]] const std::uint8_t *lost_of (std::size_t image) const
+  /* Bit 0: whether that place is a loser's; bit 1: the next one. */
+  [[nodiscard]] std::uint32_t lost_at (std::size_t place) const
   {
-    return losers.lost_.data () + frame.cloud.parts ()[image].begin;
+    std::uint16_t bits;
+    std::memcpy (&bits, losers.lost_.data () + place / 8, sizeof bits);
+    return static_cast<std::uint32_t> (bits) >> place % 8;
   }
 
   void begin (Batch &batch, const Loser *first, std::size_t most) const
@@ -102,15 +105,23 @@ template <typename L> struct Losers::CoverLoop {
       return other.winner == first->winner && other.body == first->body;
     };
     const WorldPoints &cloud = frame.cloud;
-    batch.size = 0;
+    const std::size_t end = std::min<std::size_t> (most, kLanes);
+    std::size_t size = 1;
+    while (size < end && alike (first[size]))
+      size++;
+    batch.size = static_cast<int> (size);
+    const std::uint32_t point = first->point;
+    if (first[size - 1].point - point == size - 1 && point + kLanes <= cloud.x.size ()) {
+      L::at (batch.x) = L::at (cloud.x.data () + point);
+      L::at (batch.y) = L::at (cloud.y.data () + point);
+      L::at (batch.z) = L::at (cloud.z.data () + point);
+      return;
+    }
     for (std::size_t i = 0; i < kLanes; i++) {
-      const bool goes_on =
-          static_cast<std::size_t> (batch.size) == i && i < most && alike (first[i]);
-      batch.size += goes_on;
-      const std::uint32_t point = first[goes_on ? i : 0].point;
-      batch.x[i] = cloud.x[point];
-      batch.y[i] = cloud.y[point];
-      batch.z[i] = cloud.z[point];
+      const std::uint32_t other = first[i < size ? i : 0].point;
+      batch.x[i] = cloud.x[other];
+      batch.y[i] = cloud.y[other];
+      batch.z[i] = cloud.z[other];
     }
   }
 
@@ -165,55 +176,47 @@ template <typename L> struct Losers::CoverLoop {
     const I right = x - __builtin_convertvector(L::at (batch.left), F) >= 0.5f,
             below = y - __builtin_convertvector(L::at (batch.top), F) >= 0.5f;
     const I above_it = right ? same[1] : same[0], below_it = right ? same[3] : same[2];
-    const U bytes = ((U)same[0] & 0xffu) | ((U)same[1] & 0xff00u) | ((U)same[2] & 0xff0000u) |
-                    ((U)same[3] & 0xff000000u);
-    L::at (batch.same) = bytes & (U)(below ? below_it : above_it);
+    const I bits = (same[0] & 1) | (same[1] & 2) | (same[2] & 4) | (same[3] & 8);
+    L::at (batch.same) = bits & (below ? below_it : above_it);
   }
 
   /* Whether the winner covers the batch's loser i. */
   [[nodiscard]] bool covers (const Batch &batch, int i, const Loser &loser) const
   {
-    if (batch.border[i])
-      return is_covered_by (loser, loser.winner);
+    if (batch.border[i]) {
+      const std::uint32_t of_winner = std::uint32_t{1} << loser.winner % kLanes;
+      return covers_any (loser, loser.winner / kLanes * kLanes, of_winner);
+    }
     if (batch.same[i] == 0)
       return false;
     const auto width = static_cast<std::size_t> (frame.images[loser.winner].depth.width);
-    const std::uint8_t *lost = lost_of (loser.winner) +
-                               static_cast<std::size_t> (batch.top[i]) * width +
-                               static_cast<std::size_t> (batch.left[i]);
-    std::uint16_t upper, lower;
-    std::memcpy (&upper, lost, 2);
-    std::memcpy (&lower, lost + width, 2);
-    return !((upper | std::uint32_t{lower} << 16) & batch.same[i]);
+    const std::size_t upper = frame.cloud.parts ()[loser.winner].begin +
+                              static_cast<std::size_t> (batch.top[i]) * width +
+                              static_cast<std::size_t> (batch.left[i]);
+    const std::uint32_t lost = (lost_at (upper) & 3) | (lost_at (upper + width) & 3) << 2;
+    return !(lost & static_cast<std::uint32_t> (batch.same[i]));
   }
 
-  /* The same for one loser and any view, wherever that sees it. */
-  [[nodiscard]] bool is_covered_by (const Loser &loser, std::size_t rival) const
+  /* Whether an image covers a loser that it sees at pixel (x, y) of its plane and depth z; any part
+   * of what is round it may lie beyond the plane. */
+  [[nodiscard]] bool covers_at (std::size_t rival, float x, float y, float z) const
   {
-    const WorldPoints &cloud = frame.cloud;
-    const float point[] = {cloud.x[loser.point], cloud.y[loser.point], cloud.z[loser.point]};
-    float x, y, z;
-    frame.lookups[loser.body][rival].find (point, x, y, z);
     const RangeImage &image = frame.images[rival];
-    x -= static_cast<float> (image.roi.x);
-    y -= static_cast<float> (image.roi.y);
     const int width = image.depth.width, height = image.depth.height;
-    if (!(z > 0 && x > -1 && y > -1 && x < static_cast<float> (width) &&
-            y < static_cast<float> (height)))
-      return false;
     const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
     const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
                         (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
-    const std::uint8_t *lost = lost_of (rival);
-    const auto at = [&] (int k) { /* in lost */
-      return static_cast<std::size_t> (top + k / 2) * width +
-             static_cast<std::size_t> (left + k % 2);
+    const std::size_t begin = frame.cloud.parts ()[rival].begin;
+    const auto is_lost = [&] (int k) {
+      return lost_at (begin + static_cast<std::size_t> (top + k / 2) * width +
+                      static_cast<std::size_t> (left + k % 2)) &
+             1;
     };
     const auto is_on = [&] (int k) {
       return left + k % 2 >= 0 && top + k / 2 >= 0 && left + k % 2 < width && top + k / 2 < height;
     };
     /* Most that do not cover have lost the place themselves. */
-    if (!is_on (nearest) || lost[at (nearest)])
+    if (!is_on (nearest) || is_lost (nearest))
       return false;
     for (int k : {nearest, nearest ^ 1, nearest ^ 2, nearest ^ 3}) {
       if (!is_on (k))
@@ -222,21 +225,59 @@ template <typename L> struct Losers::CoverLoop {
       const float behind = z - static_cast<float> (depth);
       const bool same =
           depth != kInvalidDepth && behind <= frame.behind[rival] && -behind <= frame.before[rival];
-      if (k == nearest ? !same : same && lost[at (k)])
+      if (k == nearest ? !same : same && is_lost (k))
         return false;
     }
     return true;
+  }
+
+  /* Whether some of kLanes images from `first` on cover a loser.
+   * @param which  bit i: image first + i is asked */
+  [[nodiscard]] bool covers_any (const Loser &loser, std::size_t first, std::uint32_t which) const
+  {
+    const WorldPoints &cloud = frame.cloud;
+    const float px = cloud.x[loser.point], py = cloud.y[loser.point], pz = cloud.z[loser.point];
+    const Lookups &all = losers.lookups_[loser.body];
+    const auto row = [&] (int k, F &to) {
+      to = L::at (&all.rows[k][0][first]) * px + L::at (&all.rows[k][1][first]) * py +
+           L::at (&all.rows[k][2][first]) * pz + L::at (&all.rows[k][3][first]);
+    };
+    F x, y, z;
+    row (0, x);
+    row (1, y);
+    row (2, z);
+    x = x / z - L::at (&losers.boxes_[0][first]);
+    y = y / z - L::at (&losers.boxes_[1][first]);
+    std::int32_t seen[kLanes];
+    L::at (seen) = (z > 0) & (x > -1) & (y > -1) & (x < L::at (&losers.boxes_[2][first])) &
+                   (y < L::at (&losers.boxes_[3][first]));
+    float u[kLanes], v[kLanes], depth[kLanes];
+    L::at (u) = x;
+    L::at (v) = y;
+    L::at (depth) = z;
+    for (; which; which &= which - 1) {
+      const int i = std::countr_zero (which);
+      if (seen[i] && covers_at (first + static_cast<std::size_t> (i), u[i], v[i], depth[i]))
+        return true;
+    }
+    return false;
   }
 
   [[nodiscard]] bool is_covered (const Batch &batch, int i, const Loser &loser) const
   {
     if (covers (batch, i, loser)) /* most often */
       return true;
-    std::uint64_t rivals = frame.units.rows.covering (loser.cell) &
-                           ~(std::uint64_t{1} << loser.image) & ~(std::uint64_t{1} << loser.winner);
-    for (; rivals; rivals &= rivals - 1)
-      if (is_covered_by (loser, static_cast<std::size_t> (std::countr_zero (rivals))))
+    const std::uint64_t rivals = frame.units.rows.covering (loser.cell) &
+                                 ~(std::uint64_t{1} << loser.image) &
+                                 ~(std::uint64_t{1} << loser.winner);
+    constexpr std::uint64_t kAll = (1u << kLanes) - 1;
+    for (std::size_t first = 0; rivals >> first; first += kLanes) {
+      const auto which = static_cast<std::uint32_t> (rivals >> first & kAll);
+      if (which && covers_any (loser, first, which))
         return true;
+      if (first + kLanes >= kMaxViews)
+        break;
+    }
     return false;
   }
 
@@ -252,7 +293,8 @@ template <typename L> struct Losers::CoverLoop {
       for (int i = 0; i < batch.size; i++) {
         const Loser loser = all[done + static_cast<std::size_t> (i)];
         const bool goes = is_covered (batch, i, loser);
-        losers.lost_[loser.place] = goes;
+        if (!goes)
+          losers.lost_[loser.place / 8] &= static_cast<std::uint8_t> (~(1 << loser.place % 8));
         all[left] = loser;
         left += goes;
       }
@@ -267,12 +309,28 @@ struct Losers::Twins {
   [[RANGECAST_CYLINDER_AVX2]] static void run (const CoverLoop<Wide> &loop) { loop.run (); }
 };
 
+/* What images need to look points up, one array a number. */
+void
+Losers::take_lookups (const DecidedFrame &frame)
+{
+  for (std::size_t i = 0; i < frame.images.size (); i++) {
+    const RangeImage &image = frame.images[i];
+    const int box[] = {image.roi.x, image.roi.y, image.depth.width, image.depth.height};
+    for (int k = 0; k < 4; k++)
+      boxes_[k][i] = static_cast<float> (box[k]);
+    for (int body = 0; body < kMaxBodies; body++)
+      for (int k = 0; k < 12; k++)
+        lookups_[body].rows[k / 4][k % 4][i] = frame.lookups[body][i].rows[k / 4][k % 4];
+  }
+}
+
 void
 Losers::keep_uncovered (const DecidedFrame &frame)
 {
-  lost_.assign (frame.cloud.x.size (), 0);
+  take_lookups (frame);
+  lost_.assign (frame.cloud.x.size () / 8 + 3, 0); /* read two bytes at a time */
   for (std::size_t i = 0; i < count_; i++)
-    lost_[losers_[i].place] = 1;
+    lost_[losers_[i].place / 8] |= static_cast<std::uint8_t> (1 << losers_[i].place % 8);
   cpu_level () >= CpuLevel::kAvx2 ? Twins::run (CoverLoop<Wide>{*this, frame})
                                   : Twins::run (CoverLoop<Narrow>{*this, frame});
 }

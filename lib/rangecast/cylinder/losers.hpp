@@ -26,7 +26,7 @@ struct DecidedFrame {
 };
 
 /** The points in units that another view won, and which of them stay all the same. Keeps its memory
- *  from frame to frame: 21 bytes a point. */
+ *  from frame to frame: 20 bytes a point. */
 class Losers {
 public:
   /** Lists them, in the order of the cloud. */
@@ -56,10 +56,16 @@ private:
   struct Twins;
 
   void find_cells (const DecidedFrame &frame);
+  void take_lookups (const DecidedFrame &frame);
 
   std::vector<Loser> losers_; /* as many as there can be; of these, the first count_ */
   std::size_t count_ = 0;
-  std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
+  std::vector<std::uint8_t> lost_; /* a bit a pixel: it is a loser's; images one after the other */
+  struct Lookups {                 /* PixelLookup::rows of all images */
+    float rows[3][4][kMaxViews];
+  };
+  std::array<Lookups, kMaxBodies> lookups_{};
+  float boxes_[4][kMaxViews] = {}; /* left, top, width and height of all images' planes */
   /* Of each slice of one plane its first cell, kNoCell of others. There cell_of_ tells the cell of
    * each point; kNoCell for the fifth and further surfaces of a unit, whose points all stay. */
   std::vector<std::uint32_t> first_cell_, cell_of_;
