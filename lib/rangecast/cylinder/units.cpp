@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../parallel.hpp"
+#include "isa.hpp"
 
 namespace rangecast {
 
@@ -182,40 +183,43 @@ struct Units::Cutter {
     return span <= gap;
   }
 
-  /* Makes the layers of those entries. */
+  /* Makes the layers of those entries. Layers are written anew with each of their entries, for the
+   * same reason. */
   void finish_entries ()
   {
-    std::uint32_t column_before = UINT32_MAX;
+    typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
     UnitEntry *entries = units.entries.data ();
-    UnitLayer *layers = units.layers.data ();
-    layer_end = slice.begin - 1;
-    UnitLayer layer;
+    UnitLayer *layer = units.layers.data () + slice.begin - 1;
+    std::uint32_t *chain = units.chain_.data ();
+    std::uint32_t column_before = UINT32_MAX, first_entry = 0, shared = 0;
+    std::uint64_t layer_views = 0;
     float weight = 0, radii = 0;
     for (std::uint32_t e = slice.begin; e < entry_end; e++) {
       UnitEntry &entry = entries[e];
-      const std::uint32_t at = entry.key / kMaxViews;
+      const std::uint32_t at = entry.key / kMaxViews, view = entry.key % kMaxViews;
       const bool fresh = at != column_before;
+      const std::uint64_t bit = std::uint64_t{1} << view;
       column_before = at;
-      layer_end += fresh;
+      layer += fresh;
       weight = (fresh ? 0 : weight) + entry.weight;
       radii = (fresh ? 0 : radii) + entry.radius;
-      layer.views = (fresh ? 0 : layer.views) | std::uint64_t{1} << entry.view ();
-      layer.first_entry = fresh ? e : layer.first_entry;
-      layer.entry_count = e + 1 - layer.first_entry;
-      layer.column = static_cast<int> (at);
-      layer.radius = radii / weight;
-      layers[layer_end] = layer;
-      slice.occupied += fresh;
-      slice.shared += layer.entry_count == 2;
+      layer_views = (fresh ? 0 : layer_views) | bit;
+      first_entry = fresh ? e : first_entry;
+      const std::uint32_t count = e + 1 - first_entry;
+      *layer = {layer_views, first_entry, count, static_cast<int> (at), 0, radii / weight};
+      shared += count == 2;
+      F4 &values = *reinterpret_cast<F4 *> (&entry.radius);
       const float share = 1 / entry.weight;
-      entry.radius *= share;
-      entry.x *= share;
-      entry.z *= share;
+      values *= F4{share, share, share, 1};
       entry.tangent[0] = entry.tangent[1] = 0;
-      entry.layer = layer_end;
-      link (e, entry.view ());
+      entry.layer = static_cast<std::uint32_t> (layer - units.layers.data ());
+      (views & bit ? chain[last[view]] : first[view]) = e;
+      last[view] = e;
+      views |= bit;
     }
-    layer_end++;
+    layer_end = static_cast<std::uint32_t> (layer - units.layers.data ()) + 1;
+    slice.occupied = layer_end - slice.begin;
+    slice.shared = shared;
     slice.planes = layer_end > slice.begin;
   }
 
@@ -307,14 +311,6 @@ struct Units::Cutter {
     slice.entry_count = entry_end - slice.begin;
   }
 };
-
-void
-Units::cut_slice (int number)
-{
-  Cutter cutter (*this, slices[number]);
-  cutter.cut (
-      begin_.data () + static_cast<std::size_t> (number) * settings_.columns, settings_.columns);
-}
 
 /* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
  * slices of one layer a unit, where each step goes a column further. */
@@ -415,7 +411,7 @@ Units::point_at (std::uint32_t number, std::uint32_t found)
 }
 
 void
-Units::find_tangents (int number)
+Units::find_tangents_of (int number)
 {
   const Slice &slice = slices[number];
   const int reach = std::min (kReach, settings_.columns / 4);
@@ -441,6 +437,42 @@ Units::sum_tangents (int number)
         cell.tangent[k] += entry->weight * entry->tangent[k];
     rows.put (rows.cell (number, layer.plane, layer.column), cell);
   }
+}
+
+/* What each processor runs; plain code, but made for it. */
+struct Units::Twins {
+  static bool avx2 () { return cpu_level () >= CpuLevel::kAvx2; }
+  static void cut (Units &units, int number)
+  {
+    const int columns = units.settings_.columns;
+    Cutter (units, units.slices[number])
+        .cut (units.begin_.data () + static_cast<std::size_t> (number) * columns, columns);
+  }
+  [[RANGECAST_CYLINDER_ANY]] static void cut_any (Units &units, int number) { cut (units, number); }
+  [[RANGECAST_CYLINDER_AVX2]] static void cut_avx2 (Units &units, int number)
+  {
+    cut (units, number);
+  }
+  [[RANGECAST_CYLINDER_ANY]] static void tangents_any (Units &units, int number)
+  {
+    units.find_tangents_of (number);
+  }
+  [[RANGECAST_CYLINDER_AVX2]] static void tangents_avx2 (Units &units, int number)
+  {
+    units.find_tangents_of (number);
+  }
+};
+
+void
+Units::cut_slice (int number)
+{
+  Twins::avx2 () ? Twins::cut_avx2 (*this, number) : Twins::cut_any (*this, number);
+}
+
+void
+Units::find_tangents (int number)
+{
+  Twins::avx2 () ? Twins::tangents_avx2 (*this, number) : Twins::tangents_any (*this, number);
 }
 
 } // namespace rangecast
