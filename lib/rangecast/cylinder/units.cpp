@@ -312,32 +312,10 @@ struct Units::Cutter {
   }
 };
 
-/* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
- * slices of one layer a unit, where each step goes a column further. */
-std::uint32_t
-Units::next_entry (std::uint32_t number, int reach) const
-{
-  const UnitEntry &entry = entries[number];
-  const auto gap = static_cast<float> (settings_.layer_gap_m);
-  int column = entry.column ();
-  for (std::uint32_t next = chain_[number], before = number; next != number;
-       before = next, next = chain_[next]) {
-    const UnitEntry &other = entries[next];
-    if (next < before)
-      column -= settings_.columns;
-    const int distance = other.column () - column;
-    if (distance > reach)
-      return kNone;
-    if (std::abs (layers[other.layer].radius - entry.radius) <= gap)
-      return next;
-  }
-  return kNone;
-}
-
-/* The same for slices of several layers. A unit may have as many as a view has points, and going
- * through all of them for each of them would take minutes. But both a view's entries in a unit and
- * those in the units after it come from the axis outwards: where the search for one entry ended the
- * one for the next begins. */
+/* A view's next entries where slices have several layers. A unit may have as many as a view has
+ * points, and going through all of them for each of them would take minutes. But both a view's
+ * entries in a unit and those in the units after it come from the axis outwards: where the search
+ * for one entry ended the one for the next begins. */
 struct Units::Followers {
   int column = -1;               /* of the view's entries asked for */
   int count = 0;                 /* columns with entries of the view that follow it within reach */
@@ -381,63 +359,88 @@ struct Units::Followers {
   }
 };
 
-void
-Units::find_layered_tangents (const Slice &slice, int reach)
-{
-  std::array<Followers, kMaxViews> followers;
-  for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
-    Followers &of_view = followers[entries[e].view ()];
-    if (of_view.column != entries[e].column ())
-      of_view.begin_column (*this, e, reach);
-    point_at (e, of_view.find (*this, e));
+/* Gives entries of a slice their tangents, and cells their sums. In its class, so that it becomes
+ * part of the twins. */
+struct Units::Tangents {
+  Units &units;
+  int number, reach;
+
+  /* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
+   * slices of one layer a unit, where each step goes a column further. */
+  [[nodiscard]] std::uint32_t next_entry (std::uint32_t from) const
+  {
+    const UnitEntry &entry = units.entries[from];
+    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    int column = entry.column ();
+    for (std::uint32_t next = units.chain_[from], before = from; next != from;
+         before = next, next = units.chain_[next]) {
+      const UnitEntry &other = units.entries[next];
+      if (next < before)
+        column -= units.settings_.columns;
+      const int distance = other.column () - column;
+      if (distance > reach)
+        return kNone;
+      if (std::abs (units.layers[other.layer].radius - entry.radius) <= gap)
+        return next;
+    }
+    return kNone;
   }
-}
 
-void
-Units::point_at (std::uint32_t number, std::uint32_t found)
-{
-  if (found == kNone)
-    return;
-  UnitEntry &entry = entries[number], &next = entries[found];
-  const float dx = next.x - entry.x, dz = next.z - entry.z;
-  const float squared = dx * dx + dz * dz;
-  if (!(squared > 1e-18f))
-    return;
-  const float per_length = 1 / std::sqrt (squared);
-  entry.tangent[0] = dx * per_length;
-  entry.tangent[1] = dz * per_length;
-  if (next.tangent[0] == 0 && next.tangent[1] == 0)
-    std::copy_n (entry.tangent, 2, next.tangent);
-}
+  void point_at (std::uint32_t from, std::uint32_t found)
+  {
+    if (found == kNone)
+      return;
+    UnitEntry &entry = units.entries[from], &next = units.entries[found];
+    const float dx = next.x - entry.x, dz = next.z - entry.z;
+    const float squared = dx * dx + dz * dz;
+    if (!(squared > 1e-18f))
+      return;
+    const float per_length = 1 / std::sqrt (squared);
+    entry.tangent[0] = dx * per_length;
+    entry.tangent[1] = dz * per_length;
+    if (next.tangent[0] == 0 && next.tangent[1] == 0)
+      std::copy_n (entry.tangent, 2, next.tangent);
+  }
 
-void
-Units::find_tangents_of (int number)
-{
-  const Slice &slice = slices[number];
-  const int reach = std::min (kReach, settings_.columns / 4);
-  if (slice.planes > 1)
-    find_layered_tangents (slice, reach);
-  else
+  void find ()
+  {
+    const Slice &slice = units.slices[number];
+    if (slice.planes > 1) {
+      find_layered ();
+      return;
+    }
     for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++)
-      point_at (e, next_entry (e, reach));
-  sum_tangents (number);
-}
-
-void
-Units::sum_tangents (int number)
-{
-  const int planes = rows.slices ()[number].planes;
-  for (const UnitLayer &layer : layers_of (slices[number])) {
-    if (layer.plane >= planes)
-      continue;
-    UnitRows::Cell cell{layer.radius, {}, layer.views};
-    const UnitEntry *entry = entries.data () + layer.first_entry;
-    for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++)
-      for (int k = 0; k < 2; k++)
-        cell.tangent[k] += entry->weight * entry->tangent[k];
-    rows.put (rows.cell (number, layer.plane, layer.column), cell);
+      point_at (e, next_entry (e));
   }
-}
+
+  void find_layered ()
+  {
+    const Slice &slice = units.slices[number];
+    std::array<Followers, kMaxViews> followers;
+    for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
+      Followers &of_view = followers[units.entries[e].view ()];
+      if (of_view.column != units.entries[e].column ())
+        of_view.begin_column (units, e, reach);
+      point_at (e, of_view.find (units, e));
+    }
+  }
+
+  void sum ()
+  {
+    UnitRows &rows = units.rows;
+    const int planes = rows.slices ()[number].planes;
+    for (const UnitLayer &layer : units.layers_of (units.slices[number])) {
+      if (layer.plane >= planes)
+        continue;
+      UnitRows::Cell cell{layer.radius, {}, layer.views};
+      const UnitEntry *entry = units.entries.data () + layer.first_entry;
+      for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++)
+        for (int k = 0; k < 2; k++)
+          cell.tangent[k] += entry->weight * entry->tangent[k];
+      rows.put (rows.cell (number, layer.plane, layer.column), cell);
+    }
+  }
+};
 
 /* What each processor runs; plain code, but made for it. */
 struct Units::Twins {
@@ -453,13 +456,19 @@ struct Units::Twins {
   {
     cut (units, number);
   }
-  [[RANGECAST_CYLINDER_ANY]] static void tangents_any (Units &units, int number)
+  static void find (Units &units, int number)
   {
-    units.find_tangents_of (number);
+    Tangents tangents{units, number, std::min (kReach, units.settings_.columns / 4)};
+    tangents.find ();
+    tangents.sum ();
   }
-  [[RANGECAST_CYLINDER_AVX2]] static void tangents_avx2 (Units &units, int number)
+  [[RANGECAST_CYLINDER_ANY]] static void find_any (Units &units, int number)
   {
-    units.find_tangents_of (number);
+    find (units, number);
+  }
+  [[RANGECAST_CYLINDER_AVX2]] static void find_avx2 (Units &units, int number)
+  {
+    find (units, number);
   }
 };
 
@@ -472,7 +481,7 @@ Units::cut_slice (int number)
 void
 Units::find_tangents (int number)
 {
-  Twins::avx2 () ? Twins::tangents_avx2 (*this, number) : Twins::tangents_any (*this, number);
+  Twins::avx2 () ? Twins::find_avx2 (*this, number) : Twins::find_any (*this, number);
 }
 
 } // namespace rangecast

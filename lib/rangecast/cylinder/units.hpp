@@ -133,12 +133,8 @@ private:
   void cut_slice (int slice);
   struct Cutter;
   struct Followers;
+  struct Tangents;
   struct Twins;
-  void find_tangents_of (int number);
-  [[nodiscard]] std::uint32_t next_entry (std::uint32_t number, int reach) const;
-  void point_at (std::uint32_t number, std::uint32_t next);
-  void find_layered_tangents (const Slice &slice, int reach);
-  void sum_tangents (int number);
 
   UnitSettings settings_;
   std::array<Stack, kMaxBodies> stacks_;
