@@ -324,7 +324,7 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
 {
   const std::size_t slices = units_.slices.size ();
   in_parallel (slices, settings.threads, [&] (std::size_t s) {
-    units_.find_tangents (static_cast<int> (s));
+    units_.fill_rows (static_cast<int> (s));
     units_.rows.sum_along (rules_, static_cast<int> (s));
   });
   in_parallel (slices, settings.threads,

@@ -26,11 +26,8 @@ Losers::find_cells (const DecidedFrame &frame)
     for (const UnitLayer &layer : units.layers_of (units.slices[s])) {
       const std::uint32_t cell =
           units.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
-      for (std::uint32_t e = 0; e < layer.entry_count; e++) {
-        const UnitEntry &entry = units.entries[layer.first_entry + e];
-        for (std::uint32_t i = 0; i < entry.point_count; i++)
-          cell_of_[units.points[entry.first_point + i].index] = cell;
-      }
+      for (std::uint32_t i = 0; i < layer.point_count; i++)
+        cell_of_[units.points[layer.first_point + i].index] = cell;
     }
   }
 }

@@ -15,27 +15,6 @@ constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
 
 void
-Units::sort (const WorldPoints &cloud, std::span<const float> radius,
-    std::span<const std::int32_t> column, std::span<const PointRun> runs,
-    std::span<const WallRange> ranges, const UnitSettings &settings, int threads)
-{
-  settings_ = settings;
-  lay_out (ranges);
-  count_units (cloud, column, runs);
-  scatter (cloud, radius, column, runs);
-  in_parallel (slices.size (), threads, [&] (std::size_t s) { cut_slice (static_cast<int> (s)); });
-  const auto images = static_cast<int> (cloud.parts ().size ());
-  rows.begin (settings.columns, slice_height_m, images, slices.size ());
-  int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
-  for (const Slice &slice : slices) {
-    const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
-    rows.add_slice (slice.body, slice.number, planes);
-    most -= planes;
-  }
-  rows.make_room ();
-}
-
-void
 Units::lay_out (std::span<const WallRange> ranges)
 {
   double height = 0;
@@ -98,11 +77,9 @@ Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
       total += count;
     }
   }
-  if (chain_.size () < total) { /* the last to grow: all have grown */
+  if (layers.size () < total) { /* the last to grow: all have grown */
     points.resize (total);
-    entries.resize (total);
     layers.resize (total);
-    chain_.resize (total);
   }
   const auto columns = static_cast<std::uint32_t> (settings_.columns);
   std::uint32_t *ends = begin_.data ();
@@ -116,26 +93,45 @@ Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
   /* Now each element is its unit's end, which is the next one's begin. */
 }
 
+/* Makes room for as many entries as the largest slice has points. */
+void
+Units::make_works (int threads)
+{
+  const std::size_t workers = workers_for (slices.size (), threads);
+  std::size_t most = 0;
+  for (std::size_t s = 0; s < slices.size (); s++)
+    most = std::max<std::size_t> (
+        most, begin_[(s + 1) * static_cast<std::size_t> (settings_.columns) - 1] - slices[s].begin);
+  if (works_.size () < workers)
+    works_.resize (workers);
+  for (Work &work : works_)
+    if (work.chain.size () < most) {
+      work.entries.resize (most + most / 4);
+      work.chain.resize (most + most / 4);
+    }
+}
+
 /* Cuts the units of a slice into layers, and links the entries of each view in their order. */
 struct Units::Cutter {
   Units &units;
   Slice &slice;
+  Work &work;
   float gap;
   int column = 0;
-  std::uint32_t entry_end, layer_end;
+  std::uint32_t entry_end = 0, layer_end;
   std::uint64_t views = 0; /* of the slice */
   std::uint32_t first[kMaxViews], last[kMaxViews];
 
-  Cutter (Units &owner, Slice &cut)
-      : units (owner), slice (cut), gap (static_cast<float> (owner.settings_.layer_gap_m)),
-        entry_end (cut.begin), layer_end (cut.begin)
+  Cutter (Units &owner, Slice &cut, Work &memory)
+      : units (owner), slice (cut), work (memory),
+        gap (static_cast<float> (owner.settings_.layer_gap_m)), layer_end (cut.begin)
   {
   }
 
   void link (std::uint32_t entry, std::uint32_t view)
   {
     const std::uint64_t bit = std::uint64_t{1} << view;
-    (views & bit ? units.chain_[last[view]] : first[view]) = entry;
+    (views & bit ? work.chain[last[view]] : first[view]) = entry;
     last[view] = entry;
     views |= bit;
   }
@@ -144,7 +140,7 @@ struct Units::Cutter {
   {
     for (std::uint64_t rest = views; rest; rest &= rest - 1) {
       const int view = std::countr_zero (rest);
-      units.chain_[last[view]] = first[view];
+      work.chain[last[view]] = first[view];
     }
   }
 
@@ -159,10 +155,10 @@ struct Units::Cutter {
     const I4 three = {-1, -1, -1, 0};
     F4 sum = {};
     float low = 0, high = 0, span = 0;
-    std::uint32_t before = UINT32_MAX, to = slice.begin - 1;
+    std::uint32_t before = UINT32_MAX, to = UINT32_MAX;
     /* Not through the vectors: stores of vectors may alias them, for all that compilers know. */
     const Point *points = units.points.data ();
-    UnitEntry *entries = units.entries.data ();
+    UnitEntry *entries = work.entries.data ();
     for (std::uint32_t i = slice.begin; i < end; i++) {
       const Point &point = points[i];
       const std::uint32_t differs = point.key ^ before;
@@ -188,13 +184,13 @@ struct Units::Cutter {
   void finish_entries ()
   {
     typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
-    UnitEntry *entries = units.entries.data ();
+    UnitEntry *entries = work.entries.data ();
     UnitLayer *layer = units.layers.data () + slice.begin - 1;
-    std::uint32_t *chain = units.chain_.data ();
+    std::uint32_t *chain = work.chain.data ();
     std::uint32_t column_before = UINT32_MAX, first_entry = 0, shared = 0;
     std::uint64_t layer_views = 0;
     float weight = 0, radii = 0;
-    for (std::uint32_t e = slice.begin; e < entry_end; e++) {
+    for (std::uint32_t e = 0; e < entry_end; e++) {
       UnitEntry &entry = entries[e];
       const std::uint32_t at = entry.key / kMaxViews, view = entry.key % kMaxViews;
       const bool fresh = at != column_before;
@@ -205,9 +201,13 @@ struct Units::Cutter {
       radii = (fresh ? 0 : radii) + entry.radius;
       layer_views = (fresh ? 0 : layer_views) | bit;
       first_entry = fresh ? e : first_entry;
-      const std::uint32_t count = e + 1 - first_entry;
-      *layer = {layer_views, first_entry, count, static_cast<int> (at), 0, radii / weight};
-      shared += count == 2;
+      layer->views = layer_views;
+      layer->first_entry = first_entry;
+      layer->entry_count = e + 1 - first_entry;
+      layer->column = static_cast<int> (at);
+      layer->plane = 0;
+      layer->radius = radii / weight;
+      shared += layer->entry_count == 2;
       F4 &values = *reinterpret_cast<F4 *> (&entry.radius);
       const float share = 1 / entry.weight;
       values *= F4{share, share, share, 1};
@@ -229,7 +229,7 @@ struct Units::Cutter {
   bool add_layer (std::uint32_t begin, std::uint32_t end, int plane, bool any)
   {
     UnitLayer &layer = units.layers[layer_end];
-    layer = {0, entry_end, 0, column, plane, 0};
+    layer = {0, entry_end, 0, column, plane, 0, {}, begin, end - begin};
     const Point *points = units.points.data ();
     float radii = 0, low = kNowhere, high = 0;
     std::uint32_t to = entry_end;
@@ -246,16 +246,15 @@ struct Units::Cutter {
       radii += radius;
       const auto weight = static_cast<float> (i - from);
       const float share = 1 / weight;
-      units.entries[to] = {
-          radius * share, x * share, z * share, weight, {}, key, layer_end, from, i - from};
-      layer.views |= std::uint64_t{1} << units.entries[to].view ();
+      work.entries[to] = {radius * share, x * share, z * share, weight, {}, key, layer_end};
+      layer.views |= std::uint64_t{1} << work.entries[to].view ();
     }
     if (any && high - low > gap)
       return true;
     layer.radius = radii / static_cast<float> (end - begin);
     layer.entry_count = to - entry_end;
     for (; entry_end < to; entry_end++)
-      link (entry_end, units.entries[entry_end].view ());
+      link (entry_end, work.entries[entry_end].view ());
     layer_end++;
     return false;
   }
@@ -303,12 +302,11 @@ struct Units::Cutter {
     if (sum_entries (ends[columns - 1])) {
       finish_entries ();
     } else {
-      entry_end = slice.begin;
+      entry_end = 0;
       cut_units (ends, columns);
     }
     close_rings ();
     slice.layer_count = layer_end - slice.begin;
-    slice.entry_count = entry_end - slice.begin;
   }
 };
 
@@ -321,13 +319,12 @@ struct Units::Followers {
   int count = 0;                 /* columns with entries of the view that follow it within reach */
   std::uint32_t entry[kReach]{}; /* of each, the next to be looked at; kNone after its last */
 
-  void begin_column (const Units &units, std::uint32_t number, int reach)
+  void begin_column (const Work &work, std::uint32_t number, int reach, int columns)
   {
-    const int columns = units.settings_.columns;
-    int at = column = units.entries[number].column ();
+    int at = column = work.entries[number].column ();
     count = 0;
-    for (std::uint32_t next = units.chain_[number]; next != number; next = units.chain_[next]) {
-      const int found = units.entries[next].column ();
+    for (std::uint32_t next = work.chain[number]; next != number; next = work.chain[next]) {
+      const int found = work.entries[next].column ();
       const int distance = found - column + (found < column ? columns : 0);
       if (distance > reach)
         return;
@@ -337,25 +334,23 @@ struct Units::Followers {
     }
   }
 
-  std::uint32_t find (const Units &units, std::uint32_t number)
+  std::uint32_t find (const Units &units, const Work &work, std::uint32_t number)
   {
-    const float radius = units.entries[number].radius;
+    const float radius = work.entries[number].radius;
     const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    const auto radius_of = [&] (std::uint32_t other) {
+      return units.layers[work.entries[other].layer].radius;
+    };
     for (int k = 0; k < count; k++) {
-      while (entry[k] != kNone && radius_of (units, entry[k]) - radius < -gap) {
-        const std::uint32_t next = units.chain_[entry[k]];
-        const bool same = units.entries[next].column () == units.entries[entry[k]].column ();
+      while (entry[k] != kNone && radius_of (entry[k]) - radius < -gap) {
+        const std::uint32_t next = work.chain[entry[k]];
+        const bool same = work.entries[next].column () == work.entries[entry[k]].column ();
         entry[k] = same ? next : kNone;
       }
-      if (entry[k] != kNone && std::abs (radius_of (units, entry[k]) - radius) <= gap)
+      if (entry[k] != kNone && std::abs (radius_of (entry[k]) - radius) <= gap)
         return entry[k];
     }
     return kNone;
-  }
-
-  static float radius_of (const Units &units, std::uint32_t number)
-  {
-    return units.layers[units.entries[number].layer].radius;
   }
 };
 
@@ -363,18 +358,21 @@ struct Units::Followers {
  * part of the twins. */
 struct Units::Tangents {
   Units &units;
-  int number, reach;
+  const Slice &slice;
+  Work &work;
+  std::uint32_t entry_count;
+  int reach;
 
   /* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
    * slices of one layer a unit, where each step goes a column further. */
   [[nodiscard]] std::uint32_t next_entry (std::uint32_t from) const
   {
-    const UnitEntry &entry = units.entries[from];
+    const UnitEntry &entry = work.entries[from];
     const auto gap = static_cast<float> (units.settings_.layer_gap_m);
     int column = entry.column ();
-    for (std::uint32_t next = units.chain_[from], before = from; next != from;
-         before = next, next = units.chain_[next]) {
-      const UnitEntry &other = units.entries[next];
+    for (std::uint32_t next = work.chain[from], before = from; next != from;
+         before = next, next = work.chain[next]) {
+      const UnitEntry &other = work.entries[next];
       if (next < before)
         column -= units.settings_.columns;
       const int distance = other.column () - column;
@@ -390,7 +388,7 @@ struct Units::Tangents {
   {
     if (found == kNone)
       return;
-    UnitEntry &entry = units.entries[from], &next = units.entries[found];
+    UnitEntry &entry = work.entries[from], &next = work.entries[found];
     const float dx = next.x - entry.x, dz = next.z - entry.z;
     const float squared = dx * dx + dz * dz;
     if (!(squared > 1e-18f))
@@ -404,40 +402,37 @@ struct Units::Tangents {
 
   void find ()
   {
-    const Slice &slice = units.slices[number];
     if (slice.planes > 1) {
       find_layered ();
       return;
     }
-    for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++)
+    for (std::uint32_t e = 0; e < entry_count; e++)
       point_at (e, next_entry (e));
   }
 
   void find_layered ()
   {
-    const Slice &slice = units.slices[number];
     std::array<Followers, kMaxViews> followers;
-    for (std::uint32_t e = slice.begin; e < slice.begin + slice.entry_count; e++) {
-      Followers &of_view = followers[units.entries[e].view ()];
-      if (of_view.column != units.entries[e].column ())
-        of_view.begin_column (units, e, reach);
-      point_at (e, of_view.find (units, e));
+    for (std::uint32_t e = 0; e < entry_count; e++) {
+      Followers &of_view = followers[work.entries[e].view ()];
+      if (of_view.column != work.entries[e].column ())
+        of_view.begin_column (work, e, reach, units.settings_.columns);
+      point_at (e, of_view.find (units, work, e));
     }
   }
 
   void sum ()
   {
-    UnitRows &rows = units.rows;
-    const int planes = rows.slices ()[number].planes;
-    for (const UnitLayer &layer : units.layers_of (units.slices[number])) {
-      if (layer.plane >= planes)
-        continue;
-      UnitRows::Cell cell{layer.radius, {}, layer.views};
-      const UnitEntry *entry = units.entries.data () + layer.first_entry;
-      for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++)
-        for (int k = 0; k < 2; k++)
-          cell.tangent[k] += entry->weight * entry->tangent[k];
-      rows.put (rows.cell (number, layer.plane, layer.column), cell);
+    for (std::uint32_t l = slice.begin; l < slice.begin + slice.layer_count; l++) {
+      UnitLayer &layer = units.layers[l];
+      const UnitEntry *entry = work.entries.data () + layer.first_entry;
+      float x = 0, z = 0;
+      for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++) {
+        x += entry->weight * entry->tangent[0];
+        z += entry->weight * entry->tangent[1];
+      }
+      layer.tangent[0] = x;
+      layer.tangent[1] = z;
     }
   }
 };
@@ -445,43 +440,59 @@ struct Units::Tangents {
 /* What each processor runs; plain code, but made for it. */
 struct Units::Twins {
   static bool avx2 () { return cpu_level () >= CpuLevel::kAvx2; }
-  static void cut (Units &units, int number)
+  static void cut (Units &units, Slice &slice, Work &work)
   {
     const int columns = units.settings_.columns;
-    Cutter (units, units.slices[number])
-        .cut (units.begin_.data () + static_cast<std::size_t> (number) * columns, columns);
-  }
-  [[RANGECAST_CYLINDER_ANY]] static void cut_any (Units &units, int number) { cut (units, number); }
-  [[RANGECAST_CYLINDER_AVX2]] static void cut_avx2 (Units &units, int number)
-  {
-    cut (units, number);
-  }
-  static void find (Units &units, int number)
-  {
-    Tangents tangents{units, number, std::min (kReach, units.settings_.columns / 4)};
+    const std::size_t number = static_cast<std::size_t> (&slice - units.slices.data ());
+    Cutter cutter (units, slice, work);
+    cutter.cut (units.begin_.data () + number * static_cast<std::size_t> (columns), columns);
+    Tangents tangents{units, slice, work, cutter.entry_end, std::min (kReach, columns / 4)};
     tangents.find ();
     tangents.sum ();
   }
-  [[RANGECAST_CYLINDER_ANY]] static void find_any (Units &units, int number)
+  [[RANGECAST_CYLINDER_ANY]] static void cut_any (Units &units, Slice &slice, Work &work)
   {
-    find (units, number);
+    cut (units, slice, work);
   }
-  [[RANGECAST_CYLINDER_AVX2]] static void find_avx2 (Units &units, int number)
+  [[RANGECAST_CYLINDER_AVX2]] static void cut_avx2 (Units &units, Slice &slice, Work &work)
   {
-    find (units, number);
+    cut (units, slice, work);
   }
 };
 
 void
-Units::cut_slice (int number)
+Units::sort (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, std::span<const PointRun> runs,
+    std::span<const WallRange> ranges, const UnitSettings &settings, int threads)
 {
-  Twins::avx2 () ? Twins::cut_avx2 (*this, number) : Twins::cut_any (*this, number);
+  settings_ = settings;
+  lay_out (ranges);
+  count_units (cloud, column, runs);
+  scatter (cloud, radius, column, runs);
+  make_works (threads);
+  in_parallel (slices.size (), threads, [&] (std::size_t s, std::size_t worker) {
+    Twins::avx2 () ? Twins::cut_avx2 (*this, slices[s], works_[worker])
+                   : Twins::cut_any (*this, slices[s], works_[worker]);
+  });
+  const auto images = static_cast<int> (cloud.parts ().size ());
+  rows.begin (settings.columns, slice_height_m, images, slices.size ());
+  int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
+  for (const Slice &slice : slices) {
+    const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
+    rows.add_slice (slice.body, slice.number, planes);
+    most -= planes;
+  }
+  rows.make_room ();
 }
 
 void
-Units::find_tangents (int number)
+Units::fill_rows (int number)
 {
-  Twins::avx2 () ? Twins::find_avx2 (*this, number) : Twins::find_any (*this, number);
+  const int planes = rows.slices ()[number].planes;
+  for (const UnitLayer &layer : layers_of (slices[number]))
+    if (layer.plane < planes)
+      rows.put (rows.cell (number, layer.plane, layer.column),
+          {layer.radius, {layer.tangent[0], layer.tangent[1]}, layer.views});
 }
 
 } // namespace rangecast
