@@ -186,6 +186,7 @@ struct Units::Cutter {
     typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
     UnitEntry *entries = work.entries.data ();
     UnitLayer *layer = units.layers.data () + slice.begin - 1;
+    layer_end = slice.begin - 1;
     std::uint32_t *chain = work.chain.data ();
     std::uint32_t column_before = UINT32_MAX, first_entry = 0, shared = 0;
     std::uint64_t layer_views = 0;
@@ -197,6 +198,7 @@ struct Units::Cutter {
       const std::uint64_t bit = std::uint64_t{1} << view;
       column_before = at;
       layer += fresh;
+      layer_end += fresh;
       weight = (fresh ? 0 : weight) + entry.weight;
       radii = (fresh ? 0 : radii) + entry.radius;
       layer_views = (fresh ? 0 : layer_views) | bit;
@@ -212,12 +214,12 @@ struct Units::Cutter {
       const float share = 1 / entry.weight;
       values *= F4{share, share, share, 1};
       entry.tangent[0] = entry.tangent[1] = 0;
-      entry.layer = static_cast<std::uint32_t> (layer - units.layers.data ());
+      entry.layer = layer_end;
       (views & bit ? chain[last[view]] : first[view]) = e;
       last[view] = e;
       views |= bit;
     }
-    layer_end = static_cast<std::uint32_t> (layer - units.layers.data ()) + 1;
+    layer_end++;
     slice.occupied = layer_end - slice.begin;
     slice.shared = shared;
     slice.planes = layer_end > slice.begin;
