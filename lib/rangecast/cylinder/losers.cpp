@@ -182,7 +182,7 @@ template <typename L> struct Losers::CoverLoop {
   {
     if (batch.border[i]) {
       const std::uint32_t of_winner = std::uint32_t{1} << loser.winner % kLanes;
-      return covers_any (loser, loser.winner / kLanes * kLanes, of_winner);
+      return covers_any (loser, loser.winner / kLanes * kLanes, of_winner, false);
     }
     if (batch.same[i] == 0)
       return false;
@@ -195,8 +195,9 @@ template <typename L> struct Losers::CoverLoop {
   }
 
   /* Whether an image covers a loser that it sees at pixel (x, y) of its plane and depth z; any part
-   * of what is round it may lie beyond the plane. */
-  [[nodiscard]] bool covers_at (std::size_t rival, float x, float y, float z) const
+   * of what is round it may lie beyond the plane.
+   * @param scrap  the pixels beside the one it falls on do not matter */
+  [[nodiscard]] bool covers_at (std::size_t rival, float x, float y, float z, bool scrap) const
   {
     const RangeImage &image = frame.images[rival];
     const int width = image.depth.width, height = image.depth.height;
@@ -224,13 +225,17 @@ template <typename L> struct Losers::CoverLoop {
           depth != kInvalidDepth && behind <= frame.behind[rival] && -behind <= frame.before[rival];
       if (k == nearest ? !same : same && is_lost (k))
         return false;
+      if (scrap)
+        return true;
     }
     return true;
   }
 
   /* Whether some of kLanes images from `first` on cover a loser.
-   * @param which  bit i: image first + i is asked */
-  [[nodiscard]] bool covers_any (const Loser &loser, std::size_t first, std::uint32_t which) const
+   * @param which  bit i: image first + i is asked
+   * @param scrap  as for covers_at() */
+  [[nodiscard]] bool covers_any (
+      const Loser &loser, std::size_t first, std::uint32_t which, bool scrap) const
   {
     const WorldPoints &cloud = frame.cloud;
     const float px = cloud.x[loser.point], py = cloud.y[loser.point], pz = cloud.z[loser.point];
@@ -254,49 +259,95 @@ template <typename L> struct Losers::CoverLoop {
     L::at (depth) = z;
     for (; which; which &= which - 1) {
       const int i = std::countr_zero (which);
-      if (seen[i] && covers_at (first + static_cast<std::size_t> (i), u[i], v[i], depth[i]))
+      if (seen[i] && covers_at (first + static_cast<std::size_t> (i), u[i], v[i], depth[i], scrap))
         return true;
     }
     return false;
   }
 
-  [[nodiscard]] bool is_covered (const Batch &batch, int i, const Loser &loser) const
+  /* Whether some view covers a loser.
+   * @param but  a view that is not asked */
+  [[nodiscard]] bool covers_one_of (const Loser &loser, std::uint64_t but, bool scrap) const
   {
-    if (covers (batch, i, loser)) /* most often */
-      return true;
-    const std::uint64_t rivals = frame.units.rows.covering (loser.cell) &
-                                 ~(std::uint64_t{1} << loser.image) &
-                                 ~(std::uint64_t{1} << loser.winner);
+    const std::uint64_t rivals =
+        frame.units.rows.covering (loser.cell) & ~(std::uint64_t{1} << loser.image) & ~but;
     constexpr std::uint64_t kAll = (1u << kLanes) - 1;
-    for (std::size_t first = 0; rivals >> first; first += kLanes) {
+    for (std::size_t first = 0; first < kMaxViews && rivals >> first; first += kLanes) {
       const auto which = static_cast<std::uint32_t> (rivals >> first & kAll);
-      if (which && covers_any (loser, first, which))
+      if (which && covers_any (loser, first, which, scrap))
         return true;
-      if (first + kLanes >= kMaxViews)
-        break;
     }
     return false;
+  }
+
+  /* Whether a loser that stays is one of kScrap pixels at most that a row of its view has there. */
+  [[nodiscard]] bool is_scrap (const Loser &loser) const
+  {
+    constexpr int kScrap = 2;
+    const RangeImage &image = frame.images[loser.image];
+    const int x = static_cast<int> (frame.cloud.pixel[loser.point] & 0xffff),
+              y = static_cast<int> (frame.cloud.pixel[loser.point] >> 16);
+    const std::uint16_t *depth = image.depth.row (y);
+    int pixels = 1;
+    for (const int step : {-1, 1})
+      for (int u = x + step; u >= 0 && u < image.depth.width && pixels <= kScrap; u += step) {
+        if (depth[u] == kInvalidDepth ||
+            (lost_at (loser.place + static_cast<std::size_t> (u) - static_cast<std::size_t> (x)) &
+                1))
+          break;
+        pixels++;
+      }
+    return pixels <= kScrap;
+  }
+
+  void set_lost (std::uint32_t place, bool lost) const
+  {
+    const auto bit = static_cast<std::uint8_t> (1 << place % 8);
+    std::uint8_t &bits = losers.lost_[place / 8];
+    bits = static_cast<std::uint8_t> (lost ? bits | bit : bits & ~bit);
+  }
+
+  void find_uncovered () const
+  {
+    const Loser *all = losers.losers_.data ();
+    Batch batch;
+    for (std::size_t done = 0; done < losers.count_;
+         done += static_cast<std::size_t> (batch.size)) {
+      begin (batch, all + done, losers.count_ - done);
+      find_places (batch, all[done]);
+      for (int i = 0; i < batch.size; i++) {
+        const Loser &loser = all[done + static_cast<std::size_t> (i)];
+        if (!covers (batch, i, loser) && /* most often it does */
+            !covers_one_of (loser, std::uint64_t{1} << loser.winner, false))
+          set_lost (loser.place, false);
+      }
+    }
+  }
+
+  /* Of what stays, scraps are no surface that could overlap with another one: points that strips
+   * would draw alone. They go where another view has the place itself. (To ask again about all that
+   * stay, of which some were kept for a pixel beside that stays now, too, makes half a percent
+   * fewer double units of eight views, and takes half as long again as asking once.) */
+  void take_off_list () const
+  {
+    Loser *all = losers.losers_.data ();
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < losers.count_; i++) {
+      const Loser loser = all[i];
+      if (!(lost_at (loser.place) & 1)) {
+        if (!is_scrap (loser) || !covers_one_of (loser, 0, true))
+          continue;
+        set_lost (loser.place, true);
+      }
+      all[left++] = loser;
+    }
+    losers.count_ = left;
   }
 
   void run () const
   {
-    Loser *all = losers.losers_.data ();
-    const std::size_t count = losers.count_;
-    std::size_t left = 0;
-    Batch batch;
-    for (std::size_t done = 0; done < count; done += static_cast<std::size_t> (batch.size)) {
-      begin (batch, all + done, count - done);
-      find_places (batch, all[done]);
-      for (int i = 0; i < batch.size; i++) {
-        const Loser loser = all[done + static_cast<std::size_t> (i)];
-        const bool goes = is_covered (batch, i, loser);
-        if (!goes)
-          losers.lost_[loser.place / 8] &= static_cast<std::uint8_t> (~(1 << loser.place % 8));
-        all[left] = loser;
-        left += goes;
-      }
-    }
-    losers.count_ = left;
+    find_uncovered ();
+    take_off_list ();
   }
 };
 

@@ -36,8 +36,9 @@ public:
    *
    *  A point well behind what a view sees is hidden from it: another place. A point well before it
    *  would have hidden that: one of both is wrong, and it is the loser's, up to errors that no
-   *  stereo makes on the same surface. One after the other, so that of two losers at one place only
-   *  the first stays. */
+   *  stereo makes on the same surface. Where the regions of two views meet, they overlap by a
+   * pixel; but what is left of a row's run of points must be more than two pixels for that. One
+   * after the other, so that of two losers at one place only the first stays. */
   void keep_uncovered (const DecidedFrame &frame);
 
   /** Makes the pixels invalid. */
