@@ -24,6 +24,7 @@
 #include <mutex>
 #include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
+#include <rangecast/guarded.hpp>
 
 #include "controlledvalues.hpp"
 
@@ -82,6 +83,7 @@ struct GstCylinderFilterPrivate {
   /* Streaming thread only. */
   rangecast::CylinderFilter core;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  bool was_off = false;
 };
 
 struct _GstCylinderFilter {
@@ -145,17 +147,61 @@ gst_cylinder_filter_axis_get_type (void)
 
 /* ---- streaming ---- */
 
+static void
+gst_cylinder_filter_forget_scene (GstCylinderFilterPrivate *priv)
+{
+  priv->core.reset ();
+  priv->colours.reset ();
+}
+
+/* All that is of one stream. */
+static void
+gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
+{
+  gst_cylinder_filter_forget_scene (priv);
+  priv->last_pts = GST_CLOCK_TIME_NONE;
+}
+
 static gboolean
 gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
 {
   auto self = GST_CYLINDER_FILTER (base);
-  gstrange::RangeInfo info;
-  rangecast::Status status = gstrange::parse_caps (in, info);
-  if (status.ok ())
-    status = self->priv->core.set_rig (info.rig);
-  if (status.ok ())
-    status = self->priv->colours.set_rig (info.rig);
+  auto priv = self->priv;
+  gst_cylinder_filter_forget (priv);
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    gstrange::RangeInfo info;
+    rangecast::Status result = gstrange::parse_caps (in, info);
+    if (result.ok ())
+      result = priv->core.set_rig (info.rig);
+    return result.ok () ? priv->colours.set_rig (info.rig) : result;
+  });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
+ */
+static bool
+gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  return !known || now <= last || now - last > GST_SECOND / 2;
+}
+
+/* Every buffer comes by here, also those that are too late or pass untouched. */
+static GstFlowReturn
+gst_cylinder_filter_submit_input_buffer (
+    GstBaseTransform *base, gboolean is_discont, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
+    gst_cylinder_filter_forget (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
+      ->submit_input_buffer (base, is_discont, buffer);
 }
 
 /* Controlled properties take their values of this buffer's time; the mode may be one of them. */
@@ -167,6 +213,9 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   std::unique_lock guard (priv->lock);
   const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
   guard.unlock ();
+  if (off && !priv->was_off) /* nobody looks at what the scene does meanwhile */
+    gst_cylinder_filter_forget_scene (priv);
+  priv->was_off = off;
   gst_base_transform_set_passthrough (base, off);
 }
 
@@ -186,18 +235,6 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.axis = result.axis;
 }
 
-/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
- */
-static bool
-gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
-{
-  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
-  if (!GST_BUFFER_IS_DISCONT (buffer))
-    return false;
-  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
-  return !known || now <= last || now - last > GST_SECOND / 2;
-}
-
 static GstFlowReturn
 gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
@@ -212,19 +249,16 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     return GST_FLOW_OK;
 
-  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
-    priv->core.reset ();
-    priv->colours.reset ();
-  }
-  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
   rangecast::CylinderResult result;
-  rangecast::Status status = frame.status ();
-  if (status.ok ())
-    status = priv->colours.before (frame.views (), colours);
-  if (status.ok ())
-    status = priv->core.process (frame.views (), settings, result);
-  if (status.ok ())
-    status = priv->colours.after (frame.views (), colours);
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+    rangecast::Status done = frame.status ();
+    if (done.ok ())
+      done = priv->colours.before (frame.views (), colours);
+    if (done.ok ())
+      done = priv->core.process (frame.views (), settings, result);
+    return done.ok () ? priv->colours.after (frame.views (), colours) : done;
+  });
   if (status.ok ())
     gst_cylinder_filter_count (priv, result);
   GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
@@ -235,11 +269,11 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 static gboolean
 gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  /* Serialised with the data: axis and gains start anew after a seek. */
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
-    GST_CYLINDER_FILTER (base)->priv->core.reset ();
-    GST_CYLINDER_FILTER (base)->priv->colours.reset ();
-  }
+  /* Serialised with the data: axis, winners and gains start anew after a seek, or with another
+   * stream. */
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP ||
+      GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
+    gst_cylinder_filter_forget (GST_CYLINDER_FILTER (base)->priv);
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
 }
 
@@ -247,11 +281,10 @@ static gboolean
 gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
+  gst_cylinder_filter_forget (priv);
+  priv->was_off = false;
   const std::lock_guard guard (priv->lock);
-  priv->colours.reset ();
   priv->counts = {};
-  priv->core.reset ();
-  priv->last_pts = GST_CLOCK_TIME_NONE;
   return TRUE;
 }
 
@@ -301,9 +334,10 @@ gst_cylinder_filter_set_axis_vector (GstCylinderFilter *self, guint id, const GV
 {
   rangecast::Vec3 vector;
   const bool direction = id == PROP_AXIS_DIRECTION;
-  if (!get_vector (value, vector) || (direction && norm (vector) < 1e-6)) {
-    GST_WARNING_OBJECT (self, "%s: expected three finite numbers%s; not changed",
-        direction ? "axis-direction" : "axis-position", direction ? ", not all 0" : "");
+  const bool good = get_vector (value, vector) && norm (vector) < 1e6;
+  if (!good || (direction && norm (vector) < 1e-6)) {
+    GST_WARNING_OBJECT (self, "%s: expected three numbers, a length%s below 1e6; not changed",
+        direction ? "axis-direction" : "axis-position", direction ? " from 1e-6 to" : "");
     return;
   }
   const std::lock_guard guard (self->priv->lock);
@@ -596,6 +630,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_BALANCE, GstPluginAPIFlags (0));
 
   transform_class->set_caps = gst_cylinder_filter_set_caps;
+  transform_class->submit_input_buffer = gst_cylinder_filter_submit_input_buffer;
   transform_class->before_transform = gst_cylinder_filter_before_transform;
   transform_class->transform_ip = gst_cylinder_filter_transform_ip;
   transform_class->transform_ip_on_passthrough = FALSE;

@@ -19,7 +19,10 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <memory>
+#include <new>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/guarded.hpp>
 
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 #define GST_CAT_DEFAULT gst_ply_enc_debug
@@ -30,7 +33,10 @@ using rangecast::PointCloudFormat;
 
 struct GstPlyEncPrivate {
   std::atomic<bool> with_view_id{false}, with_normals{false};
-  std::atomic<PointCloudFormat::Kind> kind{PointCloudFormat::kPly};
+  std::atomic<PointCloudFormat::Kind> kind{PointCloudFormat::kPly}; /* as the application wants */
+  /* What the stream's caps say, and with them its files: `kind` as it was in READY. */
+  std::atomic<PointCloudFormat::Kind> kind_of_stream{PointCloudFormat::kPly};
+  std::atomic<bool> started{false};
   gstrange::RangeInfo info; /* streaming thread only */
 };
 
@@ -61,11 +67,17 @@ gst_ply_enc_format_get_type (void)
 
 /* ---- streaming ---- */
 
+static PointCloudFormat::Kind
+gst_ply_enc_kind (const GstPlyEncPrivate *priv)
+{
+  return priv->started ? priv->kind_of_stream : priv->kind;
+}
+
 static GstCaps *
 gst_ply_enc_transform_caps (
     GstBaseTransform *base, GstPadDirection direction, GstCaps *, GstCaps *filter)
 {
-  const bool is_pcd = GST_PLY_ENC (base)->priv->kind == PointCloudFormat::kPcd;
+  const bool is_pcd = gst_ply_enc_kind (GST_PLY_ENC (base)->priv) == PointCloudFormat::kPcd;
   GstCaps *other =
       direction == GST_PAD_SRC
           ? gst_static_pad_template_get_caps (&sink_template)
@@ -81,8 +93,30 @@ static gboolean
 gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
 {
   auto self = GST_PLY_ENC (base);
-  const rangecast::Status status = gstrange::parse_caps (in, self->priv->info);
+  const rangecast::Status status =
+      rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* A buffer with the file in it. */
+static rangecast::Status
+gst_ply_enc_write (GstPlyEncPrivate *priv, GstBuffer *input, GstBuffer *&output)
+{
+  const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  const rangecast::PointCloudWriter writer (
+      {gst_ply_enc_kind (priv), priv->with_normals, priv->with_view_id});
+  std::size_t points = 0;
+  for (const auto &view : frame.views ())
+    points += rangecast::count_points (view);
+  output = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
+  GstMapInfo map;
+  if (!output || !gst_buffer_map (output, &map, GST_MAP_WRITE))
+    throw std::bad_alloc ();
+  const auto unmap = [&] (GstBuffer *buffer) { gst_buffer_unmap (buffer, &map); };
+  const std::unique_ptr<GstBuffer, decltype (unmap)> mapped (output, unmap);
+  return writer.write (frame.views (), priv->info.rig, {map.data, map.size});
 }
 
 /* The output's size depends on the points, so the file is written here, where its buffer is made.
@@ -91,29 +125,12 @@ static GstFlowReturn
 gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
 {
   auto self = GST_PLY_ENC (base);
-  gstrange::RangeFrameMap frame (input, GST_MAP_READ);
-  if (!frame.status ().ok ())
-    return gst_range_flow_return (GST_ELEMENT (self), frame.status ());
-
-  const rangecast::PointCloudWriter writer (
-      {self->priv->kind, self->priv->with_normals, self->priv->with_view_id});
-  std::size_t points = 0;
-  for (const auto &view : frame.views ())
-    points += rangecast::count_points (view);
-  GstBuffer *buffer = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
-  GstMapInfo map;
-  if (!buffer || !gst_buffer_map (buffer, &map, GST_MAP_WRITE)) {
+  GstBuffer *buffer = nullptr;
+  const rangecast::Status status =
+      rangecast::guarded ("plyenc", [&] { return gst_ply_enc_write (self->priv, input, buffer); });
+  if (!status.ok ()) {
     gst_clear_buffer (&buffer);
-    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory for a file of %" G_GSIZE_FORMAT " points", points));
-    return GST_FLOW_ERROR;
-  }
-  const auto status = writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
-  gst_buffer_unmap (buffer, &map);
-  const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
-  if (flow != GST_FLOW_OK) {
-    gst_buffer_unref (buffer);
-    return flow;
+    return gst_range_flow_return (GST_ELEMENT (self), status);
   }
   GST_BASE_TRANSFORM_GET_CLASS (base)->copy_metadata (base, input, buffer);
   *output = buffer;
@@ -134,6 +151,24 @@ gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstB
 }
 
 /* ---- life ---- */
+
+static gboolean
+gst_ply_enc_start (GstBaseTransform *base)
+{
+  GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
+  priv->kind_of_stream = priv->kind.load ();
+  priv->started = true;
+  return TRUE;
+}
+
+static gboolean
+gst_ply_enc_stop (GstBaseTransform *base)
+{
+  GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
+  priv->started = false;
+  priv->info = {};
+  return TRUE;
+}
 
 static void
 gst_ply_enc_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
@@ -220,6 +255,8 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
       "Writes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_PLY_ENC_FORMAT, GstPluginAPIFlags (0));
 
+  transform_class->start = gst_ply_enc_start;
+  transform_class->stop = gst_ply_enc_stop;
   transform_class->transform_caps = gst_ply_enc_transform_caps;
   transform_class->set_caps = gst_ply_enc_set_caps;
   transform_class->prepare_output_buffer = gst_ply_enc_prepare_output_buffer;

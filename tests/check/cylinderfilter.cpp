@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include <gst/controller/controller.h>
 
-#include "rangecast-check.hpp"
+#include "failing-memory.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -246,6 +246,108 @@ GST_START_TEST (test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_another_stream_and_another_unit_height_begin_anew)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  held_by_frame (h, element, rig, false, 0);
+  fail_unless (held_by_frame (h, element, rig, false, GST_SECOND / 30) > 0);
+  gst_harness_push_event (h, gst_event_new_stream_start ("another"));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_harness_push_event (h, gst_event_new_segment (&segment));
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 2 * GST_SECOND / 30), 0);
+  fail_unless (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30) > 0);
+  g_object_set (element, "unit-height", 0.006, nullptr);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 4 * GST_SECOND / 30), 0);
+  fail_unless (held_by_frame (h, element, rig, false, 5 * GST_SECOND / 30) > 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_forgets_winners_while_it_is_off)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  held_by_frame (h, element, rig, false, 0);
+  g_object_set (element, "mode", 0, nullptr);
+  held_by_frame (h, element, rig, false, GST_SECOND / 30);
+  g_object_set (element, "mode", 1, nullptr);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 2 * GST_SECOND / 30), 0);
+  fail_unless (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30) > 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_jump_in_time_counts_though_its_buffer_is_too_late)
+{
+  const Rig rig = same_place_rig (2);
+  GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical qos=true");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  held_by_frame (h, element, rig, false, 0);
+  gst_harness_push_upstream_event (
+      h, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 1, GST_SECOND / 2, 5 * GST_SECOND));
+  GstBuffer *late = make_frame_set (rig, 5 * GST_SECOND);
+  GST_BUFFER_FLAG_SET (late, GST_BUFFER_FLAG_DISCONT);
+  fail_unless_equals_int (gst_harness_push (h, late), GST_FLOW_OK);
+  fail_unless_equals_int (gst_harness_buffers_in_queue (h), 0);
+  fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 9 * GST_SECOND), 0);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
+{
+  /* On one thread: OpenCV's pool waits for ever where it has no memory for its own threads. */
+  const Rig rig = same_place_rig (2, 32, 24);
+  fail_unless (run_out_of_memory ("cylinderfilter n-threads=1 mode=blend", rig) > 20);
+}
+GST_END_TEST;
+
+/* All properties but the statistics say that they may change while playing. */
+GST_START_TEST (test_every_property_set_while_playing_is_kept_and_read_for_the_next_frame)
+{
+  const Rig rig = ring_rig (4);
+  GstHarness *h = harness_for (rig, "cylinderfilter");
+  GstElement *element = gst_harness_find_element (h, "cylinderfilter");
+  guint count = 0;
+  GParamSpec **specs = g_object_class_list_properties (G_OBJECT_GET_CLASS (element), &count);
+  for (guint i = 0; i < count; i++)
+    if (specs[i]->owner_type == G_OBJECT_TYPE (element) && (specs[i]->flags & G_PARAM_WRITABLE))
+      fail_unless (specs[i]->flags & GST_PARAM_MUTABLE_PLAYING, "%s", specs[i]->name);
+  g_free (specs);
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, 0)));
+  const char *changes[][2] = {{"axis", "fixed"}, {"axis-position", "<0.1,0.0,0.0>"},
+      {"axis-direction", "<0.0,0.0,2.0>"}, {"layer-gap", "0.2"}, {"smoothing", "0.05"},
+      {"hidden-gap", "0"}, {"columns", "90"}, {"blend-width", "0.1"}, {"colour-balance", "off"},
+      {"n-threads", "1"}};
+  GstClockTime time = 0;
+  for (const auto &change : changes) {
+    gst_util_set_object_arg (G_OBJECT (element), change[0], change[1]);
+    time += GST_SECOND / 30;
+    gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, time)));
+  }
+  GstStructure *stats = nullptr;
+  g_object_get (element, "stats", &stats, nullptr);
+  const GValue *position = gst_structure_get_value (stats, "axis-position");
+  const GValue *direction = gst_structure_get_value (stats, "axis-direction");
+  fail_unless_equals_float (g_value_get_double (gst_value_array_get_value (position, 0)), 0.1);
+  fail_unless_equals_float (g_value_get_double (gst_value_array_get_value (direction, 2)), 1);
+  gst_structure_free (stats);
+  /* Refused where it is set, instead of an error with the next frame. */
+  gst_util_set_object_arg (G_OBJECT (element), "axis-position", "<1e9,0.0,0.0>");
+  gst_util_set_object_arg (G_OBJECT (element), "axis-direction", "<0.0,0.0,0.0>");
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, time)));
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_bodies_and_steadiness_may_change_while_playing)
 {
   const Rig rig = same_place_rig (2);
@@ -420,6 +522,11 @@ cylinderfilter_suite ()
   tcase_add_test (tc, test_stats_count_frames_points_and_units);
   tcase_add_test (tc, test_forgets_winners_on_discont_flush_and_new_caps);
   tcase_add_test (tc, test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is);
+  tcase_add_test (tc, test_another_stream_and_another_unit_height_begin_anew);
+  tcase_add_test (tc, test_forgets_winners_while_it_is_off);
+  tcase_add_test (tc, test_jump_in_time_counts_though_its_buffer_is_too_late);
+  tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
+  tcase_add_test (tc, test_every_property_set_while_playing_is_kept_and_read_for_the_next_frame);
   tcase_add_test (tc, test_bodies_and_steadiness_may_change_while_playing);
   tcase_add_test (tc, test_views_of_one_pixel_and_64_views_pass);
   tcase_add_test (tc, test_axis_is_set_as_an_array);

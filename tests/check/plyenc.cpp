@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "rangecast-check.hpp"
+#include "failing-memory.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -291,6 +291,47 @@ GST_START_TEST (test_pcd_has_the_fields_that_its_header_names)
 }
 GST_END_TEST;
 
+/* Whether the next file, and what the caps say of it, are PCD. */
+static void
+expect_format (GstHarness *h, const Rig &rig, bool pcd)
+{
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+  fail_unless_equals_int (gst_buffer_memcmp (output, 0, "ply\n", 4) != 0, pcd);
+  gst_buffer_unref (output);
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  fail_unless (gst_structure_has_name (
+      gst_caps_get_structure (caps, 0), pcd ? "application/x-pcd" : "application/x-ply"));
+  gst_caps_unref (caps);
+}
+
+GST_START_TEST (test_format_set_while_playing_waits_for_ready)
+{
+  const Rig rig = ring_rig (1, 32, 24);
+  GstElement *element =
+      GST_ELEMENT (gst_object_ref_sink (gst_element_factory_make ("plyenc", nullptr)));
+  GParamSpec *spec = g_object_class_find_property (G_OBJECT_GET_CLASS (element), "format");
+  fail_unless (spec->flags & GST_PARAM_MUTABLE_READY);
+  for (const bool pcd : {false, true}) {
+    GstHarness *h = gst_harness_new_with_element (element, "sink", "src");
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+    expect_format (h, rig, pcd);
+    gst_util_set_object_arg (G_OBJECT (element), "format", pcd ? "ply" : "pcd");
+    expect_format (h, rig, pcd);
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 15, 1)));
+    expect_format (h, rig, pcd);
+    gst_harness_teardown (h); /* to NULL */
+  }
+  gst_object_unref (element);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
+{
+  fail_unless (run_out_of_memory ("plyenc", ring_rig (2, 32, 24)) > 2);
+  fail_unless (run_out_of_memory ("plyenc format=pcd normals=true", ring_rig (2, 32, 24)) > 2);
+}
+GST_END_TEST;
+
 #ifdef RANGECAST_HAVE_ASSIMP
 GST_START_TEST (test_assimp_reads_points_colours_and_normals)
 {
@@ -337,6 +378,8 @@ plyenc_suite ()
   tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
   tcase_add_test (tc, test_normals_of_noise_have_length_1_and_face_the_camera);
   tcase_add_test (tc, test_pcd_has_the_fields_that_its_header_names);
+  tcase_add_test (tc, test_format_set_while_playing_waits_for_ready);
+  tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
 #ifdef RANGECAST_HAVE_ASSIMP
   tcase_add_test (tc, test_assimp_reads_points_colours_and_normals);
 #endif

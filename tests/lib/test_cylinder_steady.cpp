@@ -1,157 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What cylinderfilter keeps from frame to frame, and what it does with several bodies. */
-#include "test-support.hpp"
+#include "cylinder-support.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <functional>
 #include <random>
 #include <rangecast/cpu.hpp>
-#include <rangecast/cylinder/cylinder_filter.hpp>
 #include <rangecast/scene/scene.hpp>
 
 using namespace rangecast;
-using rangecast::testing::Image;
-using rangecast::testing::ring_rig;
-using rangecast::testing::ring_view;
+using namespace rangecast::testing;
 
 namespace {
-
-constexpr int kWidth = 320, kHeight = 240;
-using Surface = std::function<double (Vec3 origin, Vec3 direction)>;
-
-Surface
-ellipsoid (Vec3 centre, Vec3 radii)
-{
-  return [=] (Vec3 o, Vec3 d) {
-    o = o - centre;
-    o = {o.x / radii.x, o.y / radii.y, o.z / radii.z};
-    d = {d.x / radii.x, d.y / radii.y, d.z / radii.z};
-    const double a = dot (d, d), b = dot (o, d), c = dot (o, o) - 1, root = b * b - a * c;
-    return root < 0 ? INFINITY : (-b - std::sqrt (root)) / a;
-  };
-}
-
-Surface
-both (const Surface &a, const Surface &b)
-{
-  return [=] (Vec3 o, Vec3 d) { return std::min (a (o, d), b (o, d)); };
-}
-
-/* A square patch 0.1 m before the axis that faces that way (0: +z). */
-Surface
-patch (double turn_deg, double half = 0.03)
-{
-  const double a = turn_deg * M_PI / 180;
-  const Vec3 normal{std::sin (a), 0, std::cos (a)}, centre{0, 0, 0.1};
-  return [=] (Vec3 o, Vec3 d) {
-    const double s = dot (centre - o, normal) / dot (d, normal);
-    const Vec3 p = o + s * d - centre;
-    return s > 0 && std::abs (p.y) < half && norm (p - Vec3{0, p.y, 0}) < half ? s : INFINITY;
-  };
-}
-
-/* The range images of one moment, with their pixels. */
-class Frame {
-public:
-  explicit Frame (const Rig &rig) : rig_ (rig)
-  {
-    for (const View &view : rig.views) {
-      depth.emplace_back (view.width, view.height);
-      colour.emplace_back (view.width, view.height);
-    }
-  }
-  Frame (const Rig &rig, const Surface &surface) : Frame (rig)
-  {
-    for (std::size_t i = 0; i < rig.views.size (); i++) {
-      const View &view = rig.views[i];
-      for (int v = 0; v < view.height; v++)
-        for (int u = 0; u < view.width; u++) {
-          const Vec3 ray = view.world_from_view.rotation * view.intrinsics.unproject (u, v, 1);
-          const double z = surface (view.world_from_view.translation, ray);
-          depth[i].view ().at (u, v) = z < 6 ? static_cast<std::uint16_t> (z * 1e4 + 0.5) : 0;
-        }
-    }
-  }
-
-  std::vector<RangeImage> images ()
-  {
-    std::vector<RangeImage> all;
-    for (std::size_t i = 0; i < rig_.views.size (); i++) {
-      const View &view = rig_.views[i];
-      all.push_back (
-          {view.id, {0, 0, view.width, view.height}, depth[i].view (), colour[i].view (), 0});
-    }
-    return all;
-  }
-
-  /* Errors as stereo makes them: of neighbouring pixels alike, growing with the square of depth. */
-  void add_noise (std::mt19937 &random, double disparity_px)
-  {
-    std::normal_distribution<float> normal (0, 1);
-    for (std::size_t i = 0; i < depth.size (); i++) {
-      ImageView<std::uint16_t> image = depth[i].view ();
-      std::vector<float> white (static_cast<std::size_t> (image.width) * image.height);
-      for (float &value : white)
-        value = normal (random);
-      for (int v = 1; v + 1 < image.height; v++)
-        for (int u = 1; u + 1 < image.width; u++) {
-          std::uint16_t &d = image.at (u, v);
-          float sum = 0;
-          for (int k = 0; k < 9; k++)
-            sum += white[static_cast<std::size_t> (v + k / 3 - 1) * image.width + u + k % 3 - 1];
-          const double z = d * 1e-4, error = z * z / (kWidth * 0.1) * disparity_px * sum / 3;
-          d = d && z < 1.2 ? static_cast<std::uint16_t> ((z + error) * 1e4) : 0;
-        }
-    }
-  }
-
-  std::size_t points (std::size_t i)
-  {
-    ImageView<std::uint16_t> image = depth[i].view ();
-    std::size_t n = 0;
-    for (int v = 0; v < image.height; v++)
-      n += static_cast<std::size_t> (
-          image.width - std::count (image.row (v), image.row (v) + image.width, 0));
-    return n;
-  }
-
-  std::vector<Image<std::uint16_t>> depth;
-  std::vector<Image<Rgbx>> colour;
-
-private:
-  Rig rig_;
-};
-
-bool
-operator== (Frame &a, Frame &b)
-{
-  for (std::size_t i = 0; i < a.depth.size (); i++) {
-    ImageView<std::uint16_t> x = a.depth[i].view (), y = b.depth[i].view ();
-    for (int v = 0; v < x.height; v++)
-      if (std::memcmp (x.row (v), y.row (v), 2 * static_cast<std::size_t> (x.width)) != 0)
-        return false;
-  }
-  return true;
-}
-
-CylinderResult
-run (CylinderFilter &filter, Frame &frame, const CylinderSettings &settings = {})
-{
-  CylinderResult result;
-  const Status status = filter.process (frame.images (), settings, result);
-  EXPECT_TRUE (status.ok ()) << status.message ();
-  return result;
-}
-
-CylinderSettings
-vertical_through_origin ()
-{
-  CylinderSettings settings;
-  settings.axis = AxisMode::kFixed;
-  return settings;
-}
 
 /* A figure that stands still, seen with noise. */
 struct StillScene {
@@ -288,6 +149,70 @@ TEST (Steady, a_new_rig_forgets_who_won)
   ASSERT_TRUE (filter.set_rig (rig).ok ());
   EXPECT_EQ (run (filter, second, vertical_through_origin ()).units_held, 0u);
   EXPECT_LT (second.points (0), second.points (1));
+}
+
+TEST (Steady, units_of_another_size_or_about_another_axis_do_not_hold_what_was_won)
+{
+  Rig rig;
+  rig.views = {ring_view (0, 0), ring_view (1, 50)};
+  const CylinderSettings first = vertical_through_origin ();
+  CylinderSettings higher = first, more = first, found = first, elsewhere = first, turned = first,
+                   nearby = first;
+  higher.units.unit_height_m = 0.005;
+  more.units.columns = 400;
+  found.axis = AxisMode::kVertical;
+  elsewhere.fixed_axis.position = {0, 0, -0.06};
+  turned.fixed_axis.direction = {0.2, 1, 0};
+  nearby.fixed_axis.position = {0, 0.001, 0.001};
+  const CylinderSettings all[] = {first, nearby, higher, more, found, elsewhere, turned};
+  for (std::size_t i = 0; i < std::size (all); i++) {
+    CylinderFilter filter;
+    ASSERT_TRUE (filter.set_rig (rig).ok ());
+    Frame before (rig, patch (0)), after (rig, patch (30));
+    run (filter, before, first);
+    const CylinderResult result = run (filter, after, all[i]);
+    const bool held = i < 2; /* the same place, and one that follows somebody */
+    EXPECT_EQ (result.units_held > 0, held) << i;
+    EXPECT_EQ (after.points (0) > after.points (1), held) << i;
+  }
+}
+
+/* Units that are said to have a winner. */
+static std::uint64_t
+units_with_winner (const CylinderFilter &filter, int columns)
+{
+  std::uint64_t units = 0;
+  for (int s = 0; s < filter.unit_slices (); s++)
+    for (int c = 0; c < columns; c++)
+      units += filter.unit_winner (s, c) >= 0;
+  return units;
+}
+
+TEST (Steady, a_unit_without_points_has_no_winner_but_its_holder_is_not_forgotten)
+{
+  Rig rig;
+  rig.views = {ring_view (0, 0), ring_view (1, 50)};
+  const CylinderSettings settings = vertical_through_origin ();
+  CylinderFilter filter;
+  ASSERT_TRUE (filter.set_rig (rig).ok ());
+  std::uint64_t units = 0;
+  const Surface whole = patch (0);
+  for (const double half_m : {0.03, 0.01, 0.03}) {
+    Frame frame (rig, [&] (Vec3 o, Vec3 d) {
+      const double s = whole (o, d);
+      return std::abs (o.x + s * d.x) < half_m ? s : INFINITY;
+    });
+    const CylinderResult result = run (filter, frame, settings);
+    EXPECT_GT (result.units, 20u);
+    EXPECT_EQ (units_with_winner (filter, settings.units.columns), result.units) << half_m;
+    if (units > 0) { /* the rest comes back to who had it */
+      EXPECT_EQ (result.units_held, result.units);
+    }
+    units = result.units;
+  }
+  Frame empty (rig);
+  run (filter, empty, settings);
+  EXPECT_EQ (units_with_winner (filter, settings.units.columns), 0u);
 }
 
 TEST (Steady, winners_are_remembered_by_view_and_not_by_place_in_the_frame_set)

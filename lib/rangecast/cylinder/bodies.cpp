@@ -133,7 +133,7 @@ Bodies::find (const WorldPoints &cloud, int most)
         body_[place] = static_cast<std::uint8_t> (body);
   spread ();
   const std::size_t points = cloud.x.size ();
-  if (x_.size () < points) {
+  if (pixel_.size () < points) { /* the last to grow: all have grown */
     for (auto *array : {&x_, &y_, &z_})
       array->resize (points);
     pixel_.resize (points);

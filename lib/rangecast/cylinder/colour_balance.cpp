@@ -2,9 +2,11 @@
 #include "colour_balance.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <opencv2/core/hal/hal.hpp>
 
+#include "../guarded.hpp"
 #include "../parallel.hpp"
 
 namespace rangecast {
@@ -82,40 +84,39 @@ Status
 ColourBalance::set_rig (const Rig &rig)
 {
   reset ();
-  return cameras_.set (rig);
+  return guarded ("rig", [&] { return cameras_.set (rig); });
 }
 
 void
 ColourBalance::reset ()
 {
   started_ = 0;
-  ratios_.clear ();
+  frame_ = 0;
+  pairs_.clear ();
+  slots_.fill (-1);
 }
 
-/* What was counted fades; it is of no use for other views. */
+/* What pairs of this frame's views counted fades; what others counted waits until they are back. */
 void
 ColourBalance::age (std::span<const RangeImage> images)
 {
-  const std::size_t pairs = 3 * images_ * (images_ - 1) / 2;
-  bool same = ratios_.size () == pairs;
-  for (std::size_t i = 0; i < images_; i++) {
-    same = same && ids_[i] == images[i].view_id;
-    ids_[i] = images[i].view_id;
-  }
-  fresh_ = !same;
-  if (fresh_)
-    ratios_.assign (pairs, {});
-  else
-    for (Histogram &bins : ratios_)
-      for (float &bin : bins)
-        bin *= kKept;
-}
-
-/* Of images i < j. */
-std::size_t
-ColourBalance::pair (std::size_t i, std::size_t j, std::size_t channel) const
-{
-  return 3 * (i * (2 * images_ - i - 1) / 2 + j - i - 1) + channel;
+  fresh_ = false;
+  for (std::size_t i = 0; i < images.size (); i++)
+    for (std::size_t j = i + 1; j < images.size (); j++) {
+      const auto [first, second] = std::minmax (images[i].view_id, images[j].view_id);
+      if (first == second)
+        continue;
+      std::int16_t &slot = slots_[place_of (first, second)];
+      if (slot >= 0) {
+        for (Histogram &bins : pairs_[static_cast<std::size_t> (slot)].ratios)
+          for (float &bin : bins)
+            bin *= kKept;
+        continue;
+      }
+      fresh_ = true;
+      pairs_.push_back ({first, second, {}});
+      slot = static_cast<std::int16_t> (pairs_.size () - 1);
+    }
 }
 
 void
@@ -133,26 +134,32 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
   const auto &logs = log_table ();
   for (std::size_t j = 0; j < images.size (); j++) {
     const RangeImage &other = images[j];
-    ColourCameras::Place place;
-    if (j == from || !has_colour (other) || !cameras_.find (other, point, place))
+    ColourCameras::Place seen;
+    if (j == from || !has_colour (other) || !cameras_.find (other, point, seen))
       continue;
-    const int column = ColourCameras::column (place), row = ColourCameras::row (place);
+    const int column = ColourCameras::column (seen), row = ColourCameras::row (seen);
     const std::uint16_t there = other.depth.at (column, row);
     const float same = cameras_.of[static_cast<std::size_t> (other.view_id)].same_surface;
-    if (there == kInvalidDepth || !(std::abs (place.depth - there) < kSamePlace * same))
+    if (there == kInvalidDepth || !(std::abs (seen.depth - there) < kSamePlace * same))
       continue;
     if (!is_steady (
             other, column, row, cameras_.of[static_cast<std::size_t> (other.view_id)].steepest))
       continue;
     const Rgbx theirs = other.colour.at (column, row);
-    const Rgbx &first = from < j ? mine : theirs, &second = from < j ? theirs : mine;
+    if (other.view_id == image.view_id)
+      continue;
+    const bool forward = image.view_id < other.view_id;
+    const Rgbx &first = forward ? mine : theirs, &second = forward ? theirs : mine;
+    const std::size_t place =
+        forward ? place_of (image.view_id, other.view_id) : place_of (other.view_id, image.view_id);
+    Pair &pair = pairs_[static_cast<std::size_t> (slots_[place])];
     const std::uint8_t a[] = {first.r, first.g, first.b}, b[] = {second.r, second.g, second.b};
     for (std::size_t c = 0; c < 3; c++) {
       if (!is_usable (a[c], b[c]))
         continue;
       const float bin = (logs[a[c]] - logs[b[c]]) * kBinsPerLog + kBins / 2.0f;
       if (bin >= 0 && bin < kBins)
-        ratios_[pair (std::min (from, j), std::max (from, j), c)][static_cast<std::size_t> (bin)]++;
+        pair.ratios[c][static_cast<std::size_t> (bin)]++;
     }
   }
 }
@@ -177,40 +184,48 @@ ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t fro
 }
 
 /* Least squares: for each pair the difference of both log gains is minus the median. The same
- * matrix for all channels, the graph's Laplacian. */
+ * matrix for all channels, the graph's Laplacian. Of all views that were ever there: would one that
+ * is missing for a frame be left out, the mean gain of the others would move. */
 void
-ColourBalance::solve (std::span<const RangeImage> images)
+ColourBalance::solve ()
 {
-  const std::size_t n = images.size ();
+  std::uint64_t views = 0;
+  for (const Pair &pair : pairs_)
+    views |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
+  const auto row_of = [views] (int id) { /* view-ids without gaps */
+    return static_cast<std::size_t> (std::popcount (views & ((std::uint64_t{1} << id) - 1)));
+  };
+  const auto n = static_cast<std::size_t> (std::popcount (views));
   linked_ = 0;
-  for (std::size_t c = 0; c < 3; c++) {
+  for (std::size_t c = 0; c < 3 && n > 0; c++) {
     matrix_.assign (n * n, 0);
     right_.assign (n, 0);
     for (std::size_t i = 0; i < n; i++)
       matrix_[i * n + i] = kPrior;
-    for (std::size_t i = 0; i < n; i++)
-      for (std::size_t j = i + 1; j < n; j++) {
-        const Histogram &bins = ratios_[pair (i, j, c)];
-        float count = 0;
-        for (float bin : bins)
-          count += bin;
-        if (count < kFewest)
-          continue;
-        linked_ |= std::uint64_t{1} << i | std::uint64_t{1} << j;
-        const double weight = std::min (1.0, double{count} / kMany),
-                     ratio = median_of (bins, count);
-        matrix_[i * n + i] += weight;
-        matrix_[j * n + j] += weight;
-        matrix_[i * n + j] -= weight;
-        matrix_[j * n + i] -= weight;
-        right_[i] -= weight * ratio;
-        right_[j] += weight * ratio;
-      }
+    for (const Pair &pair : pairs_) {
+      const Histogram &bins = pair.ratios[c];
+      float count = 0;
+      for (float bin : bins)
+        count += bin;
+      if (count < kFewest)
+        continue;
+      linked_ |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
+      const std::size_t i = row_of (pair.first), j = row_of (pair.second);
+      const double weight = std::min (1.0, double{count} / kMany), ratio = median_of (bins, count);
+      matrix_[i * n + i] += weight;
+      matrix_[j * n + j] += weight;
+      matrix_[i * n + j] -= weight;
+      matrix_[j * n + i] -= weight;
+      right_[i] -= weight * ratio;
+      right_[j] += weight * ratio;
+    }
     if (!cv::hal::Cholesky64f (matrix_.data (), n * sizeof (double), static_cast<int> (n),
             right_.data (), sizeof (double), 1))
       std::fill (right_.begin (), right_.end (), 0); /* never: the prior makes it definite */
-    for (std::size_t i = 0; i < n; i++)
-      measured_[i][c] = static_cast<float> (right_[i]);
+    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+      const int id = std::countr_zero (rest);
+      measured_[static_cast<std::size_t> (id)][c] = static_cast<float> (right_[row_of (id)]);
+    }
   }
 }
 
@@ -218,10 +233,10 @@ void
 ColourBalance::follow (std::span<const RangeImage> images)
 {
   const float most = std::log (kMostGain);
-  for (std::size_t i = 0; i < images.size (); i++) {
-    if (!(linked_ >> i & 1)) /* what it shared before still holds */
+  for (const RangeImage &image : images) {
+    const auto id = static_cast<std::size_t> (image.view_id);
+    if (!(linked_ >> id & 1)) /* what it shared before still holds */
       continue;
-    const auto id = static_cast<std::size_t> (images[i].view_id);
     if (!(started_ >> id & 1))
       frames_[id] = 0;
     started_ |= std::uint64_t{1} << id;
@@ -229,7 +244,7 @@ ColourBalance::follow (std::span<const RangeImage> images)
     const float share = std::max (kShareOfNew, 1 / static_cast<float> (frames_[id]));
     for (std::size_t c = 0; c < 3; c++) {
       float &gain = log_gains_[id][c];
-      gain += share * (std::clamp (measured_[i][c], -most, most) - gain);
+      gain += share * (std::clamp (measured_[id][c], -most, most) - gain);
     }
   }
 }
@@ -282,30 +297,31 @@ multiply (const RangeImage &image, const ColourBalance::Gains &gains)
   }
 }
 
+void
+ColourBalance::learn (std::span<const RangeImage> images)
+{
+  age (images);
+  for (std::size_t i = 0; i < images.size (); i++)
+    count_ratios (images, i);
+  solve ();
+  follow (images);
+}
+
 Status
 ColourBalance::process (std::span<const RangeImage> images, int threads)
 {
-  if (Status status = cameras_.check (images); !status.ok ())
-    return status;
-  images_ = images.size ();
-  frame_++;
-  try {
-    if (images_ > 1) { /* one alone teaches nothing, and keeps the gains that it had */
-      age (images);
-      for (std::size_t i = 0; i < images_; i++)
-        count_ratios (images, i);
-      fresh_ = false;
-      solve (images);
-      follow (images);
-    }
-    in_parallel (images_, threads, [&] (std::size_t i) {
+  return guarded ("colour balance", [&] () -> Status {
+    if (Status status = cameras_.check (images); !status.ok ())
+      return status;
+    frame_++;
+    if (images.size () > 1) /* one alone teaches nothing, and keeps the gains that it had */
+      learn (images);
+    in_parallel (images.size (), threads, [&] (std::size_t i) {
       if (has_colour (images[i]))
         multiply (images[i], gains (images[i].view_id));
     });
-  } catch (const std::exception &error) { /* memory; OpenCV's threads */
-    return {StatusCode::kNoSpace, std::string ("colour balance: ") + error.what ()};
-  }
-  return {};
+    return {};
+  });
 }
 
 } // namespace rangecast

@@ -38,8 +38,9 @@ public:
 
   /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
    *  be as it was before overlaps were cleared. Images without colour are left alone.
-   *  Nothing is allocated once a frame set of so many views has been seen.
-   *  @return as ColourCameras::check(); colours are then untouched */
+   *  What a pair of views shared is kept while one of them is missing.
+   *  Nothing is allocated once all views have been seen together.
+   *  @return as ColourCameras::check(), kNoSpace without memory; colours are then untouched */
   Status process (std::span<const RangeImage> images, int threads);
 
   /** What the colours of a view were multiplied with in the last frame. */
@@ -48,26 +49,35 @@ public:
 private:
   static constexpr int kBins = 640; /* of a histogram */
   using Histogram = std::array<float, kBins>;
+  /* Of log (colour of `first` / colour of `second`), for each channel. */
+  struct Pair {
+    int first = 0, second = 0; /* view-ids, the smaller one first */
+    std::array<Histogram, 3> ratios{};
+  };
 
+  void learn (std::span<const RangeImage> images);
   void age (std::span<const RangeImage> images);
   void count_ratios (std::span<const RangeImage> images, std::size_t from);
   void compare (std::span<const RangeImage> images, std::size_t from, int x, int y);
-  void solve (std::span<const RangeImage> images);
+  void solve ();
   void follow (std::span<const RangeImage> images);
-  [[nodiscard]] std::size_t pair (std::size_t i, std::size_t j, std::size_t channel) const;
+  /* In slots_. */
+  static std::size_t place_of (int first, int second)
+  {
+    return static_cast<std::size_t> (second) * (second - 1) / 2 + static_cast<std::size_t> (first);
+  }
 
   ColourCameras cameras_;
   std::uint64_t started_ = 0; /* bit i: the log gains of view-id i are known */
-  std::uint64_t linked_ = 0;  /* bit i: image i shares surface with another one in this frame */
+  std::uint64_t linked_ = 0;  /* bit i: view-id i shares surface with another one */
   std::uint32_t frame_ = 0;
   std::array<Gains, kMaxViews> log_gains_{}; /* by view-id; smoothed */
   std::array<int, kMaxViews> frames_{};      /* by view-id: that its gains were learnt from */
-  std::array<Gains, kMaxViews> measured_{};  /* by number of the image, of this frame */
-  std::vector<Histogram> ratios_;            /* of each pair of images and channel */
-  std::array<int, kMaxViews> ids_{};         /* that these are of */
-  bool fresh_ = true;                        /* they are empty */
-  std::vector<double> matrix_, right_;       /* of the least squares */
-  std::size_t images_ = 0;
+  std::array<Gains, kMaxViews> measured_{};  /* by view-id, of this frame */
+  std::vector<Pair> pairs_;                  /* of views that were there together */
+  std::array<std::int16_t, kMaxViews *(kMaxViews - 1) / 2> slots_; /* of each in pairs_, or -1 */
+  bool fresh_ = true;                  /* some of this frame's have counted nothing yet */
+  std::vector<double> matrix_, right_; /* of the least squares */
 };
 
 } // namespace rangecast

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../guarded.hpp"
 #include "../parallel.hpp"
 
 namespace rangecast {
@@ -37,9 +38,9 @@ Status
 ColourBlend::remember (std::span<const RangeImage> images)
 {
   begin_.clear ();
-  if (Status status = cameras_.check (images); !status.ok ())
-    return status;
-  try {
+  const Status status = guarded ("blend", [&] () -> Status {
+    if (Status bad = cameras_.check (images); !bad.ok ())
+      return bad;
     std::size_t pixels = 0;
     for (const RangeImage &image : images) {
       begin_.push_back (pixels);
@@ -47,14 +48,16 @@ ColourBlend::remember (std::span<const RangeImage> images)
         pixels += static_cast<std::size_t> (image.depth.width) * image.depth.height;
     }
     begin_.push_back (pixels);
-    if (before_.size () < pixels) {
+    if (seams_.size () < pixels) { /* the last to grow: all have grown */
       before_.resize (pixels);
       lost_.resize (pixels);
       seams_.resize (pixels);
     }
-  } catch (const std::exception &error) {
+    return {};
+  });
+  if (!status.ok ()) {
     begin_.clear ();
-    return {StatusCode::kNoSpace, std::string ("blend: ") + error.what ()};
+    return status;
   }
   for (std::size_t i = 0; i < images.size (); i++)
     for (int y = 0; y < images[i].depth.height && !images[i].depth.empty (); y++)
@@ -359,6 +362,12 @@ ColourBlend::change (const RangeImage &image, const Work &work) const
 Status
 ColourBlend::blend (std::span<const RangeImage> images, double width_m, int threads)
 {
+  return guarded ("blend", [&] { return work (images, width_m, threads); });
+}
+
+Status
+ColourBlend::work (Images images, double width_m, int threads)
+{
   const auto size_of = [&] (std::size_t i) {
     return images[i].depth.empty ()
                ? std::size_t{0}
@@ -372,32 +381,28 @@ ColourBlend::blend (std::span<const RangeImage> images, double width_m, int thre
   if (!(width_m > 0))
     return {};
   const auto width = static_cast<float> (std::min (width_m, 1.0));
-  try {
-    in_parallel (images.size (), threads, [&] (std::size_t i) {
-      works_[i].near.clear ();
-      if (!has_colour (images[i]))
-        return;
-      find_lost (images, i);
-      find_seams (images, i);
-      if (works_[i].last < 0)
-        return;
-      const int most = farthest (images[i], works_[i], width);
-      spread (images, i, most, true);
-      spread (images, i, most, false);
-      find_near (images, i, most, width);
-      if (works_[i].near.empty ())
-        return;
-      compare (images, i);
-      find_ratios (images[i], works_[i]);
-    });
-    /* Not before all have looked. */
-    in_parallel (images.size (), threads, [&] (std::size_t i) {
-      if (!works_[i].near.empty ())
-        change (images[i], works_[i]);
-    });
-  } catch (const std::exception &error) {
-    return {StatusCode::kNoSpace, std::string ("blend: ") + error.what ()};
-  }
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
+    works_[i].near.clear ();
+    if (!has_colour (images[i]))
+      return;
+    find_lost (images, i);
+    find_seams (images, i);
+    if (works_[i].last < 0)
+      return;
+    const int most = farthest (images[i], works_[i], width);
+    spread (images, i, most, true);
+    spread (images, i, most, false);
+    find_near (images, i, most, width);
+    if (works_[i].near.empty ())
+      return;
+    compare (images, i);
+    find_ratios (images[i], works_[i]);
+  });
+  /* Not before all have looked. */
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
+    if (!works_[i].near.empty ())
+      change (images[i], works_[i]);
+  });
   return {};
 }
 

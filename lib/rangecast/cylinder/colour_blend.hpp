@@ -34,7 +34,7 @@ public:
   /** Blends the colours of the same images, some of whose points are cleared now, with all colours
    *  as they were. Images without colour are left alone.
    *  @param width_m  0 .. 1; 0 = do nothing
-   *  @return kBadSize if the images are not those that were remembered */
+   *  @return kBadSize if the images are not those that were remembered, kNoSpace without memory */
   Status blend (std::span<const RangeImage> images, double width_m, int threads);
 
 private:
@@ -68,6 +68,7 @@ private:
   {
     return before_[begin_[i] + static_cast<std::size_t> (y) * images[i].depth.width + x];
   }
+  Status work (Images images, double width_m, int threads);
   void find_lost (Images images, std::size_t i);
   void find_seams (Images images, std::size_t i);
   [[nodiscard]] int owner_of (Images images, std::size_t i, int x, int y) const;

@@ -2,12 +2,11 @@
 #include "cylinder_filter.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
+#include "../guarded.hpp"
 #include "../parallel.hpp"
-#include "isa.hpp"
 
 namespace rangecast {
 
@@ -30,29 +29,32 @@ check (const CylinderSettings &settings)
   if (settings.bodies < 1 || settings.bodies > kMaxBodies)
     return bad ("cylinder: bodies, expected 1 to 8");
   const double length = norm (settings.fixed_axis.direction);
-  if (settings.axis == AxisMode::kFixed &&
-      !(length > 1e-9 && length < 1e9 && norm (settings.fixed_axis.position) < 1e6))
-    return bad ("cylinder: fixed axis, expected a direction that is not 0, 0, 0");
+  if (settings.axis == AxisMode::kFixed && !(length > 1e-9 && length < 1e9))
+    return bad ("cylinder: direction of the fixed axis, expected a length of 1e-9 to 1e9");
+  if (settings.axis == AxisMode::kFixed && !(norm (settings.fixed_axis.position) < 1e6))
+    return bad ("cylinder: position of the fixed axis, expected less than 1000 km");
   return {};
 }
 
 Status
 CylinderFilter::set_rig (const Rig &rig)
 {
-  if (Status status = validate (rig); !status.ok ())
-    return status;
   rig_views_ = 0;
-  for (const View &view : rig.views) {
-    if (!view.is_range_view ())
-      return {StatusCode::kBadValue,
-          "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
-    rig_rays_[view.id] = PixelRays (view);
-    rig_lookups_[view.id] = PixelLookup (view);
-    rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
-    rig_views_ |= std::uint64_t{1} << view.id;
-  }
   reset ();
-  return {};
+  return guarded ("rig", [&] () -> Status {
+    if (Status status = validate (rig); !status.ok ())
+      return status;
+    for (const View &view : rig.views) {
+      if (!view.is_range_view ())
+        return {StatusCode::kBadValue,
+            "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
+      rig_rays_[view.id] = PixelRays (view);
+      rig_lookups_[view.id] = PixelLookup (view);
+      rig_units_per_metre_[view.id] = static_cast<float> (1 / view.depth_unit_m);
+      rig_views_ |= std::uint64_t{1} << view.id;
+    }
+    return {};
+  });
 }
 
 void
@@ -61,6 +63,22 @@ CylinderFilter::reset ()
   for (AxisTracker &tracker : trackers_)
     tracker.reset ();
   units_.rows.forget ();
+  decided_ = false;
+}
+
+/* Units about an axis found by another rule are other units. So are those about one that was set
+ * elsewhere; but one that is set a little further on in each frame follows somebody. */
+void
+CylinderFilter::forget_other_geometry (const CylinderSettings &settings)
+{
+  constexpr double kNear = 0.05, kAlike = 0.996; /* metres; cosine of 5 degrees */
+  const Vec3 a = settings.fixed_axis.direction, b = fixed_axis_.direction;
+  const bool stays = norm (settings.fixed_axis.position - fixed_axis_.position) < kNear &&
+                     std::abs (dot (a, b)) > kAlike * norm (a) * norm (b);
+  if (settings.axis != axis_mode_ || (settings.axis == AxisMode::kFixed && !stays))
+    reset ();
+  axis_mode_ = settings.axis;
+  fixed_axis_ = settings.fixed_axis;
 }
 
 Status
@@ -206,7 +224,7 @@ CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
     frames[slot] = CylinderFrame (axes_[slot]);
     look_from (slot, frames[slot], images);
   }
-  if (radius_.size () < cloud_.x.size ()) {
+  if (column_.size () < cloud_.x.size ()) { /* the last to grow: all have grown */
     radius_.resize (cloud_.x.size ());
     column_.resize (cloud_.x.size ());
   }
@@ -239,24 +257,30 @@ CylinderFilter::process (
     std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
 {
   result = {};
-  if (Status status = check (settings); !status.ok ())
-    return status;
-  if (Status status = take_cameras (images); !status.ok ())
-    return status;
-  /* No exception leaves the core: neither ours for memory nor OpenCV's. */
-  try {
+  bool began = false;
+  const Status status = guarded ("cylinder", [&] () -> Status {
+    if (Status bad = check (settings); !bad.ok ())
+      return bad;
+    if (Status bad = take_cameras (images); !bad.ok ())
+      return bad;
+    began = true;
     return work (images, settings, result);
-  } catch (const std::exception &error) {
-    return {StatusCode::kNoSpace, std::string ("cylinder: ") + error.what ()};
+  });
+  if (began && !status.ok ()) {
+    reset (); /* what is half done is of no use */
+    result = {};
   }
+  return status;
 }
 
 Status
 CylinderFilter::work (
     std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
 {
+  decided_ = false;
   if (Status status = cloud_.reset (images); !status.ok ())
     return status;
+  forget_other_geometry (settings);
   make_points (images, settings.threads);
   result.points_in = result.points_out = cloud_.size ();
   if (result.points_in > 0) {
@@ -271,12 +295,9 @@ CylinderFilter::work (
   units_.sort (cloud_, radius_, column_, runs_, ranges_, settings.units, settings.threads);
   set_rules (settings, images.size ());
   decide_units (settings, result);
-  find_cells ();
-  list_losers (images);
-  if (settings.hidden_gap_m > 0)
-    keep_uncovered (images, settings);
-  clear_losers (images);
+  clear_losers (images, settings);
   units_.rows.remember (rules_, ids_);
+  decided_ = true;
   result.points_out -= losers_.size ();
   return {};
 }
@@ -303,7 +324,7 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
 {
   const std::size_t slices = units_.slices.size ();
   in_parallel (slices, settings.threads, [&] (std::size_t s) {
-    units_.find_tangents (static_cast<int> (s));
+    units_.fill_rows (static_cast<int> (s));
     units_.rows.sum_along (rules_, static_cast<int> (s));
   });
   in_parallel (slices, settings.threads,
@@ -318,151 +339,28 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
   }
 }
 
-/* Where units of a slice have several layers, a point's column does not tell its cell. */
-void
-CylinderFilter::find_cells ()
+/* How far a point may lie off what a view has there. */
+static void
+set_reach (DecidedFrame &frame, const CylinderSettings &settings,
+    const std::array<float, kMaxViews> &units_per_metre)
 {
-  cell_of_.resize (std::max (cell_of_.size (), cloud_.x.size ()));
-  const UnitRows &rows = units_.rows;
-  for (std::size_t s = 0; s < units_.slices.size (); s++) {
-    const auto number = static_cast<int> (s);
-    if (units_.is_plain (static_cast<std::uint32_t> (s)))
-      continue;
-    for (const UnitLayer &layer : units_.layers_of (units_.slices[s])) {
-      const std::uint32_t cell =
-          units_.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
-      for (std::uint32_t e = 0; e < layer.entry_count; e++) {
-        const UnitEntry &entry = units_.entries[layer.first_entry + e];
-        for (std::uint32_t i = 0; i < entry.point_count; i++)
-          cell_of_[units_.points[entry.first_point + i].index] = cell;
-      }
-    }
+  for (std::size_t i = 0; i < frame.images.size (); i++) {
+    const double scale = units_per_metre[static_cast<std::size_t> (frame.images[i].view_id)];
+    frame.behind[i] = static_cast<float> (settings.hidden_gap_m * scale);
+    frame.before[i] = static_cast<float> (settings.units.layer_gap_m / 2 * scale);
   }
-}
-
-/* In the order of the cloud, in which neighbours follow each other and meet the same pixels. */
-void
-CylinderFilter::list_losers (std::span<const RangeImage> images)
-{
-  losers_.clear ();
-  losers_.reserve (cloud_.x.size ()); /* as large as it can ever get, once */
-  const UnitRows &rows = units_.rows;
-  for (const PointRun &run : runs_) {
-    const auto view = static_cast<int> (run.view);
-    const auto width = static_cast<std::uint32_t> (images[run.view].depth.width);
-    const auto begin = static_cast<std::uint32_t> (cloud_.parts ()[run.view].begin);
-    for (std::size_t i = run.begin; i < run.end; i++) {
-      const auto slice = static_cast<int> (units_.slice_of[i]);
-      const std::uint32_t cell =
-          units_.is_plain (units_.slice_of[i]) ? rows.cell (slice, 0, column_[i]) : cell_of_[i];
-      if (cell == kNoCell || rows.winner (cell) == view || rows.second (cell) == view)
-        continue;
-      const std::uint32_t pixel = cloud_.pixel[i];
-      losers_.push_back (
-          {static_cast<std::uint32_t> (i), begin + (pixel >> 16) * width + (pixel & 0xffff), cell,
-              static_cast<std::uint8_t> (run.view), static_cast<std::uint8_t> (run.body)});
-    }
-  }
-}
-
-/* What a view has in the pixel and its neighbours where it sees a point at depth z. Without
- * branches but one: what neighbours have is a coin toss along every seam. */
-bool
-CylinderFilter::covers (std::size_t i, const RangeImage &image, float u, float v, float z) const
-{
-  using I = Narrow::I;
-  const float x = u - static_cast<float> (image.roi.x), y = v - static_cast<float> (image.roi.y);
-  const int width = image.depth.width, height = image.depth.height;
-  if (!(x > -1 && y > -1 && x < static_cast<float> (width) && y < static_cast<float> (height)))
-    return false;
-  const int left = static_cast<int> (x + 1) - 1, top = static_cast<int> (y + 1) - 1;
-  const int nearest = (y - static_cast<float> (top) >= 0.5f ? 2 : 0) +
-                      (x - static_cast<float> (left) >= 0.5f ? 1 : 0);
-  const std::uint8_t *lost = lost_.data () + cloud_.parts ()[i].begin;
-  /* Most that do not cover have lost the place themselves. */
-  const int column = left + nearest % 2, row = top + nearest / 2;
-  if (column < 0 || row < 0 || column >= width || row >= height ||
-      lost[static_cast<std::size_t> (row) * width + column])
-    return false;
-  I depth = {}, gone = {};
-  if (left >= 0 && top >= 0 && left + 1 < width && top + 1 < height) {
-    const std::uint16_t *upper = image.depth.row (top) + left,
-                        *lower = image.depth.row (top + 1) + left;
-    const std::uint8_t *flags = lost + static_cast<std::size_t> (top) * width + left;
-    depth = I{upper[0], upper[1], lower[0], lower[1]};
-    gone = I{flags[0], flags[1], flags[width], flags[width + 1]};
-  } else {
-    for (int k = 0; k < 4; k++) {
-      const int px = left + k % 2, py = top + k / 2;
-      if (px < 0 || py < 0 || px >= width || py >= height)
-        continue;
-      depth[k] = image.depth.at (px, py);
-      gone[k] = lost[static_cast<std::size_t> (py) * width + px];
-    }
-  }
-  const Narrow::F behind = z - __builtin_convertvector(depth, Narrow::F);
-  const I same = (depth != kInvalidDepth) & (behind <= behind_[i]) & (-behind <= before_[i]);
-  /* Where the winner's region ends the two overlap by a pixel. */
-  return same[nearest] != 0 && !Narrow::any (same & (gone != 0));
-}
-
-/* Whether one of the loser's rivals has a point left where it sees the loser's. A point well behind
- * what a view sees is hidden from it: another place. A point well before it would have hidden that:
- * one of both is wrong, and it is the loser's, up to errors that no stereo makes on the same
- * surface. */
-bool
-CylinderFilter::is_covered (std::span<const RangeImage> images, const Loser &loser) const
-{
-  const int winner = units_.rows.winner (loser.cell);
-  std::uint64_t rivals = units_.rows.covering (loser.cell) & ~(std::uint64_t{1} << loser.image);
-  /* Most often it is the winner. */
-  if ((rivals >> winner & 1) && is_covered_by (images, loser, static_cast<std::size_t> (winner)))
-    return true;
-  for (rivals &= ~(std::uint64_t{1} << winner); rivals; rivals &= rivals - 1)
-    if (is_covered_by (images, loser, static_cast<std::size_t> (std::countr_zero (rivals))))
-      return true;
-  return false;
-}
-
-bool
-CylinderFilter::is_covered_by (
-    std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const
-{
-  const float point[] = {cloud_.x[loser.point], cloud_.y[loser.point], cloud_.z[loser.point]};
-  float u, v, z;
-  lookups_[loser.body][rival].find (point, u, v, z);
-  return z > 0 && covers (rival, images[rival], u, v, z);
-}
-
-/* One after the other, so that of two losers at one place only the first stays. */
-void
-CylinderFilter::keep_uncovered (
-    std::span<const RangeImage> images, const CylinderSettings &settings)
-{
-  for (std::size_t i = 0; i < images.size (); i++) {
-    const double units_per_metre = rig_units_per_metre_[images[i].view_id];
-    behind_[i] = static_cast<float> (settings.hidden_gap_m * units_per_metre);
-    before_[i] = static_cast<float> (settings.units.layer_gap_m / 2 * units_per_metre);
-  }
-  lost_.assign (cloud_.x.size (), 0);
-  for (const Loser &loser : losers_)
-    lost_[loser.place] = 1;
-  std::erase_if (losers_, [&] (const Loser &loser) {
-    if (is_covered (images, loser))
-      return false;
-    lost_[loser.place] = 0;
-    return true;
-  });
 }
 
 void
-CylinderFilter::clear_losers (std::span<const RangeImage> images) const
+CylinderFilter::clear_losers (std::span<const RangeImage> images, const CylinderSettings &settings)
 {
-  for (const Loser &loser : losers_) {
-    const std::uint32_t pixel = cloud_.pixel[loser.point];
-    images[loser.image].depth.at (
-        static_cast<int> (pixel & 0xffff), static_cast<int> (pixel >> 16)) = kInvalidDepth;
+  DecidedFrame frame{images, cloud_, runs_, column_, units_, lookups_, {}, {}};
+  losers_.list (frame);
+  if (settings.hidden_gap_m > 0) {
+    set_reach (frame, settings, rig_units_per_metre_);
+    losers_.keep_uncovered (frame);
   }
+  losers_.clear (frame);
 }
 
 } // namespace rangecast

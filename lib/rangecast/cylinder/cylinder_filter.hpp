@@ -11,6 +11,7 @@
 #include "../status.hpp"
 #include "axis.hpp"
 #include "bodies.hpp"
+#include "losers.hpp"
 #include "units.hpp"
 #include "world_points.hpp"
 
@@ -87,31 +88,25 @@ public:
   /** Clears depths in place. A frame set of less than two images with points is left alone.
    *  Nothing is allocated once the largest frame set has been seen.
    *  @return kBadValue for settings out of range, kNotFound for a view that the rig has not,
-   *  kBadSize for more than kMaxViews images; depth is then untouched. */
+   *  kBadSize for more than kMaxViews images, kNoSpace without memory; depth is then untouched. */
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
   /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
-   *  the other, from the lowest up. */
-  [[nodiscard]] int unit_slices () const { return units_.rows.old_slices (); }
-  /** The view-id of the winner of a unit's outermost surface; -1 where there is none. */
+   *  the other, from the lowest up. None if it had points of fewer than two views. */
+  [[nodiscard]] int unit_slices () const { return decided_ ? units_.rows.old_slices () : 0; }
+  /** The view-id of the winner of a unit's outermost surface; -1 where the frame set has no points.
+   */
   [[nodiscard]] int unit_winner (int slice, int column) const
   {
-    return units_.rows.old_winner (slice, column);
+    return decided_ ? units_.rows.old_winner (slice, column) : -1;
   }
 
 private:
-  /* A point in a unit that another view won. */
-  struct Loser {
-    std::uint32_t point; /* in the cloud */
-    std::uint32_t place; /* in lost_ */
-    std::uint32_t cell;  /* in the rows */
-    std::uint8_t image, body;
-  };
-
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status take_cameras (std::span<const RangeImage> images);
+  void forget_other_geometry (const CylinderSettings &settings);
   void make_points (std::span<const RangeImage> images, int threads);
   void find_bodies (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);
@@ -120,15 +115,7 @@ private:
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_units (const CylinderSettings &settings, CylinderResult &result);
-  void find_cells ();
-  void list_losers (std::span<const RangeImage> images);
-  void keep_uncovered (std::span<const RangeImage> images, const CylinderSettings &settings);
-  [[nodiscard]] bool is_covered (std::span<const RangeImage> images, const Loser &loser) const;
-  [[nodiscard]] bool is_covered_by (
-      std::span<const RangeImage> images, const Loser &loser, std::size_t rival) const;
-  [[nodiscard]] bool covers (
-      std::size_t i, const RangeImage &image, float u, float v, float z) const;
-  void clear_losers (std::span<const RangeImage> images) const;
+  void clear_losers (std::span<const RangeImage> images, const CylinderSettings &settings);
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
@@ -137,6 +124,9 @@ private:
   /* Of each body. A body keeps its place in these as long as it is there. */
   std::array<AxisTracker, kMaxBodies> trackers_;
   Bodies bodies_;
+  AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set, and its */
+  Axis fixed_axis_;
+  bool decided_ = false; /* it had winners */
 
   /* Of the present frame; kept for their memory. By number of the image. */
   std::array<PixelRays, kMaxViews> rays_;
@@ -156,15 +146,7 @@ private:
   std::vector<std::int32_t> column_;
   Units units_;
   RowRules rules_;
-
-  /* Of each point of the cloud in a slice of several planes; kNoCell for the fifth and further
-   * surfaces of a unit, whose points all stay. */
-  std::vector<std::uint32_t> cell_of_;
-  static constexpr std::uint32_t kNoCell = UINT32_MAX;
-  std::vector<Loser> losers_;      /* in the order of the cloud */
-  std::vector<std::uint8_t> lost_; /* 1: this pixel is a loser's; images one after the other */
-  /* How far a point may lie behind, or before, what the image has there; in its depth units. */
-  std::array<float, kMaxViews> behind_{}, before_{};
+  Losers losers_;
 };
 
 } // namespace rangecast

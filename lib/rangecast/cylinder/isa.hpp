@@ -33,6 +33,7 @@ template <int kNumbers> struct LanesOf {
   static const F &at (const float *p) { return *reinterpret_cast<const F *> (p); }
   static I &at (std::int32_t *p) { return *reinterpret_cast<I *> (p); }
   static U &at (std::uint32_t *p) { return *reinterpret_cast<U *> (p); }
+  static const U &at (const std::uint32_t *p) { return *reinterpret_cast<const U *> (p); }
 
   /* |v| */
   static void make_positive (F &v) { v = (F)((I)v & 0x7fffffff); }

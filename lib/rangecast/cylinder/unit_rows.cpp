@@ -16,14 +16,14 @@ namespace rangecast {
 constexpr float kOtherSide = 0.35f;
 
 void
-UnitRows::begin (int columns, int images, std::size_t slices)
+UnitRows::begin (int columns, double slice_height_m, int images, std::size_t slices)
 {
+  slice_height_m_ = slice_height_m;
   /* This frame's memory is the next one's for what was: both have to be large enough. */
   slices_.reserve (slices);
   old_slices_.reserve (slices);
   const int rounded = (columns + kMostLanes - 1) / kMostLanes * kMostLanes;
   if (columns != columns_) {
-    columns_ = columns;
     for (int k = 0; k < 2; k++)
       wall_[k].resize (static_cast<std::size_t> (rounded));
     for (int c = 0; c < rounded; c++) {
@@ -31,6 +31,7 @@ UnitRows::begin (int columns, int images, std::size_t slices)
       wall_[0][c] = static_cast<float> (-std::sin (phi));
       wall_[1][c] = static_cast<float> (std::cos (phi));
     }
+    columns_ = columns;
   }
   width_ = static_cast<std::uint32_t> (rounded + 2 * kPad);
   words_ = images > 32 ? 2 : 1;
@@ -508,7 +509,7 @@ const UnitRows::Slice *
 UnitRows::old_slice (const Slice &slice) const
 {
   const std::uint32_t begin = old_begin_[slice.body], end = old_begin_[slice.body + 1];
-  if (begin == end || old_columns_ != columns_)
+  if (begin == end || old_columns_ != columns_ || old_slice_height_m_ != slice_height_m_)
     return nullptr;
   const std::int64_t at = std::int64_t{slice.number} - old_slices_[begin].number;
   return at < 0 || at >= std::int64_t{end} - begin ? nullptr : &old_slices_[begin + at];
@@ -549,6 +550,7 @@ UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids
     old_begin_[body + 1] += old_begin_[body];
   old_width_ = width_;
   old_columns_ = columns_;
+  old_slice_height_m_ = slice_height_m_;
   old_ids_ = ids;
   old_images_ = rules.images;
 }
@@ -579,7 +581,7 @@ UnitRows::old_winner (int slice, int column) const
   const Slice &old = old_slices_[slice];
   for (int p = old.planes - 1; p >= 0; p--) {
     const std::size_t row = old.first_row + static_cast<std::uint32_t> (p);
-    const int image = old_first_[row * old_width_ + kPad + static_cast<std::size_t> (column)];
+    const int image = next_[row * old_width_ + kPad + static_cast<std::size_t> (column)];
     if (image >= 0 && image < old_images_)
       return old_ids_[image];
   }

@@ -60,7 +60,7 @@ public:
     std::uint64_t views = 0;
   };
 
-  void begin (int columns, int images, std::size_t slices);
+  void begin (int columns, double slice_height_m, int images, std::size_t slices);
   /** Appends a slice with room for so many planes; slices of a body are consecutive. */
   void add_slice (int body, int number, int planes);
   /** Makes room for the slices' rows, and empties them. */
@@ -106,12 +106,13 @@ public:
   /** Keeps the winners for the next frame's hysteresis.
    *  @param ids  view-id of each image */
   void remember (const RowRules &rules, const std::array<int, kMaxViews> &ids);
-  /** Before the next decide(): what images the winners kept have now. */
+  /** Before the next decide(): what images the winners kept have now. Units of another size are
+   *  other units: what was kept of them is not used. */
   void recall (const std::array<int, kMaxViews> &ids, int images);
   void forget ();
 
-  /** What remember() kept: the slices, and the view-id of the winner of a unit's outermost layer,
-   * -1 if it has none. */
+  /** The slices of the frame that remember() saw, and the view-id of the winner of a unit's
+   *  outermost layer in it; -1 where the unit had no points, whoever held it before. */
   [[nodiscard]] int old_slices () const { return static_cast<int> (old_slices_.size ()); }
   [[nodiscard]] int old_winner (int slice, int column) const;
 
@@ -126,12 +127,14 @@ private:
   template <typename Number> using Plane = std::vector<Number>;
 
   int columns_ = 0, words_ = 1;
+  double slice_height_m_ = 0;
   std::uint32_t width_ = 0, rows_ = 0;
   std::vector<Slice> slices_;
   Plane<float> radius_;
   std::array<Plane<float>, 2> tangent_, sum_;
   std::array<Plane<std::uint32_t>, 2> views_, covering_;
-  Plane<std::int32_t> first_, next_, second_, held_;
+  Plane<std::int32_t> first_, second_, held_;
+  Plane<std::int32_t> next_; /* after decide(): as first_, and carry_over() leaves it alone */
   std::array<std::vector<float>, 2> wall_; /* tangent of the wall in each column */
 
   /* Of the frame before. */
@@ -139,6 +142,7 @@ private:
   std::array<std::uint32_t, kMaxBodies + 1> old_begin_{}; /* of each body in old_slices_ */
   std::uint32_t old_width_ = 0;
   int old_columns_ = 0, old_images_ = 0;
+  double old_slice_height_m_ = 0;
   std::array<int, kMaxViews> old_ids_{};
   Plane<float> old_radius_;
   Plane<std::int32_t> old_first_;

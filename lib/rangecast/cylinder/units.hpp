@@ -38,8 +38,6 @@ struct UnitEntry {
   float tangent[2] = {};          ///< x, z; unit vector, as phi grows; 0, 0 if not known
   std::uint32_t key = 0;          ///< as in Units::Point
   std::uint32_t layer = 0;        ///< in Units::layers
-  /** In Units::points; not known where the slice is plain. */
-  std::uint32_t first_point = 0, point_count = 0;
 
   /** Number of the image in the frame set, not its view-id. */
   [[nodiscard]] std::uint32_t view () const { return key % kMaxViews; }
@@ -49,16 +47,19 @@ struct UnitEntry {
 /** One surface in one unit: points whose radii have no gap between them. */
 struct UnitLayer {
   std::uint64_t views = 0;       ///< bit i: image i has points here; one entry each, in their order
-  std::uint32_t first_entry = 0; ///< in Units::entries
+  std::uint32_t first_entry = 0; ///< while the slice is worked on
   std::uint32_t entry_count = 0;
   int column = 0;
-  int plane = 0;    ///< number of the layer in its unit, from the axis outwards
-  float radius = 0; ///< mean of the points, metres
+  int plane = 0;         ///< number of the layer in its unit, from the axis outwards
+  float radius = 0;      ///< mean of the points, metres
+  float tangent[2] = {}; ///< x, z; sum of the entries' tangents, weighted by their points
+  /** In Units::points; not known where the slice is plain. */
+  std::uint32_t first_point = 0, point_count = 0;
 };
 
 /** The points of a frame set, sorted into the units of the inner walls of some cylinders. Keeps its
- * memory from frame to frame: 24 bytes a point, 4 a unit, 40 a layer, 40 an entry and what UnitRows
- * has. */
+ * memory from frame to frame: 72 bytes a point, 4 a unit, 36 a point of the largest slice for each
+ * worker, and what UnitRows has. */
 class Units {
 public:
   struct Point {
@@ -68,29 +69,30 @@ public:
   };
 
   /** Sorts points (in cylinder coordinates, with radius and column as to_wall() gives them) into
-   *  units and layers, and makes room for them in the rows.
+   *  units and layers, gives each layer the sum of its views' tangents weighted by their points,
+   * and makes room for them in the rows.
+   *
+   *  A view's tangent in a layer is the normalised difference to its next point in the slice. Rows
+   *  of a range image need not lie along slices, and a unit often holds one point of a view or
+   * none. So "next" means: of the view's mean points in successive occupied units of the slice, at
+   * most kReach columns apart and not across a layer gap, in the order of phi, across 2 pi too. The
+   * last one of such a run has the tangent of the one before it.
    *  @param runs    ordered by view
    *  @param ranges  heights of each body's points */
   void sort (const WorldPoints &cloud, std::span<const float> radius,
       std::span<const std::int32_t> column, std::span<const PointRun> runs,
       std::span<const WallRange> ranges, const UnitSettings &settings, int threads);
 
-  /** Gives each entry of a slice the normalised difference to the view's next entry in the slice,
-   *  and each cell of its rows the sum of its entries' tangents weighted by their points.
-   *
-   *  Rows of a range image need not lie along slices, and a unit often holds one point of a view or
-   *  none. So "successive" means: the view's mean points in successive occupied units of the slice,
-   *  at most kReach columns apart and not across a layer gap, in the order of phi, across 2 pi too.
-   *  The last one of such a run has the tangent of the one before it. */
-  void find_tangents (int slice);
+  /** Puts a slice's layers into the rows. Different slices may be put there at the same time. */
+  void fill_rows (int slice);
 
   /** Columns over which a view's points are still successive. */
   static constexpr int kReach = 6;
 
   /** A slice's part of the lists below. Elements between the parts mean nothing. */
   struct Slice {
-    std::uint32_t begin = 0; ///< its first point; its entries and layers begin there, too
-    std::uint32_t layer_count = 0, entry_count = 0;
+    std::uint32_t begin = 0; ///< its first point; its layers begin there, too
+    std::uint32_t layer_count = 0;
     std::uint32_t occupied = 0, shared = 0; ///< units with points; of more than one view
     int planes = 0, body = 0, number = 0;   ///< as in UnitRows
   };
@@ -113,13 +115,16 @@ public:
 
   std::vector<Point> points;
   std::vector<std::uint32_t> slice_of; ///< of each point of the cloud
-  std::vector<UnitEntry> entries;
   std::vector<UnitLayer> layers;
   std::vector<Slice> slices;
   double slice_height_m = 0;
   UnitRows rows;
 
 private:
+  struct Work { /* of a worker, for one slice after the other: small enough to stay in caches */
+    std::vector<UnitEntry> entries;
+    std::vector<std::uint32_t> chain; /* of each entry: the view's next one, in a ring */
+  };
   struct Stack { /* the slices of a body */
     int first_slice = 0, count = 0;
     float first_y = 0;
@@ -130,14 +135,16 @@ private:
       std::span<const PointRun> runs);
   void scatter (const WorldPoints &cloud, std::span<const float> radius,
       std::span<const std::int32_t> column, std::span<const PointRun> runs);
-  void cut_slice (int slice);
+  void make_works (int threads);
   struct Cutter;
-  [[nodiscard]] std::uint32_t next_entry (std::uint32_t number, int reach) const;
+  struct Followers;
+  struct Tangents;
+  struct Twins;
 
   UnitSettings settings_;
   std::array<Stack, kMaxBodies> stacks_;
   std::vector<std::uint32_t> begin_; /* of each unit in points; after scatter () its end */
-  std::vector<std::uint32_t> chain_; /* of each entry: the view's next one, in a ring */
+  std::vector<Work> works_;
 };
 
 } // namespace rangecast

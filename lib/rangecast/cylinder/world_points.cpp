@@ -57,7 +57,7 @@ WorldPoints::reset (std::span<const RangeImage> images)
     return {StatusCode::kBadSize,
         "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
   }
-  if (x.size () < pixels) {
+  if (pixel.size () < pixels) { /* the last to grow: all have grown */
     for (auto *array : {&x, &y, &z})
       array->resize (pixels);
     pixel.resize (pixels);
@@ -66,7 +66,10 @@ WorldPoints::reset (std::span<const RangeImage> images)
 }
 
 /* Makes points of an image's valid pixels. */
-struct FillLoop {
+template <typename L> struct FillLoop {
+  using F = typename L::F;
+  using I = typename L::I;
+
   const ConstRangeImage &image;
   const PixelRays &rays;
   float *x, *y, *z;
@@ -129,7 +132,15 @@ struct FillLoop {
       float base[3];
       for (int k = 0; k < 3; k++)
         base[k] = rays.corner[k] + v * rays.down[k] + u0 * rays.right[k];
-      for (std::size_t i = 0; i < n; i++) {
+      std::size_t i = 0;
+      for (; i + L::kLanes <= n; i += L::kLanes) {
+        const F d = L::at (px + i);
+        const F u = __builtin_convertvector((I)(L::at (place + i) & 0xffff), F);
+        L::at (px + i) = rays.origin[0] + d * (base[0] + u * rays.right[0]);
+        L::at (py + i) = rays.origin[1] + d * (base[1] + u * rays.right[1]);
+        L::at (pz + i) = rays.origin[2] + d * (base[2] + u * rays.right[2]);
+      }
+      for (; i < n; i++) {
         const float d = px[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
         px[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
         py[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
@@ -139,19 +150,30 @@ struct FillLoop {
     }
     return end;
   }
-
-  [[RANGECAST_CYLINDER_ANY]] std::size_t run_any () const { return run (); }
-  [[RANGECAST_CYLINDER_AVX2]] std::size_t run_avx2 () const { return run (); }
 };
+
+[[RANGECAST_CYLINDER_ANY]] static std::size_t
+run_fill (const FillLoop<Narrow> &loop)
+{
+  return loop.run ();
+}
+
+[[RANGECAST_CYLINDER_AVX2]] static std::size_t
+run_fill (const FillLoop<Wide> &loop)
+{
+  return loop.run ();
+}
 
 void
 WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)
 {
   Part &part = parts_[index];
   const std::size_t begin = part.begin;
-  const FillLoop loop{
-      image, rays, x.data () + begin, y.data () + begin, z.data () + begin, pixel.data () + begin};
-  part.end = begin + (cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 () : loop.run_any ());
+  float *px = x.data () + begin, *py = y.data () + begin, *pz = z.data () + begin;
+  std::uint32_t *place = pixel.data () + begin;
+  part.end = begin + (cpu_level () >= CpuLevel::kAvx2
+                             ? run_fill (FillLoop<Wide>{image, rays, px, py, pz, place})
+                             : run_fill (FillLoop<Narrow>{image, rays, px, py, pz, place}));
 }
 
 std::size_t

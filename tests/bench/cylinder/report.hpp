@@ -14,8 +14,8 @@ struct TruthRow {
   int views = 0;
   double pose_mm = 0, pose_deg = 0;
   Verdict verdict;
-  double new_holes = 0; ///< uncovered, less what was uncovered before
-  double ms = 0;        ///< of the method, median
+  double new_holes = 0, new_holes_6mm = 0; ///< uncovered, less what was uncovered before
+  double ms = 0;                           ///< of the method, median
 };
 
 void print_header ();

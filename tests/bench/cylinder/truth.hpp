@@ -22,8 +22,8 @@ struct Verdict {
   double thickness_mm = 0, thickness95_mm = 0;
   double distance_mm = 0, distance95_mm = 0; ///< of what is left to the true surface: median, 95 %
   /** Of the surface that cameras see, what has no point within 2 pixels' width along it and 20 mm
-   *  across it. */
-  double uncovered = 0;
+   *  across it; and with 6 mm across it, which stereo's own errors exceed. */
+  double uncovered = 0, uncovered_6mm = 0;
   std::size_t strips = 0, isolated = 0; ///< as striprender would draw what is left
 };
 
@@ -48,14 +48,16 @@ private:
   void judge_slice (const std::vector<char> &alive, Verdict &verdict) const;
   void judge_distance (const std::vector<char> &alive, Verdict &verdict) const;
   [[nodiscard]] std::vector<char> alive_in (const FrameSet &set) const;
-  [[nodiscard]] bool is_covered (std::size_t sample, const std::vector<char> &alive) const;
+  [[nodiscard]] bool is_covered (
+      std::size_t sample, const std::vector<char> &alive, double across) const;
 
   std::vector<Spot> spots_;
   std::vector<double> height_; /* of each spot above the true surface, metres */
   rangecast::Vec3 middle_;
   std::vector<Sample> visible_;
   std::vector<std::uint32_t> covers_begin_, covers_; /* spots that cover each of visible_ */
-  std::vector<std::vector<std::uint32_t>> slice_;    /* spots of each angle */
+  std::vector<float> across_;                     /* of each of covers_: metres off the surface */
+  std::vector<std::vector<std::uint32_t>> slice_; /* spots of each angle */
 };
 
 /** Places of the surface that at least one camera sees.

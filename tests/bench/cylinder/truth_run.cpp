@@ -43,14 +43,17 @@ run_methods (FrameSet &set, const Judge &judge, TruthRow row, const TruthJob &jo
       {"cylinder", cylinder (set.rig, job.settings)},
       {"cylinder, all go", cylinder (set.rig, all_go)}, {"published rule", plain_rule, true},
       {"voxel grid 4 mm", voxel_grid, true}, {"most frontal camera", frontal_camera, true}};
-  double uncovered = 0;
+  double uncovered = 0, uncovered_6mm = 0;
   for (const Method &method : methods) {
     row.method = method.name;
     row.ms = median_ms (set, method.once ? 1 : job.rounds, [&] { method.work (set); });
     row.verdict = judge.judge (set);
-    if (&method == &methods[0])
+    if (&method == &methods[0]) {
       uncovered = row.verdict.uncovered;
+      uncovered_6mm = row.verdict.uncovered_6mm;
+    }
     row.new_holes = row.verdict.uncovered - uncovered;
+    row.new_holes_6mm = row.verdict.uncovered_6mm - uncovered_6mm;
     print_row (row);
     rows.push_back (row);
   }
