@@ -453,12 +453,18 @@ GST_END_TEST;
 
 /* The fake camera draws one byte value a frame, which grows from frame to frame. */
 static void
-fill_with_count (ArvBuffer *buffer, void *, guint32, guint32, ArvPixelFormat)
+fill_with_count (ArvBuffer *buffer, void *n_bytes, guint32, guint32, ArvPixelFormat)
 {
   static int count = 0;
-  std::size_t size = 0;
-  auto *data = static_cast<guint8 *> (const_cast<void *> (arv_buffer_get_data (buffer, &size)));
-  memset (data, ++count & 0xff, size);
+  std::size_t size = 0; /* what was received, which is nothing here */
+  void *data = const_cast<void *> (arv_buffer_get_data (buffer, &size));
+  memset (data, ++count & 0xff, GPOINTER_TO_SIZE (n_bytes));
+}
+
+static void
+draw_count (FakeCamera &fake, gsize n_bytes)
+{
+  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, GSIZE_TO_POINTER (n_bytes));
 }
 
 /** The count in a picture; fails the test where it is not the same all over. */
@@ -478,7 +484,7 @@ GST_START_TEST (test_pixels_are_those_of_the_frame_as_long_as_it_is_held)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera fake;
-  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, nullptr);
+  draw_count (fake, 64 * 48);
   const auto camera = open_camera ("127.0.0.1");
   CameraSettings settings = small_pictures ();
   settings.n_buffers = 6;
@@ -608,7 +614,7 @@ GST_START_TEST (test_buffers_outlive_the_camera)
 {
   SKIP_WITHOUT_NETWORK ();
   auto fake = std::make_unique<FakeCamera> ();
-  arv_fake_camera_set_fill_pattern (fake->registers (), fill_with_count, nullptr);
+  draw_count (*fake, 64 * 48);
   auto camera = open_camera ("127.0.0.1");
   configure (*camera, small_pictures ());
   Listener listener;
@@ -653,7 +659,7 @@ GST_START_TEST (test_lost_packets_make_incomplete_frames_or_gaps_never_pictures)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera fake;
-  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, nullptr);
+  draw_count (fake, 128 * 128);
   const auto camera = open_camera ("127.0.0.1");
   CameraSettings settings = small_pictures ();
   settings.width = settings.height = 128; /* some 12 packets a picture */
