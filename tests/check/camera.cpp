@@ -3,6 +3,7 @@
 #include <camera.hpp>
 
 #include <deque>
+#include <look_follower.hpp>
 
 #include "camera-check.hpp"
 
@@ -761,6 +762,48 @@ GST_START_TEST (test_software_trigger_takes_one_picture_a_call)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
+{
+  SKIP_WITHOUT_NETWORK ();
+  FakeCamera left ("127.0.0.2", "left"), right ("127.0.0.3", "right");
+  const auto leader = open_camera ("127.0.0.2"), follower = open_camera ("127.0.0.3");
+  CameraSettings settings = small_pictures ();
+  settings.exposure_mode = settings.gain_mode = AutoMode::kManual;
+  settings.exposure_us = 1000;
+  settings.gain = 1;
+  configure (*leader, settings);
+  settings.gain = 2;
+  configure (*follower, settings);
+  Listener from_leader, from_follower;
+  start (*leader, from_leader);
+  start (*follower, from_follower);
+  LookFollower look;
+  std::atomic<int> n_refusals{0};
+  look.start (*leader, {follower.get ()}, std::chrono::milliseconds (5),
+      [&] (const CameraStatus &) { n_refusals++; });
+  for (const guint32 exposure : {3000u, 700u, 12000u}) {
+    /* as the camera's own regulator would */
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, exposure);
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, exposure % 7);
+    guint32 got_exposure = 0, got_gain = 0;
+    for (int i = 0; i < 2000 && (got_exposure != exposure || got_gain != exposure % 7); i++) {
+      g_usleep (5000);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, &got_exposure);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, &got_gain);
+    }
+    assert_equals_int (got_exposure, exposure);
+    assert_equals_int (got_gain, exposure % 7);
+  }
+  assert_equals_int (n_refusals, 0);
+  (void)from_follower.next_complete ();
+  look.stop ();
+}
+GST_END_TEST;
+
 GST_START_TEST (test_eight_cameras_stream_at_once)
 {
   SKIP_WITHOUT_NETWORK ();
@@ -815,6 +858,7 @@ camera_suite ()
   tcase_add_test (tc, test_vanished_camera_is_told_once_and_is_no_hang);
   tcase_add_test (tc, test_camera_that_came_back_opens_again);
   tcase_add_test (tc, test_software_trigger_takes_one_picture_a_call);
+  tcase_add_test (tc, test_followers_take_over_the_look_of_the_leader);
   tcase_add_test (tc, test_eight_cameras_stream_at_once);
   return suite;
 }
