@@ -8,8 +8,8 @@
 
 #include "camera.hpp"
 
-/** Keeps the look of cameras equal: reads what the leader's regulators chose, and writes it into the
- *  followers, from a thread of its own. */
+/** Keeps the look of cameras equal: reads what the leader's regulators chose, and writes it into
+ * the followers, from a thread of its own. */
 class LookFollower {
 public:
   using Failed = std::function<void (const CameraStatus &)>;
@@ -19,7 +19,8 @@ public:
   LookFollower &operator= (const LookFollower &) = delete;
   ~LookFollower () { stop (); }
 
-  /** @param failed  from its thread; the first time that a camera refuses, and again after a success */
+  /** @param failed  from its thread; the first time that a camera refuses, and again after a
+   * success */
   void start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
       std::chrono::milliseconds period, Failed failed);
   /** `failed` does not come after it. A camera that does not answer is not waited for: its thread
