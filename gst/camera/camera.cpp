@@ -16,6 +16,7 @@
 #include "camera_setup.hpp"
 #include "frame_counter.hpp"
 #include "frame_store.hpp"
+#include "receive_buffer.hpp"
 
 using namespace std::chrono_literals;
 
@@ -375,8 +376,10 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
   const std::size_t wanted = settings.socket_buffer > 0
                                  ? std::size_t (settings.socket_buffer)
                                  : std::max (2 * format.size (), kLeastSocketBuffer);
+  const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-      int (std::min<std::size_t> (wanted, G_MAXINT)), nullptr);
+      bytes, nullptr);
+  (void)enlarge_receive_buffer (arv_gv_stream_get_port (ARV_GV_STREAM (stream)), bytes);
 }
 
 CameraStatus
