@@ -21,6 +21,7 @@
 using namespace std::chrono_literals;
 
 static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
+static constexpr std::size_t kMostExtra = 1 << 20; /* bytes that chunks may add to a picture */
 
 namespace {
 
@@ -412,7 +413,7 @@ Camera::Impl::fill (Run &run)
   const auto guard = control->lock ();
   const guint payload = arv_camera_get_payload (control->camera (), &error);
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
-  if (status.ok () && payload < format.size ())
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMostExtra))
     status = control->refuse (CameraFault::kUnsupported,
         "sends " + std::to_string (payload) + " bytes a picture; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +

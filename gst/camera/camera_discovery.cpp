@@ -141,7 +141,8 @@ not_found (const std::string &name, const std::vector<ListedCamera> &list)
   text += describe (list);
   for (const ForbiddenCamera &camera : forbidden_usb_cameras ()) {
     if (list.empty () || name == camera.serial)
-      return {CameraFault::kNoPermission, "camera '" + name + "': " + permission_text (camera)};
+      return {CameraFault::kNoPermission,
+          (name.empty () ? "" : "camera '" + name + "': ") + permission_text (camera)};
     text += "; besides, " + permission_text (camera);
   }
   return {CameraFault::kNotFound, text};
@@ -249,7 +250,7 @@ open_listed (const std::string &name, bool afresh, std::vector<ListedCamera> &li
     return {CameraFault::kNotFound, ""};
   info = chosen->info;
   const char *protocol = "";
-  return open_by_id (name, info.id, device, protocol);
+  return open_by_id (name.empty () ? info.id : name, info.id, device, protocol);
 }
 
 CameraStatus

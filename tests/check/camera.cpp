@@ -3,6 +3,7 @@
 #include <camera.hpp>
 
 #include <deque>
+#include <glib/gstdio.h>
 #include <look_follower.hpp>
 
 #include "camera-check.hpp"
@@ -416,6 +417,77 @@ GST_START_TEST (test_features_win_over_settings)
   assert_equals_float (*look.gain, 7);
   assert_equals_float (*look.exposure_us, 2000);
   assert_equals_int (camera->format ().width, 32);
+}
+GST_END_TEST;
+
+/** A file with the features of Aravis' fake camera, and one text of them replaced. */
+class Features {
+public:
+  Features (const std::string &from, const std::string &to)
+  {
+    ArvFakeCamera *fake = arv_fake_camera_new ("any");
+    std::size_t size = 0;
+    const char *text = arv_fake_camera_get_genicam_xml (fake, &size);
+    std::string xml (text, size);
+    g_object_unref (fake);
+    const std::size_t at = xml.find (from);
+    fail_unless (at != std::string::npos, "the fake camera's features have no '%s'", from.c_str ());
+    xml.replace (at, from.size (), to);
+    gchar *name = nullptr;
+    const int fd = g_file_open_tmp ("rangecast-features-XXXXXX.xml", &name, nullptr);
+    fail_unless (fd >= 0);
+    close (fd);
+    path_ = name;
+    g_free (name);
+    fail_unless (g_file_set_contents (path_.c_str (), xml.c_str (), xml.size (), nullptr));
+  }
+  Features (const Features &) = delete;
+  Features &operator= (const Features &) = delete;
+  ~Features () { g_unlink (path_.c_str ()); }
+  [[nodiscard]] const std::string &path () const { return path_; }
+
+private:
+  std::string path_;
+};
+
+GST_START_TEST (test_camera_that_sends_another_size_than_its_pictures_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const char *formula = "<Formula>WIDTH * HEIGHT * ((PIXELFORMAT>>16)&amp;0xFF) / 8</Formula>";
+  for (const char *wrong : {"<Formula>4000000000</Formula>", "<Formula>WIDTH</Formula>"}) {
+    const Features features (formula, wrong);
+    FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+    const auto camera = open_camera ("127.0.0.1");
+    configure (*camera, small_pictures ());
+    Listener listener;
+    assert_refused (camera->start (listener.arrived (), listener.lost ()),
+        CameraFault::kUnsupported, "bytes a picture; expected 3072 for 64x48 Mono8");
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_without_a_usable_pixel_format_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const Features features ("Name=\"PixelFormat\"", "Name=\"OtherFormat\"");
+  FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+  const auto camera = open_camera ("127.0.0.1");
+  const CameraStatus status = camera->configure (small_pictures ());
+  fail_unless (!status.ok ());
+  fail_unless (
+      status.message ().find ("camera '127.0.0.1'") == 0, "%s", status.message ().c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_without_a_width_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const Features features ("Name=\"Width\"", "Name=\"Breadth\"");
+  FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+  const auto camera = open_camera ("127.0.0.1");
+  fail_unless (!camera->configure (small_pictures ()).ok ());
+  Listener listener;
+  fail_unless (!camera->start (listener.arrived (), listener.lost ()).ok ());
 }
 GST_END_TEST;
 
@@ -845,6 +917,9 @@ camera_suite ()
   tcase_add_test (tc, test_refused_settings_say_what_the_camera_accepts);
   tcase_add_test (tc, test_refused_features_name_feature_value_and_range);
   tcase_add_test (tc, test_features_win_over_settings);
+  tcase_add_test (tc, test_camera_that_sends_another_size_than_its_pictures_is_refused);
+  tcase_add_test (tc, test_camera_without_a_usable_pixel_format_is_refused);
+  tcase_add_test (tc, test_camera_without_a_width_is_refused);
   tcase_add_test (tc, test_frames_arrive_whole_numbered_and_in_order);
   tcase_add_test (tc, test_pixels_are_those_of_the_frame_as_long_as_it_is_held);
   tcase_add_test (tc, test_buffers_are_used_again_with_all_that_a_frame_wrote_gone);
