@@ -448,7 +448,8 @@ GigeCamera::take_wake_ups (std::int64_t now_ns)
   }
   if (due && is_triggered_by (kTriggerByAction))
     expose (now_ns);
-  if (line_.exchange (false) && is_triggered_by (kTriggerByLine))
+  if (line_.exchange (false) &&
+      (is_triggered_by (kTriggerByLine) || is_triggered_by (kTriggerByLine1)))
     expose (now_ns);
 }
 

@@ -48,18 +48,42 @@ entry (const std::string &name, std::uint32_t value)
 }
 
 static std::string
+enumeration_node (const std::string &name, std::uint32_t address, const std::string &entries)
+{
+  return "<Enumeration Name=\"" + name + "\" NameSpace=\"Standard\">" + entries + "<pValue>" +
+         name + "Register</pValue></Enumeration>\n" + register_node (name + "Register", address);
+}
+
+/* The output line is wired and on, whatever these say. */
+static std::string
+line_features ()
+{
+  return enumeration_node ("LineSelector", 0x410, entry ("Line1", 1) + entry ("Line2", 2)) +
+         enumeration_node ("LineMode", 0x414, entry ("Input", 0) + entry ("Output", 1)) +
+         enumeration_node ("LineSource", 0x418, entry ("Off", 0) + entry ("ExposureActive", 1));
+}
+
+/* They can be set and read; the pictures stay the same. */
+static std::string
+look_features ()
+{
+  const std::string modes = entry ("Off", 0) + entry ("Once", 1) + entry ("Continuous", 2);
+  return enumeration_node ("ExposureAuto", 0x420, modes) +
+         enumeration_node ("BalanceWhiteAuto", 0x424, modes);
+}
+
+static std::string
 more_features ()
 {
-  return integer_node ("ActionDeviceKey", kRegisterActionDeviceKey) +
+  return line_features () + look_features () +
+         integer_node ("ActionDeviceKey", kRegisterActionDeviceKey) +
          integer_node ("ActionGroupKey", kRegisterActionGroupKey) +
          integer_node ("ActionGroupMask", kRegisterActionGroupMask) +
          "<Boolean Name=\"PtpEnable\" NameSpace=\"Standard\"><pValue>PtpEnableRegister</pValue>"
          "<OnValue>1</OnValue><OffValue>0</OffValue></Boolean>\n" +
          register_node ("PtpEnableRegister", kRegisterPtpEnable) +
-         "<Enumeration Name=\"PtpStatus\" NameSpace=\"Standard\">" +
-         entry ("Disabled", kPtpDisabled) + entry ("Slave", kPtpSlave) +
-         "<pValue>PtpStatusRegister</pValue></Enumeration>\n" +
-         register_node ("PtpStatusRegister", kRegisterPtpStatus) +
+         enumeration_node ("PtpStatus", kRegisterPtpStatus,
+             entry ("Disabled", kPtpDisabled) + entry ("Slave", kPtpSlave)) +
          "<Boolean Name=\"GevSCPSFireTestPacket\" NameSpace=\"Standard\">"
          "<pValue>FireTestPacketRegister</pValue><OnValue>1</OnValue><OffValue>0</OffValue>"
          "</Boolean>\n" +
@@ -89,7 +113,7 @@ description ()
   std::string xml (text, size);
   g_object_unref (plain);
   insert (xml, "<Enumeration Name=\"TriggerSource\"", "<EnumEntry",
-      entry ("Action1", kTriggerByAction));
+      entry ("Action1", kTriggerByAction) + entry ("Line1", kTriggerByLine1));
   insert (xml, "<Category Name=\"TransportLayerControl\"", "<pFeature",
       "<pFeature>PtpEnable</pFeature><pFeature>PtpStatus</pFeature>"
       "<pFeature>ActionDeviceKey</pFeature><pFeature>ActionGroupKey</pFeature>"
