@@ -21,11 +21,12 @@
 #include <condition_variable>
 #include <mutex>
 #include <set>
+#include <system_error>
 #include <thread>
 #include <utility>
 
+#include "camera/camera.hpp"
 #include "cameradevices.hpp"
-#include "gigecameras.hpp"
 #include "usbcameras.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_camera_device_provider_debug);
@@ -85,6 +86,24 @@ GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdevicepr
 
 /*** What is there ***/
 
+/** The GigE Vision cameras that answer. USB comes from libusb, which tells about hotplug and
+ *  permissions. Takes about a second. */
+static FoundCameras
+find_gige_cameras ()
+{
+  FoundCameras found;
+  for (auto &info : list_cameras ())
+    if (info.protocol == "GigEVision")
+      found.push_back ({.transport = FoundCamera::Transport::kGigEVision,
+          .id = info.id,
+          .vendor = info.vendor,
+          .model = info.model,
+          .serial = info.serial,
+          .address = info.address,
+          .problem = {}});
+  return found;
+}
+
 static std::unique_ptr<UsbCameras>
 open_usb (GstDeviceProvider *provider)
 {
@@ -118,7 +137,7 @@ present (GstDeviceProvider *provider, FoundCameras cameras, std::set<std::string
 static GList *
 gst_camera_device_provider_probe (GstDeviceProvider *provider)
 {
-  auto cameras = rangecast::find_gige_cameras ();
+  auto cameras = find_gige_cameras ();
   if (auto usb = open_usb (provider))
     std::ranges::copy (usb->list (), std::back_inserter (cameras));
   std::set<std::string> told;
@@ -158,7 +177,7 @@ announce (GstDeviceProvider *provider, std::vector<Announced<What>> &announced,
 static void
 discover_gige (Watch &watch)
 {
-  auto answered = rangecast::find_gige_cameras ();
+  auto answered = find_gige_cameras ();
   std::vector<int> misses (answered.size (), 0);
   for (std::size_t i = 0; i < watch.gige.size (); ++i) {
     const auto is_same = [&] (const FoundCamera &camera) { return camera.id == watch.gige[i].id; };
@@ -187,8 +206,7 @@ static bool
 wait_for_change (Watch &watch, std::chrono::steady_clock::time_point until, bool &is_usb)
 {
   std::unique_lock guard (watch.lock);
-  watch.changed.wait_until (
-      guard, until, [&] { return watch.is_over || watch.has_usb_changed; });
+  watch.changed.wait_until (guard, until, [&] { return watch.is_over || watch.has_usb_changed; });
   is_usb = std::exchange (watch.has_usb_changed, false);
   return !watch.is_over;
 }
@@ -229,8 +247,13 @@ gst_camera_device_provider_start (GstDeviceProvider *provider)
   };
   if (watch.usb && !watch.usb->watch (on_usb))
     GST_WARNING_OBJECT (provider, "this host's libusb does not tell when devices come and go");
-  watch.thread = std::thread ([&watch] { run_watch (watch); });
-
+  try {
+    watch.thread = std::thread ([&watch] { run_watch (watch); });
+  } catch (const std::system_error &error) {
+    GST_ERROR_OBJECT (provider, "no thread to look for cameras: %s", error.what ());
+    delete std::exchange (self->watch, nullptr);
+    return FALSE;
+  }
   std::unique_lock guard (watch.lock); // the list is there when start() returns
   watch.changed.wait (guard, [&] { return watch.is_listed; });
   return TRUE;
@@ -267,7 +290,7 @@ gst_camera_device_provider_class_init (GstCameraDeviceProviderClass *klass)
   gst_device_provider_class_set_static_metadata (provider_class,
       "Machine-vision cameras and stereo pairs", "Source/Video",
       "Lists GigE Vision and USB3 Vision cameras, and the stereo pairs of known rigs",
-      "The gst-rangecast authors");
+      "gst-rangecast");
   GST_DEBUG_CATEGORY_INIT (gst_camera_device_provider_debug, "rangecastdeviceprovider", 0,
       "Machine-vision cameras and stereo pairs");
 }

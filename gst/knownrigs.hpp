@@ -24,8 +24,8 @@ struct KnownPair {
  *  (XDG). @return the files that end in .yaml, .yml or .json, each once */
 std::vector<std::string> known_rig_files ();
 
-/** The pairs, among the views of these rig files, whose cameras are among `found`. Files that cannot
- *  be read are left out: `problems` then has one line for each, as load_rig() words it. */
+/** The pairs, among the views of these rig files, whose cameras are among `found`. Files that
+ * cannot be read are left out: `problems` then has one line for each, as load_rig() words it. */
 std::vector<KnownPair> known_pairs (const std::vector<std::string> &files,
     const FoundCameras &found, std::vector<std::string> &problems);
 

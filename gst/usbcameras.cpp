@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdio>
 #include <fstream>
+#include <system_error>
 #include <thread>
 
 #include <libusb.h>
@@ -76,9 +77,9 @@ std::string
 device_text (libusb_device_handle *handle, std::uint8_t index)
 {
   std::array<unsigned char, 256> text;
-  const int size = handle && index
-      ? libusb_get_string_descriptor_ascii (handle, index, text.data (), int (text.size ()))
-      : 0;
+  const int size = handle && index ? libusb_get_string_descriptor_ascii (
+                                         handle, index, text.data (), int (text.size ()))
+                                   : 0;
   return size > 0 ? std::string (text.begin (), text.begin () + size) : std::string ();
 }
 
@@ -98,7 +99,7 @@ opening_problem (int error, const std::string &node)
     return {};
   if (error == LIBUSB_ERROR_ACCESS)
     return "no permission to open " + node +
-        ": copy docs/99-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
+           ": copy docs/99-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
   return "cannot open " + node + ": " + libusb_strerror (libusb_error (error));
 }
 
@@ -112,7 +113,8 @@ aravis_id (const FoundCamera &camera)
 FoundCamera
 describe (libusb_device *device, const libusb_device_descriptor &descriptor)
 {
-  FoundCamera camera{.transport = FoundCamera::Transport::kUsb3Vision};
+  FoundCamera camera;
+  camera.transport = FoundCamera::Transport::kUsb3Vision;
   camera.address = device_node (device);
   libusb_device_handle *handle = nullptr;
   camera.problem = opening_problem (libusb_open (device, &handle), camera.address);
@@ -160,9 +162,7 @@ on_hotplug (libusb_context *, libusb_device *, libusb_hotplug_event, void *user_
   return 0;
 }
 
-UsbCameras::UsbCameras (std::unique_ptr<Private> priv) : priv_ (std::move (priv))
-{
-}
+UsbCameras::UsbCameras (std::unique_ptr<Private> priv) : priv_ (std::move (priv)) {}
 
 std::unique_ptr<UsbCameras>
 UsbCameras::open (std::string &why)
@@ -209,15 +209,19 @@ UsbCameras::watch (std::function<void ()> on_change)
 {
   if (!libusb_has_capability (LIBUSB_CAP_HAS_HOTPLUG))
     return false;
-  constexpr auto both =
-      LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
+  constexpr auto both = LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
   priv_->on_change = std::move (on_change);
   if (libusb_hotplug_register_callback (priv_->context, both, LIBUSB_HOTPLUG_NO_FLAGS,
-          LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-          on_hotplug, &priv_->has_changed, &priv_->hotplug) != LIBUSB_SUCCESS)
+          LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_hotplug,
+          &priv_->has_changed, &priv_->hotplug) != LIBUSB_SUCCESS)
     return false;
+  try {
+    priv_->thread = std::thread ([priv = priv_.get ()] { priv->run (); });
+  } catch (const std::system_error &) {
+    libusb_hotplug_deregister_callback (priv_->context, priv_->hotplug);
+    return false;
+  }
   priv_->is_watched = true;
-  priv_->thread = std::thread ([priv = priv_.get ()] { priv->run (); });
   return true;
 }
 

@@ -14,8 +14,7 @@ namespace rangecast {
  *  interface of USB3 Vision (the device itself says class EF, subclass 02, since it groups
  *  interfaces). Names come from what the kernel read when it was plugged in, so that they are known
  *  without permission to open it, too. */
-class UsbCameras
-{
+class UsbCameras {
 public:
   /** @return nullptr if libusb does not start; `why` then says so */
   static std::unique_ptr<UsbCameras> open (std::string &why);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The device provider, with USB devices of a umockdev test bed and GigE Vision cameras in process. */
+/* The device provider, with USB devices of a umockdev test bed and GigE Vision cameras in process.
+ */
 #include "rangecast-check.hpp"
 
 #include <unistd.h>
@@ -34,18 +35,34 @@ constexpr char kRootHub[] = "P: /devices/usb2\n"
                             "A: devnum=1\n"
                             "A: speed=5000\n"
                             "A: bConfigurationValue=1\n"
-                            "H: descriptors=1201000309000309" "6B1D0300060103020101"
-                            "09021F00010100E000" "0904000001090000" "00" "0705810304000C\n";
+                            "H: descriptors=1201000309000309"
+                            "6B1D0300060103020101"
+                            "09021F00010100E000"
+                            "0904000001090000"
+                            "00"
+                            "0705810304000C\n";
 
 /** Device descriptor of class EF/02/01 and one configuration of a function of two interfaces: the
  *  first of class EF, `sub_class`, protocol 0. */
 std::string
 descriptors (const std::string &sub_class)
 {
-  return "12010003EF020109" "781678560100" "01020301"                    // device
-         "09023800020100C032" "080B0002EF" + sub_class + "0000"           // configuration, function
-         "0904000002EF" + sub_class + "0000" "07058102000200" "07050102000200" // control interface
-         "0904010001EF" + sub_class + "0200" "07058202000400";            // stream interface
+  return "12010003EF020109"
+         "781678560100"
+         "01020301" // device
+         "09023800020100C032"
+         "080B0002EF" +
+         sub_class +
+         "0000" // configuration, function
+         "0904000002EF" +
+         sub_class +
+         "0000"
+         "07058102000200"
+         "07050102000200" // control interface
+         "0904010001EF" +
+         sub_class +
+         "0200"
+         "07058202000400"; // stream interface
 }
 
 std::string
@@ -53,11 +70,12 @@ usb_device (int number, const std::string &serial, const std::string &sub_class)
 {
   const auto n = std::to_string (number), node = "bus/usb/002/00" + std::to_string (number + 1);
   return "P: /devices/usb2/2-" + n + "\nN: " + node +
-      "\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_device\nE: DEVNAME=/dev/" + node +
-      "\nE: BUSNUM=002\nE: DEVNUM=00" + std::to_string (number + 1) +
-      "\nA: busnum=2\nA: devnum=" + std::to_string (number + 1) +
-      "\nA: speed=5000\nA: bConfigurationValue=1\nA: manufacturer=Acme\nA: product=U3-900c"
-      "\nA: serial=" + serial + "\nH: descriptors=" + descriptors (sub_class) + "\n";
+         "\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_device\nE: DEVNAME=/dev/" + node +
+         "\nE: BUSNUM=002\nE: DEVNUM=00" + std::to_string (number + 1) +
+         "\nA: busnum=2\nA: devnum=" + std::to_string (number + 1) +
+         "\nA: speed=5000\nA: bConfigurationValue=1\nA: manufacturer=Acme\nA: product=U3-900c"
+         "\nA: serial=" +
+         serial + "\nH: descriptors=" + descriptors (sub_class) + "\n";
 }
 
 std::string
@@ -185,8 +203,7 @@ GST_START_TEST (test_usb_camera_is_listed_with_names_and_what_opens_it)
   fail_unless_equals_string (text_of (device, "camera.model").c_str (), "U3-900c");
   fail_unless_equals_string (text_of (device, "camera.protocol").c_str (), "USB3Vision");
   fail_unless_equals_string (text_of (device, "camera.problem").c_str (), "");
-  fail_unless_equals_string (
-      text_of (device, "launch").c_str (), "aravissrc camera-name=Acme-SN1");
+  fail_unless_equals_string (text_of (device, "launch").c_str (), "aravissrc camera-name=Acme-SN1");
   gchar *name = gst_device_get_display_name (device);
   fail_unless_equals_string (name, "Acme U3-900c (SN1)");
   g_free (name);
@@ -246,7 +263,8 @@ GST_END_TEST
 GST_START_TEST (test_missing_permission_is_told_with_the_rule_to_add)
 {
   if (geteuid () == 0)
-    fail_unless (setuid (65534) == 0); // root may open everything; the test has a process of its own
+    fail_unless (
+        setuid (65534) == 0); // root may open everything; the test has a process of its own
   TestBed bed;
   bed.add (usb_camera (1, "SN1"));
   std::filesystem::permissions (bed.node (1), std::filesystem::perms::none);
@@ -328,7 +346,8 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
   view.intrinsics = {.fx = 600, .fy = 600, .cx = 320, .cy = 240};
   view.right = PartnerCamera{.intrinsics = view.intrinsics};
   view.right->partner_from_left.t = {-0.06, 0, 0};
-  view.cameras = {"SN1", "SN2", ""};
+  view.camera = "SN1";
+  view.right->camera = "SN2";
   rig.views.push_back (view);
   fail_unless (save_rig (file, rig).ok ());
   g_setenv ("RANGECAST_RIG_PATH", folder, TRUE);
@@ -378,8 +397,7 @@ GST_START_TEST (test_probe_lists_without_starting)
 {
   TestBed bed;
   bed.add (usb_camera (1, "SN1"));
-  GstDeviceProvider *provider =
-      gst_device_provider_factory_get_by_name ("rangecastdeviceprovider");
+  GstDeviceProvider *provider = gst_device_provider_factory_get_by_name ("rangecastdeviceprovider");
   fail_unless (provider != nullptr);
   for (int i = 0; i < 2; ++i) {
     GList *devices = gst_device_provider_get_devices (provider);
