@@ -1,19 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The device provider, with USB devices of a umockdev test bed and GigE Vision cameras in process.
  */
+#include <filesystem> // before check, which defines fail()
+
 #include "rangecast-check.hpp"
 
 #include <unistd.h>
 
-#include <filesystem>
 #include <functional>
 #include <string>
 
-#include <umockdev.h>
-
-extern "C" {
 #include <arv.h>
-}
+#include <umockdev.h>
 
 #include <rangecast/geometry/rig.hpp>
 
@@ -223,9 +221,11 @@ GST_START_TEST (test_device_makes_the_element_that_opens_it)
     g_object_set (element, "camera-name", "another", nullptr);
     fail_unless (gst_device_reconfigure_element (device, element));
     fail_unless_equals_string (string_property (element, "camera-name").c_str (), "Acme-SN1");
-    gst_object_unref (gst_object_ref_sink (element));
+    gst_object_ref_sink (element);
+    gst_object_unref (element);
   }
-  GstElement *other = gst_object_ref_sink (gst_element_factory_make ("fakesrc", nullptr));
+  GstElement *other = gst_element_factory_make ("fakesrc", nullptr);
+  gst_object_ref_sink (other);
   fail_if (gst_device_reconfigure_element (device, other));
   gst_object_unref (other);
   gst_object_unref (device);
@@ -338,14 +338,10 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
   gchar *folder = g_dir_make_tmp ("rangecast-rigs-XXXXXX", nullptr);
   const auto file = std::string (folder) + "/studio.yaml";
   Rig rig;
-  View view;
+  View view = testing::ring_rig (1).views[0];
   view.id = 5;
   view.name = "front";
-  view.width = 640;
-  view.height = 480;
-  view.intrinsics = {.fx = 600, .fy = 600, .cx = 320, .cy = 240};
-  view.right = PartnerCamera{.intrinsics = view.intrinsics};
-  view.right->partner_from_left.t = {-0.06, 0, 0};
+  view.right = PartnerCamera{view.intrinsics, {}, {kIdentity3, {-0.06, 0, 0}}};
   view.camera = "SN1";
   view.right->camera = "SN2";
   rig.views.push_back (view);
@@ -367,7 +363,8 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
   gint view_id = 0;
   g_object_get (element, "view-id", &view_id, nullptr);
   fail_unless_equals_int (view_id, 5);
-  gst_object_unref (gst_object_ref_sink (element));
+  gst_object_ref_sink (element);
+  gst_object_unref (element);
   gst_object_unref (device);
   bed.unplug (1);
   monitor.wait_for (GST_MESSAGE_DEVICE_REMOVED, "rig.file", file);
