@@ -50,8 +50,7 @@ bool
 CamSourceSession::choose_format ()
 {
   std::string why;
-  GstCaps *offered =
-      camera_source_caps (abilities_, settings_.format, settings_.single_shot, why);
+  GstCaps *offered = camera_source_caps (abilities_, settings_.format, settings_.single_shot, why);
   const std::vector<GstPad *> pads = gst_pads ();
   for (GstPad *pad : pads)
     gst_pad_check_reconfigure (pad);
@@ -146,8 +145,8 @@ CamSourceSession::start_cameras ()
     std::vector<Camera *> others;
     for (std::size_t i = 1; i < cameras_.size (); i++)
       others.push_back (cameras_[i].get ());
-    look_.start (*cameras_[0], others, std::chrono::milliseconds (500),
-        [this] (const CameraStatus &status) {
+    look_.start (
+        *cameras_[0], others, std::chrono::milliseconds (500), [this] (const CameraStatus &status) {
           GST_WARNING_OBJECT (element_, "%s", status.message ().c_str ());
         });
   }
@@ -178,8 +177,8 @@ CamSourceSession::start_ticker ()
   CamSourceTicker::Actions actions;
   actions.may_fire = [this] { return pairing_.may_fire (g_get_monotonic_time () * 1000); };
   actions.fire = [this] (GstClockTime tick) { fire (tick); };
-  ticker_.start ({format_.fps_n, format_.fps_d}, settings_.single_shot,
-      scheduled ? kActionLead : 0, std::move (actions));
+  ticker_.start ({format_.fps_n, format_.fps_d}, settings_.single_shot, scheduled ? kActionLead : 0,
+      std::move (actions));
 }
 
 /* The ticker's thread. Answers may come before the last camera has acknowledged. */

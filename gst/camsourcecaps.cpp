@@ -37,8 +37,7 @@ common_range (std::span<const CameraAbilities> cameras, bool widths)
   for (const CameraAbilities &c : cameras) {
     range.least = std::max (range.least, widths ? c.min_width : c.min_height);
     range.most = std::min (range.most, widths ? c.max_width : c.max_height);
-    range.step =
-        common_multiple (range.step, std::max (1, widths ? c.width_step : c.height_step));
+    range.step = common_multiple (range.step, std::max (1, widths ? c.width_step : c.height_step));
   }
   range.least = (range.least + range.step - 1) / range.step * range.step;
   range.most = range.most / range.step * range.step;

@@ -27,8 +27,8 @@ struct CamSourceFormat {
   }
 };
 
-/** What all of the cameras can do, as caps: rows of whole words (widths are multiples of 4), so that
- *  no element needs GstVideoMeta to find them.
+/** What all of the cameras can do, as caps: rows of whole words (widths are multiples of 4), so
+ * that no element needs GstVideoMeta to find them.
  *  @param pixel_format  only this one; empty: any
  *  @param single_shot   the frame rate may be 0/1
  *  @param[out] why      if the result is empty: what they lack in common

@@ -16,7 +16,8 @@ public:
 
   /** Begins to ask the server; nothing waits for it, but for the look-up of a host's name.
    *  @param server  HOST:PORT, [IPv6]:PORT or ptp:DOMAIN; empty: no clock
-   *  @return kBadValue: the text says what was expected; kNotFound: there can be no such clock here */
+   *  @return kBadValue: the text says what was expected; kNotFound: there can be no such clock here
+   */
   rangecast::Status open (const std::string &server);
   void close () { gst_clear_object (&clock_); }
 

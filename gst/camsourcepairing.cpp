@@ -113,7 +113,8 @@ CamSourcePairing::may_fire (std::int64_t now_ns)
     lone_shots_ = 0;
   }
   const Tick &last = ticks_[(shots_ + kTicks - 1) % kTicks];
-  if (shots_ == 0 || now_ns - last.fired_ns > kAnswerTime + 2 * static_cast<std::int64_t> (exposure_))
+  if (shots_ == 0 ||
+      now_ns - last.fired_ns > kAnswerTime + 2 * static_cast<std::int64_t> (exposure_))
     return true;
   for (int c = 0; c < cameras_; c++)
     if (answered_[c] < shots_)
@@ -175,8 +176,7 @@ CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
   const Tick &tick = ticks_[found.shot % kTicks];
   const bool read = stamp > 0 && std::ranges::all_of (std::span (offsets_).first (cameras_),
                                      [] (const auto &o) { return o.has_value (); });
-  const std::int64_t taken =
-      read ? stamp + *offsets_[camera] : tick.fired_ns + found.residual_ns;
+  const std::int64_t taken = read ? stamp + *offsets_[camera] : tick.fired_ns + found.residual_ns;
   if (frame.buffer)
     delay_.add (frame.arrived_us * 1000 - tick.fired_ns);
   const bool whole = frame.buffer != nullptr;

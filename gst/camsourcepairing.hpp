@@ -18,7 +18,7 @@ using rangecast::kMaxCameras;
 struct CamSourceSet {
   std::array<GstBufferPtr, kMaxCameras> pictures;
   GstClockTime tick = GST_CLOCK_TIME_NONE; ///< on the pipeline's clock; NONE: see taken_ns
-  std::int64_t taken_ns = 0;               ///< else when the left one was taken, g_get_monotonic_time
+  std::int64_t taken_ns = 0; ///< else when the left one was taken, g_get_monotonic_time
 };
 
 /** Counted since start(). */
@@ -29,7 +29,7 @@ struct CamSourcePairingStats {
   guint64 missing_packets = 0;
   bool has_spread = false;
   std::int64_t spread_p50_ns = 0, spread_p99_ns = 0; ///< of the exposures within a set
-  std::int64_t delay_p50_ns = 0, delay_p99_ns = 0; ///< from tick, or exposure, to the last packet
+  std::int64_t delay_p50_ns = 0, delay_p99_ns = 0;   ///< from tick, or exposure, to the last packet
 };
 
 /** Puts frames of two or three cameras together: by the trigger that they answer, or, where this

@@ -9,10 +9,10 @@ GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
 static constexpr std::int64_t kSecond = 1'000'000'000;
-static constexpr std::int64_t kLook = kSecond / 10;          ///< between two looks around
-static constexpr std::int64_t kClockRead = 5 * kSecond;      ///< cameras' clocks drift
+static constexpr std::int64_t kLook = kSecond / 10;     ///< between two looks around
+static constexpr std::int64_t kClockRead = 5 * kSecond; ///< cameras' clocks drift
 static constexpr std::int64_t kStatsMessage = 5 * kSecond;
-static constexpr std::int64_t kPatience = 3 * kSecond;       ///< for a frame of a camera that runs
+static constexpr std::int64_t kPatience = 3 * kSecond; ///< for a frame of a camera that runs
 
 CamSourceSession::End
 CamSourceSession::serve ()
@@ -21,8 +21,9 @@ CamSourceSession::serve ()
     bool playing = false;
     {
       std::unique_lock guard (lock_);
-      changed_.wait_for (guard, std::chrono::nanoseconds (kLook),
-          [this] { return quit_ || !inbox_.empty () || !fault_.ok () || fatal_flow_ != GST_FLOW_OK; });
+      changed_.wait_for (guard, std::chrono::nanoseconds (kLook), [this] {
+        return quit_ || !inbox_.empty () || !fault_.ok () || fatal_flow_ != GST_FLOW_OK;
+      });
       if (quit_)
         return End::kStopped;
       if (!fault_.ok () || fatal_flow_ != GST_FLOW_OK)
@@ -140,8 +141,7 @@ CamSourceSession::watch_cameras (std::int64_t now_ns)
           !settings_.single_shot);
   if (!comes_by_itself || playing_since_ns_ == 0)
     return;
-  const std::int64_t most =
-      std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
+  const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     const std::int64_t last =
         std::max (pairing_.last_arrival (static_cast<int> (i)), playing_since_ns_);
@@ -181,7 +181,6 @@ CamSourceSession::look_around ()
     read_clocks ();
   if (now - last_stats_ns_ > kStatsMessage && was_playing_) {
     last_stats_ns_ = now;
-    gst_element_post_message (
-        element_, gst_message_new_element (GST_OBJECT (element_), stats ()));
+    gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), stats ()));
   }
 }

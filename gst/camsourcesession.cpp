@@ -173,8 +173,7 @@ CamSourceSession::post_fault (bool warning)
     fault = fault_;
   }
   const ErrorDomain error = domain_of (fault.fault ());
-  const std::string text =
-      fault.message () + (warning ? "; trying again until it comes back" : "");
+  const std::string text = fault.message () + (warning ? "; trying again until it comes back" : "");
   gst_element_message_full (element_, warning ? GST_MESSAGE_WARNING : GST_MESSAGE_ERROR,
       error.domain, error.code, g_strdup (text.c_str ()), nullptr, __FILE__, GST_FUNCTION,
       __LINE__);
@@ -185,10 +184,8 @@ CamSourceSession::say (const char *name, const char *field, const std::string &v
 {
   if (quits ())
     return;
-  GstStructure *structure =
-      gst_structure_new (name, field, G_TYPE_STRING, value.c_str (), nullptr);
-  gst_element_post_message (
-      element_, gst_message_new_element (GST_OBJECT (element_), structure));
+  GstStructure *structure = gst_structure_new (name, field, G_TYPE_STRING, value.c_str (), nullptr);
+  gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), structure));
 }
 
 /* @return false: it is the end */
@@ -308,7 +305,8 @@ CamSourceSession::pad_stopped (const CamSourcePad &pad, GstFlowReturn flow)
 {
   std::lock_guard guard (lock_);
   const GstFlowReturn all = gst_flow_combiner_update_pad_flow (flows_, pad.pad (), flow);
-  GST_DEBUG_OBJECT (pad.pad (), "%s, together %s", gst_flow_get_name (flow), gst_flow_get_name (all));
+  GST_DEBUG_OBJECT (
+      pad.pad (), "%s, together %s", gst_flow_get_name (flow), gst_flow_get_name (all));
   if (all == GST_FLOW_OK || all == GST_FLOW_FLUSHING || fatal_flow_ != GST_FLOW_OK)
     return;
   fatal_flow_ = all;

@@ -22,9 +22,9 @@
 using CamSourcePads = std::vector<std::shared_ptr<CamSourcePad>>; ///< left, right, perhaps third
 
 /** What stereocamsrc does from READY to PAUSED and back, in a thread of its own, for cameras make
- *  one wait: opens the cameras, agrees with downstream on a format, lets them run, pairs what comes,
- *  and begins again when one is lost. The thread keeps itself and the element alive, so that no
- *  state change has to wait for a camera that does not answer.
+ *  one wait: opens the cameras, agrees with downstream on a format, lets them run, pairs what
+ * comes, and begins again when one is lost. The thread keeps itself and the element alive, so that
+ * no state change has to wait for a camera that does not answer.
  *
  *  Threads: this one; Aravis' (frames and losses are only noted); the ticker's and the cameras'
  *  trigger threads; the pads' tasks, which tell with what flow they stopped. lock_ is held while
@@ -36,7 +36,7 @@ public:
     CamSourceSettings settings;
     CameraNames names;
     CamSourcePads pads;
-    GstClock *clock = nullptr; ///< to be waited for; transfer none; may be null
+    GstClock *clock = nullptr;                  ///< to be waited for; transfer none; may be null
     std::shared_ptr<CamSourceSession> previous; ///< must have ended first; may be null
   };
 
@@ -127,7 +127,7 @@ private:
   CameraStatus fault_; ///< what ended the life
   GstFlowReturn fatal_flow_ = GST_FLOW_OK;
   GstFlowCombiner *flows_ = gst_flow_combiner_new ();
-  CameraStatistics before_{}; ///< of cameras that are closed
+  CameraStatistics before_{};                    ///< of cameras that are closed
   std::vector<std::shared_ptr<Camera>> counted_; ///< for stats()
 
   /* This thread's. */

@@ -262,7 +262,8 @@ names_from_rig (const Settings &settings, CameraNames &found)
   if (!view)
     return {StatusCode::kNotFound,
         settings.rig + ": has no view with view-id " + std::to_string (settings.view_id)};
-  found = view->cameras;
+  found = {
+      view->camera, view->right ? view->right->camera : "", view->third ? view->third->camera : ""};
   for (int i = 0; i < 2; i++)
     if (found[i].empty ())
       return {StatusCode::kNotFound, which + " does not name its " + (i ? "right" : "left") +

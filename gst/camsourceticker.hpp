@@ -39,8 +39,8 @@ public:
   /* Any thread. */
 
   void set_playing (bool playing);
-  /** Fires at that time, at once if it has passed or is NONE. @return false: it does not run, or too
-   * many wait */
+  /** Fires at that time, at once if it has passed or is NONE. @return false: it does not run, or
+   * too many wait */
   bool ask (GstClockTime time);
   /** Ticks that passed without a shot while the element played, since the first one. */
   [[nodiscard]] guint64 missed () const { return missed_; }
