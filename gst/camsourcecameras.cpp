@@ -1,0 +1,269 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A session's cameras: opening, format, settings, triggers, clocks. */
+#include "camsourcesession.hpp"
+
+#include <algorithm>
+#include <optional>
+
+GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
+#define GST_CAT_DEFAULT gst_stereo_cam_src_debug
+
+/* Scheduled action commands go out so much before their tick. */
+static constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
+
+bool
+CamSourceSession::open_cameras ()
+{
+  cameras_.clear ();
+  abilities_.clear ();
+  for (std::size_t i = 0; i < pads_.size (); i++) {
+    if (quits ())
+      return false;
+    std::unique_ptr<Camera> camera;
+    CameraStatus status = Camera::open (names_[i], camera);
+    CameraAbilities abilities;
+    if (status.ok ())
+      status = camera->abilities (abilities);
+    if (!status.ok ()) {
+      fail ({status.fault (), std::string ("pad ") + pads_[i]->name () + ": " + status.message ()});
+      return false;
+    }
+    GST_INFO_OBJECT (element_, "%s is %s", pads_[i]->name (), camera->label ().c_str ());
+    cameras_.push_back (std::move (camera));
+    abilities_.push_back (std::move (abilities));
+  }
+  return !quits ();
+}
+
+/* ---- the format ---- */
+
+std::vector<GstPad *>
+CamSourceSession::gst_pads () const
+{
+  std::vector<GstPad *> pads;
+  for (const auto &pad : pads_)
+    pads.push_back (pad->pad ());
+  return pads;
+}
+
+bool
+CamSourceSession::choose_format ()
+{
+  std::string why;
+  GstCaps *offered = camera_source_caps (abilities_, settings_.format, settings_.single_shot, why);
+  const std::vector<GstPad *> pads = gst_pads ();
+  for (GstPad *pad : pads)
+    gst_pad_check_reconfigure (pad);
+  bool chosen = false;
+  if (!gst_caps_is_empty (offered)) {
+    chosen = choose_camera_format (offered, pads, abilities_, format_);
+    if (!chosen) {
+      gchar *text = gst_caps_to_string (offered);
+      why = std::string ("downstream takes none of the cameras' formats: ") + text;
+      g_free (text);
+    }
+  }
+  gst_caps_unref (offered);
+  if (!chosen)
+    fail ({CameraFault::kUnsupported, why});
+  return chosen;
+}
+
+/* A link that is made anew may want something else. */
+bool
+CamSourceSession::needs_other_format ()
+{
+  bool other = false;
+  for (GstPad *pad : gst_pads ())
+    if (gst_pad_check_reconfigure (pad) && gst_pad_is_linked (pad))
+      other |= !gst_pad_peer_query_accept_caps (pad, format_.caps);
+  return other;
+}
+
+/* ---- settings ---- */
+
+bool
+CamSourceSession::configure_cameras ()
+{
+  double exposure_us = 0;
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    CameraSettings settings = settings_.for_camera (static_cast<int> (i));
+    settings.pixel_format = format_.pixel_format;
+    settings.width = format_.width;
+    settings.height = format_.height;
+    if (format_.fps_n > 0)
+      settings.frame_rate = double (format_.fps_n) / format_.fps_d;
+    if (CameraStatus status = cameras_[i]->configure (settings); !status.ok ()) {
+      fail (std::move (status));
+      return false;
+    }
+    CameraLook look;
+    if (cameras_[i]->read_look (look).ok () && look.exposure_us)
+      exposure_us = std::max (exposure_us, *look.exposure_us);
+  }
+  const auto exposure = static_cast<GstClockTime> (exposure_us * 1000);
+  const bool triggered =
+      settings_.trigger == TriggerMode::kSoftware || settings_.trigger == TriggerMode::kAction;
+  pairing_.start (static_cast<int> (cameras_.size ()), triggered, format_.period (), exposure);
+  const GstClockTime period = format_.period () > 0 ? format_.period () : 100 * GST_MSECOND;
+  /* exposed, and on its way no longer than until the next one */
+  const GstClockTime latency = MIN (exposure, period) + period;
+  if (latency_.exchange (latency) != latency)
+    gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
+  return !quits ();
+}
+
+/* ---- running ---- */
+
+bool
+CamSourceSession::start_cameras ()
+{
+  {
+    std::lock_guard guard (lock_);
+    inbox_.clear ();
+    inbox_.reserve (cameras_.size () * static_cast<std::size_t> (settings_.n_buffers) + 8);
+    counted_ = cameras_;
+  }
+  pairing_.forget ();
+  playing_since_ns_ = 0;
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const auto arrived = [this, i] (CameraFrame frame) {
+      std::lock_guard guard (lock_);
+      inbox_.push_back ({static_cast<int> (i), std::move (frame)});
+      changed_.notify_all ();
+    };
+    const auto lost = [this] (CameraStatus status) { fail (std::move (status)); };
+    if (CameraStatus status = cameras_[i]->start (arrived, lost); !status.ok ()) {
+      fail (std::move (status));
+      return false;
+    }
+  }
+  for (const auto &pad : pads_)
+    pad->set_caps (format_.caps);
+  read_clocks ();
+  if (settings_.follows_left ()) {
+    std::vector<Camera *> others;
+    for (std::size_t i = 1; i < cameras_.size (); i++)
+      others.push_back (cameras_[i].get ());
+    look_.start (
+        *cameras_[0], others, std::chrono::milliseconds (500), [this] (const CameraStatus &status) {
+          GST_WARNING_OBJECT (element_, "%s", status.message ().c_str ());
+        });
+  }
+  start_ticker ();
+  return true;
+}
+
+void
+CamSourceSession::start_ticker ()
+{
+  if (settings_.trigger == TriggerMode::kSoftware)
+    triggers_.start (static_cast<int> (cameras_.size ()), [this] (int camera) {
+      if (CameraStatus status = cameras_[camera]->trigger_software (); !status.ok ())
+        fail (std::move (status));
+    });
+  else if (settings_.trigger != TriggerMode::kAction)
+    return;
+  if (settings_.trigger == TriggerMode::kAction && settings_.action_send) {
+    std::vector<std::string> interfaces;
+    for (const auto &camera : cameras_)
+      interfaces.push_back (camera->interface_address ());
+    if (CameraStatus status = action_.open (interfaces); !status.ok ()) {
+      fail (std::move (status));
+      return;
+    }
+  }
+  const bool scheduled = settings_.trigger == TriggerMode::kAction && settings_.action_scheduled;
+  CamSourceTicker::Actions actions;
+  actions.may_fire = [this] { return pairing_.may_fire (g_get_monotonic_time () * 1000); };
+  actions.fire = [this] (GstClockTime tick) { fire (tick); };
+  ticker_.start ({format_.fps_n, format_.fps_d}, settings_.single_shot, scheduled ? kActionLead : 0,
+      std::move (actions));
+}
+
+/* The ticker's thread. Answers may come before the last camera has acknowledged. */
+void
+CamSourceSession::fire (GstClockTime tick)
+{
+  const bool scheduled = settings_.trigger == TriggerMode::kAction && settings_.action_scheduled;
+  const gint64 lead = scheduled ? static_cast<gint64> (kActionLead) : 0;
+  pairing_.fired (tick, g_get_monotonic_time () * 1000 + lead);
+  if (settings_.trigger == TriggerMode::kSoftware) {
+    triggers_.run ();
+    return;
+  }
+  if (!settings_.action_send)
+    return;
+  ActionCommand command;
+  command.device_key = settings_.action_device_key;
+  command.group_key = settings_.action_group_key;
+  command.group_mask = settings_.action_group_mask;
+  if (scheduled)
+    command.time_ns = tick;
+  if (CameraStatus status = action_.send (command); !status.ok ())
+    fail (std::move (status));
+}
+
+/* Cameras that follow one IEEE 1588 clock get one offset, so that their stamps compare exactly. */
+void
+CamSourceSession::read_clocks ()
+{
+  last_clock_read_ns_ = g_get_monotonic_time () * 1000;
+  bool ptp = true;
+  for (const auto &camera : cameras_)
+    ptp = ptp && camera->clock_is_ptp ();
+  std::optional<std::int64_t> common;
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    std::uint64_t camera_ns = 0;
+    std::int64_t read_at_us = 0;
+    if (!common || !ptp) {
+      if (!cameras_[i]->read_clock (camera_ns, read_at_us).ok () || camera_ns == 0)
+        return;
+      common = read_at_us * 1000 - static_cast<std::int64_t> (camera_ns);
+    }
+    pairing_.set_clock_offset (static_cast<int> (i), *common);
+  }
+}
+
+void
+CamSourceSession::stop_cameras ()
+{
+  ticker_.stop ();
+  look_.stop ();
+  triggers_.stop ();
+  action_.close ();
+  for (const auto &camera : cameras_)
+    camera->stop ();
+  pairing_.drop_waiting ();
+  const CameraStatistics all = camera_statistics ();
+  std::vector<std::shared_ptr<Camera>> counted;
+  {
+    std::lock_guard guard (lock_);
+    before_ = all;
+    counted.swap (counted_);
+    inbox_.clear ();
+  }
+  counted.clear ();
+  cameras_.clear ();
+}
+
+CameraStatistics
+CamSourceSession::camera_statistics ()
+{
+  std::vector<std::shared_ptr<Camera>> cameras;
+  CameraStatistics sum;
+  {
+    std::lock_guard guard (lock_);
+    cameras = counted_;
+    sum = before_;
+  }
+  for (const auto &camera : cameras) {
+    const CameraStatistics one = camera->statistics ();
+    sum.completed += one.completed;
+    sum.failures += one.failures;
+    sum.underruns += one.underruns;
+    sum.resent_packets += one.resent_packets;
+    sum.missing_packets += one.missing_packets;
+  }
+  return sum;
+}

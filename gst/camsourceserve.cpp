@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A session while its cameras run: frames become sets, sets go to the pads. */
+#include "camsourcesession.hpp"
+
+#include <algorithm>
+#include <gstrange/gstrange.h>
+
+GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
+#define GST_CAT_DEFAULT gst_stereo_cam_src_debug
+
+static constexpr std::int64_t kSecond = 1'000'000'000;
+static constexpr std::int64_t kLook = kSecond / 10;     ///< between two looks around
+static constexpr std::int64_t kClockRead = 5 * kSecond; ///< cameras' clocks drift
+static constexpr std::int64_t kStatsMessage = 5 * kSecond;
+static constexpr std::int64_t kPatience = 3 * kSecond; ///< for a frame of a camera that runs
+
+CamSourceSession::End
+CamSourceSession::serve ()
+{
+  for (;;) {
+    bool playing = false;
+    {
+      std::unique_lock guard (lock_);
+      changed_.wait_for (guard, std::chrono::nanoseconds (kLook), [this] {
+        return quit_ || !inbox_.empty () || !fault_.ok () || fatal_flow_ != GST_FLOW_OK;
+      });
+      if (quit_)
+        return End::kStopped;
+      if (!fault_.ok () || fatal_flow_ != GST_FLOW_OK)
+        return End::kFault;
+      taken_.swap (inbox_);
+      playing = playing_ && !eos_;
+    }
+    if (playing != was_playing_) {
+      was_playing_ = playing;
+      playing_since_ns_ = playing ? g_get_monotonic_time () * 1000 : 0;
+    }
+    take_frames ();
+    const std::int64_t now = g_get_monotonic_time () * 1000;
+    if (now - last_look_ns_ < kLook)
+      continue;
+    last_look_ns_ = now;
+    if (needs_other_format ())
+      return End::kAgain;
+    look_around ();
+  }
+}
+
+/* In PAUSED a live source has no pictures, but what comes late tells of the cameras' clocks. */
+void
+CamSourceSession::take_frames ()
+{
+  for (Arrival &arrival : taken_)
+    pairing_.take (arrival.camera, std::move (arrival.frame));
+  taken_.clear ();
+  CamSourceSet set;
+  while (pairing_.next (set)) {
+    if (was_playing_)
+      send (set);
+    set = {};
+  }
+}
+
+/* ---- sets ---- */
+
+/* @return false: from before the stream's beginning */
+bool
+CamSourceSession::stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTime &capture)
+{
+  const GstClockTime base = gst_element_get_base_time (element_);
+  capture = set.tick;
+  if (!GST_CLOCK_TIME_IS_VALID (capture)) {
+    GstClock *clock = gst_element_get_clock (element_);
+    if (!clock)
+      clock = gst_system_clock_obtain ();
+    const std::int64_t age = g_get_monotonic_time () * 1000 - set.taken_ns;
+    const auto now = static_cast<std::int64_t> (gst_clock_get_time (clock));
+    gst_object_unref (clock);
+    capture = static_cast<GstClockTime> (std::max<std::int64_t> (now - age, 0));
+  }
+  if (capture < base)
+    return false;
+  pts = capture - base;
+  if (GST_CLOCK_TIME_IS_VALID (last_pts_) && pts <= last_pts_ && set.tick == GST_CLOCK_TIME_NONE)
+    pts = last_pts_ + 1;
+  return true;
+}
+
+void
+CamSourceSession::send (CamSourceSet &set)
+{
+  GstClockTime pts = 0, capture = 0;
+  if (!stamp (set, pts, capture))
+    return;
+  const GstClockTime period = format_.period ();
+  for (std::size_t i = 0; i < pads_.size (); i++) {
+    GstBuffer *buffer = set.pictures[i].release ();
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT);
+    GST_BUFFER_PTS (buffer) = pts;
+    GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
+    GST_BUFFER_DURATION (buffer) = period > 0 ? period : GST_CLOCK_TIME_NONE;
+    GST_BUFFER_OFFSET (buffer) = sent_;
+    GST_BUFFER_OFFSET_END (buffer) = sent_ + 1;
+    gst_range_buffer_set_capture_time (buffer, capture);
+    pads_[i]->send (buffer);
+  }
+  sent_++;
+  last_pts_ = pts;
+  sent_until_ = pts + period;
+  if (settings_.num_buffers >= 0 && sent_ >= static_cast<guint64> (settings_.num_buffers))
+    finish (gst_util_seqnum_next ());
+}
+
+/* So that branches, and what waits for them elsewhere, go on. */
+void
+CamSourceSession::send_gaps ()
+{
+  const GstClockTime now = running_time ();
+  {
+    std::lock_guard guard (lock_);
+    if (!playing_ || eos_ || !GST_CLOCK_TIME_IS_VALID (now))
+      return;
+  }
+  const GstClockTime begin = GST_CLOCK_TIME_IS_VALID (sent_until_) ? sent_until_ : 0;
+  if (now <= begin)
+    return;
+  for (const auto &pad : pads_)
+    pad->send_gap (begin, now - begin);
+  sent_until_ = now;
+}
+
+/* ---- ten times a second ---- */
+
+void
+CamSourceSession::watch_cameras (std::int64_t now_ns)
+{
+  const bool comes_by_itself =
+      settings_.trigger == TriggerMode::kFreeRun ||
+      (settings_.trigger == TriggerMode::kSoftware && !settings_.single_shot) ||
+      (settings_.trigger == TriggerMode::kAction && settings_.action_send &&
+          !settings_.single_shot);
+  if (!comes_by_itself || playing_since_ns_ == 0)
+    return;
+  const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const std::int64_t last =
+        std::max (pairing_.last_arrival (static_cast<int> (i)), playing_since_ns_);
+    if (now_ns - last > most)
+      fail ({CameraFault::kTimedOut, cameras_[i]->label () + ": no picture for " +
+                                         std::to_string ((now_ns - last) / kSecond) +
+                                         " s; expected one each frame period (is the way for its "
+                                         "packets open, is its trigger connected?)"});
+  }
+}
+
+void
+CamSourceSession::warn_once (const CameraStatistics &all)
+{
+  if (all.underruns > 0 && !std::exchange (said_underruns_, true))
+    GST_ELEMENT_WARNING (element_, RESOURCE, NO_SPACE_LEFT,
+        ("Pictures are lost because downstream keeps all buffers of a camera: raise property "
+         "buffers above %d, or make downstream faster",
+            settings_.n_buffers),
+        (nullptr));
+  if (all.failures > 20 && all.failures > all.completed / 4 &&
+      !std::exchange (said_incomplete_, true))
+    GST_ELEMENT_WARNING (element_, RESOURCE, READ,
+        ("Many pictures arrive without all of their packets: lower packet-size to the network's "
+         "MTU, raise packet-delay or the receive buffers"),
+        ("%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT, guint64 (all.failures),
+            guint64 (all.failures + all.completed)));
+}
+
+void
+CamSourceSession::look_around ()
+{
+  const std::int64_t now = g_get_monotonic_time () * 1000;
+  watch_cameras (now);
+  warn_once (camera_statistics ());
+  if (now - last_clock_read_ns_ > kClockRead)
+    read_clocks ();
+  if (now - last_stats_ns_ > kStatsMessage && was_playing_) {
+    last_stats_ns_ = now;
+    gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), stats ()));
+  }
+}

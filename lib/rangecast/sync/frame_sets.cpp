@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "frame_sets.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace rangecast {
+
+void
+FrameSets::start (int cameras, std::int64_t tolerance)
+{
+  lanes_ = {};
+  cameras_ = std::clamp (cameras, 1, kMaxCameras);
+  tolerance_ = tolerance;
+}
+
+/* next() takes away what exceeds kMostWaiting, so the ring has room. A frame that is rejected twice
+ * without a next() between cannot be: the caller follows each put() with it. */
+void
+FrameSets::put (int camera, std::int64_t key, Frame frame)
+{
+  Lane &lane = lanes_[camera];
+  if (lane.count > kMostWaiting || (lane.has_last && key <= lane.last_key)) {
+    lane.rejected = frame;
+    return;
+  }
+  lane.last_key = key;
+  lane.has_last = true;
+  lane.ring[(lane.first + lane.count++) % lane.ring.size ()] = {key, frame};
+}
+
+void
+FrameSets::take_head (int camera, Set &set)
+{
+  Lane &lane = lanes_[camera];
+  const Waiting &waiting = lane.ring[lane.first];
+  set.frames[camera] = waiting.frame;
+  set.keys[camera] = waiting.key;
+  lane.first = static_cast<int> ((lane.first + 1) % lane.ring.size ());
+  lane.count--;
+}
+
+void
+FrameSets::drop_head (int camera, Set &set)
+{
+  take_head (camera, set);
+  lanes_[camera].dropped += set.frames[camera] != nullptr;
+}
+
+/* @param[out] oldest  the camera whose head cannot have a partner any more, if the heads are no set
+ */
+bool
+FrameSets::complete (int &oldest) const
+{
+  oldest = 0;
+  std::int64_t newest = head (0).key;
+  for (int c = 1; c < cameras_; c++) {
+    if (head (c).key < head (oldest).key)
+      oldest = c;
+    newest = std::max (newest, head (c).key);
+  }
+  return newest - head (oldest).key <= tolerance_;
+}
+
+FrameSets::Step
+FrameSets::next (Set &set)
+{
+  set = {};
+  int longest = 0, oldest = 0;
+  bool all = true;
+  for (int c = 0; c < cameras_; c++) {
+    Lane &lane = lanes_[c];
+    if (lane.rejected) {
+      set.frames[c] = std::exchange (lane.rejected, nullptr);
+      lane.dropped++;
+      return Step::kDrop;
+    }
+    all &= lane.count > 0;
+    if (lane.count > lanes_[longest].count)
+      longest = c;
+  }
+  if (!all) {
+    if (lanes_[longest].count <= kMostWaiting)
+      return Step::kWait;
+    drop_head (longest, set);
+    return Step::kDrop;
+  }
+  if (!complete (oldest)) {
+    drop_head (oldest, set);
+    return Step::kDrop;
+  }
+  bool lost = false;
+  for (int c = 0; c < cameras_; c++) {
+    take_head (c, set);
+    lost |= set.frames[c] == nullptr;
+  }
+  for (int c = 0; lost && c < cameras_; c++)
+    lanes_[c].dropped += set.frames[c] != nullptr;
+  return lost ? Step::kDrop : Step::kSet;
+}
+
+FrameSets::Step
+FrameSets::take_rest (Set &set)
+{
+  set = {};
+  Step step = Step::kWait;
+  for (int c = 0; c < cameras_; c++)
+    if (lanes_[c].rejected) {
+      set.frames[c] = std::exchange (lanes_[c].rejected, nullptr);
+      step = Step::kDrop;
+    } else if (lanes_[c].count > 0) {
+      take_head (c, set);
+      step = Step::kDrop;
+    }
+  return step;
+}
+
+} // namespace rangecast
