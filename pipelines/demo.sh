@@ -123,9 +123,7 @@ esac
 parent_port=$port viewer_port=$((port + views))
 echo "$views stereo cameras at $size, $fps frame sets/s: $views camera hosts, parent and viewer"
 for ((i = 0; i < views; i++)); do
-  host_input=$input
-  [ "$input" != cameras ] || host_input="cameras=$(sed -n "s/^view$i-left //p; s/^view$i-right //p" "$out/log/fake-cameras.log" | paste -sd,)"
-  start "camera$i" pipelines/camera-host.sh --view "$i" --views "$views" --rig "$rig" --input "$host_input" \
+  start "camera$i" pipelines/camera-host.sh --view "$i" --views "$views" --rig "$rig" --input "$input" \
     --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))"
 done
 run_options=

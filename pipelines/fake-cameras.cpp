@@ -120,9 +120,14 @@ FakeRig::export_rig (const FakeCameraOptions &options) const
   if (options.rig_export.empty ())
     return {};
   rangecast::Rig rig = scene_->rig ();
-  if (!options.third)
-    for (rangecast::View &view : rig.views)
+  for (rangecast::View &view : rig.views) {
+    view.camera = address_of (options, view.id, SceneCamera::kLeft);
+    view.right->camera = address_of (options, view.id, SceneCamera::kRight);
+    if (options.third)
+      view.third->camera = address_of (options, view.id, SceneCamera::kThird);
+    else
       view.third.reset ();
+  }
   return rangecast::save_rig (options.rig_export, rig);
 }
 
