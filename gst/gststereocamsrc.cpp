@@ -160,20 +160,11 @@ gst_stereo_cam_src_send_event (GstElement *element, GstEvent *event)
 
 /* ---- pads ---- */
 
-static CamSourcePad *
-find_pad (GstStereoCamSrc *self, GstPad *pad)
-{
-  for (const auto &entry : self->priv->pads)
-    if (entry->pad () == pad)
-      return entry.get ();
-  return nullptr;
-}
-
 static gboolean
-gst_stereo_cam_src_activate_mode (GstPad *pad, GstObject *parent, GstPadMode mode, gboolean active)
+gst_stereo_cam_src_activate_mode (GstPad *pad, GstObject *, GstPadMode mode, gboolean active)
 {
-  CamSourcePad *entry = find_pad (GST_STEREO_CAM_SRC (parent), pad);
-  return mode == GST_PAD_MODE_PUSH && entry && entry->activate (active);
+  auto entry = static_cast<CamSourcePad *> (gst_pad_get_element_private (pad));
+  return mode == GST_PAD_MODE_PUSH && entry->activate (active);
 }
 
 static void
@@ -189,6 +180,7 @@ add_pad (GstStereoCamSrc *self, GstStaticPadTemplate *pad_template)
         if (const auto session = self->priv->current ())
           session->pad_stopped (stopped, flow);
       }));
+  gst_pad_set_element_private (pad, self->priv->pads.back ().get ());
 }
 
 /* The third pad is there while its camera is named. */
@@ -201,11 +193,8 @@ add_third_pad (GstStereoCamSrc *self, bool wanted, guint group_id)
     pad->prepare (group_id);
     pad->reset_counters ();
   }
-  if (!wanted)
-    return;
-  GstPad *pad = self->priv->pads.back ()->pad ();
-  gst_pad_set_active (pad, TRUE);
-  gst_element_add_pad (GST_ELEMENT (self), pad);
+  if (wanted) /* becomes active: the element is on its way to PAUSED */
+    gst_element_add_pad (GST_ELEMENT (self), self->priv->pads.back ()->pad ());
 }
 
 static void
