@@ -552,6 +552,42 @@ Camera::clock_is_ptp ()
   return status == "Slave" || status == "Master";
 }
 
+/* GigE Vision's bootstrap registers, which every GigE camera has: the latch keeps the clock for
+ * reading. */
+static constexpr guint64 kTimestampControl = 0x0944, kTimestampHigh = 0x0948,
+                         kTimestampLow = 0x094c;
+static constexpr guint32 kTimestampLatch = 2;
+
+static std::uint64_t
+ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
+{
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  if (frequency == 0)
+    return 0;
+  return ticks / frequency * kSecond +
+         gst_util_uint64_scale (ticks % frequency, kSecond, frequency);
+}
+
+static GError *
+read_gige_clock (ArvDevice *device, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  GError *error = nullptr;
+  guint32 high = 0, low = 0;
+  const std::int64_t before = g_get_monotonic_time ();
+  arv_device_write_register (device, kTimestampControl, kTimestampLatch, &error);
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (!error)
+    arv_device_read_register (device, kTimestampHigh, &high, &error);
+  if (!error)
+    arv_device_read_register (device, kTimestampLow, &low, &error);
+  if (error)
+    return error;
+  const guint64 frequency =
+      arv_gv_device_get_timestamp_tick_frequency (ARV_GV_DEVICE (device), &error);
+  time_ns = ticks_to_ns (std::uint64_t (high) << 32 | low, frequency);
+  return error;
+}
+
 CameraStatus
 Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
 {
@@ -559,21 +595,21 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
   if (is_lost ())
     return control.refuse (CameraFault::kLost, "was lost");
   const auto guard = control.lock ();
-  const bool modern = control.has ("TimestampLatch");
-  const char *latch = modern ? "TimestampLatch" : "GevTimestampControlLatch";
-  const std::int64_t before = g_get_monotonic_time ();
-  CameraStatus status = control.execute (latch);
-  read_at_us = (before + g_get_monotonic_time ()) / 2;
-  if (!status.ok ())
-    return impl_->judged (status);
-  std::int64_t ticks = 0, frequency = 1'000'000'000;
-  if (!control.read (modern ? "TimestampLatchValue" : "GevTimestampValue", ticks))
+  CameraStatus status;
+  if (is_gige ()) {
+    GError *error = read_gige_clock (control.device (), camera_time_ns, read_at_us);
+    status = control.status ("its clock", error, CameraFault::kFailed);
+  } else { /* USB3 Vision: nanoseconds */
+    std::int64_t ticks = 0;
+    const std::int64_t before = g_get_monotonic_time ();
+    status = control.execute ("TimestampLatch");
+    read_at_us = (before + g_get_monotonic_time ()) / 2;
+    if (status.ok () && control.read ("TimestampLatchValue", ticks))
+      camera_time_ns = ticks;
+    else if (status.ok ())
+      status = control.refuse (CameraFault::kFailed, "has no feature 'TimestampLatchValue'");
+  }
+  if (status.ok () && camera_time_ns == 0)
     return control.refuse (CameraFault::kFailed, "does not tell its clock");
-  if (!modern)
-    (void)control.read ("GevTimestampTickFrequency", frequency);
-  const std::uint64_t whole = frequency > 0 ? ticks / frequency : 0;
-  const std::uint64_t rest = frequency > 0 ? ticks % frequency : 0;
-  camera_time_ns = whole * 1'000'000'000 + gst_util_uint64_scale (rest, 1'000'000'000,
-                                               std::max<std::int64_t> (frequency, 1));
-  return {};
+  return impl_->judged (status);
 }

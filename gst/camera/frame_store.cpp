@@ -51,6 +51,13 @@ FrameStore::give_back (ArvBuffer *frame)
   g_object_unref (frame);
 }
 
+bool
+FrameStore::is_closed ()
+{
+  std::lock_guard guard (lock_);
+  return !stream_;
+}
+
 void
 FrameStore::close ()
 {
@@ -109,27 +116,33 @@ reset_buffer (GstBuffer *buffer)
   GST_BUFFER_OFFSET (buffer) = GST_BUFFER_OFFSET_END (buffer) = GST_BUFFER_OFFSET_NONE;
 }
 
-/* The last holder let the buffer go. FALSE keeps it, for the next frame. */
+/* Nobody else holds the memory, and nobody changed it or put another in its place. */
+bool
+FrameStore::is_unchanged (GstBuffer *buffer, const Slot &slot)
+{
+  if (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_TAG_MEMORY) ||
+      gst_buffer_n_memory (buffer) != 1 || gst_buffer_peek_memory (buffer, 0) != slot.memory)
+    return false;
+  gsize offset = 0, whole = 0;
+  const gsize size = gst_memory_get_sizes (slot.memory, &offset, &whole);
+  return offset == 0 && size == whole && gst_buffer_is_all_memory_writable (buffer);
+}
+
+/* The last holder let the buffer go. FALSE: it is taken care of. */
 gboolean
 FrameStore::dispose (GstMiniObject *object)
 {
-  GstBuffer *buffer = GST_BUFFER_CAST (object);
+  GstBuffer *buffer =
+      gst_buffer_ref (GST_BUFFER_CAST (object)); /* memory of no buffer is not writable */
   auto *slot = static_cast<Slot *> (gst_mini_object_get_qdata (object, slot_quark ()));
   const std::shared_ptr<FrameStore> store = slot->store; /* outlives the slot */
-  gsize offset = 0, whole = 0;
-  const bool ours = !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_TAG_MEMORY) &&
-                    gst_buffer_n_memory (buffer) == 1 &&
-                    gst_buffer_peek_memory (buffer, 0) == slot->memory &&
-                    gst_memory_get_sizes (slot->memory, &offset, &whole) == whole && offset == 0 &&
-                    gst_buffer_is_all_memory_writable (buffer);
-  if (!ours)
-    return TRUE; /* memory_gone() follows now, or when the memory's last holder lets it go */
-  std::unique_lock guard (store->lock_);
-  if (!store->stream_)
-    return TRUE;
-  guard.unlock ();
+  if (!is_unchanged (buffer, *slot) || store->is_closed ()) {
+    object->dispose = nullptr;
+    gst_buffer_unref (buffer); /* memory_gone() follows when the memory's last holder lets it go */
+    return FALSE;
+  }
   reset_buffer (buffer);
-  slot->spare = gst_buffer_ref (buffer);
+  slot->spare = buffer;
   slot->out = false;
   store->out_--;
   store->give_back (

@@ -39,9 +39,11 @@ public:
 
 private:
   struct Slot;
+  static bool is_unchanged (GstBuffer *buffer, const Slot &slot);
   static gboolean dispose (GstMiniObject *object);
   static void memory_gone (gpointer slot);
   GstBuffer *make_buffer (Slot &slot);
+  bool is_closed ();
 
   std::mutex lock_;
   ArvStream *stream_;

@@ -3,6 +3,7 @@
 #include <camera.hpp>
 
 #include <deque>
+#include <look_follower.hpp>
 
 #include "camera-check.hpp"
 
@@ -453,12 +454,18 @@ GST_END_TEST;
 
 /* The fake camera draws one byte value a frame, which grows from frame to frame. */
 static void
-fill_with_count (ArvBuffer *buffer, void *, guint32, guint32, ArvPixelFormat)
+fill_with_count (ArvBuffer *buffer, void *n_bytes, guint32, guint32, ArvPixelFormat)
 {
   static int count = 0;
-  std::size_t size = 0;
-  auto *data = static_cast<guint8 *> (const_cast<void *> (arv_buffer_get_data (buffer, &size)));
-  memset (data, ++count & 0xff, size);
+  std::size_t size = 0; /* what was received, which is nothing here */
+  void *data = const_cast<void *> (arv_buffer_get_data (buffer, &size));
+  memset (data, ++count & 0xff, GPOINTER_TO_SIZE (n_bytes));
+}
+
+static void
+draw_count (FakeCamera &fake, gsize n_bytes)
+{
+  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, GSIZE_TO_POINTER (n_bytes));
 }
 
 /** The count in a picture; fails the test where it is not the same all over. */
@@ -478,7 +485,7 @@ GST_START_TEST (test_pixels_are_those_of_the_frame_as_long_as_it_is_held)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera fake;
-  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, nullptr);
+  draw_count (fake, 64 * 48);
   const auto camera = open_camera ("127.0.0.1");
   CameraSettings settings = small_pictures ();
   settings.n_buffers = 6;
@@ -608,7 +615,7 @@ GST_START_TEST (test_buffers_outlive_the_camera)
 {
   SKIP_WITHOUT_NETWORK ();
   auto fake = std::make_unique<FakeCamera> ();
-  arv_fake_camera_set_fill_pattern (fake->registers (), fill_with_count, nullptr);
+  draw_count (*fake, 64 * 48);
   auto camera = open_camera ("127.0.0.1");
   configure (*camera, small_pictures ());
   Listener listener;
@@ -653,7 +660,7 @@ GST_START_TEST (test_lost_packets_make_incomplete_frames_or_gaps_never_pictures)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera fake;
-  arv_fake_camera_set_fill_pattern (fake.registers (), fill_with_count, nullptr);
+  draw_count (fake, 128 * 128);
   const auto camera = open_camera ("127.0.0.1");
   CameraSettings settings = small_pictures ();
   settings.width = settings.height = 128; /* some 12 packets a picture */
@@ -755,6 +762,48 @@ GST_START_TEST (test_software_trigger_takes_one_picture_a_call)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
+{
+  SKIP_WITHOUT_NETWORK ();
+  FakeCamera left ("127.0.0.2", "left"), right ("127.0.0.3", "right");
+  const auto leader = open_camera ("127.0.0.2"), follower = open_camera ("127.0.0.3");
+  CameraSettings settings = small_pictures ();
+  settings.exposure_mode = settings.gain_mode = AutoMode::kManual;
+  settings.exposure_us = 1000;
+  settings.gain = 1;
+  configure (*leader, settings);
+  settings.gain = 2;
+  configure (*follower, settings);
+  Listener from_leader, from_follower;
+  start (*leader, from_leader);
+  start (*follower, from_follower);
+  LookFollower look;
+  std::atomic<int> n_refusals{0};
+  look.start (*leader, {follower.get ()}, std::chrono::milliseconds (5),
+      [&] (const CameraStatus &) { n_refusals++; });
+  for (const guint32 exposure : {3000u, 700u, 12000u}) {
+    /* as the camera's own regulator would */
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, exposure);
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, exposure % 7);
+    guint32 got_exposure = 0, got_gain = 0;
+    for (int i = 0; i < 2000 && (got_exposure != exposure || got_gain != exposure % 7); i++) {
+      g_usleep (5000);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, &got_exposure);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, &got_gain);
+    }
+    assert_equals_int (got_exposure, exposure);
+    assert_equals_int (got_gain, exposure % 7);
+  }
+  assert_equals_int (n_refusals, 0);
+  (void)from_follower.next_complete ();
+  look.stop ();
+}
+GST_END_TEST;
+
 GST_START_TEST (test_eight_cameras_stream_at_once)
 {
   SKIP_WITHOUT_NETWORK ();
@@ -809,6 +858,7 @@ camera_suite ()
   tcase_add_test (tc, test_vanished_camera_is_told_once_and_is_no_hang);
   tcase_add_test (tc, test_camera_that_came_back_opens_again);
   tcase_add_test (tc, test_software_trigger_takes_one_picture_a_call);
+  tcase_add_test (tc, test_followers_take_over_the_look_of_the_leader);
   tcase_add_test (tc, test_eight_cameras_stream_at_once);
   return suite;
 }
