@@ -18,6 +18,7 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --views N       number of views in the rig, for avatar (default 4)
   --size WxH      picture size, for avatar and cameras (default 320x240)
   --fps N         frames per second, for avatar, cameras and image sequences (default 15)
+  --format WHAT   rgb (default), bayer or grey: pictures that the cameras send
   --trigger HOW   free-run, software (default), hardware or action, for cameras
   --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
                   there (default: this machine's)
@@ -27,7 +28,7 @@ END
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
-trigger=software clock_server= reconnect=false
+format=rgb trigger=software clock_server= reconnect=false
 while [ $# -gt 0 ]; do
   case "$1" in
     --view) view=${2:-}; shift ;;
@@ -38,6 +39,7 @@ while [ $# -gt 0 ]; do
     --size) size=${2:-}; shift ;;
     --fps) fps=${2:-}; shift ;;
     --learn) learn=${2:-}; shift ;;
+    --format) format=${2:-}; shift ;;
     --trigger) trigger=${2:-}; shift ;;
     --clock-server) clock_server=${2:-}; shift ;;
     --reconnect) reconnect=true ;;
@@ -94,9 +96,15 @@ read_cameras () {
       names=("${names[@]:1}")
     done
   fi
+  local pixels="width=${size%x*},height=${size#*x},framerate=$fps/1"
+  case "$format" in
+    rgb) pixels=("video/x-raw,format=RGB,$pixels") ;;
+    grey) pixels=("video/x-raw,format=GRAY8,$pixels") ;;
+    bayer) pixels=("video/x-bayer,$pixels" ! bayer2rgb) ;;
+    *) die "--format: expected rgb, bayer or grey, got '$format'" ;;
+  esac
   for side in "$@"; do
-    cameras+=("cameras.$side" ! "video/x-raw,width=${size%x*},height=${size#*x},framerate=$fps/1"
-      ! queue max-size-buffers=2 ! "depth.$side")
+    cameras+=("cameras.$side" ! "${pixels[@]}" ! queue max-size-buffers=2 ! "depth.$side")
   done
 }
 

@@ -66,10 +66,12 @@ stop_hosts () {
 trap stop_hosts EXIT
 declare -A names=()
 
-# Starts the cameras and waits until they are there; they write the rig.
+# Starts the cameras and waits until they are there; they write the rig. Two demos at a time have
+# ports of their own, and so do their cameras have addresses.
 start_fake_cameras () {
   local i log=$out/log/fake-cameras.log
-  fake-cameras --views "$views" --size "$size" --fps "$fps" --rig-export "$rig" >"$log" 2>&1 &
+  fake-cameras --views "$views" --size "$size" --fps "$fps" --rig-export "$rig" \
+    --address-base "127.$((port / 256)).$((port % 256)).1" >"$log" 2>&1 &
   pids+=($!)
   names[$!]=fake-cameras
   for ((i = 0; i < 600; i++)); do

@@ -20,11 +20,11 @@ struct RawOptions {
   gint views = 4, third = 0, empty_frames = 25, loop = 0, no_resend = 0;
   gdouble fps = 15, loss = 0, link = 1000;
   gchar *size = nullptr, *address = nullptr, *colour = nullptr, *rig = nullptr, *model = nullptr,
-        *only = nullptr;
+        *only = nullptr, *log = nullptr;
 
   ~RawOptions ()
   {
-    for (gchar *text : {size, address, colour, rig, model, only})
+    for (gchar *text : {size, address, colour, rig, model, only, log})
       g_free (text);
   }
 };
@@ -53,6 +53,8 @@ parse (int *argc, char ***argv, RawOptions &raw)
       {"only", 0, 0, G_OPTION_ARG_STRING, &raw.only,
           "serve only these of the rig's cameras, e.g. view0-left,view0-right", "NAMES"},
       {"rig-export", 0, 0, G_OPTION_ARG_FILENAME, &raw.rig, "write the rig", "FILE"},
+      {"log", 0, 0, G_OPTION_ARG_FILENAME, &raw.log,
+          "write when each picture was taken: camera, number, ns of the time of day", "FILE"},
       {"model", 0, 0, G_OPTION_ARG_FILENAME, &raw.model,
           "glTF or OBJ model instead of the built-in figure", "FILE"},
       {"empty-frames", 0, 0, G_OPTION_ARG_INT, &raw.empty_frames,
@@ -123,6 +125,7 @@ take_texts (const RawOptions &raw, FakeCameraOptions &options)
   if (raw.address)
     options.address_base = ntohl (address.s_addr);
   options.rig_export = raw.rig ? raw.rig : "";
+  options.log = raw.log ? raw.log : "";
   options.scene.model = raw.model ? raw.model : "";
   options.only = raw.only ? raw.only : "";
   return true;

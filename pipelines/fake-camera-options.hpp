@@ -14,8 +14,8 @@ struct FakeCameraOptions {
   std::uint32_t address_base = 0x7f000101; ///< of view0-left; the others follow
   bool third = false;
   int empty_frames = 25, loop = 0;
-  std::string only; ///< comma-separated names; empty: all
-  std::string rig_export;
+  std::string only;            ///< comma-separated names; empty: all
+  std::string rig_export, log; ///< files to write; empty: none
 
   [[nodiscard]] bool serves (const std::string &name) const;
 };

@@ -6,7 +6,9 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
+#include <mutex>
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <string>
@@ -27,6 +29,32 @@ struct ViewCameras {
   std::vector<GigeCamera *> wired; /* fired by the left camera's output line */
 };
 
+/* When each picture was taken, for whoever judges how well cameras agree. Any thread. */
+class ExposureLog {
+public:
+  Status open (const std::string &path)
+  {
+    if (path.empty ())
+      return {};
+    file_.open (path);
+    return file_ ? Status () : Status (StatusCode::kBadValue, "--log: cannot write '" + path + "'");
+  }
+  /* In time of day: it is the same in all time namespaces. */
+  void add (const std::string &serial, std::uint16_t block_id, std::int64_t monotonic_ns)
+  {
+    if (!file_.is_open ())
+      return;
+    const std::int64_t ago_ns = g_get_monotonic_time () * 1000 - monotonic_ns,
+                       time_ns = g_get_real_time () * 1000 - ago_ns;
+    std::lock_guard guard (lock_);
+    file_ << serial << ' ' << block_id << ' ' << time_ns << std::endl;
+  }
+
+private:
+  std::mutex lock_;
+  std::ofstream file_;
+};
+
 class FakeRig {
 public:
   Status create (const FakeCameraOptions &options);
@@ -40,6 +68,7 @@ private:
 
   std::shared_ptr<rangecast::Scene> scene_;
   std::unique_ptr<Moments> moments_;
+  ExposureLog log_;
   std::vector<ViewCameras> views_;
   std::vector<std::unique_ptr<GigeCamera>> cameras_;
   std::unique_ptr<GigeListener> listener_;
@@ -84,7 +113,9 @@ FakeRig::scenery_for (int view, SceneCamera camera, std::shared_ptr<ScenePicture
     if (!s.ok ())
       g_printerr ("fake-cameras: %s\n", s.message ().c_str ());
   };
-  scenery.exposed = [&cameras, camera] {
+  scenery.exposed = [this, &cameras, camera, serial = serial_of (view, camera)] (
+                        std::uint16_t block_id, std::int64_t time_ns) {
+    log_.add (serial, block_id, time_ns);
     if (camera == SceneCamera::kLeft)
       for (GigeCamera *other : cameras.wired)
         other->line_rises ();
@@ -136,6 +167,8 @@ FakeRig::create (const FakeCameraOptions &options)
 {
   std::unique_ptr<rangecast::Scene> scene;
   if (Status s = rangecast::Scene::create (options.scene, scene); !s.ok ())
+    return s;
+  if (Status s = log_.open (options.log); !s.ok ())
     return s;
   scene_ = std::move (scene);
   const auto period_ns = std::int64_t (1e9 / options.camera.fps);

@@ -513,8 +513,8 @@ GigeCamera::expose (std::int64_t now_ns)
                     region.height <= settings_.height - region.y;
   if (!acquiring_ || !fits || bytes_per_pixel (format) == 0 || size <= kGvspOverhead)
     return;
-  scenery_.exposed ();
   last_block_ = last_block_ == 65535 ? 1 : last_block_ + 1;
+  scenery_.exposed (last_block_, now_ns);
   Frame &frame = frames_[last_block_ % kFramesKept];
   frame.picture = {last_block_, camera_time (now_ns), format, std::uint32_t (region.width),
       std::uint32_t (region.height), std::uint32_t (region.x), std::uint32_t (region.y)};

@@ -43,8 +43,9 @@ public:
         std::span<std::uint8_t> out)>
         paint;
     std::function<void (bool running)> acquisition;
-    /** A picture has begun: the signal on the camera's output line. */
-    std::function<void ()> exposed;
+    /** A picture has begun: the signal on the camera's output line.
+     *  @param time_ns  CLOCK_MONOTONIC */
+    std::function<void (std::uint16_t block_id, std::int64_t time_ns)> exposed;
   };
 
   /** Opens the sockets. @return kBadValue naming the address */

@@ -50,7 +50,7 @@ struct Cameras {
         std::ranges::fill (out, std::uint8_t (++n));
       };
       scenery.acquisition = [] (bool) {};
-      scenery.exposed = [this, i] {
+      scenery.exposed = [this, i] (std::uint16_t, std::int64_t) {
         for (std::size_t other = 1; i == 0 && other < list.size (); other++)
           list[other]->line_rises ();
       };

@@ -62,6 +62,14 @@ test_demo_plays_recorded_pairs () {
   check_picture demo/avatar.png
 }
 
+test_demo_takes_pictures_with_cameras () {
+  need_gl
+  command -v fake-cameras >/dev/null || skip "built without Aravis"
+  "$pipelines/demo.sh" --input cameras --views 2 --frames 15 --fps 6 --size 160x120 --out demo --port $((ports + 40))
+  check_report demo 15 2 1
+  check_picture demo/avatar.png
+}
+
 test_demo_says_what_is_wrong () {
   expect_error "--views" "$pipelines/demo.sh" --views 99 --out demo
   expect_error "--size" "$pipelines/demo.sh" --size big --out demo
