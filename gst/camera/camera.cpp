@@ -1,11 +1,579 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A camera that is gone lets every call wait for seconds, so what is taken down goes in a thread of
+ * its own, for which nobody waits longer than a second (see TakeDown). */
 #include "camera.hpp"
 
 #include <arv.h>
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "camera_control.hpp"
+#include "camera_discovery.hpp"
+#include "camera_format.hpp"
+#include "camera_setup.hpp"
+#include "frame_counter.hpp"
+#include "frame_store.hpp"
+
+using namespace std::chrono_literals;
+
+static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
+
+namespace {
+
+/* Work that may have to wait for a camera that does not answer. */
+class TakeDown {
+public:
+  void run (std::function<void ()> work)
+  {
+    wait (kLongest);
+    std::packaged_task<void ()> task (std::move (work));
+    done_ = task.get_future ().share ();
+    std::thread (std::move (task)).detach ();
+    wait (kPatience);
+  }
+  /* @return false: still at work */
+  bool wait (std::chrono::milliseconds limit)
+  {
+    return !done_.valid () || done_.wait_for (limit) == std::future_status::ready;
+  }
+
+  static constexpr std::chrono::milliseconds kPatience = 1s;
+  static constexpr std::chrono::milliseconds kLongest = 15s; /* Aravis' tries end before */
+
+private:
+  std::shared_future<void> done_;
+};
+
+/* Outlives the camera where its device's signal is just being emitted. */
+struct LossWatch {
+  std::mutex lock; /* guards report, held while it runs */
+  Camera::Lost report;
+  std::string label;
+  std::atomic<bool> lost{false};
+
+  void on_lost ()
+  {
+    if (lost.exchange (true))
+      return;
+    std::lock_guard guard (lock);
+    if (report)
+      report ({CameraFault::kLost,
+          label +
+              ": lost; it does not answer any more (unplugged, switched off), or another program "
+              "took control"});
+  }
+};
+
+/* One run from start() to stop(). */
+struct Run {
+  std::mutex lock; /* guards all of it, held while `arrived` runs; only the stream's thread waits */
+  Camera::Arrived arrived;
+  ArvStream *stream = nullptr; /* transfer full; deleted by take-down */
+  std::shared_ptr<FrameStore> store;
+  FrameCounter counter;
+  CameraFormat format;
+  ArvPixelFormat code = 0;
+  std::uint64_t missing_packets = 0; /* told so far */
+  bool stopped = false;
+
+  void on_done ();
+  void deliver (ArvBuffer *buffer);
+  [[nodiscard]] bool fits (ArvBuffer *buffer) const;
+};
+
+void
+Run::on_done ()
+{
+  std::lock_guard guard (lock);
+  while (!stopped && stream) {
+    ArvBuffer *buffer = arv_stream_try_pop_buffer (stream);
+    if (!buffer)
+      break;
+    deliver (buffer);
+  }
+}
+
+bool
+Run::fits (ArvBuffer *buffer) const
+{
+  const ArvBufferPayloadType type = arv_buffer_get_payload_type (buffer);
+  if (type != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && type != ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA)
+    return false;
+  std::size_t size = 0, all = 0;
+  gint x_padding = 0, y_padding = 0;
+  if (arv_buffer_get_image_data (buffer, &size) != arv_buffer_get_data (buffer, &all))
+    return false;
+  arv_buffer_get_image_padding (buffer, &x_padding, &y_padding);
+  return size >= format.size () && x_padding == 0 &&
+         arv_buffer_get_image_width (buffer) == format.width &&
+         arv_buffer_get_image_height (buffer) == format.height &&
+         arv_buffer_get_image_pixel_format (buffer) == code;
+}
+
+/* buffer: transfer full */
+void
+Run::deliver (ArvBuffer *buffer)
+{
+  const ArvBufferStatus status = arv_buffer_get_status (buffer);
+  const std::uint64_t id = arv_buffer_get_frame_id (buffer);
+  if (id == FrameStore::kNoId || status == ARV_BUFFER_STATUS_ABORTED ||
+      status == ARV_BUFFER_STATUS_CLEARED) { /* nobody knows which one it is: a gap */
+    store->give_back (buffer);
+    return;
+  }
+  CameraFrame frame;
+  frame.id = id;
+  frame.number = counter.number (id);
+  frame.arrived_us = g_get_monotonic_time ();
+  frame.system_time_ns = arv_buffer_get_system_timestamp (buffer);
+  const std::int64_t age_us = g_get_real_time () - std::int64_t (frame.system_time_ns / 1000);
+  frame.began_us = frame.arrived_us - std::max<std::int64_t> (age_us, 0);
+  const std::uint64_t taken = arv_buffer_get_timestamp (buffer);
+  frame.camera_time_ns = taken == frame.system_time_ns ? 0 : taken; /* Aravis' makeshift */
+  if (ARV_IS_GV_STREAM (stream)) {
+    guint64 missing = 0;
+    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), nullptr, &missing);
+    frame.missing_packets = missing - missing_packets;
+    missing_packets = missing;
+  }
+  if (status != ARV_BUFFER_STATUS_SUCCESS)
+    frame.state = FrameState::kMissing;
+  else
+    frame.state = fits (buffer) ? FrameState::kComplete : FrameState::kUnfit;
+  if (frame.state == FrameState::kComplete)
+    frame.buffer = store->wrap (buffer);
+  else
+    store->give_back (buffer);
+  arrived (std::move (frame));
+}
+
+CameraStatistics
+count (ArvStream *stream)
+{
+  CameraStatistics numbers;
+  guint64 completed = 0, failures = 0, underruns = 0, resent = 0, missing = 0;
+  arv_stream_get_statistics (stream, &completed, &failures, &underruns);
+  if (ARV_IS_GV_STREAM (stream))
+    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), &resent, &missing);
+  numbers.completed = completed;
+  numbers.failures = failures;
+  numbers.underruns = underruns;
+  numbers.resent_packets = resent;
+  numbers.missing_packets = missing;
+  return numbers;
+}
+
+} // namespace
 
 struct Camera::Impl {
   CameraInfo info;
+  std::string interface;
+  std::unique_ptr<CameraControl> control;
+  CameraSettings settings;
+  CameraFormat format;
+  int packet_size = 0;
+  std::shared_ptr<LossWatch> watch = std::make_shared<LossWatch> ();
+  gulong watch_handler = 0;
+  TakeDown take_down;
+
+  std::mutex run_lock; /* guards what follows */
+  std::shared_ptr<Run> run;
+  CameraStatistics last_statistics;
+
+  std::mutex look_lock; /* guards written */
+  CameraLook written;
+
+  void describe (const std::string &name);
+  CameraStatus create_stream (const std::shared_ptr<Run> &run);
+  void set_stream_properties (ArvStream *stream) const;
+  CameraStatus fill (Run &run);
+  void end (const std::shared_ptr<Run> &run);
+  /* A fault is a loss where the camera is known to be lost. */
+  CameraStatus judged (CameraStatus status) const
+  {
+    if (status.ok () || !watch->lost)
+      return status;
+    return {CameraFault::kLost, status.message ()};
+  }
 };
 
+/* Opening */
+
+static std::string
+text_of (const char *text)
+{
+  return text ? text : "";
+}
+
+void
+Camera::Impl::describe (const std::string &name)
+{
+  ArvCamera *camera = control->camera ();
+  if (info.vendor.empty ())
+    info.vendor = text_of (arv_camera_get_vendor_name (camera, nullptr));
+  if (info.model.empty ())
+    info.model = text_of (arv_camera_get_model_name (camera, nullptr));
+  if (info.serial.empty ())
+    info.serial = text_of (arv_camera_get_device_serial_number (camera, nullptr));
+  if (info.id.empty ())
+    info.id = info.vendor + "-" + info.serial;
+  if (!ARV_IS_GV_DEVICE (control->device ()))
+    return;
+  const auto address = [] (GSocketAddress *socket_address) {
+    gchar *text = g_inet_address_to_string (
+        g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (socket_address)));
+    std::string copy = text;
+    g_free (text);
+    return copy;
+  };
+  ArvGvDevice *device = ARV_GV_DEVICE (control->device ());
+  interface = address (arv_gv_device_get_interface_address (device));
+  info.address = address (arv_gv_device_get_device_address (device));
+  (void)name;
+}
+
+CameraStatus
+Camera::open (const std::string &name, std::unique_ptr<Camera> &camera)
+{
+  auto impl = std::make_unique<Impl> ();
+  ArvDevice *device = nullptr;
+  CameraStatus status = open_camera_device (name, device, impl->info);
+  if (!status.ok ())
+    return status;
+  GError *error = nullptr;
+  ArvCamera *arv = arv_camera_new_with_device (device, &error);
+  g_object_unref (device);
+  if (!arv) {
+    status = {CameraFault::kFailed,
+        "camera '" + name + "': " + (error ? error->message : "Aravis cannot use it")};
+    g_clear_error (&error);
+    return status;
+  }
+  g_clear_error (&error);
+  const std::string called = name.empty () ? impl->info.id : name;
+  std::string label = "camera '" + called + "'";
+  if (!impl->info.model.empty () && impl->info.id != called)
+    label +=
+        " (" + impl->info.vendor + " " + impl->info.model + ", serial " + impl->info.serial + ")";
+  impl->control = std::make_unique<CameraControl> (arv, label);
+  impl->describe (name);
+  impl->watch->label = label;
+  impl->watch_handler = g_signal_connect_data (
+      impl->control->device (), "control-lost", G_CALLBACK (+[] (ArvDevice *, gpointer watch) {
+        (*static_cast<std::shared_ptr<LossWatch> *> (watch))->on_lost ();
+      }),
+      new std::shared_ptr<LossWatch> (impl->watch),
+      [] (gpointer watch, GClosure *) { delete static_cast<std::shared_ptr<LossWatch> *> (watch); },
+      GConnectFlags (0));
+  camera.reset (new Camera (std::move (impl)));
+  return {};
+}
+
 Camera::Camera (std::unique_ptr<Impl> impl) : impl_ (std::move (impl)) {}
-Camera::~Camera () = default;
+
+Camera::~Camera ()
+{
+  stop ();
+  g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
+  impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
+                             std::move (impl_->control))] () mutable { control.reset (); });
+}
+
+const CameraInfo &
+Camera::info () const
+{
+  return impl_->info;
+}
+
+const std::string &
+Camera::label () const
+{
+  return impl_->control->label ();
+}
+
+bool
+Camera::is_gige () const
+{
+  return ARV_IS_GV_DEVICE (impl_->control->device ());
+}
+
+const std::string &
+Camera::interface_address () const
+{
+  return impl_->interface;
+}
+
+/* Configuring */
+
+CameraStatus
+Camera::abilities (CameraAbilities &abilities)
+{
+  return impl_->judged (read_abilities (*impl_->control, abilities));
+}
+
+CameraStatus
+Camera::configure (const CameraSettings &settings)
+{
+  CameraControl &control = *impl_->control;
+  if (settings.n_buffers < 2)
+    return control.refuse (CameraFault::kBadSetting,
+        std::to_string (settings.n_buffers) + " buffers: expected at least 2");
+  double frame_rate = 0;
+  impl_->settings = settings;
+  CameraStatus status = set_transport (control, settings);
+  if (status.ok ())
+    status = set_image (control, settings);
+  if (status.ok ())
+    status = set_trigger (control, settings);
+  if (status.ok ())
+    status = set_look (control, settings, frame_rate);
+  if (status.ok ())
+    status = set_features (control, settings.features);
+  if (status.ok ())
+    status = read_format (control, impl_->format);
+  impl_->format.frame_rate = frame_rate;
+  std::lock_guard guard (impl_->look_lock);
+  impl_->written = {};
+  return impl_->judged (status);
+}
+
+const CameraFormat &
+Camera::format () const
+{
+  return impl_->format;
+}
+
+int
+Camera::packet_size () const
+{
+  return impl_->packet_size;
+}
+
+/* Streaming */
+
+void
+Camera::Impl::set_stream_properties (ArvStream *stream) const
+{
+  if (!ARV_IS_GV_STREAM (stream))
+    return;
+  g_object_set (stream, "packet-timeout", guint (settings.packet_timeout_us), "frame-retention",
+      guint (settings.frame_retention_us), nullptr);
+  if (!settings.packet_resend) /* else as the camera can */
+    g_object_set (stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
+  /* Aravis' own choice is one picture, which for small ones is less than a few packets need. */
+  const std::size_t wanted = settings.socket_buffer > 0
+                                 ? std::size_t (settings.socket_buffer)
+                                 : std::max (2 * format.size (), kLeastSocketBuffer);
+  g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+      int (std::min<std::size_t> (wanted, G_MAXINT)), nullptr);
+}
+
+CameraStatus
+Camera::Impl::create_stream (const std::shared_ptr<Run> &run)
+{
+  const auto guard = control->lock ();
+  GError *error = nullptr;
+  ArvStream *stream = arv_camera_create_stream_full (
+      control->camera (),
+      [] (void *data, ArvStreamCallbackType type, ArvBuffer *) {
+        if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE)
+          static_cast<Run *> (data)->on_done ();
+      },
+      run.get (), nullptr, &error); /* end() keeps the run until the stream is gone */
+  if (!stream)
+    return error ? control->status ("stream", error, CameraFault::kFailed)
+                 : control->refuse (CameraFault::kFailed, "gives no stream");
+  g_clear_error (&error);
+  set_stream_properties (stream);
+  std::lock_guard run_guard (run->lock);
+  run->stream = stream;
+  run->store = std::make_shared<FrameStore> (stream, format);
+  return {};
+}
+
+CameraStatus
+Camera::Impl::fill (Run &run)
+{
+  GError *error = nullptr;
+  const auto guard = control->lock ();
+  const guint payload = arv_camera_get_payload (control->camera (), &error);
+  CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
+  if (status.ok () && payload < format.size ())
+    status = control->refuse (CameraFault::kUnsupported,
+        "sends " + std::to_string (payload) + " bytes a picture; expected " +
+            std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
+            std::to_string (format.height) + " " + format.pixel_format);
+  if (!status.ok ())
+    return status;
+  run.store->fill (settings.n_buffers, payload);
+  packet_size = 0;
+  if (arv_camera_is_gv_device (control->camera ()))
+    packet_size = int (arv_camera_gv_get_packet_size (control->camera (), nullptr));
+  return {};
+}
+
+CameraStatus
+Camera::start (Arrived arrived, Lost lost)
+{
+  CameraControl &control = *impl_->control;
+  if (impl_->format.width == 0)
+    return control.refuse (CameraFault::kBadSetting, "was started before it was configured");
+  if (impl_->watch->lost)
+    return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
+  stop ();
+  if (!impl_->take_down.wait (TakeDown::kLongest))
+    return control.refuse (CameraFault::kTimedOut, "still ends what it did before");
+  auto run = std::make_shared<Run> ();
+  run->arrived = std::move (arrived);
+  run->format = impl_->format;
+  run->code = find_pixel_format (impl_->format.pixel_format)->code;
+  run->counter = FrameCounter (is_gige () ? FrameCounter::Ids::kGigE : FrameCounter::Ids::kUsb);
+  CameraStatus status = impl_->create_stream (run);
+  if (!status.ok ())
+    return impl_->judged (status);
+  {
+    std::lock_guard guard (impl_->watch->lock);
+    impl_->watch->report = std::move (lost);
+  }
+  status = impl_->fill (*run);
+  {
+    std::lock_guard guard (impl_->run_lock);
+    impl_->run = run;
+    impl_->last_statistics = {};
+  }
+  if (status.ok ()) {
+    const auto guard = control.lock ();
+    GError *error = nullptr;
+    arv_camera_start_acquisition (control.camera (), &error);
+    status = control.status ("start of acquisition", error, CameraFault::kFailed);
+  }
+  if (!status.ok ())
+    stop ();
+  return impl_->judged (status);
+}
+
+/* The acquisition ends before the thread that receives it, which ends before its buffers go. */
+void
+Camera::Impl::end (const std::shared_ptr<Run> &run)
+{
+  take_down.run ([control = control.get (), run, lost = watch->lost.load ()] {
+    if (!lost) {
+      const auto guard = control->lock ();
+      arv_camera_stop_acquisition (control->camera (), nullptr);
+    }
+    g_object_unref (run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
+  });
+}
+
+void
+Camera::stop ()
+{
+  {
+    std::lock_guard guard (impl_->watch->lock);
+    impl_->watch->report = nullptr;
+  }
+  std::shared_ptr<Run> run;
+  {
+    std::lock_guard guard (impl_->run_lock);
+    run = std::move (impl_->run);
+    impl_->run = nullptr;
+    if (!run)
+      return;
+    impl_->last_statistics = count (run->stream);
+  }
+  {
+    std::lock_guard guard (run->lock);
+    run->stopped = true;
+    run->arrived = nullptr;
+  }
+  run->store->close ();
+  impl_->end (run);
+}
+
+bool
+Camera::is_lost () const
+{
+  return impl_->watch->lost;
+}
+
+CameraStatistics
+Camera::statistics () const
+{
+  std::lock_guard guard (impl_->run_lock);
+  if (!impl_->run)
+    return impl_->last_statistics;
+  CameraStatistics numbers = count (impl_->run->stream);
+  numbers.buffers_out = impl_->run->store->out ();
+  return numbers;
+}
+
+/* Features while it streams */
+
+CameraStatus
+Camera::trigger_software ()
+{
+  CameraControl &control = *impl_->control;
+  if (is_lost ())
+    return control.refuse (CameraFault::kLost, "cannot be triggered: it was lost");
+  const auto guard = control.lock ();
+  GError *error = nullptr;
+  arv_camera_software_trigger (control.camera (), &error);
+  return impl_->judged (control.status ("software trigger", error));
+}
+
+CameraStatus
+Camera::read_look (CameraLook &look)
+{
+  if (is_lost ())
+    return impl_->control->refuse (CameraFault::kLost, "was lost");
+  return impl_->judged (::read_look (*impl_->control, look));
+}
+
+CameraStatus
+Camera::write_look (const CameraLook &look)
+{
+  if (is_lost ())
+    return impl_->control->refuse (CameraFault::kLost, "was lost");
+  std::lock_guard guard (impl_->look_lock);
+  return impl_->judged (::write_look (*impl_->control, look, impl_->written));
+}
+
+bool
+Camera::clock_is_ptp ()
+{
+  std::string status;
+  CameraControl &control = *impl_->control;
+  if (is_lost () ||
+      !(control.read ("PtpStatus", status) || control.read ("GevIEEE1588Status", status)))
+    return false;
+  return status == "Slave" || status == "Master";
+}
+
+CameraStatus
+Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
+{
+  CameraControl &control = *impl_->control;
+  if (is_lost ())
+    return control.refuse (CameraFault::kLost, "was lost");
+  const auto guard = control.lock ();
+  const bool modern = control.has ("TimestampLatch");
+  const char *latch = modern ? "TimestampLatch" : "GevTimestampControlLatch";
+  const std::int64_t before = g_get_monotonic_time ();
+  CameraStatus status = control.execute (latch);
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (!status.ok ())
+    return impl_->judged (status);
+  std::int64_t ticks = 0, frequency = 1'000'000'000;
+  if (!control.read (modern ? "TimestampLatchValue" : "GevTimestampValue", ticks))
+    return control.refuse (CameraFault::kFailed, "does not tell its clock");
+  if (!modern)
+    (void)control.read ("GevTimestampTickFrequency", frequency);
+  const std::uint64_t whole = frequency > 0 ? ticks / frequency : 0;
+  const std::uint64_t rest = frequency > 0 ? ticks % frequency : 0;
+  camera_time_ns = whole * 1'000'000'000 + gst_util_uint64_scale (rest, 1'000'000'000,
+                                               std::max<std::int64_t> (frequency, 1));
+  return {};
+}

@@ -78,6 +78,7 @@ struct CameraStatistics {
   std::uint64_t underruns = 0;       ///< pictures for which all buffers were downstream
   std::uint64_t resent_packets = 0;  ///< GigE: packets that came when asked for again
   std::uint64_t missing_packets = 0; ///< GigE: packets that never came
+  int buffers_out = 0;               ///< pictures that are downstream now
 };
 
 /** What the camera's own regulators steer, to give it to another camera. Absent: it has no such

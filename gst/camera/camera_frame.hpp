@@ -18,14 +18,15 @@ enum class FrameState {
 };
 
 /** One picture that arrived, or did not. Pictures for which there was no buffer at all (underruns),
- * and those of which no packet arrived, are not reported: their numbers are missing in the
+ * and those whose first packet never came, are not reported: their numbers are missing in the
  * sequence. */
 struct CameraFrame {
   FrameState state = FrameState::kMissing;
   std::uint64_t id =
       0; ///< the camera's own: GigE 1 to 65535 and again 1 (or 64 bits), USB 0 and on
-  /** `id` counted on beyond 65535, from 0 for the first picture after start() if the camera begins
-   * at its first id, as the standards say. Grows strictly; a gap is a lost picture. */
+  /** `id` counted on beyond 65535, from 0 for the camera's first id. Grows strictly; a gap is a
+   * lost picture. Cameras should begin at their first id with start(), but not all do: whoever
+   * pairs them learns the difference from when their first frames came. */
   std::uint64_t number = 0;
   /** When it was taken (start of the exposure for most cameras), ns on the camera's clock: its own,
    * which begins anywhere, or that of IEEE 1588 (see Camera::clock_is_ptp). 0: the camera does not
@@ -33,12 +34,12 @@ struct CameraFrame {
   std::uint64_t camera_time_ns = 0;
   std::uint64_t system_time_ns =
       0;                       ///< when its first packet came, ns since 1970 on this host's clock
+  std::int64_t began_us = 0;   ///< the same, g_get_monotonic_time()
   std::int64_t arrived_us = 0; ///< when its last packet came, g_get_monotonic_time()
   /** Packets of this stream that were given up since the frame before: mostly this one's. */
   std::uint64_t missing_packets = 0;
-  /** The pixels where Aravis put them, not copied, not writable without a copy; null unless
-   * complete. Has a GstVideoMeta for video/x-raw and no time stamps. Goes back to the camera's
-   * stream when its last holder lets it go, from any thread, also long after the camera was stopped
-   * or deleted. */
+  /** The pixels where Aravis put them, not copied; null unless complete. Has a GstVideoMeta for
+   *  video/x-raw, and no time stamps. Goes back to the camera's stream when its last holder lets it
+   *  go, from any thread, also long after the camera was stopped or deleted. */
   GstBufferPtr buffer;
 };
