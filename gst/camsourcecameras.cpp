@@ -104,7 +104,10 @@ CamSourceSession::configure_cameras ()
   const auto exposure = static_cast<GstClockTime> (exposure_us * 1000);
   const bool triggered =
       settings_.trigger == TriggerMode::kSoftware || settings_.trigger == TriggerMode::kAction;
-  pairing_.start (static_cast<int> (cameras_.size ()), triggered, format_.period (), exposure);
+  /* the others are for what is on its way, and for downstream */
+  const int waiting = settings_.n_buffers / 2 - 1;
+  pairing_.start (
+      static_cast<int> (cameras_.size ()), triggered, format_.period (), exposure, waiting);
   const GstClockTime period = format_.period () > 0 ? format_.period () : 100 * GST_MSECOND;
   /* exposed, and on its way no longer than until the next one */
   const GstClockTime latency = MIN (exposure, period) + period;

@@ -82,13 +82,13 @@ CamSourcePad::send (GstBuffer *buffer)
   put (GST_MINI_OBJECT_CAST (buffer));
 }
 
-/* Of several in a row the last does: it is the same silence. */
+/* Of many in a row some do: it is the same silence. Before there are caps nobody waits. */
 void
 CamSourcePad::send_gap (GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
   discont_ = true;
-  if (count_ < kMostItems / 2)
+  if (caps_ && count_ < kMostItems / 2)
     put (GST_MINI_OBJECT_CAST (gst_event_new_gap (begin, duration)));
 }
 

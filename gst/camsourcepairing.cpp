@@ -23,11 +23,13 @@ CamSourcePairing::~CamSourcePairing ()
 }
 
 void
-CamSourcePairing::start (int cameras, bool triggered, GstClockTime period, GstClockTime exposure)
+CamSourcePairing::start (
+    int cameras, bool triggered, GstClockTime period, GstClockTime exposure, int waiting)
 {
   drop_waiting ();
   std::lock_guard guard (lock_);
   cameras_ = cameras;
+  waiting_ = waiting;
   triggered_ = triggered;
   period_ = period > 0 ? period : GST_SECOND;
   exposure_ = exposure;
@@ -41,7 +43,7 @@ CamSourcePairing::forget ()
 {
   drop_waiting ();
   std::lock_guard guard (lock_);
-  sets_.start (cameras_, triggered_ ? 0 : static_cast<std::int64_t> (period_) / 2);
+  sets_.start (cameras_, triggered_ ? 0 : static_cast<std::int64_t> (period_) / 2, waiting_);
   for (int c = 0; c < kMaxCameras; c++) {
     finders_[c].start (static_cast<std::int64_t> (period_));
     clocks_[c].forget ();

@@ -43,8 +43,9 @@ public:
 
   /** @param triggered  shots are told with fired()
    *  @param period     ns; 0 for single shots
-   *  @param exposure   ns, as far as it is known */
-  void start (int cameras, bool triggered, GstClockTime period, GstClockTime exposure);
+   *  @param exposure   ns, as far as it is known
+   *  @param waiting    pictures of one camera that may wait for partners */
+  void start (int cameras, bool triggered, GstClockTime period, GstClockTime exposure, int waiting);
   /** Forgets frames, and what it learnt about the cameras' clocks, not what it counted. */
   void forget ();
   /** Lets waiting frames go. */
@@ -91,7 +92,7 @@ private:
   bool hand_out (rangecast::FrameSets::Set &from, CamSourceSet &set);
 
   std::mutex lock_; /* guards all */
-  int cameras_ = 2;
+  int cameras_ = 2, waiting_ = 1;
   bool triggered_ = false;
   GstClockTime period_ = 0, exposure_ = 0;
   rangecast::FrameSets sets_;

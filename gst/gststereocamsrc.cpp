@@ -239,6 +239,9 @@ open_clock (GstStereoCamSrc *self)
     GST_OBJECT_FLAG_UNSET (
         element, GST_ELEMENT_FLAG_PROVIDE_CLOCK | GST_ELEMENT_FLAG_REQUIRE_CLOCK);
   GST_OBJECT_UNLOCK (element);
+  if (self->priv->clock.clock ()) /* the pipeline may have asked before there was one */
+    gst_element_post_message (element,
+        gst_message_new_clock_provide (GST_OBJECT (element), self->priv->clock.clock (), TRUE));
   return true;
 }
 

@@ -150,7 +150,7 @@ public:
   void wait_for_eos ()
   {
     GstMessage *message = gst_bus_timed_pop_filtered (
-        bus_, 90 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+        bus_, 200 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
     fail_unless (message != nullptr, "no EOS came");
     if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
       GError *error = nullptr;

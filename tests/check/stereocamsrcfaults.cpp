@@ -60,7 +60,7 @@ GST_START_TEST (test_feature_that_is_not_there_is_one_error_that_names_it)
     const char *features, *expected;
   } rows[] = {
       {"features=NoSuchFeature=3", "NoSuchFeature"},
-      {"features=\"Width 3\"", "Width"},
+      {"features=\"Gamma =3\"", "features"},
       {"features=ExposureTimeAbs=fast", "ExposureTimeAbs"},
   };
   for (const auto &row : rows) {

@@ -7,20 +7,21 @@
 namespace rangecast {
 
 void
-FrameSets::start (int cameras, std::int64_t tolerance)
+FrameSets::start (int cameras, std::int64_t tolerance, int waiting)
 {
   lanes_ = {};
   cameras_ = std::clamp (cameras, 1, kMaxCameras);
   tolerance_ = tolerance;
+  waiting_ = std::clamp (waiting, 1, kMostWaiting);
 }
 
-/* next() takes away what exceeds kMostWaiting, so the ring has room. A frame that is rejected twice
+/* next() takes away what exceeds waiting_, so the ring has room. A frame that is rejected twice
  * without a next() between cannot be: the caller follows each put() with it. */
 void
 FrameSets::put (int camera, std::int64_t key, Frame frame)
 {
   Lane &lane = lanes_[camera];
-  if (lane.count > kMostWaiting || (lane.has_last && key <= lane.last_key)) {
+  if (lane.count > waiting_ || (lane.has_last && key <= lane.last_key)) {
     lane.rejected = frame;
     return;
   }
@@ -80,7 +81,7 @@ FrameSets::next (Set &set)
       longest = c;
   }
   if (!all) {
-    if (lanes_[longest].count <= kMostWaiting)
+    if (lanes_[longest].count <= waiting_)
       return Step::kWait;
     drop_head (longest, set);
     return Step::kDrop;

@@ -16,8 +16,9 @@ public:
   using Frame = void *; ///< the caller's; null: it was lost, its partners need not wait
 
   /** @param cameras    2 to kMaxCameras
-   *  @param tolerance  how far the keys of one set may lie apart: 0 for trigger numbers */
-  void start (int cameras, std::int64_t tolerance);
+   *  @param tolerance  how far the keys of one set may lie apart: 0 for trigger numbers
+   *  @param waiting    frames of one camera that may wait for partners, 1 to kMostWaiting */
+  void start (int cameras, std::int64_t tolerance, int waiting = kMostWaiting);
 
   struct Set {
     std::array<Frame, kMaxCameras> frames{}; ///< by camera; the caller's again
@@ -39,10 +40,10 @@ public:
   /** Frames without partner so far; lost ones (null) are not among them. */
   [[nodiscard]] std::uint64_t dropped (int camera) const { return lanes_[camera].dropped; }
 
-private:
   /** A partner that comes more than so many frames behind never comes. */
   static constexpr int kMostWaiting = 8;
 
+private:
   struct Waiting {
     std::int64_t key;
     Frame frame;
@@ -65,7 +66,7 @@ private:
   [[nodiscard]] bool complete (int &oldest) const;
 
   std::array<Lane, kMaxCameras> lanes_{};
-  int cameras_ = 2;
+  int cameras_ = 2, waiting_ = kMostWaiting;
   std::int64_t tolerance_ = 0;
 };
 
