@@ -83,6 +83,31 @@ test_host_waits_for_cameras_that_are_killed_and_come_back () {
   stop_all "$host" "$parent" "$recorder" "$cameras"
 }
 
+# Pairs from stereocamsrc by themselves; fails unless both cameras took at least so many pictures.
+take_pairs () { # pairs properties...
+  local pairs=$1 side
+  shift
+  timeout 100 gst-launch-1.0 -q stereocamsrc name=c rig=rig.yaml num-buffers="$pairs" "$@" \
+    c.left ! video/x-raw,format=GRAY8,framerate=8/1 ! fakesink c.right ! fakesink >pairs.log 2>&1 || fail "$(cat pairs.log)"
+  for side in left right; do
+    [ "$(grep -c "view0-$side " shots.log)" -ge "$pairs" ] || fail "$side: $(tail -n 5 shots.log pairs.log)"
+  done
+}
+
+test_action_commands_fire_the_cameras () {
+  need_cameras
+  start_cameras cameras.log --views 1 --rig-export rig.yaml --log shots.log
+  take_pairs 20 trigger=action
+  stop_all "$cameras"
+}
+
+test_left_cameras_output_line_fires_the_right_one () {
+  need_cameras
+  start_cameras cameras.log --views 1 --rig-export rig.yaml --log shots.log
+  take_pairs 20 trigger=hardware output-line=Line2
+  stop_all "$cameras"
+}
+
 test_cameras_say_what_is_wrong () {
   need_cameras
   expect_error "--size" fake-cameras --size big
