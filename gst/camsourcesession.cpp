@@ -248,6 +248,7 @@ CamSourceSession::finish (guint32 seqnum)
     if (std::exchange (eos_, true))
       return;
   }
+  ticker_.set_playing (false);
   for (const auto &pad : pads_)
     pad->send_eos (seqnum);
 }
@@ -294,14 +295,19 @@ void
 CamSourceSession::flushed ()
 {
   pairing_.drop_waiting ();
-  std::lock_guard guard (lock_);
-  eos_ = false;
-  fatal_flow_ = GST_FLOW_OK;
-  gst_flow_combiner_reset (flows_);
+  bool playing;
+  {
+    std::lock_guard guard (lock_);
+    eos_ = false;
+    fatal_flow_ = GST_FLOW_OK;
+    gst_flow_combiner_reset (flows_);
+    playing = playing_;
+  }
+  ticker_.set_playing (playing);
 }
 
 void
-CamSourceSession::pad_stopped (const CamSourcePad &pad, GstFlowReturn flow)
+CamSourceSession::pad_flowed (const CamSourcePad &pad, GstFlowReturn flow)
 {
   std::lock_guard guard (lock_);
   const GstFlowReturn all = gst_flow_combiner_update_pad_flow (flows_, pad.pad (), flow);
