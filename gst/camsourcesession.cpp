@@ -343,6 +343,7 @@ CamSourceSession::stats ()
   const CamSourcePairingStats pairing = pairing_.stats ();
   const CameraStatistics cameras = camera_statistics ();
   GstStructure *s = gst_structure_new ("stereocamsrc-stats", "sets", G_TYPE_UINT64, pairing.sets,
+      "apart", G_TYPE_UINT64, pairing.apart, "unknown", G_TYPE_UINT64, pairing.unknown,
       "missed-ticks", G_TYPE_UINT64, ticker_.missed (), "missing-packets", G_TYPE_UINT64,
       pairing.missing_packets, "resent-packets", G_TYPE_UINT64, guint64 (cameras.resent_packets),
       "underruns", G_TYPE_UINT64, guint64 (cameras.underruns), "reconnects", G_TYPE_UINT64,

@@ -278,7 +278,6 @@ close (GstStereoCamSrc *self)
   const auto session = self->priv->current ();
   if (session && !session->wait_for_end (kGiveBack))
     GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
-  self->priv->clock.close ();
 }
 
 static GstStateChangeReturn

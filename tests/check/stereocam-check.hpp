@@ -39,6 +39,7 @@ struct PictureMark {
 /** Two or three cameras of 64x48 on sockets of this machine, in this process. */
 struct TestCameras {
   GigeCameraSettings settings;
+  std::mutex lock; ///< guards the list against the cameras' threads
   std::vector<std::unique_ptr<GigeCamera>> list;
   std::unique_ptr<GigeListener> listener;
 
@@ -73,6 +74,7 @@ struct TestCameras {
     };
     scenery.acquisition = [] (bool) {};
     scenery.exposed = [this, i] (std::uint16_t, std::int64_t) {
+      std::lock_guard guard (lock);
       for (std::size_t other = 1; i == 0 && other < list.size (); other++)
         if (list[other])
           list[other]->line_rises ();
@@ -81,13 +83,18 @@ struct TestCameras {
     const Status s = GigeCamera::create (settings, std::move (scenery), camera);
     fail_unless (s.ok (), "%s", s.message ().c_str ());
     camera->start ();
+    std::lock_guard guard (lock);
     list[i] = std::move (camera);
   }
   /** As if its cable were pulled out. The listener must not run: give it up first. */
   void unplug (int i)
   {
     listener.reset ();
-    list[i].reset ();
+    std::unique_ptr<GigeCamera> gone;
+    {
+      std::lock_guard guard (lock);
+      gone = std::move (list[i]);
+    }
   }
 };
 

@@ -26,8 +26,10 @@ expect_exact_pairs (const char *properties, int cameras, double loss, int pairs,
     incomplete += p.stat ((std::string ("incomplete-") + kSides[side]).c_str ());
   }
   g_print ("%s, %.0f %% loss, %d cameras: %d sets, %" G_GUINT64_FORMAT
-           " pictures without partner, %" G_GUINT64_FORMAT " incomplete\n",
-      properties, loss * 100, cameras, pairs, dropped, incomplete);
+           " pictures without partner (%d sets apart, %d unknown), %" G_GUINT64_FORMAT
+           " incomplete, %d ticks missed\n",
+      properties, loss * 100, cameras, pairs, dropped, int (p.stat ("apart")),
+      int (p.stat ("unknown")), incomplete, int (p.stat ("missed-ticks")));
   fail_unless (incomplete > 0, "nothing was lost");
   fail_unless (dropped > 0, "no partner was dropped");
 }
