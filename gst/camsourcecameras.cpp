@@ -102,12 +102,10 @@ CamSourceSession::configure_cameras ()
       exposure_us = std::max (exposure_us, *look.exposure_us);
   }
   const auto exposure = static_cast<GstClockTime> (exposure_us * 1000);
-  const bool triggered =
-      settings_.trigger == TriggerMode::kSoftware || settings_.trigger == TriggerMode::kAction;
   /* the others are for what is on its way, and for downstream */
   const int waiting = settings_.n_buffers / 2 - 1;
   pairing_.start (
-      static_cast<int> (cameras_.size ()), triggered, format_.period (), exposure, waiting);
+      static_cast<int> (cameras_.size ()), fires (), format_.period (), exposure, waiting);
   const GstClockTime period = format_.period () > 0 ? format_.period () : 100 * GST_MSECOND;
   /* exposed, and on its way no longer than until the next one */
   const GstClockTime latency = MIN (exposure, period) + period;
@@ -128,7 +126,8 @@ CamSourceSession::start_cameras ()
     counted_ = cameras_;
   }
   pairing_.forget ();
-  playing_since_ns_ = 0;
+  shortest_trip_us_ = {};
+  was_playing_ = false;
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     const auto arrived = [this, i] (CameraFrame frame) {
       std::lock_guard guard (lock_);
@@ -160,14 +159,14 @@ CamSourceSession::start_cameras ()
 void
 CamSourceSession::start_ticker ()
 {
+  if (!fires ())
+    return;
   if (settings_.trigger == TriggerMode::kSoftware)
     triggers_.start (static_cast<int> (cameras_.size ()), [this] (int camera) {
       if (CameraStatus status = cameras_[camera]->trigger_software (); !status.ok ())
         fail (std::move (status));
     });
-  else if (settings_.trigger != TriggerMode::kAction)
-    return;
-  if (settings_.trigger == TriggerMode::kAction && settings_.action_send) {
+  if (settings_.trigger == TriggerMode::kAction) {
     std::vector<std::string> interfaces;
     for (const auto &camera : cameras_)
       interfaces.push_back (camera->interface_address ());
@@ -195,8 +194,6 @@ CamSourceSession::fire (GstClockTime tick)
     triggers_.run ();
     return;
   }
-  if (!settings_.action_send)
-    return;
   ActionCommand command;
   command.device_key = settings_.action_device_key;
   command.group_key = settings_.action_group_key;
@@ -207,6 +204,27 @@ CamSourceSession::fire (GstClockTime tick)
     fail (std::move (status));
 }
 
+/* The middle of the round trip is only as good as the trip is short: of several, the shortest;
+ * later ones only if they are no longer than twice that. @return false: the camera does not tell */
+static bool
+read_offset (Camera &camera, std::int64_t &shortest_us, std::optional<std::int64_t> &offset_ns)
+{
+  const bool first = shortest_us == 0;
+  for (int i = 0; i < (first ? 5 : 1); i++) {
+    std::uint64_t camera_ns = 0;
+    std::int64_t read_at_us = 0;
+    const gint64 begin = g_get_monotonic_time ();
+    if (!camera.read_clock (camera_ns, read_at_us).ok () || camera_ns == 0)
+      return false;
+    const gint64 trip = MAX (g_get_monotonic_time () - begin, 1);
+    if (shortest_us == 0 || trip < shortest_us || (!first && trip <= 2 * shortest_us)) {
+      shortest_us = shortest_us == 0 ? trip : MIN (shortest_us, trip);
+      offset_ns = read_at_us * 1000 - static_cast<std::int64_t> (camera_ns);
+    }
+  }
+  return true;
+}
+
 /* Cameras that follow one IEEE 1588 clock get one offset, so that their stamps compare exactly. */
 void
 CamSourceSession::read_clocks ()
@@ -215,16 +233,14 @@ CamSourceSession::read_clocks ()
   bool ptp = true;
   for (const auto &camera : cameras_)
     ptp = ptp && camera->clock_is_ptp ();
-  std::optional<std::int64_t> common;
+  std::optional<std::int64_t> offset;
   for (std::size_t i = 0; i < cameras_.size (); i++) {
-    std::uint64_t camera_ns = 0;
-    std::int64_t read_at_us = 0;
-    if (!common || !ptp) {
-      if (!cameras_[i]->read_clock (camera_ns, read_at_us).ok () || camera_ns == 0)
-        return;
-      common = read_at_us * 1000 - static_cast<std::int64_t> (camera_ns);
-    }
-    pairing_.set_clock_offset (static_cast<int> (i), *common);
+    if (i == 0 || !ptp)
+      offset.reset ();
+    if (!offset && !read_offset (*cameras_[i], shortest_trip_us_[i], offset) && !ptp)
+      return;
+    if (offset)
+      pairing_.set_clock_offset (static_cast<int> (i), *offset);
   }
 }
 

@@ -36,11 +36,16 @@ parse_clock_server (const std::string &text, ClockServer &server)
   return {};
 }
 
-/* A net clock begins at 0, before any other: when it is in step it can only go forward. */
+/* A net clock begins at 0, before any other: when it is in step it can only go forward. The clock
+ * stays until another is wanted: it is in step already then, and GStreamer 1.22's must not be let
+ * go at the moment when it gets into step. */
 Status
 CamSourceClock::open (const std::string &text)
 {
-  close ();
+  if (clock_ && text == server_)
+    return {};
+  gst_clear_object (&clock_);
+  server_ = text;
   if (text.empty ())
     return {};
   ClockServer server;

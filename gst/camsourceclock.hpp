@@ -19,12 +19,12 @@ public:
    *  @return kBadValue: the text says what was expected; kNotFound: there can be no such clock here
    */
   rangecast::Status open (const std::string &server);
-  void close () { gst_clear_object (&clock_); }
 
   /** Transfer none; null: none. */
   [[nodiscard]] GstClock *clock () const { return clock_; }
 
 private:
+  std::string server_;
   GstClock *clock_ = nullptr;
 };
 

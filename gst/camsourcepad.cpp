@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "camsourcepad.hpp"
 
-CamSourcePad::CamSourcePad (GstElement *element, GstPad *pad, Stopped stopped)
-    : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))), stopped_ (std::move (stopped))
+#include <utility>
+
+CamSourcePad::CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed)
+    : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))), flowed_ (std::move (flowed))
 {
 }
 
@@ -170,13 +172,12 @@ CamSourcePad::one_item ()
     gst_pad_pause_task (pad_);
     return;
   }
-  const bool eos = GST_IS_EVENT (item) && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_EOS;
+  const bool picture = GST_IS_BUFFER (item);
   const GstFlowReturn flow = push (item);
-  if (flow == GST_FLOW_OK)
-    return;
-  if (!eos && flow != GST_FLOW_FLUSHING)
-    stopped_ (*this, flow);
-  if (flow != GST_FLOW_NOT_LINKED) /* it may be linked again */
+  const bool tells = picture || flow == GST_FLOW_NOT_NEGOTIATED; /* of the peer's wishes */
+  if (tells && flow != GST_FLOW_FLUSHING && std::exchange (last_flow_, flow) != flow)
+    flowed_ (*this, flow);
+  if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* it may be linked again */
     gst_pad_pause_task (pad_);
 }
 
@@ -196,6 +197,7 @@ CamSourcePad::prepare (guint group_id)
   gst_clear_caps (&caps_);
   ended_ = false;
   discont_ = needs_start_ = needs_segment_ = true;
+  last_flow_ = GST_FLOW_OK;
   group_id_ = group_id;
 }
 
@@ -231,6 +233,7 @@ CamSourcePad::flush_stop (GstEvent *event)
   GST_PAD_STREAM_LOCK (pad_); /* the task stands still */
   gst_pad_push_event (pad_, gst_event_ref (event));
   needs_segment_ = true;
+  last_flow_ = GST_FLOW_OK;
   {
     std::lock_guard guard (lock_);
     flushing_ = ended_ = false;

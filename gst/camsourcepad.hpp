@@ -14,11 +14,11 @@
  *  picture go and counts it. Any thread, but for what is said. */
 class CamSourcePad {
 public:
-  /** From the task: what a push gave, if it is not GST_FLOW_OK. */
-  using Stopped = std::function<void (CamSourcePad &, GstFlowReturn)>;
+  /** From the task: what a push gave, if it is something else than the last one's. */
+  using Flowed = std::function<void (CamSourcePad &, GstFlowReturn)>;
 
   /** @param pad  not active; this has a reference */
-  CamSourcePad (GstElement *element, GstPad *pad, Stopped stopped);
+  CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed);
   /** The pad is not active any more. */
   ~CamSourcePad ();
   CamSourcePad (const CamSourcePad &) = delete;
@@ -63,7 +63,7 @@ private:
 
   GstElement *element_;
   GstPad *pad_;
-  Stopped stopped_;
+  Flowed flowed_;
   std::atomic<guint64> overrun_ = 0;
 
   std::mutex lock_; /* guards down to the blank line */
@@ -76,4 +76,5 @@ private:
   /* The task's, and theirs who made it stand still. */
   guint group_id_ = 0;
   bool needs_start_ = true, needs_segment_ = true;
+  GstFlowReturn last_flow_ = GST_FLOW_OK;
 };

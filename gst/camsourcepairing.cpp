@@ -173,6 +173,7 @@ CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
     answered_[camera] = std::max (answered_[camera], found.known ? found.shot + 1 : 0);
   if (!found.known) {
     counts_.dropped[camera] += frame.buffer != nullptr;
+    counts_.unknown += frame.buffer != nullptr;
     return;
   }
   const Tick &tick = ticks_[found.shot % kTicks];
@@ -226,6 +227,7 @@ CamSourcePairing::hand_out (FrameSets::Set &from, CamSourceSet &set)
   }
   if (most - least > static_cast<std::int64_t> (period_) / 2) {
     drop (from);
+    counts_.apart++;
     return false;
   }
   spread_.add (most - least);

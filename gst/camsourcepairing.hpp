@@ -26,6 +26,8 @@ struct CamSourcePairingStats {
   guint64 sets = 0;
   std::array<guint64, kMaxCameras> dropped{};    ///< whole pictures without partners
   std::array<guint64, kMaxCameras> incomplete{}; ///< pictures that lack packets, or did not come
+  guint64 apart = 0;   ///< sets that were dropped because they were not taken at one moment
+  guint64 unknown = 0; ///< pictures that answer no trigger of ours
   guint64 missing_packets = 0;
   bool has_spread = false;
   std::int64_t spread_p50_ns = 0, spread_p99_ns = 0; ///< of the exposures within a set

@@ -31,10 +31,9 @@ CamSourceSession::serve ()
       taken_.swap (inbox_);
       playing = playing_ && !eos_;
     }
-    if (playing != was_playing_) {
-      was_playing_ = playing;
-      playing_since_ns_ = playing ? g_get_monotonic_time () * 1000 : 0;
-    }
+    if (playing && !was_playing_)
+      begin_to_play ();
+    was_playing_ = playing;
     take_frames ();
     const std::int64_t now = g_get_monotonic_time () * 1000;
     if (now - last_look_ns_ < kLook)
@@ -44,6 +43,21 @@ CamSourceSession::serve ()
       return End::kAgain;
     look_around ();
   }
+}
+
+void
+CamSourceSession::begin_to_play ()
+{
+  playing_since_ns_ = g_get_monotonic_time () * 1000;
+  GstClock *clock = gst_element_get_clock (element_);
+  if (clock_ && clock && clock != clock_)
+    GST_ELEMENT_WARNING (element_, CORE, CLOCK,
+        ("The pipeline does not use the clock of clock-server %s, but another element's: pictures "
+         "of "
+         "different hosts will not be taken together",
+            settings_.clock_server.c_str ()),
+        ("it uses %s", GST_OBJECT_NAME (clock)));
+  gst_clear_object (&clock);
 }
 
 /* In PAUSED a live source has no pictures, but what comes late tells of the cameras' clocks. */
@@ -63,7 +77,8 @@ CamSourceSession::take_frames ()
 
 /* ---- sets ---- */
 
-/* @return false: from before the stream's beginning */
+/* Cameras that another element fires are fired on ticks, too.
+ * @return false: from before the stream's beginning */
 bool
 CamSourceSession::stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTime &capture)
 {
@@ -76,7 +91,12 @@ CamSourceSession::stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTim
     const std::int64_t age = g_get_monotonic_time () * 1000 - set.taken_ns;
     const auto now = static_cast<std::int64_t> (gst_clock_get_time (clock));
     gst_object_unref (clock);
-    capture = static_cast<GstClockTime> (std::max<std::int64_t> (now - age, 0));
+    std::int64_t taken = std::max<std::int64_t> (now - age, 0);
+    const rangecast::TickRate rate{format_.fps_n, format_.fps_d};
+    if (settings_.trigger == TriggerMode::kAction && rate.valid ())
+      taken = rate.time_of (
+          rate.at_or_after (std::max<std::int64_t> (taken - rate.period_ns () / 2, 0)));
+    capture = static_cast<GstClockTime> (taken);
   }
   if (capture < base)
     return false;
@@ -135,11 +155,8 @@ void
 CamSourceSession::watch_cameras (std::int64_t now_ns)
 {
   const bool comes_by_itself =
-      settings_.trigger == TriggerMode::kFreeRun ||
-      (settings_.trigger == TriggerMode::kSoftware && !settings_.single_shot) ||
-      (settings_.trigger == TriggerMode::kAction && settings_.action_send &&
-          !settings_.single_shot);
-  if (!comes_by_itself || playing_since_ns_ == 0)
+      settings_.trigger == TriggerMode::kFreeRun || (fires () && !settings_.single_shot);
+  if (!comes_by_itself || !was_playing_)
     return;
   const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
   for (std::size_t i = 0; i < cameras_.size (); i++) {

@@ -248,6 +248,7 @@ CamSourceSession::finish (guint32 seqnum)
     if (std::exchange (eos_, true))
       return;
   }
+  ticker_.set_playing (false);
   for (const auto &pad : pads_)
     pad->send_eos (seqnum);
 }
@@ -294,14 +295,19 @@ void
 CamSourceSession::flushed ()
 {
   pairing_.drop_waiting ();
-  std::lock_guard guard (lock_);
-  eos_ = false;
-  fatal_flow_ = GST_FLOW_OK;
-  gst_flow_combiner_reset (flows_);
+  bool playing;
+  {
+    std::lock_guard guard (lock_);
+    eos_ = false;
+    fatal_flow_ = GST_FLOW_OK;
+    gst_flow_combiner_reset (flows_);
+    playing = playing_;
+  }
+  ticker_.set_playing (playing);
 }
 
 void
-CamSourceSession::pad_stopped (const CamSourcePad &pad, GstFlowReturn flow)
+CamSourceSession::pad_flowed (const CamSourcePad &pad, GstFlowReturn flow)
 {
   std::lock_guard guard (lock_);
   const GstFlowReturn all = gst_flow_combiner_update_pad_flow (flows_, pad.pad (), flow);
@@ -337,6 +343,7 @@ CamSourceSession::stats ()
   const CamSourcePairingStats pairing = pairing_.stats ();
   const CameraStatistics cameras = camera_statistics ();
   GstStructure *s = gst_structure_new ("stereocamsrc-stats", "sets", G_TYPE_UINT64, pairing.sets,
+      "apart", G_TYPE_UINT64, pairing.apart, "unknown", G_TYPE_UINT64, pairing.unknown,
       "missed-ticks", G_TYPE_UINT64, ticker_.missed (), "missing-packets", G_TYPE_UINT64,
       pairing.missing_packets, "resent-packets", G_TYPE_UINT64, guint64 (cameras.resent_packets),
       "underruns", G_TYPE_UINT64, guint64 (cameras.underruns), "reconnects", G_TYPE_UINT64,

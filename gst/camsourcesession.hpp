@@ -27,7 +27,7 @@ using CamSourcePads = std::vector<std::shared_ptr<CamSourcePad>>; ///< left, rig
  * no state change has to wait for a camera that does not answer.
  *
  *  Threads: this one; Aravis' (frames and losses are only noted); the ticker's and the cameras'
- *  trigger threads; the pads' tasks, which tell with what flow they stopped. lock_ is held while
+ *  trigger threads; the pads' tasks, which tell how pushing goes. lock_ is held while
  *  nothing is called that waits, pushes or posts. */
 class CamSourceSession : public std::enable_shared_from_this<CamSourceSession> {
 public:
@@ -55,8 +55,8 @@ public:
   /** What waits between frames is forgotten. */
   void flushed ();
   bool capture (GstClockTime time) { return ticker_.ask (time); }
-  /** What a pad's task stopped with. */
-  void pad_stopped (const CamSourcePad &pad, GstFlowReturn flow);
+  /** What pushing on a pad gives now. */
+  void pad_flowed (const CamSourcePad &pad, GstFlowReturn flow);
 
   /** From a picture's time to when it is handed out, ns; what is known of it. */
   [[nodiscard]] GstClockTime latency () const { return latency_; }
@@ -82,6 +82,13 @@ private:
   bool wait_for_clock ();
   GstClockTime running_time ();
 
+  /** Whether this element fires its cameras. */
+  [[nodiscard]] bool fires () const
+  {
+    return settings_.trigger == TriggerMode::kSoftware ||
+           (settings_.trigger == TriggerMode::kAction && settings_.action_send);
+  }
+
   /* camsourcecameras.cpp: the cameras */
   bool open_cameras ();
   bool choose_format ();
@@ -99,6 +106,7 @@ private:
   void take_frames ();
   void send (CamSourceSet &set);
   bool stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTime &capture);
+  void begin_to_play ();
   void look_around ();
   void send_gaps ();
   void watch_cameras (std::int64_t now_ns);
@@ -143,5 +151,6 @@ private:
   std::int64_t playing_since_ns_ = 0, last_look_ns_ = 0, last_clock_read_ns_ = 0,
                last_stats_ns_ = 0;
   guint64 sent_ = 0;
+  std::array<std::int64_t, kMaxCameras> shortest_trip_us_{}; ///< to a camera's clock and back
   GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE;
 };

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "camsourceticker.hpp"
 
+#include <pthread.h>
+#include <sched.h>
+#include <sys/prctl.h>
+
 /* ---- the clock ---- */
 
 void
@@ -9,11 +13,11 @@ CamSourceTicker::start (
 {
   stop ();
   rate_ = rate;
-  only_when_asked_ = only_when_asked || !rate.valid ();
   lead_ = lead;
   actions_ = std::move (actions);
   last_tick_ = -1;
   std::lock_guard guard (lock_);
+  only_when_asked_ = only_when_asked || !rate.valid ();
   running_ = paused_since_tick_ = true;
   asked_.clear ();
   thread_ = std::thread ([this] { run (); });
@@ -48,7 +52,7 @@ bool
 CamSourceTicker::ask (GstClockTime time)
 {
   std::lock_guard guard (lock_);
-  if (!running_ || !playing_ || asked_.size () >= kMostAsked)
+  if (!running_ || !playing_ || !only_when_asked_ || asked_.size () >= kMostAsked)
     return false;
   asked_.push_back (time);
   changed_.notify_all ();
@@ -145,8 +149,18 @@ CamSourceTicker::one_shot ()
 }
 
 void
+make_thread_punctual ()
+{
+  sched_param parameters{};
+  parameters.sched_priority = sched_get_priority_min (SCHED_RR);
+  pthread_setschedparam (pthread_self (), SCHED_RR, &parameters); /* may be refused */
+  prctl (PR_SET_TIMERSLACK, 1000UL, 0, 0, 0);                     /* ns */
+}
+
+void
 CamSourceTicker::run ()
 {
+  make_thread_punctual ();
   for (;;) {
     {
       std::unique_lock guard (lock_);
@@ -201,6 +215,7 @@ SimultaneousCalls::run ()
 void
 SimultaneousCalls::loop (int index)
 {
+  make_thread_punctual ();
   std::unique_lock guard (lock_);
   guint64 seen = round_;
   for (;;) {

@@ -55,7 +55,6 @@ private:
 
   GstElement *element_;
   rangecast::TickRate rate_;
-  bool only_when_asked_ = false;
   GstClockTime lead_ = 0;
   Actions actions_;
   std::atomic<guint64> missed_ = 0;
@@ -63,11 +62,15 @@ private:
 
   std::mutex lock_; /* guards what follows */
   std::condition_variable changed_;
-  bool running_ = false, playing_ = false, paused_since_tick_ = true;
+  bool running_ = false, playing_ = false, paused_since_tick_ = true, only_when_asked_ = false;
   std::deque<GstClockTime> asked_;
   GstClockID waiting_ = nullptr;
   std::thread thread_;
 };
+
+/** For threads that must do a little at a moment: first in the queue where the system allows it (it
+ *  asks for the right to real-time scheduling, RLIMIT_RTPRIO), and no slack in the timers. */
+void make_thread_punctual ();
 
 /** Calls one function a camera at the same moment, each in a thread of its own: a call waits for
  *  its camera's answer. */

@@ -176,9 +176,9 @@ add_pad (GstStereoCamSrc *self, GstStaticPadTemplate *pad_template)
   gst_pad_set_activatemode_function (pad, gst_stereo_cam_src_activate_mode);
   gst_pad_use_fixed_caps (pad);
   self->priv->pads.push_back (std::make_shared<CamSourcePad> (
-      GST_ELEMENT (self), pad, [self] (CamSourcePad &stopped, GstFlowReturn flow) {
+      GST_ELEMENT (self), pad, [self] (CamSourcePad &pushed, GstFlowReturn flow) {
         if (const auto session = self->priv->current ())
-          session->pad_stopped (stopped, flow);
+          session->pad_flowed (pushed, flow);
       }));
   gst_pad_set_element_private (pad, self->priv->pads.back ().get ());
 }
@@ -278,7 +278,6 @@ close (GstStereoCamSrc *self)
   const auto session = self->priv->current ();
   if (session && !session->wait_for_end (kGiveBack))
     GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
-  self->priv->clock.close ();
 }
 
 static GstStateChangeReturn
@@ -299,8 +298,10 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     remove_third_pad (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL)
     close (self);
-  if (result == GST_STATE_CHANGE_FAILURE)
+  if (result == GST_STATE_CHANGE_FAILURE) {
+    stop (self);
     return result;
+  }
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
     self->priv->current ()->set_playing (true);
   const bool to_paused = transition == GST_STATE_CHANGE_READY_TO_PAUSED ||
