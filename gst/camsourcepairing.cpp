@@ -61,7 +61,9 @@ CamSourcePairing::forget ()
 CamSourcePairing::Held *
 CamSourcePairing::hold (CameraFrame frame, std::int64_t taken_ns)
 {
-  Held *held = std::exchange (free_, free_->next_free); /* FrameSets keeps fewer than there are */
+  if (!free_) /* FrameSets keeps fewer than there are */
+    return nullptr;
+  Held *held = std::exchange (free_, free_->next_free);
   held->frame = std::move (frame);
   held->taken_ns = taken_ns;
   return held;

@@ -16,6 +16,7 @@
 #include "camera_setup.hpp"
 #include "frame_counter.hpp"
 #include "frame_store.hpp"
+#include "receive_buffer.hpp"
 
 using namespace std::chrono_literals;
 
@@ -23,16 +24,22 @@ static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
 
 namespace {
 
-/* Work that may have to wait for a camera that does not answer. */
+/* Work that may have to wait for a camera that does not answer: one after the other, in threads of
+ * its own. One that is late makes the next ones not be waited for. */
 class TakeDown {
 public:
-  void run (std::function<void ()> work)
+  void run (std::function<void ()> work, bool patient)
   {
-    wait (kLongest);
-    std::packaged_task<void ()> task (std::move (work));
+    patient = patient && wait (0s);
+    std::packaged_task<void ()> task ([before = done_, work = std::move (work)] {
+      if (before.valid ())
+        before.wait ();
+      work ();
+    });
     done_ = task.get_future ().share ();
     std::thread (std::move (task)).detach ();
-    wait (kPatience);
+    if (patient)
+      wait (kPatience);
   }
   /* @return false: still at work */
   bool wait (std::chrono::milliseconds limit)
@@ -40,10 +47,11 @@ public:
     return !done_.valid () || done_.wait_for (limit) == std::future_status::ready;
   }
 
-  static constexpr std::chrono::milliseconds kPatience = 1s;
   static constexpr std::chrono::milliseconds kLongest = 15s; /* Aravis' tries end before */
 
 private:
+  static constexpr std::chrono::milliseconds kPatience = 1s;
+
   std::shared_future<void> done_;
 };
 
@@ -279,7 +287,8 @@ Camera::~Camera ()
   stop ();
   g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
   impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
-                             std::move (impl_->control))] () mutable { control.reset (); });
+                             std::move (impl_->control))] () mutable { control.reset (); },
+      !is_lost ());
 }
 
 const CameraInfo &
@@ -367,8 +376,10 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
   const std::size_t wanted = settings.socket_buffer > 0
                                  ? std::size_t (settings.socket_buffer)
                                  : std::max (2 * format.size (), kLeastSocketBuffer);
+  const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-      int (std::min<std::size_t> (wanted, G_MAXINT)), nullptr);
+      bytes, nullptr);
+  (void)enlarge_receive_buffer (arv_gv_stream_get_port (ARV_GV_STREAM (stream)), bytes);
 }
 
 CameraStatus
@@ -459,13 +470,17 @@ Camera::start (Arrived arrived, Lost lost)
 void
 Camera::Impl::end (const std::shared_ptr<Run> &run)
 {
-  take_down.run ([control = control.get (), run, lost = watch->lost.load ()] {
-    if (!lost) {
-      const auto guard = control->lock ();
-      arv_camera_stop_acquisition (control->camera (), nullptr);
-    }
-    g_object_unref (run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
-  });
+  const bool answers = !watch->lost;
+  take_down.run (
+      [control = control.get (), run, answers] {
+        if (answers) {
+          const auto guard = control->lock ();
+          arv_camera_stop_acquisition (control->camera (), nullptr);
+        }
+        g_object_unref (
+            run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
+      },
+      answers);
 }
 
 void

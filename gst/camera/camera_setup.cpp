@@ -421,9 +421,9 @@ set_transport (CameraControl &control, const CameraSettings &settings)
   if (!arv_camera_is_gv_device (camera))
     return {};
   GError *error = nullptr;
-  /* Memory-mapped packet sockets need a privilege, so only some users would have them, and hand
-   * packets over in blocks, late. */
-  arv_camera_gv_set_stream_options (camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  arv_camera_gv_set_stream_options (camera, settings.packet_socket
+                                                ? ARV_GV_STREAM_OPTION_NONE
+                                                : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   arv_camera_gv_set_packet_size_adjustment (camera, settings.packet_size == 0
                                                         ? ARV_GV_PACKET_SIZE_ADJUSTMENT_ONCE
                                                         : ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);

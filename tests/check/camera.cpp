@@ -9,37 +9,33 @@
 
 using namespace rangecast::testing;
 
-/** Keeps what a camera's callbacks say. */
+/** Keeps what a camera's callbacks say, which may come until the camera was stopped. */
 class Listener {
 public:
-  Camera::Arrived arrived ()
+  Camera::Arrived arrived () const
   {
-    return [this] (CameraFrame frame) {
-      std::lock_guard guard (lock_);
-      if (!keep_ && frame.state == FrameState::kComplete)
-        frame.buffer.reset ();
-      frames_.push_back (std::move (frame));
-      changed_.notify_all ();
+    return [heard = heard_] (CameraFrame frame) {
+      std::lock_guard guard (heard->lock);
+      heard->frames.push_back (std::move (frame));
+      heard->changed.notify_all ();
     };
   }
-  Camera::Lost lost ()
+  Camera::Lost lost () const
   {
-    return [this] (CameraStatus status) {
-      std::lock_guard guard (lock_);
-      losses_.push_back (std::move (status));
-      changed_.notify_all ();
+    return [heard = heard_] (CameraStatus status) {
+      std::lock_guard guard (heard->lock);
+      heard->losses.push_back (std::move (status));
+      heard->changed.notify_all ();
     };
   }
-  /** false: buffers go back at once. */
-  void keep_buffers (bool keep) { keep_ = keep; }
   /** The next frame; fails the test if none comes. */
   CameraFrame next ()
   {
-    std::unique_lock guard (lock_);
-    const auto some = [this] { return !frames_.empty (); };
-    fail_unless (changed_.wait_for (guard, std::chrono::seconds (20), some), "no frame came");
-    CameraFrame frame = std::move (frames_.front ());
-    frames_.pop_front ();
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->frames.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (20), some), "no frame");
+    CameraFrame frame = std::move (heard_->frames.front ());
+    heard_->frames.pop_front ();
     return frame;
   }
   CameraFrame next_complete ()
@@ -52,28 +48,30 @@ public:
   }
   CameraStatus wait_for_loss ()
   {
-    std::unique_lock guard (lock_);
-    const auto some = [this] { return !losses_.empty (); };
-    fail_unless (changed_.wait_for (guard, std::chrono::seconds (60), some), "no loss was told");
-    return losses_.front ();
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->losses.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (60), some), "no loss");
+    return heard_->losses.front ();
   }
   std::size_t n_losses ()
   {
-    std::lock_guard guard (lock_);
-    return losses_.size ();
+    std::lock_guard guard (heard_->lock);
+    return heard_->losses.size ();
   }
   std::size_t n_frames ()
   {
-    std::lock_guard guard (lock_);
-    return frames_.size ();
+    std::lock_guard guard (heard_->lock);
+    return heard_->frames.size ();
   }
 
 private:
-  std::mutex lock_;
-  std::condition_variable changed_;
-  std::deque<CameraFrame> frames_;
-  std::vector<CameraStatus> losses_;
-  std::atomic<bool> keep_{true};
+  struct Heard {
+    std::mutex lock;
+    std::condition_variable changed;
+    std::deque<CameraFrame> frames;
+    std::vector<CameraStatus> losses;
+  };
+  std::shared_ptr<Heard> heard_ = std::make_shared<Heard> ();
 };
 
 static std::unique_ptr<Camera>
@@ -766,7 +764,8 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera left ("127.0.0.2", "left"), right ("127.0.0.3", "right");
-  const auto leader = open_camera ("127.0.0.2"), follower = open_camera ("127.0.0.3");
+  const std::shared_ptr<Camera> leader = open_camera ("127.0.0.2"),
+                                follower = open_camera ("127.0.0.3");
   CameraSettings settings = small_pictures ();
   settings.exposure_mode = settings.gain_mode = AutoMode::kManual;
   settings.exposure_us = 1000;
@@ -779,7 +778,7 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
   start (*follower, from_follower);
   LookFollower look;
   std::atomic<int> n_refusals{0};
-  look.start (*leader, {follower.get ()}, std::chrono::milliseconds (5),
+  look.start (leader, {follower}, std::chrono::milliseconds (5),
       [&] (const CameraStatus &) { n_refusals++; });
   for (const guint32 exposure : {3000u, 700u, 12000u}) {
     /* as the camera's own regulator would */

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <frame_counter.hpp>
 #include <fstream>
+#include <receive_buffer.hpp>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include "rangecast-check.hpp"
@@ -159,6 +161,8 @@ public:
     return {bytes, bytes + n};
   }
 
+  [[nodiscard]] GSocket *socket () const { return socket_; }
+
 private:
   GSocket *socket_;
 };
@@ -215,6 +219,18 @@ GST_START_TEST (test_foreign_interface_is_refused_by_name)
     fail_unless (status.message ().find (std::string ("'") + name + "'") != std::string::npos, "%s",
         status.message ().c_str ());
   }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_receive_buffer_of_a_port_is_enlarged)
+{
+  Ear ear;
+  gint before = 0, after = 0;
+  fail_unless (g_socket_get_option (ear.socket (), SOL_SOCKET, SO_RCVBUF, &before, nullptr));
+  fail_unless (enlarge_receive_buffer (ear.port (), before / 4)); /* the system doubles it */
+  fail_unless (g_socket_get_option (ear.socket (), SOL_SOCKET, SO_RCVBUF, &after, nullptr));
+  assert_equals_int (after, before / 4 * 2);
+  fail_unless (!enlarge_receive_buffer (1, before));
 }
 GST_END_TEST;
 
@@ -306,6 +322,7 @@ cameraparts_suite ()
   tcase_add_test (tc, test_action_command_is_heard_once_from_each_interface);
   tcase_add_test (tc, test_request_ids_are_never_zero);
   tcase_add_test (tc, test_foreign_interface_is_refused_by_name);
+  tcase_add_test (tc, test_receive_buffer_of_a_port_is_enlarged);
   tcase_add_test (tc, test_frame_numbers_count_on_over_16_bits);
   tcase_add_test (tc, test_64_bit_frame_ids_need_no_rounds);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
