@@ -143,7 +143,9 @@ while true; do
   wait -n -p ended "${pids[@]}" || status=$?
   [ "$ended" != "$viewer" ] || break
   if [ "$status" != 0 ]; then
-    echo "demo.sh: ${names[$ended]} failed:" >&2
+    why=failed
+    [ "$status" -le 128 ] || why="was killed by signal $((status - 128))"
+    echo "demo.sh: ${names[$ended]} $why:" >&2
     cat "$out/log/${names[$ended]}.log" >&2
     exit 1
   fi
@@ -153,6 +155,7 @@ while true; do
   done
   pids=("${left[@]}")
 done
+[ "$status" -le 128 ] || { echo "demo.sh: the viewer was killed by signal $((status - 128))" >&2; exit 1; }
 [ "$status" = 0 ] || { echo "demo.sh: the viewer failed" >&2; exit 1; }
 
 stop_hosts

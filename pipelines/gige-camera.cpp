@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -37,6 +38,15 @@ now ()
   timespec time;
   clock_gettime (CLOCK_MONOTONIC, &time);
   return time.tv_sec * kSecond + time.tv_nsec;
+}
+
+/* A camera's hardware answers at once, whatever else this machine does. Where the user may not have
+ * that (RLIMIT_RTPRIO), the thread is one as any other. */
+static void
+set_at_once (bool at_once)
+{
+  const sched_param priority = {at_once ? 10 : 0};
+  pthread_setschedparam (pthread_self (), at_once ? SCHED_RR : SCHED_OTHER, &priority);
 }
 
 static sockaddr_in
@@ -474,6 +484,7 @@ void
 GigeCamera::run ()
 {
   prctl (PR_SET_TIMERSLACK, 1000UL);
+  set_at_once (true);
   pollfd fds[] = {{control_, POLLIN, 0}, {wake_, POLLIN, 0}};
   while (!ending_) {
     std::int64_t time = now ();
@@ -521,7 +532,9 @@ GigeCamera::expose (std::int64_t now_ns)
   frame.chunk = size - kGvspOverhead;
   frame.pixels.resize (
       std::size_t (region.width) * region.height * std::size_t (bytes_per_pixel (format)));
+  set_at_once (false); /* to draw is not the hardware's work */
   scenery_.paint (scenery_.moment (now_ns), format, region, frame.pixels);
+  set_at_once (true);
   pictures_++;
   send_frame (frame, 0, frame.data_packets () + 1);
   if (get (ARV_FAKE_CAMERA_REGISTER_ACQUISITION_MODE) == kSingleFrame)

@@ -78,6 +78,22 @@ test_demo_says_what_is_wrong () {
   expect_error "bad.glb" "$pipelines/demo.sh" --input avatar=bad.glb --out demo
 }
 
+test_demo_says_which_host_was_killed () {
+  need_gl
+  local log=demo.log i host
+  "$pipelines/demo.sh" --views 2 --frames 500 --fps 8 --size 160x120 --out demo --port $((ports + 50)) >"$log" 2>&1 &
+  local demo=$!
+  for ((i = 0; i < 300; i++)); do
+    host=$(pgrep -P "$demo" -f "rangecast-run .*view-id=1" || true)
+    [ -z "$host" ] || break
+    sleep 0.2
+  done
+  sleep 1
+  kill -KILL $host
+  ! wait "$demo" || fail "the demo went on: $(cat "$log")"
+  grep -qF "camera1 was killed by signal 9" "$log" || fail "$(cat "$log")"
+}
+
 test_demo_says_when_a_port_is_in_use () {
   need_gl
   python3 -c 'import socket, time
