@@ -11,6 +11,8 @@ GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
 /* Scheduled action commands go out so much before their tick. */
 static constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
 
+static constexpr gint64 kPtpPatience = 30 * G_USEC_PER_SEC;
+
 bool
 CamSourceSession::open_cameras ()
 {
@@ -144,16 +146,41 @@ CamSourceSession::start_cameras ()
     pad->set_caps (format_.caps);
   read_clocks ();
   if (settings_.follows_left ()) {
-    std::vector<Camera *> others;
-    for (std::size_t i = 1; i < cameras_.size (); i++)
-      others.push_back (cameras_[i].get ());
-    look_.start (
-        *cameras_[0], others, std::chrono::milliseconds (500), [this] (const CameraStatus &status) {
+    look_.start (cameras_[0], {cameras_.begin () + 1, cameras_.end ()},
+        std::chrono::milliseconds (500), [this] (const CameraStatus &status) {
           GST_WARNING_OBJECT (element_, "%s", status.message ().c_str ());
         });
   }
+  if (!wait_for_ptp ())
+    return false;
   start_ticker ();
   return true;
+}
+
+/* Cameras need seconds to follow a PTP clock, and obey no time before. */
+bool
+CamSourceSession::wait_for_ptp ()
+{
+  if (!settings_.action_scheduled || settings_.trigger != TriggerMode::kAction)
+    return true;
+  for (const gint64 begin = g_get_monotonic_time ();;) {
+    const Camera *behind = nullptr;
+    for (const auto &camera : cameras_)
+      if (!behind && !camera->clock_is_ptp ())
+        behind = camera.get ();
+    if (!behind)
+      return true;
+    if (g_get_monotonic_time () - begin > kPtpPatience) {
+      fail ({CameraFault::kTimedOut,
+          behind->label () + ": its clock does not follow PTP after 30 s; expected a PTP master in "
+                             "its network, or action-scheduled=false"});
+      return false;
+    }
+    std::unique_lock guard (lock_);
+    if (changed_.wait_for (
+            guard, std::chrono::milliseconds (200), [this] { return quit_ || !fault_.ok (); }))
+      return false;
+  }
 }
 
 void
@@ -220,6 +247,8 @@ read_offset (Camera &camera, std::int64_t &shortest_us, std::optional<std::int64
     if (shortest_us == 0 || trip < shortest_us || (!first && trip <= 2 * shortest_us)) {
       shortest_us = shortest_us == 0 ? trip : MIN (shortest_us, trip);
       offset_ns = read_at_us * 1000 - static_cast<std::int64_t> (camera_ns);
+    } else if (!first) {
+      shortest_us += shortest_us / 2 + 10; /* a clock drifts: what is old gets worse */
     }
   }
   return true;
@@ -254,16 +283,21 @@ CamSourceSession::stop_cameras ()
   for (const auto &camera : cameras_)
     camera->stop ();
   pairing_.drop_waiting ();
-  const CameraStatistics all = camera_statistics ();
-  std::vector<std::shared_ptr<Camera>> counted;
-  {
-    std::lock_guard guard (lock_);
-    before_ = all;
-    counted.swap (counted_);
-    inbox_.clear ();
-  }
-  counted.clear ();
+  bank_statistics ();
   cameras_.clear ();
+}
+
+/* Cameras that stand still count from 0 when they begin again. */
+void
+CamSourceSession::bank_statistics ()
+{
+  const CameraStatistics all = camera_statistics ();
+  std::vector<std::shared_ptr<Camera>> counted; /* and their last references go without the lock */
+  std::vector<Arrival> late;
+  std::lock_guard guard (lock_);
+  before_ = all;
+  counted.swap (counted_);
+  late.swap (inbox_);
 }
 
 CameraStatistics

@@ -2,7 +2,7 @@
 #include "camsourcepairing.hpp"
 
 #include <algorithm>
-#include <climits>
+#include <cstdlib>
 #include <span>
 #include <utility>
 
@@ -10,6 +10,9 @@ using rangecast::FrameSets;
 
 /* A camera that did not answer a shot within this time does not any more. */
 static constexpr std::int64_t kAnswerTime = 1'000'000'000;
+
+/* How wrong the reading of a camera's clock may be. */
+static constexpr std::int64_t kClockError = 50'000'000;
 
 CamSourcePairing::CamSourcePairing ()
 {
@@ -33,9 +36,13 @@ CamSourcePairing::start (
   triggered_ = triggered;
   period_ = period > 0 ? period : GST_SECOND;
   exposure_ = exposure;
-  counts_ = {};
-  spread_.forget ();
-  delay_.forget ();
+}
+
+bool
+CamSourcePairing::clocks_are_off ()
+{
+  std::lock_guard guard (lock_);
+  return std::exchange (clocks_are_off_, false);
 }
 
 void
@@ -43,12 +50,16 @@ CamSourcePairing::forget ()
 {
   drop_waiting ();
   std::lock_guard guard (lock_);
-  sets_.start (cameras_, triggered_ ? 0 : static_cast<std::int64_t> (period_) / 2, waiting_);
+  tolerance_ = static_cast<std::int64_t> (period_) / 2;
+  sets_.start (cameras_, triggered_ ? 0 : tolerance_, waiting_);
+  intervals_.forget ();
+  counted_intervals_ = 0;
+  clocks_are_off_ = false;
   for (int c = 0; c < kMaxCameras; c++) {
     finders_[c].start (static_cast<std::int64_t> (period_));
     clocks_[c].forget ();
     offsets_[c].reset ();
-    answered_[c] = last_arrival_ns_[c] = 0;
+    answered_[c] = last_arrival_ns_[c] = last_taken_ns_[c] = 0;
     has_number_[c] = false;
   }
   ticks_ = {};
@@ -59,11 +70,14 @@ CamSourcePairing::forget ()
 /* ---- frames that are kept ---- */
 
 CamSourcePairing::Held *
-CamSourcePairing::hold (CameraFrame frame, std::int64_t taken_ns)
+CamSourcePairing::hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns)
 {
-  Held *held = std::exchange (free_, free_->next_free); /* FrameSets keeps fewer than there are */
+  if (!free_) /* FrameSets keeps fewer than there are */
+    return nullptr;
+  Held *held = std::exchange (free_, free_->next_free);
   held->frame = std::move (frame);
   held->taken_ns = taken_ns;
+  held->exposed_ns = exposed_ns;
   return held;
 }
 
@@ -151,24 +165,35 @@ CamSourcePairing::set_clock_offset (int camera, std::int64_t offset_ns)
   offsets_[camera] = offset_ns;
 }
 
-/* With the cameras' clocks read, times of exposure; else of arrival, without what only held them
- * up. */
-std::int64_t
-CamSourcePairing::taken_at (int camera, const CameraFrame &frame)
+/* A stamp that no clock reaches is none. */
+static std::int64_t
+stamp_of (const CameraFrame &frame)
 {
-  const auto stamp = static_cast<std::int64_t> (frame.camera_time_ns);
-  const std::int64_t least = clocks_[camera].host_time (stamp, frame.arrived_us * 1000);
-  bool read = stamp > 0;
-  for (int c = 0; c < cameras_; c++)
-    read &= offsets_[c].has_value ();
-  return read ? stamp + *offsets_[camera] : least - static_cast<std::int64_t> (exposure_);
+  constexpr std::uint64_t kMost = std::uint64_t (1) << 62;
+  return frame.camera_time_ns < kMost ? static_cast<std::int64_t> (frame.camera_time_ns) : 0;
+}
+
+/* By the cameras' clocks, if all were read and this one was not set since. */
+std::optional<std::int64_t>
+CamSourcePairing::exposed_at (int camera, const CameraFrame &frame)
+{
+  const std::int64_t stamp = stamp_of (frame), arrived = frame.arrived_us * 1000;
+  const auto offsets = std::span (offsets_).first (static_cast<std::size_t> (cameras_));
+  if (stamp == 0 || !std::ranges::all_of (offsets, [] (const auto &o) { return o.has_value (); }))
+    return {};
+  const std::int64_t time = stamp + *offsets_[camera];
+  const auto most = kAnswerTime + 2 * static_cast<std::int64_t> (exposure_);
+  if (time <= arrived + kClockError && time >= arrived - most)
+    return time;
+  clocks_are_off_ = true;
+  return {};
 }
 
 void
 CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
 {
-  const auto stamp = static_cast<std::int64_t> (frame.camera_time_ns);
-  const auto found = finders_[camera].find (frame.number + 1, stamp, frame.arrived_us * 1000);
+  const auto found =
+      finders_[camera].find (frame.number + 1, stamp_of (frame), frame.arrived_us * 1000);
   if (shots_ > 0)
     answered_[camera] = std::max (answered_[camera], found.known ? found.shot + 1 : 0);
   if (!found.known) {
@@ -177,25 +202,55 @@ CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
     return;
   }
   const Tick &tick = ticks_[found.shot % kTicks];
-  const bool read = stamp > 0 && std::ranges::all_of (std::span (offsets_).first (cameras_),
-                                     [] (const auto &o) { return o.has_value (); });
-  const std::int64_t taken = read ? stamp + *offsets_[camera] : tick.fired_ns + found.residual_ns;
+  /* without stamps the residual is of the arrival, and says nothing about the exposure */
+  const std::int64_t taken = tick.fired_ns + (stamp_of (frame) ? found.residual_ns : 0);
   if (frame.buffer)
     delay_.add (frame.arrived_us * 1000 - tick.fired_ns);
-  const bool whole = frame.buffer != nullptr;
-  sets_.put (camera, found.shot, whole ? hold (std::move (frame), taken) : nullptr);
+  put (camera, found.shot, std::move (frame), taken);
+}
+
+/* Pictures of a line may come faster than the caps say: what belongs together then lies closer. A
+ * quarter of the intervals, for losses make them longer and jitter some shorter. */
+void
+CamSourcePairing::learn_interval (int camera, std::int64_t taken)
+{
+  const std::int64_t last = std::exchange (last_taken_ns_[camera], taken);
+  if (last == 0 || taken <= last)
+    return;
+  intervals_.add (taken - last);
+  if (++counted_intervals_ % 16 == 0)
+    tolerance_ = std::min (static_cast<std::int64_t> (period_), intervals_.quantile (0.25)) / 2;
+  sets_.set_tolerance (tolerance_);
 }
 
 void
 CamSourcePairing::place_by_time (int camera, CameraFrame frame)
 {
-  const std::int64_t taken = taken_at (camera, frame);
-  const bool whole = frame.buffer != nullptr;
-  if (whole)
+  const std::int64_t arrived =
+      clocks_[camera].host_time (stamp_of (frame), frame.arrived_us * 1000);
+  const auto exposed = exposed_at (camera, frame);
+  const std::int64_t taken = exposed ? *exposed : arrived - static_cast<std::int64_t> (exposure_);
+  if (frame.buffer)
     delay_.add (frame.arrived_us * 1000 - taken);
   else if (frame.camera_time_ns == 0)
     return; /* came too late to say when it was taken */
-  sets_.put (camera, taken, whole ? hold (std::move (frame), taken) : nullptr);
+  learn_interval (camera, taken);
+  put (camera, taken, std::move (frame), taken);
+}
+
+void
+CamSourcePairing::put (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken)
+{
+  Held *held = nullptr;
+  if (frame.buffer) {
+    const std::int64_t exposed = exposed_at (camera, frame).value_or (taken);
+    held = hold (std::move (frame), taken, exposed);
+    counts_.dropped[camera] += held == nullptr;
+  }
+  if (auto refused = static_cast<Held *> (sets_.put (camera, key, held))) {
+    counts_.dropped[camera]++;
+    let_go (refused);
+  }
 }
 
 void
@@ -219,21 +274,21 @@ CamSourcePairing::take (int camera, CameraFrame frame)
 bool
 CamSourcePairing::hand_out (FrameSets::Set &from, CamSourceSet &set)
 {
-  std::int64_t least = INT64_MAX, most = INT64_MIN;
-  for (int c = 0; c < cameras_; c++) {
-    const auto held = static_cast<Held *> (from.frames[c]);
-    least = std::min (least, held->taken_ns);
-    most = std::max (most, held->taken_ns);
-  }
-  if (most - least > static_cast<std::int64_t> (period_) / 2) {
+  const auto held_by = [&] (int c) { return static_cast<Held *> (from.frames[c]); };
+  std::int64_t spread = 0, apart = 0;
+  for (int c = 1; c < cameras_; c++)
+    for (int d = 0; d < c; d++) {
+      spread = std::max (spread, std::abs (held_by (c)->exposed_ns - held_by (d)->exposed_ns));
+      apart = std::max (apart, std::abs (held_by (c)->taken_ns - held_by (d)->taken_ns));
+    }
+  if (apart > tolerance_) {
     drop (from);
     counts_.apart++;
     return false;
   }
-  spread_.add (most - least);
-  const Tick &tick = ticks_[from.keys[0] % kTicks];
-  set.tick = triggered_ ? tick.time : GST_CLOCK_TIME_NONE;
-  set.taken_ns = static_cast<Held *> (from.frames[0])->taken_ns;
+  spread_.add (spread);
+  set.tick = triggered_ ? ticks_[from.keys[0] % kTicks].time : GST_CLOCK_TIME_NONE;
+  set.taken_ns = held_by (0)->taken_ns;
   for (int c = 0; c < cameras_; c++) {
     const auto held = static_cast<Held *> (from.frames[c]);
     set.pictures[c] = std::move (held->frame.buffer);

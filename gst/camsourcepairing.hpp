@@ -21,7 +21,7 @@ struct CamSourceSet {
   std::int64_t taken_ns = 0; ///< else when the left one was taken, g_get_monotonic_time
 };
 
-/** Counted since start(). */
+/** Counted since the beginning. */
 struct CamSourcePairingStats {
   guint64 sets = 0;
   std::array<guint64, kMaxCameras> dropped{};    ///< whole pictures without partners
@@ -55,6 +55,8 @@ public:
 
   /** Of one camera's clock: add it to a time stamp for g_get_monotonic_time, ns. */
   void set_clock_offset (int camera, std::int64_t offset_ns);
+  /** Once after each time that stamps contradict the offsets: read the clocks again. */
+  bool clocks_are_off ();
 
   /** Whether a shot may be fired now. While a camera's delay is not known, one must be over before
    * the next. @param now_ns  g_get_monotonic_time */
@@ -75,7 +77,8 @@ public:
 private:
   struct Held {
     CameraFrame frame;
-    std::int64_t taken_ns = 0; ///< comparable between cameras
+    std::int64_t taken_ns = 0;   ///< comparable between cameras; decides
+    std::int64_t exposed_ns = 0; ///< by the cameras' clocks if they tell; for the statistics
     Held *next_free = nullptr;
   };
   struct Tick {
@@ -85,11 +88,13 @@ private:
   };
   static constexpr int kHeld = 40, kTicks = 64, kMostLoneShots = 8;
 
-  Held *hold (CameraFrame frame, std::int64_t taken_ns);
+  Held *hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns);
   void let_go (Held *held);
   void place_by_shot (int camera, CameraFrame frame);
   void place_by_time (int camera, CameraFrame frame);
-  std::int64_t taken_at (int camera, const CameraFrame &frame);
+  void put (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken);
+  std::optional<std::int64_t> exposed_at (int camera, const CameraFrame &frame);
+  void learn_interval (int camera, std::int64_t taken);
   void drop (rangecast::FrameSets::Set &set);
   bool hand_out (rangecast::FrameSets::Set &from, CamSourceSet &set);
 
@@ -111,5 +116,9 @@ private:
   std::array<Held, kHeld> held_;
   Held *free_ = nullptr;
   CamSourcePairingStats counts_;
-  rangecast::RecentValues spread_, delay_;
+  rangecast::RecentValues spread_, delay_, intervals_;
+  std::int64_t tolerance_ = 0; ///< ns; half of the time between pictures
+  unsigned counted_intervals_ = 0;
+  std::array<std::int64_t, kMaxCameras> last_taken_ns_{};
+  bool clocks_are_off_ = false;
 };

@@ -12,6 +12,7 @@ static constexpr std::int64_t kSecond = 1'000'000'000;
 static constexpr std::int64_t kLook = kSecond / 10;     ///< between two looks around
 static constexpr std::int64_t kClockRead = 5 * kSecond; ///< cameras' clocks drift
 static constexpr std::int64_t kStatsMessage = 5 * kSecond;
+static constexpr std::int64_t kSilence = kSecond;      ///< of all cameras, before GAPs say so
 static constexpr std::int64_t kPatience = 3 * kSecond; ///< for a frame of a camera that runs
 
 CamSourceSession::End
@@ -29,6 +30,8 @@ CamSourceSession::serve ()
       if (!fault_.ok () || fatal_flow_ != GST_FLOW_OK)
         return End::kFault;
       taken_.swap (inbox_);
+      if (std::exchange (flushed_, false)) /* running time may begin anew */
+        last_pts_ = sent_until_ = GST_CLOCK_TIME_NONE;
       playing = playing_ && !eos_;
     }
     if (playing && !was_playing_)
@@ -57,22 +60,44 @@ CamSourceSession::begin_to_play ()
          "different hosts will not be taken together",
             settings_.clock_server.c_str ()),
         ("it uses %s", GST_OBJECT_NAME (clock)));
+  if (settings_.action_scheduled && settings_.trigger == TriggerMode::kAction)
+    warn_if_not_ptp (clock);
   gst_clear_object (&clock);
+}
+
+/* Scheduled commands name times of the pipeline's clock, which the cameras take for theirs. */
+void
+CamSourceSession::warn_if_not_ptp (GstClock *clock)
+{
+  std::uint64_t camera_ns = 0;
+  std::int64_t read_at_us = 0;
+  if (!clock || !cameras_[0]->read_clock (camera_ns, read_at_us).ok ())
+    return;
+  const auto pipeline = static_cast<std::int64_t> (gst_clock_get_time (clock));
+  const std::int64_t off = (pipeline - static_cast<std::int64_t> (camera_ns)) / kSecond;
+  if (off == 0)
+    return;
+  GST_ELEMENT_WARNING (element_, CORE, CLOCK,
+      ("The pipeline's clock and that of %s differ by %d s: scheduled action commands need one PTP "
+       "clock for both (clock-server=ptp:DOMAIN)",
+          cameras_[0]->label ().c_str (), int (off)),
+      (nullptr));
 }
 
 /* In PAUSED a live source has no pictures, but what comes late tells of the cameras' clocks. */
 void
 CamSourceSession::take_frames ()
 {
-  for (Arrival &arrival : taken_)
+  for (Arrival &arrival : taken_) {
     pairing_.take (arrival.camera, std::move (arrival.frame));
-  taken_.clear ();
-  CamSourceSet set;
-  while (pairing_.next (set)) {
-    if (was_playing_)
-      send (set);
-    set = {};
+    CamSourceSet set;
+    while (pairing_.next (set)) {
+      if (was_playing_)
+        send (set);
+      set = {};
+    }
   }
+  taken_.clear ();
 }
 
 /* ---- sets ---- */
@@ -126,6 +151,7 @@ CamSourceSession::send (CamSourceSet &set)
   }
   sent_++;
   last_pts_ = pts;
+  last_sent_ns_ = g_get_monotonic_time () * 1000;
   sent_until_ = pts + period;
   if (settings_.num_buffers >= 0 && sent_ >= static_cast<guint64> (settings_.num_buffers))
     finish (gst_util_seqnum_next ());
@@ -159,6 +185,18 @@ CamSourceSession::watch_cameras (std::int64_t now_ns)
   if (!comes_by_itself || !was_playing_)
     return;
   const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
+  if (GST_CLOCK_TIME_IS_VALID (sent_until_) && last_sent_ns_ > 0 &&
+      now_ns - last_sent_ns_ > std::max (kSilence, most / 2))
+    send_gaps ();
+  if (fires () && now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) > most) {
+    fail ({CameraFault::kTimedOut,
+        "the pipeline's clock does not go on: no tick for " + std::to_string (most / kSecond) +
+            " s" +
+            (settings_.clock_server.empty () ? ""
+                                             : "; is clock-server " + settings_.clock_server +
+                                                   " still the one that it was?")});
+    return;
+  }
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     const std::int64_t last =
         std::max (pairing_.last_arrival (static_cast<int> (i)), playing_since_ns_);
@@ -188,16 +226,32 @@ CamSourceSession::warn_once (const CameraStatistics &all)
             guint64 (all.failures + all.completed)));
 }
 
+/* A network that loses packets makes pictures wait for them longer than was told. */
+void
+CamSourceSession::raise_latency ()
+{
+  const auto delay = static_cast<GstClockTime> (pairing_.stats ().delay_p99_ns);
+  if (delay <= latency_)
+    return;
+  latency_ = delay + delay / 4;
+  gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
+}
+
 void
 CamSourceSession::look_around ()
 {
   const std::int64_t now = g_get_monotonic_time () * 1000;
   watch_cameras (now);
   warn_once (camera_statistics ());
-  if (now - last_clock_read_ns_ > kClockRead)
+  if (pairing_.clocks_are_off ()) {
+    shortest_trip_us_ = {};
     read_clocks ();
+  } else if (now - last_clock_read_ns_ > kClockRead) {
+    read_clocks ();
+  }
   if (now - last_stats_ns_ > kStatsMessage && was_playing_) {
     last_stats_ns_ = now;
+    raise_latency ();
     gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), stats ()));
   }
 }

@@ -2,7 +2,9 @@
 /* The life of a session: beginning and end, faults, what the application asks. */
 #include "camsourcesession.hpp"
 
+#include <future>
 #include <gstrange/gstrangestatus.hpp>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -36,7 +38,7 @@ std::shared_ptr<CamSourceSession>
 CamSourceSession::begin (Setup setup)
 {
   std::shared_ptr<CamSourceSession> session (new CamSourceSession (std::move (setup)));
-  std::thread ([self = session] () mutable {
+  const auto body = [self = session] () mutable {
     GstElement *element = self->element_;
     self->run ();
     {
@@ -46,7 +48,13 @@ CamSourceSession::begin (Setup setup)
     }
     self.reset ();
     gst_object_unref (element);
-  }).detach ();
+  };
+  try {
+    std::thread (body).detach ();
+  } catch (const std::system_error &) {
+    gst_object_unref (session->element_);
+    session.reset ();
+  }
   return session;
 }
 
@@ -66,7 +74,7 @@ CamSourceSession::run ()
     while (!previous_->wait_for_end (Milliseconds (1000)))
       ;
   previous_.reset ();
-  while (!quits () && one_life () == End::kFault) {
+  while (!quits () && one_guarded_life () == End::kFault) {
     stop_cameras ();
     if (!stands_fault ())
       break;
@@ -75,11 +83,33 @@ CamSourceSession::run ()
   stop_cameras ();
 }
 
+/* While a camera that is away is looked for, which takes seconds, branches go on. */
+bool
+CamSourceSession::open_with_gaps ()
+{
+  auto opened = std::async (std::launch::async, [this] { return open_cameras (); });
+  while (opened.wait_for (kGapTime) != std::future_status::ready)
+    send_gaps ();
+  return opened.get ();
+}
+
+/* Where the system gives no more threads, as the standard library says it. */
+CamSourceSession::End
+CamSourceSession::one_guarded_life ()
+{
+  try {
+    return one_life ();
+  } catch (const std::exception &e) {
+    fail ({CameraFault::kFailed, std::string ("the cameras cannot be served: ") + e.what ()});
+    return End::kFault;
+  }
+}
+
 /* From opening the cameras to their loss. */
 CamSourceSession::End
 CamSourceSession::one_life ()
 {
-  if (!open_cameras ())
+  if (!open_with_gaps ())
     return quits () ? End::kStopped : End::kFault;
   if (!wait_for_clock ())
     return quits () ? End::kStopped : End::kFault;
@@ -97,6 +127,7 @@ CamSourceSession::one_life ()
     triggers_.stop ();
     for (const auto &camera : cameras_)
       camera->stop ();
+    bank_statistics ();
   }
   return end;
 }
@@ -299,6 +330,7 @@ CamSourceSession::flushed ()
   {
     std::lock_guard guard (lock_);
     eos_ = false;
+    flushed_ = true;
     fatal_flow_ = GST_FLOW_OK;
     gst_flow_combiner_reset (flows_);
     playing = playing_;

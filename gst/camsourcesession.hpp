@@ -40,6 +40,7 @@ public:
     std::shared_ptr<CamSourceSession> previous; ///< must have ended first; may be null
   };
 
+  /** @return null if the system gives no thread */
   static std::shared_ptr<CamSourceSession> begin (Setup setup);
   ~CamSourceSession ();
 
@@ -71,7 +72,9 @@ private:
 
   /* camsourcesession.cpp: life, faults */
   void run ();
+  End one_guarded_life ();
   End one_life ();
+  bool open_with_gaps ();
   bool stands_fault ();
   void rest_before_retry ();
   void post_fault (bool warning);
@@ -94,6 +97,8 @@ private:
   bool choose_format ();
   bool configure_cameras ();
   bool start_cameras ();
+  bool wait_for_ptp ();
+  void bank_statistics ();
   void stop_cameras ();
   void start_ticker ();
   void fire (GstClockTime tick);
@@ -107,6 +112,8 @@ private:
   void send (CamSourceSet &set);
   bool stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTime &capture);
   void begin_to_play ();
+  void warn_if_not_ptp (GstClock *clock);
+  void raise_latency ();
   void look_around ();
   void send_gaps ();
   void watch_cameras (std::int64_t now_ns);
@@ -126,7 +133,7 @@ private:
 
   std::mutex lock_; /* guards down to the blank line */
   std::condition_variable changed_;
-  bool quit_ = false, ended_ = false, playing_ = false, eos_ = false, flow_ended_ = false;
+  bool quit_ = false, ended_ = false, playing_ = false, eos_ = false, flushed_ = false;
   struct Arrival {
     int camera;
     CameraFrame frame;
@@ -149,7 +156,7 @@ private:
   bool was_playing_ = false, said_fault_ = false, said_underruns_ = false, said_incomplete_ = false,
        clock_ready_ = false;
   std::int64_t playing_since_ns_ = 0, last_look_ns_ = 0, last_clock_read_ns_ = 0,
-               last_stats_ns_ = 0;
+               last_stats_ns_ = 0, last_sent_ns_ = 0;
   guint64 sent_ = 0;
   std::array<std::int64_t, kMaxCameras> shortest_trip_us_{}; ///< to a camera's clock and back
   GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "camsourceticker.hpp"
 
+#include <algorithm>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -55,6 +56,7 @@ CamSourceTicker::ask (GstClockTime time)
   if (!running_ || !playing_ || !only_when_asked_ || asked_.size () >= kMostAsked)
     return false;
   asked_.push_back (time);
+  wishes_++;
   changed_.notify_all ();
   if (waiting_) /* it may be due before what is waited for */
     gst_clock_id_unschedule (waiting_);
@@ -66,6 +68,7 @@ bool
 CamSourceTicker::next_time (GstClock *clock, GstClockTime base, GstClockTime &time)
 {
   std::unique_lock guard (lock_);
+  seen_wishes_ = wishes_;
   if (only_when_asked_) {
     if (asked_.empty ()) {
       changed_.wait_for (guard, std::chrono::milliseconds (100));
@@ -75,7 +78,7 @@ CamSourceTicker::next_time (GstClock *clock, GstClockTime base, GstClockTime &ti
     auto soonest = asked_.begin ();
     for (auto it = asked_.begin (); it != asked_.end (); ++it) {
       if (!GST_CLOCK_TIME_IS_VALID (*it))
-        *it = now;
+        *it = now + lead_;
       if (*it < *soonest)
         soonest = it;
     }
@@ -97,7 +100,7 @@ CamSourceTicker::wait_until (GstClock *clock, GstClockTime time)
   GstClockID id = gst_clock_new_single_shot_id (clock, time - MIN (time, lead_));
   GstClockReturn result = GST_CLOCK_UNSCHEDULED;
   std::unique_lock guard (lock_);
-  if (running_ && playing_) {
+  if (running_ && playing_ && seen_wishes_ == wishes_) {
     waiting_ = id;
     guard.unlock ();
     result = gst_clock_id_wait (id, nullptr);
@@ -106,6 +109,22 @@ CamSourceTicker::wait_until (GstClock *clock, GstClockTime time)
   }
   gst_clock_id_unref (id);
   return result == GST_CLOCK_OK || result == GST_CLOCK_EARLY;
+}
+
+/* A picture that is taken late has the time when it is taken. */
+void
+CamSourceTicker::asked_shot (GstClockTime time, GstClockTime now, bool may)
+{
+  if (!may) { /* cameras are busy with the shot before */
+    g_usleep (1000);
+    return;
+  }
+  {
+    std::lock_guard guard (lock_);
+    if (const auto it = std::ranges::find (asked_, time); it != asked_.end ())
+      asked_.erase (it);
+  }
+  actions_.fire (now + lead_ <= time + GST_MSECOND + lead_ / 2 ? time : now + lead_);
 }
 
 /* A tick is fired until half a period behind it; with what passed then, it is missed. */
@@ -124,15 +143,7 @@ CamSourceTicker::one_shot ()
     return;
   const bool may = actions_.may_fire ();
   if (only_when_asked_) {
-    if (!may) { /* cameras are busy with the shot before */
-      g_usleep (1000);
-      return;
-    }
-    {
-      std::lock_guard guard (lock_);
-      std::erase (asked_, time);
-    }
-    actions_.fire (MAX (time, base));
+    asked_shot (time, MAX (now, base), may);
     return;
   }
   const gint64 tick = rate_.at_or_after (static_cast<gint64> (time));
@@ -140,12 +151,14 @@ CamSourceTicker::one_shot ()
   {
     std::lock_guard guard (lock_);
     if (!paused_since_tick_)
-      missed_ += static_cast<guint64> (tick - last_tick_ - 1) + late;
+      missed_ += static_cast<guint64> (tick - last_tick_ - 1) + (late || !may);
     paused_since_tick_ = false;
     last_tick_ = tick;
   }
-  if (may && !late)
-    actions_.fire (time);
+  if (!may || late)
+    return;
+  last_shot_ns_ = g_get_monotonic_time () * 1000;
+  actions_.fire (time);
 }
 
 void

@@ -42,6 +42,8 @@ public:
   /** Fires at that time, at once if it has passed or is NONE. @return false: it does not run, or
    * too many wait */
   bool ask (GstClockTime time);
+  /** When it last fired, g_get_monotonic_time, ns; 0: never. */
+  [[nodiscard]] gint64 last_shot_ns () const { return last_shot_ns_; }
   /** Ticks that passed without a shot while the element played, since the first one. */
   [[nodiscard]] guint64 missed () const { return missed_; }
 
@@ -52,18 +54,22 @@ private:
   bool next_time (GstClock *clock, GstClockTime base, GstClockTime &time);
   bool wait_until (GstClock *clock, GstClockTime time);
   void one_shot ();
+  void asked_shot (GstClockTime time, GstClockTime now, bool may);
 
   GstElement *element_;
   rangecast::TickRate rate_;
   GstClockTime lead_ = 0;
   Actions actions_;
   std::atomic<guint64> missed_ = 0;
-  gint64 last_tick_ = -1; ///< the thread's
+  std::atomic<gint64> last_shot_ns_ = 0;
+  gint64 last_tick_ = -1;   ///< the thread's
+  guint64 seen_wishes_ = 0; ///< the thread's
 
   std::mutex lock_; /* guards what follows */
   std::condition_variable changed_;
   bool running_ = false, playing_ = false, paused_since_tick_ = true, only_when_asked_ = false;
   std::deque<GstClockTime> asked_;
+  guint64 wishes_ = 0; ///< calls of ask(): a wait that began before one is over
   GstClockID waiting_ = nullptr;
   std::thread thread_;
 };

@@ -246,6 +246,19 @@ open_clock (GstStereoCamSrc *self)
 }
 
 static bool
+prepare_pads (GstStereoCamSrc *self)
+{
+  CamSourceSettings settings;
+  CameraNames names;
+  if (!check_settings (self, settings, names))
+    return false;
+  add_third_pad (self, !names[2].empty (), gst_util_group_id_next ());
+  gst_element_no_more_pads (GST_ELEMENT (self));
+  return true;
+}
+
+/* The pads are active. */
+static bool
 start (GstStereoCamSrc *self)
 {
   CamSourceSession::Setup setup;
@@ -253,11 +266,15 @@ start (GstStereoCamSrc *self)
     return false;
   setup.element = GST_ELEMENT (self);
   setup.clock = self->priv->clock.clock ();
-  add_third_pad (self, !setup.names[2].empty (), gst_util_group_id_next ());
-  gst_element_no_more_pads (setup.element);
   setup.pads = self->priv->pads;
+  setup.names[2] = setup.pads.size () > 2 ? setup.names[2] : "";
   setup.previous = self->priv->current ();
   auto session = CamSourceSession::begin (std::move (setup));
+  if (!session) {
+    GST_ELEMENT_ERROR (
+        self, RESOURCE, FAILED, ("The system gives no thread for the cameras"), (nullptr));
+    return false;
+  }
   std::lock_guard guard (self->priv->lock);
   self->priv->session = std::move (session);
   return true;
@@ -286,7 +303,7 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
   auto self = GST_STEREO_CAM_SRC (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !open_clock (self))
     return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start (self))
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare_pads (self))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     self->priv->current ()->set_playing (false);
@@ -298,10 +315,10 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     remove_third_pad (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL)
     close (self);
-  if (result == GST_STATE_CHANGE_FAILURE) {
-    stop (self);
+  if (result == GST_STATE_CHANGE_FAILURE)
     return result;
-  }
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start (self))
+    return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
     self->priv->current ()->set_playing (true);
   const bool to_paused = transition == GST_STATE_CHANGE_READY_TO_PAUSED ||

@@ -346,6 +346,57 @@ GST_START_TEST (test_flush_goes_out_on_all_pads_and_pictures_go_on)
 }
 GST_END_TEST;
 
+/* The pipeline takes a new base time, so running time begins at 0 again. */
+GST_START_TEST (test_running_time_begins_anew_after_a_flush_that_resets_it)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=free-run");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 50));
+  gst_element_send_event (p.source (), gst_event_new_flush_start ());
+  gst_element_send_event (p.source (), gst_event_new_flush_stop (TRUE));
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  p.forget ();
+  gst_element_set_start_time (p.pipeline (), 0);
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 20));
+  const auto pictures = p.seen (0);
+  const GstClockTime step = pictures[19].pts - pictures[10].pts;
+  fail_unless (step > 5 * kPeriod, "9 pictures in %" G_GUINT64_FORMAT " ns", step);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstream_may_want_another_size_mid_stream)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  for (int side = 0; side < 2; side++) {
+    GstPad *pad = gst_element_get_static_pad (p.source (), kSides[side]);
+    GstPad *peer = gst_pad_get_peer (pad);
+    GstElement *filter = gst_pad_get_parent_element (peer);
+    GstCaps *caps = gst_caps_from_string ("video/x-raw,format=GRAY8,width=32,framerate=50/1");
+    g_object_set (filter, "caps", caps, nullptr);
+    gst_caps_unref (caps);
+    gst_object_unref (filter);
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+  }
+  GstPad *pad = gst_element_get_static_pad (p.source (), "right");
+  int width = 0;
+  for (int i = 0; i < 1000 && width != 32; i++, g_usleep (10000))
+    if (GstCaps *caps = gst_pad_get_current_caps (pad)) {
+      gst_structure_get_int (gst_caps_get_structure (caps, 0), "width", &width);
+      gst_caps_unref (caps);
+    }
+  fail_unless_equals_int (width, 32);
+  gst_object_unref (pad);
+  p.forget ();
+  fail_unless (p.wait_for_pictures (0, 10) && p.wait_for_pictures (1, 10));
+}
+GST_END_TEST;
+
 static Suite *
 stereocamsrc_suite ()
 {
@@ -370,6 +421,8 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_eos_event_ends_all_pads);
   tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);
   tcase_add_test (tc, test_flush_goes_out_on_all_pads_and_pictures_go_on);
+  tcase_add_test (tc, test_running_time_begins_anew_after_a_flush_that_resets_it);
+  tcase_add_test (tc, test_downstream_may_want_another_size_mid_stream);
   return suite;
 }
 

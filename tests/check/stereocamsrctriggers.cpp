@@ -69,6 +69,8 @@ GST_START_TEST (test_element_that_does_not_send_takes_what_another_fires)
     for (const SeenPicture &picture : taker.seen (side)) {
       fail_unless_equals_int (picture.mark.camera, side + 2);
       fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
+      const auto off = picture.mark.taken_ns - static_cast<std::int64_t> (picture.capture);
+      fail_unless (std::llabs (off) < kPeriod, "tick is off by %d us", int (off / 1000));
     }
 }
 GST_END_TEST;
@@ -107,6 +109,44 @@ GST_START_TEST (test_single_shots_come_only_when_asked_for)
     fail_unless_equals_int (int (p.seen (0).size ()), i);
   }
   expect_pairs (p, 2, 20 * GST_MSECOND);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_capture_is_one_picture_with_the_time_when_it_was_taken)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  p.play ();
+  capture_when_ready (p, GST_CLOCK_TIME_NONE);
+  fail_unless (p.wait_for_pictures (1, 1));
+  g_usleep (300000);
+  fail_unless (capture (p, gst_element_get_base_time (p.source ()) + 1)); /* long ago */
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (p.wait_for_pictures (0, 4) && p.wait_for_pictures (1, 4));
+  expect_pairs (p, 2, 20 * GST_MSECOND);
+  for (const SeenPicture &picture : p.seen (0)) {
+    const auto off = picture.mark.taken_ns - static_cast<std::int64_t> (picture.capture);
+    fail_unless (
+        off >= 0 && off < 200 * std::int64_t (GST_MSECOND), "off by %d us", int (off / 1000));
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_at_once_overtakes_one_that_waits)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  p.play ();
+  capture_when_ready (p, GST_CLOCK_TIME_NONE);
+  fail_unless (p.wait_for_pictures (1, 1));
+  GstClock *clock = gst_element_get_clock (p.source ());
+  fail_unless (capture (p, gst_clock_get_time (clock) + 3600 * GST_SECOND));
+  gst_object_unref (clock);
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (p.wait_for_pictures (0, 2));
 }
 GST_END_TEST;
 
@@ -152,7 +192,7 @@ GST_START_TEST (test_clock_of_a_server_is_provided_and_ticks_are_its_multiples)
   for (const SeenPicture &picture : p.seen (0)) {
     fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
     const auto ahead = static_cast<std::int64_t> (picture.capture) - picture.mark.taken_ns;
-    fail_unless (std::llabs (ahead - 3600 * std::int64_t (GST_SECOND)) < kPeriod,
+    fail_unless (std::llabs (ahead - 3600 * std::int64_t (GST_SECOND)) < std::int64_t (GST_SECOND),
         "ahead by %" G_GINT64_FORMAT " ns", ahead);
   }
   p.stop ();
@@ -183,6 +223,8 @@ stereocamsrctriggers_suite ()
   tcase_add_test (tc, test_scheduled_action_fires_at_the_tick_itself);
   tcase_add_test (tc, test_element_that_does_not_send_takes_what_another_fires);
   tcase_add_test (tc, test_single_shots_come_only_when_asked_for);
+  tcase_add_test (tc, test_each_capture_is_one_picture_with_the_time_when_it_was_taken);
+  tcase_add_test (tc, test_capture_at_once_overtakes_one_that_waits);
   tcase_add_test (tc, test_single_shot_has_the_time_that_was_asked_for);
   tcase_add_test (tc, test_clock_of_a_server_is_provided_and_ticks_are_its_multiples);
   tcase_add_test (tc, test_clock_server_that_never_answers_is_one_error);

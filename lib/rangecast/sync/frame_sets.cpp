@@ -2,7 +2,6 @@
 #include "frame_sets.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace rangecast {
 
@@ -15,19 +14,19 @@ FrameSets::start (int cameras, std::int64_t tolerance, int waiting)
   waiting_ = std::clamp (waiting, 1, kMostWaiting);
 }
 
-/* next() takes away what exceeds waiting_, so the ring has room. A frame that is rejected twice
- * without a next() between cannot be: the caller follows each put() with it. */
-void
+/* next() takes away what exceeds waiting_, so the ring has room. */
+FrameSets::Frame
 FrameSets::put (int camera, std::int64_t key, Frame frame)
 {
   Lane &lane = lanes_[camera];
   if (lane.count > waiting_ || (lane.has_last && key <= lane.last_key)) {
-    lane.rejected = frame;
-    return;
+    lane.dropped += frame != nullptr;
+    return frame;
   }
   lane.last_key = key;
   lane.has_last = true;
   lane.ring[(lane.first + lane.count++) % lane.ring.size ()] = {key, frame};
+  return nullptr;
 }
 
 void
@@ -70,12 +69,7 @@ FrameSets::next (Set &set)
   int longest = 0, oldest = 0;
   bool all = true;
   for (int c = 0; c < cameras_; c++) {
-    Lane &lane = lanes_[c];
-    if (lane.rejected) {
-      set.frames[c] = std::exchange (lane.rejected, nullptr);
-      lane.dropped++;
-      return Step::kDrop;
-    }
+    const Lane &lane = lanes_[c];
     all &= lane.count > 0;
     if (lane.count > lanes_[longest].count)
       longest = c;
@@ -106,10 +100,7 @@ FrameSets::take_rest (Set &set)
   set = {};
   Step step = Step::kWait;
   for (int c = 0; c < cameras_; c++)
-    if (lanes_[c].rejected) {
-      set.frames[c] = std::exchange (lanes_[c].rejected, nullptr);
-      step = Step::kDrop;
-    } else if (lanes_[c].count > 0) {
+    if (lanes_[c].count > 0) {
       take_head (c, set);
       step = Step::kDrop;
     }

@@ -9,8 +9,8 @@ namespace rangecast {
 inline constexpr int kMaxCameras = 3; ///< left, right, third
 
 /** Puts the frames of two or three cameras together that belong to one moment. A frame has a key:
- *  the number of its trigger, or its time. Keys of one camera grow; a frame whose key does not is
- *  one too many and comes back as dropped. What waits is bounded, nothing is allocated. */
+ *  the number of its trigger, or its time. Keys of one camera grow. What waits is bounded,
+ *  nothing is allocated. */
 class FrameSets {
 public:
   using Frame = void *; ///< the caller's; null: it was lost, its partners need not wait
@@ -31,9 +31,13 @@ public:
     kDrop, ///< frames (not null ones only) that will have no partner
   };
 
-  /** Follow it with next() until that says kWait. */
-  void put (int camera, std::int64_t key, Frame frame);
+  /** Follow it with next() until that says kWait.
+   *  @return null, or the frame itself if it is one too many: its key did not grow, or next() was
+   *  not called. It is the caller's again, and counted as dropped */
+  [[nodiscard]] Frame put (int camera, std::int64_t key, Frame frame);
   Step next (Set &set);
+  /** For keys that are times: from now on. */
+  void set_tolerance (std::int64_t tolerance) { tolerance_ = tolerance; }
   /** Everything that waits, one call after the other: to let it go. @return kDrop or kWait */
   Step take_rest (Set &set);
 
@@ -53,7 +57,6 @@ private:
     int first = 0, count = 0;
     std::int64_t last_key = 0;
     bool has_last = false;
-    Frame rejected = nullptr; ///< the key did not grow
     std::uint64_t dropped = 0;
   };
 
