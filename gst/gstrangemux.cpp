@@ -7,6 +7,9 @@
  * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
  * one that is gone, and takes it back when it returns. No pixel is copied.
  *
+ * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
+ * at the same time.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 rangemux name=m ! cylinderfilter ! plyenc ! multifilesink location=cloud-%05d.ply
@@ -26,6 +29,8 @@
 #include <mutex>
 #include <vector>
 
+#include "clockpublisher.hpp"
+
 using gstrange::RangeInfo;
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -33,7 +38,7 @@ using rangecast::StatusCode;
 GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
-enum { PROP_0, PROP_MAX_SKEW, PROP_STATS };
+enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_STATS };
 
 /* Capture times further than this from most others' are those of a clock that is not in step. */
 static constexpr GstClockTime kOutOfStep = 2 * GST_SECOND;
@@ -58,6 +63,8 @@ struct GstRangeMuxPrivate {
   MuxPads pads;
   GstClockTime max_skew = 0;
   guint64 frames = 0, complete = 0;
+
+  ClockPublisher clock; /* has locks of its own */
 
   /* streaming thread only */
   bool caps_dirty = true;
@@ -430,7 +437,46 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
   GST_ELEMENT_CLASS (gst_range_mux_parent_class)->release_pad (element, pad);
 }
 
+/* ---- the clock, for other hosts ---- */
+
+/* Posts its error itself. */
+static bool
+report_clock (GstRangeMux *self, const Status &status)
+{
+  if (status.ok ())
+    return true;
+  GST_ELEMENT_ERROR (self, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
+  return false;
+}
+
+static bool
+publish_clock (GstRangeMux *self)
+{
+  GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
+  const Status status = self->priv->clock.start (clock);
+  gst_clear_object (&clock);
+  if (self->priv->clock.port () != ClockPublisher::kOff)
+    g_object_notify (G_OBJECT (self), "clock-port"); /* 0 has become a number */
+  return report_clock (self, status);
+}
+
+/* The pipeline chooses its clock on the way to PLAYING, and perhaps another one later. */
+static gboolean
+gst_range_mux_set_clock (GstElement *element, GstClock *clock)
+{
+  auto self = GST_RANGE_MUX (element);
+  report_clock (self, self->priv->clock.use (clock));
+  return GST_ELEMENT_CLASS (gst_range_mux_parent_class)->set_clock (element, clock);
+}
+
 /* ---- life ---- */
+
+static gboolean
+gst_range_mux_stop (GstAggregator *aggregator)
+{
+  GST_RANGE_MUX (aggregator)->priv->clock.stop ();
+  return TRUE;
+}
 
 static gboolean
 gst_range_mux_start (GstAggregator *aggregator)
@@ -438,6 +484,8 @@ gst_range_mux_start (GstAggregator *aggregator)
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->caps_dirty = true;
   priv->frame_duration = priv->last_capture = priv->last_running = GST_CLOCK_TIME_NONE;
+  if (!publish_clock (GST_RANGE_MUX (aggregator)))
+    return FALSE;
   std::lock_guard guard (priv->lock);
   priv->frames = priv->complete = 0;
   for (const auto &entry : priv->pads) {
@@ -451,12 +499,17 @@ static void
 gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  if (id != PROP_MAX_SKEW) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
   std::lock_guard guard (priv->lock);
-  priv->max_skew = g_value_get_uint64 (value);
+  switch (id) {
+    case PROP_MAX_SKEW:
+      priv->max_skew = g_value_get_uint64 (value);
+      break;
+    case PROP_CLOCK_PORT:
+      priv->clock.set_port (g_value_get_int (value));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
 }
 
 static GstStructure *
@@ -490,6 +543,9 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
   switch (id) {
     case PROP_MAX_SKEW:
       g_value_set_uint64 (value, priv->max_skew);
+      break;
+    case PROP_CLOCK_PORT:
+      g_value_set_int (value, priv->clock.port ());
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
@@ -529,6 +585,12 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
           "frame period, or 5 ms where the frame rate is unknown)",
           0, G_MAXINT64, 0,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property (object_class, PROP_CLOCK_PORT,
+      g_param_spec_int ("clock-port", "Clock port",
+          "Publish the pipeline's clock on this UDP port, for GstNetClientClock on other hosts; -1 "
+          "= no, 0 = any free port, which can be read while not in READY (default -1)",
+          -1, 65535, ClockPublisher::kOff,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, complete, incomplete, dropped-late, out-of-step; and a "
@@ -544,8 +606,10 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
 
   element_class->request_new_pad = gst_range_mux_request_new_pad;
   element_class->release_pad = gst_range_mux_release_pad;
+  element_class->set_clock = gst_range_mux_set_clock;
 
   aggregator_class->start = gst_range_mux_start;
+  aggregator_class->stop = gst_range_mux_stop;
   aggregator_class->flush = gst_range_mux_flush;
   aggregator_class->sink_event = gst_range_mux_sink_event;
   aggregator_class->update_src_caps = gst_range_mux_update_src_caps;

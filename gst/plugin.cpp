@@ -12,6 +12,9 @@
 #define RANGECAST_ELEMENT(name) GST_ELEMENT_REGISTER_DECLARE (name)
 #include "rangecast-elements.h"
 #undef RANGECAST_ELEMENT
+#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
+GST_DEVICE_PROVIDER_REGISTER_DECLARE (rangecastdeviceprovider)
+#endif
 
 static gboolean
 plugin_init ([[maybe_unused]] GstPlugin *plugin)
@@ -20,6 +23,9 @@ plugin_init ([[maybe_unused]] GstPlugin *plugin)
 #define RANGECAST_ELEMENT(name) registered |= GST_ELEMENT_REGISTER (name, plugin);
 #include "rangecast-elements.h"
 #undef RANGECAST_ELEMENT
+#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
+  registered |= GST_DEVICE_PROVIDER_REGISTER (rangecastdeviceprovider, plugin);
+#endif
   return registered;
 }
 

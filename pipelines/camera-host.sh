@@ -12,15 +12,23 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --rig FILE      rig file with all views
   --input WHAT    avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
                   DIR: recorded pairs DIR/viewN-left.* and DIR/viewN-right.* (video files, or image
-                  sequences viewN-left-%05d.png from 0), which begin with the empty scene
+                  sequences viewN-left-%05d.png from 0), which begin with the empty scene;
+                  cameras: those that the rig names; cameras=LEFT,RIGHT[,THIRD]: these, by name,
+                  serial number or address
   --views N       number of views in the rig, for avatar (default 4)
-  --size WxH      picture size, for avatar (default 320x240)
-  --fps N         frames per second, for avatar and image sequences (default 15)
+  --size WxH      picture size, for avatar and cameras (default 320x240)
+  --fps N         frames per second, for avatar, cameras and image sequences (default 15)
+  --format WHAT   rgb (default), bayer or grey: pictures that the cameras send
+  --trigger HOW   free-run, software (default), hardware or action, for cameras
+  --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
+                  there (default: this machine's)
+  --reconnect     wait for cameras that are gone or not there yet, instead of ending
   --learn N       frames from which the background is learnt (default 20)
 END
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
+format=rgb trigger=software clock_server= reconnect=false
 while [ $# -gt 0 ]; do
   case "$1" in
     --view) view=${2:-}; shift ;;
@@ -31,6 +39,10 @@ while [ $# -gt 0 ]; do
     --size) size=${2:-}; shift ;;
     --fps) fps=${2:-}; shift ;;
     --learn) learn=${2:-}; shift ;;
+    --format) format=${2:-}; shift ;;
+    --trigger) trigger=${2:-}; shift ;;
+    --clock-server) clock_server=${2:-}; shift ;;
+    --reconnect) reconnect=true ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
@@ -41,6 +53,14 @@ need_number "$views" --views 1 64
 need_number "$fps" --fps 1 1000
 need_number "$learn" --learn 1 100000
 need_size "$size" --size
+case "$trigger" in
+  free-run | software | hardware | action) ;;
+  *) die "--trigger: expected free-run, software, hardware or action, got '$trigger'" ;;
+esac
+if [ -n "$clock_server" ]; then
+  split_address "$clock_server" --clock-server
+  [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs fire by this machine's clock"
+fi
 split_address "$to" --to
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
@@ -60,7 +80,37 @@ read_side () { # left|right
     ! decodebin ! videoconvert ! clocksync)
 }
 
+# Sets `cameras` to stereocamsrc and what leads from it.
+read_cameras () {
+  local name names side
+  cameras=(stereocamsrc name=cameras "trigger=$trigger" "reconnect=$reconnect")
+  [ -z "$clock_server" ] || cameras+=("clock-server=$clock_server")
+  if [ "$input" = cameras ]; then
+    cameras+=("rig=$rig" "view-id=$view")
+  else
+    IFS=, read -ra names <<<"${input#cameras=}"
+    [ ${#names[@]} -ge 2 ] && [ ${#names[@]} -le 3 ] ||
+      die "--input: expected cameras=LEFT,RIGHT or cameras=LEFT,RIGHT,THIRD, got '$input'"
+    for side in left right third; do
+      [ ${#names[@]} = 0 ] || cameras+=("$side=${names[0]}")
+      names=("${names[@]:1}")
+    done
+  fi
+  local pixels="width=${size%x*},height=${size#*x},framerate=$fps/1"
+  case "$format" in
+    rgb) pixels=("video/x-raw,format=RGB,$pixels") ;;
+    grey) pixels=("video/x-raw,format=GRAY8,$pixels") ;;
+    bayer) pixels=("video/x-bayer,$pixels" ! bayer2rgb) ;;
+    *) die "--format: expected rgb, bayer or grey, got '$format'" ;;
+  esac
+  for side in "$@"; do
+    cameras+=("cameras.$side" ! "${pixels[@]}" ! queue max-size-buffers=2 ! "depth.$side")
+  done
+}
+
 case "$input" in
+  cameras=*,*,*) read_cameras left right third ;;
+  cameras | cameras=*) read_cameras left right ;;
   avatar | avatar=*)
     caps="video/x-raw,format=RGBx,width=${size%x*},height=${size#*x},framerate=$fps/1"
     cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))")
@@ -68,7 +118,7 @@ case "$input" in
     cameras+=(cameras.left ! "$caps" ! queue max-size-buffers=2 ! depth.left
       cameras.right ! "$caps" ! queue max-size-buffers=2 ! depth.right) ;;
   *)
-    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL or a folder of recorded pairs"
+    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, cameras, cameras=LEFT,RIGHT or a folder of recorded pairs"
     read_side left
     cameras=("${side[@]}" ! queue ! depth.left)
     read_side right

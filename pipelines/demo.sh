@@ -12,8 +12,9 @@ absolute () { case "$1" in /*) echo "$1" ;; *) echo "$called_from/$1" ;; esac; }
 usage () {
   cat <<'END'
 usage: demo.sh [options]
-  --input WHAT  avatar (default), avatar=MODEL.glb, or a folder of recorded pairs with its rig.yaml
-                (see camera-host.sh --help)
+  --input WHAT  avatar (default), avatar=MODEL.glb, a folder of recorded pairs with its rig.yaml
+                (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
+                shows, made on this machine's loopback network by fake-cameras
   --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
   --size WxH    size of the camera pictures (default 320x240)
   --frames N    frame sets to render (default 150)
@@ -52,15 +53,44 @@ need_number "$port" --port 1024 65000
 [ -n "$out" ] || die "--out: expected a folder"
 out=$(absolute "$out")
 case "$input" in
-  avatar) ;;
+  avatar | cameras) ;;
   avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
   *) input=$(absolute "$input") ;;
 esac
 mkdir -p "$out/log" || die "--out: cannot make '$out'"
 
-# The rig: written by the test source, or recorded with the pictures.
+pids=()
+stop_hosts () {
+  [ ${#pids[@]} = 0 ] || kill -TERM "${pids[@]}" 2>/dev/null || true
+}
+trap stop_hosts EXIT
+declare -A names=()
+
+# Starts the cameras and waits until they are there; they write the rig. Two demos at a time have
+# ports of their own, and so do their cameras have addresses.
+start_fake_cameras () {
+  local i log=$out/log/fake-cameras.log
+  fake-cameras --views "$views" --size "$size" --fps "$fps" --rig-export "$rig" \
+    --address-base "127.$((port / 256)).$((port % 256)).1" >"$log" 2>&1 &
+  pids+=($!)
+  names[$!]=fake-cameras
+  for ((i = 0; i < 600; i++)); do
+    ! grep -q '^ready' "$log" || return 0
+    kill -0 "${pids[-1]}" 2>/dev/null || break
+    sleep 0.1
+  done
+  cat "$log" >&2
+  exit 1
+}
+
+# The rig: written by the test source or the fake cameras, or recorded with the pictures.
 rig=$out/rig.yaml
 case "$input" in
+  cameras)
+    views=${views:-4}
+    need_number "$views" --views 1 64
+    command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras was not built; it needs Aravis (libaravis-dev)"
+    start_fake_cameras ;;
   avatar | avatar=*)
     views=${views:-4}
     need_number "$views" --views 1 64
@@ -69,18 +99,12 @@ case "$input" in
     gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
       ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
   *)
-    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, or a folder with a rig.yaml"
+    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, cameras, or a folder with a rig.yaml"
     cp "$input/rig.yaml" "$rig"
     recorded_views=$(grep -c '^ *id:' "$rig" || true)
     views=${views:-$recorded_views}
     need_number "$views" --views 1 "$recorded_views" ;;
 esac
-
-pids=()
-stop_hosts () {
-  [ ${#pids[@]} = 0 ] || kill -TERM "${pids[@]}" 2>/dev/null || true
-}
-trap stop_hosts EXIT
 
 start () { # name command...
   local name=$1
@@ -90,12 +114,11 @@ start () { # name command...
   pids+=($!)
   names[$!]=$name
 }
-declare -A names=()
 
 # Recorded pictures must begin at the same clock time on all hosts.
 run_options=
 case "$input" in
-  avatar | avatar=*) ;;
+  avatar | avatar=* | cameras) ;;
   *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
@@ -120,7 +143,9 @@ while true; do
   wait -n -p ended "${pids[@]}" || status=$?
   [ "$ended" != "$viewer" ] || break
   if [ "$status" != 0 ]; then
-    echo "demo.sh: ${names[$ended]} failed:" >&2
+    why=failed
+    [ "$status" -le 128 ] || why="was killed by signal $((status - 128))"
+    echo "demo.sh: ${names[$ended]} $why:" >&2
     cat "$out/log/${names[$ended]}.log" >&2
     exit 1
   fi
@@ -130,6 +155,7 @@ while true; do
   done
   pids=("${left[@]}")
 done
+[ "$status" -le 128 ] || { echo "demo.sh: the viewer was killed by signal $((status - 128))" >&2; exit 1; }
 [ "$status" = 0 ] || { echo "demo.sh: the viewer failed" >&2; exit 1; }
 
 stop_hosts

@@ -29,6 +29,10 @@ done
 [ -f "$file" ] || die "no file '$file'"
 need_size "$size" --size
 
+# gst-launch-1.0 -e may wait for ever after an error that comes before the first picture.
+if [ -z "${RANGECAST_LAUNCH:-}" ] && command -v rangecast-run >/dev/null; then
+  RANGECAST_LAUNCH=rangecast-run
+fi
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")

@@ -91,6 +91,26 @@ TEST (Rig, yaml_and_json_files_round_trip)
   }
 }
 
+TEST (Rig, cameras_are_kept_in_files_even_if_their_serial_numbers_are_digits)
+{
+  Rig rig = stereo_rig ();
+  rig.views[1].camera = "0022301001";
+  rig.views[1].right->camera = "99999999999999999999";
+  rig.views[1].third->camera = "Acme-G \"5\"";
+  for (const char *name : {"cameras.yaml", "cameras.json"}) {
+    const std::string path = temporary (name);
+    ASSERT_TRUE (save_rig (path, rig).ok ());
+    Rig loaded;
+    const Status status = load_rig (path, loaded);
+    ASSERT_TRUE (status.ok ()) << status.message ();
+    EXPECT_EQ (loaded.views[0].camera, "");
+    EXPECT_EQ (loaded.views[1].camera, rig.views[1].camera);
+    EXPECT_EQ (loaded.views[1].right->camera, rig.views[1].right->camera);
+    EXPECT_EQ (loaded.views[1].third->camera, rig.views[1].third->camera);
+    std::filesystem::remove (path);
+  }
+}
+
 TEST (Rig, what_cannot_be_written_is_named)
 {
   EXPECT_NE (save_rig ("/nowhere/rig.yaml", stereo_rig ()).message ().find ("/nowhere/rig.yaml"),
@@ -201,6 +221,9 @@ TEST (Rig, message_of_a_bad_file_names_the_field)
   const std::string view = "%YAML:1.0\n---\nrangecast_rig: 1\nviews:\n  - id: ";
   EXPECT_NE (message_of_file (view + "0\n    image_size: [ 640.5, 480 ]\n")
                  .find ("views[0].image_size: expected whole numbers"),
+      std::string::npos);
+  EXPECT_NE (message_of_file (view + "0\n    camera: 22301001\n")
+                 .find ("views[0].camera: expected a text (a serial number stands in quotes)"),
       std::string::npos);
   EXPECT_NE (message_of_file (view + "99999999999999999999\n")
                  .find ("views[0].id: expected an integer from 0 to 63"),

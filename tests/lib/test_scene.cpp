@@ -218,6 +218,30 @@ TEST (Scene, test_small_obj_is_fitted_and_drawn)
   EXPECT_NEAR (depth.view ().at (160, 120), 8000, 40) << "a plane through the origin, 0.8 m away";
 }
 
+TEST (Scene, test_model_with_numbers_out_of_range_is_refused_by_name)
+{
+  const std::string path = ::testing::TempDir () + "wild-" + std::to_string (getpid ()) + ".obj";
+  for (const char *wild :
+      {"vt 1e30 0", "vt 0 -1e30", "vt nan 0", "vt 0 inf", "v 1e38 0 0", "v nan 0 0"}) {
+    std::ofstream (path) << "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nvt 0 0\nvt 1 1\n"
+                         << wild << "\nf 1/1 2/2 3/1\nf 1/1 3/2 4/1\nf -1/-1 2/2 3/-1\n";
+    SceneSettings settings;
+    settings.model = path;
+    std::unique_ptr<Scene> scene;
+    const Status status = Scene::create (settings, scene);
+    if (status.ok ()) { // the importer reads some of these words as 0
+      Image<Rgbx> colour (320, 240);
+      Image<std::uint16_t> depth (320, 240);
+      EXPECT_TRUE (
+          scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), depth.view (), {}).ok ());
+      EXPECT_TRUE (std::string (wild).find ("1e") == std::string::npos) << wild;
+    } else {
+      EXPECT_TRUE (status.message ().starts_with (path)) << status.message ();
+    }
+  }
+  std::filesystem::remove (path);
+}
+
 /* A folder with a square that faces view 0, as OBJ and as glTF, and a picture for it: red above,
  * blue below. Each format's v runs its own way; the picture's top belongs to the square's. */
 class TexturedSquare {

@@ -62,12 +62,36 @@ test_demo_plays_recorded_pairs () {
   check_picture demo/avatar.png
 }
 
+test_demo_takes_pictures_with_cameras () {
+  need_gl
+  command -v fake-cameras >/dev/null || skip "built without Aravis"
+  "$pipelines/demo.sh" --input cameras --views 2 --frames 15 --fps 6 --size 160x120 --out demo --port $((ports + 40))
+  check_report demo 15 2 1
+  check_picture demo/avatar.png
+}
+
 test_demo_says_what_is_wrong () {
   expect_error "--views" "$pipelines/demo.sh" --views 99 --out demo
   expect_error "--size" "$pipelines/demo.sh" --size big --out demo
   expect_error "rig.yaml" "$pipelines/demo.sh" --input nowhere --out demo
   echo "this is no model" >bad.glb
   expect_error "bad.glb" "$pipelines/demo.sh" --input avatar=bad.glb --out demo
+}
+
+test_demo_says_which_host_was_killed () {
+  need_gl
+  local log=demo.log i host
+  "$pipelines/demo.sh" --views 2 --frames 500 --fps 8 --size 160x120 --out demo --port $((ports + 50)) >"$log" 2>&1 &
+  local demo=$!
+  for ((i = 0; i < 300; i++)); do
+    host=$(pgrep -P "$demo" -f "rangecast-run .*view-id=1" || true)
+    [ -z "$host" ] || break
+    sleep 0.2
+  done
+  sleep 1
+  kill -KILL $host
+  ! wait "$demo" || fail "the demo went on: $(cat "$log")"
+  grep -qF "camera1 was killed by signal 9" "$log" || fail "$(cat "$log")"
 }
 
 test_demo_says_when_a_port_is_in_use () {

@@ -43,6 +43,12 @@ test_recording_plays_to_a_film () {
   expect_file film.webm 1000
 }
 
+test_what_is_no_recording_is_an_error_and_no_film () {
+  need_gl
+  echo "this is no recording" >text.txt
+  expect_error "No access unit found" "$pipelines/play.sh" text.txt --film film.webm
+}
+
 test_rgbd_pictures_become_a_point_cloud () {
   need_data open3d_rgbd/depth
   "$pipelines/rgbd-to-ply.sh" "$(find "$data/open3d_rgbd/color" -name '*.jpg' | sort | head -n 1)" \

@@ -76,6 +76,8 @@ check_partner (const View &view, const std::optional<PartnerCamera> &partner, co
   if (!partner)
     return {};
   const std::string prefix = std::string (name) + ".";
+  if (partner->camera.size () > kMaxViewName)
+    return bad_field (view, prefix + "camera is longer than 255 bytes");
   if (Status s = check_lens (view, partner->intrinsics, partner->distortion, prefix); !s.ok ())
     return s;
   if (Status s = check_pose (view, partner->partner_from_left, prefix + "partner_from_left");
@@ -94,6 +96,8 @@ check_view (const View &view)
                                        std::to_string (kMaxViews - 1)};
   if (view.name.size () > kMaxViewName)
     return bad_field (view, "name is longer than 255 bytes");
+  if (view.camera.size () > kMaxViewName)
+    return bad_field (view, "camera is longer than 255 bytes");
   if (view.width < 1 || view.height < 1 || view.width > kMaxImageSide ||
       view.height > kMaxImageSide)
     return bad_field (view, "image size " + size_text (view.width, view.height) +

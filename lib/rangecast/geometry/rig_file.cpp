@@ -68,6 +68,18 @@ read_lens (const cv::FileNode &node, Intrinsics &intrinsics, Distortion &distort
     distortion = numbers (node["distortion"], "distortion", 0);
 }
 
+/** A serial number without quotes is a number to YAML, which may have lost digits of it. */
+std::string
+read_camera (const cv::FileNode &parent)
+{
+  const cv::FileNode node = parent["camera"];
+  if (node.empty ())
+    return {};
+  if (!node.isString ())
+    throw BadFile{"camera: expected a text (a serial number stands in quotes)"};
+  return node.string ();
+}
+
 std::optional<PartnerCamera>
 read_partner (const cv::FileNode &parent, const char *name)
 {
@@ -77,6 +89,7 @@ read_partner (const cv::FileNode &parent, const char *name)
   if (!node.isMap ())
     throw BadFile{std::string (name) + ": expected a map"};
   PartnerCamera partner;
+  partner.camera = read_camera (node);
   read_lens (node, partner.intrinsics, partner.distortion);
   partner.partner_from_left = read_pose (node, "partner_from_left");
   return partner;
@@ -95,6 +108,7 @@ read_view (const cv::FileNode &node)
   view.id = static_cast<int> (id);
   if (node["name"].isString ())
     view.name = node["name"].string ();
+  view.camera = read_camera (node);
   const auto size = numbers (node["image_size"], "image_size", 2);
   for (double side : size)
     if (!(side >= 1 && side <= kMaxImageSide && side == std::floor (side)))
@@ -166,11 +180,19 @@ write_lens (cv::FileStorage &file, const Intrinsics &k, const Distortion &distor
 }
 
 void
+write_camera (cv::FileStorage &file, const std::string &camera)
+{
+  if (!camera.empty ())
+    file << "camera" << camera;
+}
+
+void
 write_partner (cv::FileStorage &file, const char *name, const std::optional<PartnerCamera> &partner)
 {
   if (!partner)
     return;
   file.startWriteStruct (name, cv::FileNode::MAP);
+  write_camera (file, partner->camera);
   write_lens (file, partner->intrinsics, partner->distortion);
   write_pose (file, "partner_from_left", partner->partner_from_left);
   file.endWriteStruct ();
@@ -184,6 +206,7 @@ write_view (cv::FileStorage &file, const View &view)
   file << "id" << view.id;
   if (!view.name.empty ())
     file << "name" << view.name;
+  write_camera (file, view.camera);
   write_numbers (file, "image_size", size);
   write_lens (file, view.intrinsics, view.distortion);
   write_pose (file, "world_from_view", view.world_from_view);

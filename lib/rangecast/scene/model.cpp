@@ -8,6 +8,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -23,6 +24,32 @@ namespace {
 
 /* More than any scan that a software rasteriser could draw live. */
 constexpr std::size_t kMaxVertices = 4'000'000;
+
+/* Positions and texture coordinates that the rasteriser's arithmetic can hold: far more than any
+ * scan, in any unit, needs. */
+constexpr float kMaxPosition = 1e9f, kMaxTextureCoordinate = 1e4f;
+
+bool
+is_within (float value, float limit)
+{
+  return std::abs (value) <= limit; /* false for NaN */
+}
+
+bool
+is_drawable (const Mesh &mesh)
+{
+  const auto vertex_ok = [] (const MeshVertex &v) {
+    return is_within (v.x, kMaxPosition) && is_within (v.y, kMaxPosition) &&
+           is_within (v.z, kMaxPosition) && is_within (v.u, kMaxTextureCoordinate) &&
+           is_within (v.v, kMaxTextureCoordinate);
+  };
+  const auto triangle_ok = [&] (const auto &triangle) {
+    return std::ranges::all_of (
+        triangle, [&] (std::uint32_t index) { return index < mesh.vertices.size (); });
+  };
+  return std::ranges::all_of (mesh.vertices, vertex_ok) &&
+         std::ranges::all_of (mesh.triangles, triangle_ok);
+}
 
 void
 add_mesh (const aiMesh &from, Mesh &mesh)
@@ -180,6 +207,10 @@ load_model (const std::string &path, const std::string &texture, bool flip, Mesh
     }
     if (loaded.triangles.empty ())
       return {StatusCode::kBadData, path + ": a model without triangles"};
+    if (!is_drawable (loaded))
+      return {StatusCode::kBadData, path + ": a position, texture coordinate or index is out of "
+                                           "range; expected finite positions below 1e9 and texture "
+                                           "coordinates below 1e4"};
     if (Status s = take_texture (*scene, path, texture, loaded); !s.ok ())
       return s;
     if (flip)

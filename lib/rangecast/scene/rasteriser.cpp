@@ -76,10 +76,10 @@ level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, 
   const ImageView<const Rgbx> full = texture.level (0);
   const float texels = std::abs ((b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v)) *
                        static_cast<float> (full.width) * static_cast<float> (full.height);
-  if (texels <= area)
+  if (!(texels > area))
     return 0;
-  return std::min (
-      static_cast<int> (0.5f * std::log2 (texels / area) + 0.5f), texture.levels () - 1);
+  const auto last = static_cast<float> (texture.levels () - 1);
+  return static_cast<int> (std::min (0.5f * std::log2 (texels / area) + 0.5f, last));
 }
 
 void

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "foundcamera.hpp"
+
+namespace rangecast {
+
+/** A view of a known rig whose cameras are all there. */
+struct KnownPair {
+  std::string rig_path;
+  int view_id = 0;
+  std::array<std::string, 3> cameras; ///< left, right, third as the rig names them; third may be ""
+  std::string display_name;           ///< for people
+
+  bool operator== (const KnownPair &) const = default;
+};
+
+/** Where rig files are looked for, in this order: what RANGECAST_RIG_PATH lists (files and folders,
+ *  parted by ':'), then rangecast/rigs in the user's and in the system's configuration folders
+ *  (XDG). @return the files that end in .yaml, .yml or .json, each once */
+std::vector<std::string> known_rig_files ();
+
+/** The pairs, among the views of these rig files, whose cameras are among `found`. Files that
+ * cannot be read are left out: `problems` then has one line for each, as load_rig() words it. */
+std::vector<KnownPair> known_pairs (const std::vector<std::string> &files,
+    const FoundCameras &found, std::vector<std::string> &problems);
+
+} // namespace rangecast

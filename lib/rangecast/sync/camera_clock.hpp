@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace rangecast {
+
+/** Puts the time stamps of a camera that runs by its own clock on the host's clock: the least delay
+ *  between stamp and arrival within the last windows is taken for the way of a frame that nothing
+ *  held up. Jitter of the host and of the network then shifts nothing, and the drift of
+ *  the camera's clock (100 ppm are 1 ms in 10 s) is followed. One a camera; nothing is allocated.
+ */
+class CameraClock {
+public:
+  void forget () { *this = {}; }
+
+  /** When the picture was taken, or as long after as the shortest way takes, ns of the host's
+   * clock.
+   *  @param camera_ns  the camera's time stamp; 0: it has none, then this is the arrival
+   *  @param arrival_ns on the host's clock */
+  std::int64_t host_time (std::int64_t camera_ns, std::int64_t arrival_ns);
+
+private:
+  static constexpr int kWindows = 4, kWindowFrames = 64;
+
+  void begin (std::int64_t delay);
+  [[nodiscard]] std::int64_t least () const;
+
+  std::array<std::int64_t, kWindows> least_{}; ///< delay of each window
+  int windows_ = 0, current_ = 0, in_window_ = 0;
+  std::int64_t last_camera_ns_ = 0;
+};
+
+/** The last few values of something, for its median and its tail. Nothing is allocated. */
+class RecentValues {
+public:
+  static constexpr std::size_t kMost = 512;
+
+  void forget () { count_ = 0; }
+  void add (std::int64_t value) { values_[count_++ % kMost] = value; }
+  [[nodiscard]] bool empty () const { return count_ == 0; }
+  /** Nearest rank. @param share  0 to 1 @return 0 if there are no values */
+  [[nodiscard]] std::int64_t quantile (double share) const;
+
+private:
+  std::array<std::int64_t, kMost> values_{};
+  std::uint64_t count_ = 0;
+};
+
+} // namespace rangecast

@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Stereo cameras round avatartestsrc's person, as GigE Vision cameras on this machine's network:
+ * for programs that want cameras where there are none. */
+#include <arpa/inet.h>
+#include <glib-unix.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <rangecast/geometry/rig.hpp>
+#include <rangecast/scene/scene.hpp>
+#include <string>
+#include <vector>
+
+#include "fake-camera-options.hpp"
+#include "gige-camera.hpp"
+#include "gige-listener.hpp"
+#include "scene-pictures.hpp"
+
+using rangecast::SceneCamera;
+using rangecast::Status;
+using rangecast::StatusCode;
+
+/* One stereo camera of the rig. */
+struct ViewCameras {
+  std::unique_ptr<EmptyPhase> empty;
+  std::vector<GigeCamera *> wired; /* fired by the left camera's output line */
+};
+
+/* When each picture was taken, for whoever judges how well cameras agree. Any thread. */
+class ExposureLog {
+public:
+  Status open (const std::string &path)
+  {
+    if (path.empty ())
+      return {};
+    file_.open (path);
+    return file_ ? Status () : Status (StatusCode::kBadValue, "--log: cannot write '" + path + "'");
+  }
+  /* In time of day: it is the same in all time namespaces. */
+  void add (const std::string &serial, std::uint16_t block_id, std::int64_t monotonic_ns)
+  {
+    if (!file_.is_open ())
+      return;
+    const std::int64_t ago_ns = g_get_monotonic_time () * 1000 - monotonic_ns,
+                       time_ns = g_get_real_time () * 1000 - ago_ns;
+    std::lock_guard guard (lock_);
+    file_ << serial << ' ' << block_id << ' ' << time_ns << std::endl;
+  }
+
+private:
+  std::mutex lock_;
+  std::ofstream file_;
+};
+
+class FakeRig {
+public:
+  Status create (const FakeCameraOptions &options);
+  void print () const;
+  ~FakeRig () { listener_.reset (); /* it speaks of the cameras */ }
+
+private:
+  Status add_camera (const FakeCameraOptions &options, int view, SceneCamera camera);
+  Status export_rig (const FakeCameraOptions &options) const;
+  GigeCamera::Scenery scenery_for (int view, SceneCamera camera, std::shared_ptr<ScenePictures> of);
+
+  std::shared_ptr<rangecast::Scene> scene_;
+  std::unique_ptr<Moments> moments_;
+  ExposureLog log_;
+  std::vector<ViewCameras> views_;
+  std::vector<std::unique_ptr<GigeCamera>> cameras_;
+  std::unique_ptr<GigeListener> listener_;
+};
+
+static const char *
+side_name (SceneCamera camera)
+{
+  return camera == SceneCamera::kLeft ? "left" : camera == SceneCamera::kRight ? "right" : "third";
+}
+
+static std::string
+serial_of (int view, SceneCamera camera)
+{
+  return "view" + std::to_string (view) + "-" + side_name (camera);
+}
+
+/* The address of the rig's nth camera, whether or not it is served here. */
+static std::string
+address_of (const FakeCameraOptions &options, int view, SceneCamera camera)
+{
+  const int per_view = options.third ? 3 : 2;
+  in_addr address{htonl (options.address_base + std::uint32_t (view * per_view + int (camera)))};
+  char text[INET_ADDRSTRLEN] = "";
+  inet_ntop (AF_INET, &address, text, sizeof text);
+  return text;
+}
+
+GigeCamera::Scenery
+FakeRig::scenery_for (int view, SceneCamera camera, std::shared_ptr<ScenePictures> pictures)
+{
+  ViewCameras &cameras = views_[std::size_t (view)];
+  GigeCamera::Scenery scenery;
+  scenery.moment = [this] (std::int64_t now_ns) { return moments_->at (now_ns); };
+  scenery.acquisition = [&cameras] (bool running) {
+    running ? cameras.empty->camera_starts () : cameras.empty->camera_stops ();
+  };
+  scenery.paint = [&cameras, pictures] (std::int64_t moment_ns, std::uint32_t format,
+                      const SensorRegion &region, std::span<std::uint8_t> out) {
+    const Status s =
+        pictures->paint (moment_ns, cameras.empty->at (moment_ns), format, region, out);
+    if (!s.ok ())
+      g_printerr ("fake-cameras: %s\n", s.message ().c_str ());
+  };
+  scenery.exposed = [this, &cameras, camera, serial = serial_of (view, camera)] (
+                        std::uint16_t block_id, std::int64_t time_ns) {
+    log_.add (serial, block_id, time_ns);
+    if (camera == SceneCamera::kLeft)
+      for (GigeCamera *other : cameras.wired)
+        other->line_rises ();
+  };
+  return scenery;
+}
+
+Status
+FakeRig::add_camera (const FakeCameraOptions &options, int view, SceneCamera camera)
+{
+  GigeCameraSettings settings = options.camera;
+  settings.serial = serial_of (view, camera);
+  settings.address = address_of (options, view, camera);
+  settings.seed = std::uint32_t (view * 3 + int (camera) + 1);
+  const auto period_ns = std::int64_t (1e9 / settings.fps);
+  auto pictures = std::make_shared<ScenePictures> (scene_, view, camera, period_ns, options.loop);
+  const SensorRegion all = {0, 0, settings.width, settings.height};
+  if (Status s = pictures->prepare (settings.pixel_format, all); !s.ok ())
+    return s;
+  std::unique_ptr<GigeCamera> made;
+  if (Status s = GigeCamera::create (settings, scenery_for (view, camera, pictures), made);
+      !s.ok ())
+    return s;
+  if (camera != SceneCamera::kLeft)
+    views_[std::size_t (view)].wired.push_back (made.get ());
+  cameras_.push_back (std::move (made));
+  return {};
+}
+
+Status
+FakeRig::export_rig (const FakeCameraOptions &options) const
+{
+  if (options.rig_export.empty ())
+    return {};
+  rangecast::Rig rig = scene_->rig ();
+  for (rangecast::View &view : rig.views) {
+    view.camera = address_of (options, view.id, SceneCamera::kLeft);
+    view.right->camera = address_of (options, view.id, SceneCamera::kRight);
+    if (options.third)
+      view.third->camera = address_of (options, view.id, SceneCamera::kThird);
+    else
+      view.third.reset ();
+  }
+  return rangecast::save_rig (options.rig_export, rig);
+}
+
+Status
+FakeRig::create (const FakeCameraOptions &options)
+{
+  std::unique_ptr<rangecast::Scene> scene;
+  if (Status s = rangecast::Scene::create (options.scene, scene); !s.ok ())
+    return s;
+  if (Status s = log_.open (options.log); !s.ok ())
+    return s;
+  scene_ = std::move (scene);
+  const auto period_ns = std::int64_t (1e9 / options.camera.fps);
+  moments_ = std::make_unique<Moments> (period_ns);
+  views_.resize (std::size_t (options.scene.views));
+  for (int view = 0; view < options.scene.views; view++) {
+    views_[std::size_t (view)].empty =
+        std::make_unique<EmptyPhase> (period_ns, options.empty_frames);
+    for (SceneCamera camera : {SceneCamera::kLeft, SceneCamera::kRight, SceneCamera::kThird})
+      if ((camera != SceneCamera::kThird || options.third) &&
+          options.serves (serial_of (view, camera)))
+        if (Status s = add_camera (options, view, camera); !s.ok ())
+          return s;
+  }
+  if (cameras_.empty ())
+    return {StatusCode::kBadValue,
+        "--only: expected names such as view0-left, got '" + options.only + "'"};
+  if (Status s = export_rig (options); !s.ok ())
+    return s;
+  for (const auto &camera : cameras_)
+    camera->start ();
+  listener_ = std::make_unique<GigeListener> (cameras_);
+  listener_->start ();
+  return {};
+}
+
+void
+FakeRig::print () const
+{
+  for (const auto &camera : cameras_)
+    g_print ("%s %s\n", camera->settings ().serial.c_str (), camera->settings ().address.c_str ());
+  g_print ("ready\n");
+}
+
+static gboolean
+quit (gpointer loop)
+{
+  g_main_loop_quit (static_cast<GMainLoop *> (loop));
+  return G_SOURCE_CONTINUE;
+}
+
+int
+main (int argc, char **argv)
+{
+  FakeCameraOptions options;
+  if (const int status = read_fake_camera_options (argc, argv, options); status >= 0)
+    return status;
+  FakeRig rig;
+  if (Status s = rig.create (options); !s.ok ()) {
+    g_printerr ("fake-cameras: %s\n", s.message ().c_str ());
+    return EXIT_FAILURE;
+  }
+  rig.print ();
+  std::fflush (stdout);
+  GMainLoop *loop = g_main_loop_new (nullptr, FALSE);
+  g_unix_signal_add (SIGINT, quit, loop);
+  g_unix_signal_add (SIGTERM, quit, loop);
+  g_main_loop_run (loop);
+  g_main_loop_unref (loop);
+  return EXIT_SUCCESS;
+}

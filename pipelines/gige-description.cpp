@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "gige-description.hpp"
+
+#include <glib/gstdio.h>
+#include <unistd.h>
+
+#include "gige-packets.hpp"
+
+static std::string
+hex (std::uint32_t value)
+{
+  gchar text[16];
+  g_snprintf (text, sizeof text, "0x%x", value);
+  return text;
+}
+
+static std::string
+register_node (const std::string &name, std::uint32_t address)
+{
+  return "<IntReg Name=\"" + name + "\" NameSpace=\"Custom\"><Address>" + hex (address) +
+         "</Address><Length>4</Length><AccessMode>RW</AccessMode><pPort>Device</pPort>"
+         "<Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n";
+}
+
+/* Bit 0 is the highest one. */
+static std::string
+bit_node (const std::string &name, std::uint32_t address, int bit)
+{
+  return "<MaskedIntReg Name=\"" + name + "\" NameSpace=\"Custom\"><Address>" + hex (address) +
+         "</Address><Length>4</Length><AccessMode>RW</AccessMode><pPort>Device</pPort><Bit>" +
+         std::to_string (bit) +
+         "</Bit><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></MaskedIntReg>\n";
+}
+
+static std::string
+integer_node (const std::string &name, std::uint32_t address)
+{
+  return "<Integer Name=\"" + name + "\" NameSpace=\"Standard\"><pValue>" + name +
+         "Register</pValue><Min>0</Min><Max>4294967295</Max></Integer>\n" +
+         register_node (name + "Register", address);
+}
+
+static std::string
+entry (const std::string &name, std::uint32_t value)
+{
+  return "<EnumEntry Name=\"" + name + "\" NameSpace=\"Standard\"><Value>" +
+         std::to_string (value) + "</Value></EnumEntry>\n";
+}
+
+static std::string
+enumeration_node (const std::string &name, std::uint32_t address, const std::string &entries)
+{
+  return "<Enumeration Name=\"" + name + "\" NameSpace=\"Standard\">" + entries + "<pValue>" +
+         name + "Register</pValue></Enumeration>\n" + register_node (name + "Register", address);
+}
+
+/* The output line is wired and on, whatever these say. */
+static std::string
+line_features ()
+{
+  return enumeration_node ("LineSelector", 0x410, entry ("Line1", 1) + entry ("Line2", 2)) +
+         enumeration_node ("LineMode", 0x414, entry ("Input", 0) + entry ("Output", 1)) +
+         enumeration_node ("LineSource", 0x418, entry ("Off", 0) + entry ("ExposureActive", 1));
+}
+
+/* They can be set and read; the pictures stay the same. */
+static std::string
+look_features ()
+{
+  const std::string modes = entry ("Off", 0) + entry ("Once", 1) + entry ("Continuous", 2);
+  return enumeration_node ("ExposureAuto", 0x420, modes) +
+         enumeration_node ("BalanceWhiteAuto", 0x424, modes);
+}
+
+static std::string
+more_features ()
+{
+  return line_features () + look_features () +
+         integer_node ("ActionDeviceKey", kRegisterActionDeviceKey) +
+         integer_node ("ActionGroupKey", kRegisterActionGroupKey) +
+         integer_node ("ActionGroupMask", kRegisterActionGroupMask) +
+         "<Boolean Name=\"PtpEnable\" NameSpace=\"Standard\"><pValue>PtpEnableRegister</pValue>"
+         "<OnValue>1</OnValue><OffValue>0</OffValue></Boolean>\n" +
+         register_node ("PtpEnableRegister", kRegisterPtpEnable) +
+         enumeration_node ("PtpStatus", kRegisterPtpStatus,
+             entry ("Disabled", kPtpDisabled) + entry ("Slave", kPtpSlave)) +
+         "<Boolean Name=\"GevSCPSFireTestPacket\" NameSpace=\"Standard\">"
+         "<pValue>FireTestPacketRegister</pValue><OnValue>1</OnValue><OffValue>0</OffValue>"
+         "</Boolean>\n" +
+         bit_node ("FireTestPacketRegister", kRegisterPacketSize, 0) +
+         "<Boolean Name=\"GevSCPSDoNotFragment\" NameSpace=\"Standard\">"
+         "<pValue>DoNotFragmentRegister</pValue><OnValue>1</OnValue><OffValue>0</OffValue>"
+         "</Boolean>\n" +
+         bit_node ("DoNotFragmentRegister", kRegisterPacketSize, 1);
+}
+
+/* Puts text before the first `mark` behind `from`. */
+static void
+insert (std::string &xml, const std::string &from, const std::string &mark, const std::string &text)
+{
+  const std::size_t at = xml.find (from);
+  const std::size_t before = at == xml.npos ? at : xml.find (mark, at + from.size ());
+  if (before != xml.npos)
+    xml.insert (before, text);
+}
+
+static std::string
+description ()
+{
+  ArvFakeCamera *plain = arv_fake_camera_new ("plain");
+  size_t size = 0;
+  const char *text = arv_fake_camera_get_genicam_xml (plain, &size);
+  std::string xml (text, size);
+  g_object_unref (plain);
+  insert (xml, "<Enumeration Name=\"TriggerSource\"", "<EnumEntry",
+      entry ("Action1", kTriggerByAction) + entry ("Line1", kTriggerByLine1));
+  insert (xml, "<Category Name=\"TransportLayerControl\"", "<pFeature",
+      "<pFeature>PtpEnable</pFeature><pFeature>PtpStatus</pFeature>"
+      "<pFeature>ActionDeviceKey</pFeature><pFeature>ActionGroupKey</pFeature>"
+      "<pFeature>ActionGroupMask</pFeature>\n");
+  insert (
+      xml, "<Category Name=\"TransportLayerControl\"", "<Port Name=\"Device\"", more_features ());
+  return xml;
+}
+
+ArvFakeCamera *
+make_fake_camera (const std::string &serial)
+{
+  static const std::string xml = description ();
+  gchar *path = nullptr;
+  const int file = g_file_open_tmp ("fake-camera-XXXXXX.xml", &path, nullptr);
+  const bool written = file >= 0 && write (file, xml.data (), xml.size ()) == ssize_t (xml.size ());
+  ArvFakeCamera *camera = arv_fake_camera_new_full (serial.c_str (), written ? path : nullptr);
+  if (file >= 0) {
+    close (file);
+    g_unlink (path);
+  }
+  g_free (path);
+  return camera;
+}

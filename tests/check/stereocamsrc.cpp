@@ -1,0 +1,429 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* stereocamsrc: pairs, pads, formats, life. */
+#include <set>
+
+#include "stereocam-check.hpp"
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static constexpr std::int64_t kPeriod = GST_SECOND / 50;
+
+/* ---- pairs ---- */
+
+GST_START_TEST (test_software_pairs_share_pts_and_capture_time_on_ticks)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software num-buffers=50");
+  p.play_to_the_end ();
+  expect_pairs (p, 2, kPeriod / 2);
+  const GstClockTime base = gst_element_get_base_time (p.source ());
+  fail_unless_equals_int (int (p.seen (0).size ()), 50);
+  for (const SeenPicture &picture : p.seen (0)) {
+    fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
+    fail_unless_equals_uint64 (picture.pts, picture.capture - base);
+    fail_unless_equals_uint64 (picture.duration, kPeriod);
+    /* the system clock is CLOCK_MONOTONIC: it was taken after its tick */
+    fail_unless (picture.mark.taken_ns >= static_cast<std::int64_t> (picture.capture));
+  }
+  fail_unless_equals_uint64 (p.stat ("sets"), 50);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_third_camera_belongs_to_the_set)
+{
+  TestCameras cameras (3);
+  CameraPipeline p ("trigger=software num-buffers=30", 3);
+  p.play_to_the_end ();
+  expect_pairs (p, 3, kPeriod / 2);
+  fail_unless_equals_int (int (p.seen (2).size ()), 30);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_third_pad_is_there_only_while_its_camera_is_named)
+{
+  TestCameras cameras (3);
+  CameraPipeline p ("trigger=software", 2);
+  g_object_set (p.source (), "third", camera_address (2).c_str (), nullptr);
+  fail_unless (gst_element_get_static_pad (p.source (), "third") == nullptr);
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  GstPad *pad = gst_element_get_static_pad (p.source (), "third");
+  fail_unless (pad != nullptr);
+  gst_object_unref (pad);
+  gst_element_set_state (p.pipeline (), GST_STATE_READY);
+  fail_unless (gst_element_get_static_pad (p.source (), "third") == nullptr);
+}
+GST_END_TEST;
+
+/* Every picture comes in one of the few buffers that the camera's stream has. */
+GST_START_TEST (test_pixels_are_not_copied)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software num-buffers=60 buffers=4");
+  p.play_to_the_end ();
+  for (int side = 0; side < 2; side++) {
+    std::set<const void *> memories;
+    for (const SeenPicture &picture : p.seen (side))
+      memories.insert (picture.memory);
+    fail_unless (memories.size () <= 4, "%d buffers", int (memories.size ()));
+  }
+}
+GST_END_TEST;
+
+/* ---- formats ---- */
+
+static GstCaps *
+caps_after_one_pair (const char *properties, const char *wanted)
+{
+  CameraPipeline p (std::string ("trigger=software num-buffers=1 ") + properties, 2, wanted);
+  p.play_to_the_end ();
+  GstPad *pad = gst_element_get_static_pad (p.source (), "right");
+  GstCaps *caps = gst_pad_get_current_caps (pad);
+  gst_object_unref (pad);
+  fail_unless (caps != nullptr);
+  return caps;
+}
+
+static void
+expect_caps (const char *properties, const char *wanted, const char *expected)
+{
+  GstCaps *caps = caps_after_one_pair (properties, wanted), *text = gst_caps_from_string (expected);
+  fail_unless (gst_caps_is_subset (caps, text), "%" GST_PTR_FORMAT, caps);
+  gst_caps_unref (caps);
+  gst_caps_unref (text);
+}
+
+GST_START_TEST (test_downstream_chooses_format_size_and_rate)
+{
+  TestCameras cameras;
+  expect_caps ("", "video/x-raw,format=RGB,framerate=25/1",
+      "video/x-raw,format=RGB,width=64,height=48,framerate=25/1");
+  expect_caps (
+      "", "video/x-raw,width=32,height=16", "video/x-raw,width=32,height=16,framerate=30/1");
+  expect_caps ("", "video/x-bayer,format=rggb", "video/x-bayer,format=rggb,width=64");
+  expect_caps ("format=BayerGB8", "ANY", "video/x-bayer,format=gbrg");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_formats_that_nobody_has_are_one_error_that_lists_the_cameras)
+{
+  TestCameras cameras;
+  {
+    CameraPipeline p ("trigger=software", 2, "video/x-raw,width=31");
+    p.play ();
+    const std::string text = p.next_text (GST_MESSAGE_ERROR);
+    fail_unless (text.find ("GRAY8") != std::string::npos, "%s", text.c_str ());
+  }
+  CameraPipeline p ("trigger=software format=Mono12Packed", 2, "ANY");
+  p.play ();
+  const std::string text = p.next_text (GST_MESSAGE_ERROR);
+  fail_unless (text.find ("Mono12Packed") != std::string::npos, "%s", text.c_str ());
+  fail_unless (text.find ("Mono8") != std::string::npos, "%s", text.c_str ());
+}
+GST_END_TEST;
+
+/* ---- which cameras ---- */
+
+static std::string
+write_rig (bool with_names)
+{
+  Rig rig = ring_rig (1, 64, 48);
+  PartnerCamera right;
+  right.intrinsics = rig.views[0].intrinsics;
+  right.partner_from_left.translation.x = -0.1;
+  if (with_names) {
+    rig.views[0].camera = camera_address (0);
+    right.camera = camera_address (1);
+  }
+  rig.views[0].right = right;
+  const std::string path =
+      std::string (g_get_tmp_dir ()) + "/rangecast-cameras-" + std::to_string (getpid ()) + ".yaml";
+  fail_unless (save_rig (path, rig).ok ());
+  return path;
+}
+
+GST_START_TEST (test_rig_file_names_the_cameras)
+{
+  TestCameras cameras;
+  const std::string path = write_rig (true);
+  CameraPipeline p ("trigger=software num-buffers=3 rig=" + path, 2, "ANY", false);
+  p.play_to_the_end ();
+  expect_pairs (p, 2, kPeriod);
+  unlink (path.c_str ());
+}
+GST_END_TEST;
+
+static std::string
+error_going_to_paused (const std::string &properties)
+{
+  CameraPipeline p (properties, 2, "ANY", false);
+  fail_unless_equals_int (
+      gst_element_set_state (p.pipeline (), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+  return p.next_text (GST_MESSAGE_ERROR);
+}
+
+GST_START_TEST (test_cameras_that_are_not_named_are_one_error)
+{
+  const std::string path = write_rig (false);
+  const struct {
+    std::string properties, expected;
+  } rows[] = {
+      {"", "property left"},
+      {"left=a", "property right"},
+      {"left=a right=a", "named twice"},
+      {"rig=/nowhere.yaml", "/nowhere.yaml: no such file"},
+      {"rig=" + path, "does not name its left camera"},
+      {"view-id=7 rig=" + path, "view-id 7"},
+      {"left=a right=b clock-server=here", "clock-server here: expected HOST:PORT"},
+      {"left=a right=b clock-server=here:0", "clock-server here:0: expected HOST:PORT"},
+      {"left=a right=b clock-server=ptp:900", "clock-server ptp:900: expected HOST:PORT"},
+  };
+  for (const auto &row : rows) {
+    const std::string text = error_going_to_paused (row.properties);
+    fail_unless (text.find (row.expected) != std::string::npos, "%s: %s", row.properties.c_str (),
+        text.c_str ());
+  }
+  unlink (path.c_str ());
+}
+GST_END_TEST;
+
+/* ---- pads ---- */
+
+static GstPadProbeReturn
+block (GstPad *, GstPadProbeInfo *, gpointer)
+{
+  return GST_PAD_PROBE_OK;
+}
+
+GST_START_TEST (test_blocked_branch_does_not_hold_up_the_other)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software buffers=12");
+  GstPad *left = gst_element_get_static_pad (p.source (), "left");
+  const gulong id = gst_pad_add_probe (left,
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER), block, nullptr,
+      nullptr);
+  p.play ();
+  fail_unless (p.wait_for_pictures (1, 40));
+  fail_unless_equals_int (int (p.seen (0).size ()), 0);
+  fail_unless (p.stat ("overrun-left") > 0);
+  fail_unless_equals_uint64 (p.stat ("overrun-right"), 0);
+  gst_pad_remove_probe (left, id);
+  fail_unless (p.wait_for_pictures (0, 5));
+  gst_object_unref (left);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_one_pad_alone_may_be_linked)
+{
+  TestCameras cameras;
+  const std::string launch =
+      "stereocamsrc trigger=software num-buffers=5 left=" + camera_address (0) +
+      " right=" + camera_address (1) + " name=c c.right ! fakesink async=false";
+  GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstream_that_refuses_is_one_error_and_eos)
+{
+  TestCameras cameras;
+  const std::string launch = "stereocamsrc trigger=software left=" + camera_address (0) +
+                             " right=" + camera_address (1) +
+                             " name=c c.right ! identity error-after=3 ! fakesink async=false "
+                             "c.left ! fakesink async=false";
+  GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  fail_if (next_message_text (bus, GST_MESSAGE_ERROR).empty ());
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+/* ---- life ---- */
+
+GST_START_TEST (test_runs_again_after_null_and_after_ready)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  for (GstState between : {GST_STATE_NULL, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_NULL}) {
+    p.forget ();
+    p.play ();
+    fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
+    gst_element_set_state (p.pipeline (), between);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_states_may_change_at_once)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  for (int i = 0; i < 5; i++)
+    for (GstState state : {GST_STATE_PLAYING, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_NULL}) {
+      gst_element_set_state (p.pipeline (), state);
+      g_usleep (g_random_int_range (0, 3000));
+    }
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_it_is_live_and_says_its_latency)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software exposure=5000");
+  fail_unless_equals_int (
+      gst_element_set_state (p.pipeline (), GST_STATE_PAUSED), GST_STATE_CHANGE_NO_PREROLL);
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+  GstQuery *query = gst_query_new_latency ();
+  GstPad *pad = gst_element_get_static_pad (p.source (), "left");
+  fail_unless (gst_pad_query (pad, query));
+  gboolean live = FALSE;
+  GstClockTime least = 0;
+  gst_query_parse_latency (query, &live, &least, nullptr);
+  fail_unless (live);
+  fail_unless_equals_uint64 (least, 5 * GST_MSECOND + kPeriod);
+  gst_query_unref (query);
+  gst_object_unref (pad);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_no_picture_is_taken_while_paused)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  g_usleep (200000);
+  const std::uint64_t taken = cameras.list[0]->pictures ();
+  g_usleep (200000);
+  fail_unless_equals_uint64 (cameras.list[0]->pictures (), taken);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_eos_event_ends_all_pads)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  fail_unless (gst_element_send_event (p.source (), gst_event_new_eos ()));
+  p.wait_for_eos ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_eos_event_ends_a_stream_that_has_not_begun)
+{
+  CameraPipeline p ("trigger=software"); /* nobody answers there */
+  p.play ();
+  fail_unless (gst_element_send_event (p.source (), gst_event_new_eos ()));
+  GstMessage *message = gst_bus_timed_pop_filtered (p.bus (), 20 * GST_SECOND, GST_MESSAGE_EOS);
+  fail_unless (message != nullptr);
+  gst_message_unref (message);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_goes_out_on_all_pads_and_pictures_go_on)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  fail_unless (gst_element_send_event (p.source (), gst_event_new_flush_start ()));
+  g_usleep (100000);
+  p.forget ();
+  g_usleep (100000);
+  fail_unless_equals_int (int (p.seen (0).size ()), 0);
+  fail_unless (gst_element_send_event (p.source (), gst_event_new_flush_stop (FALSE)));
+  fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
+  fail_unless (p.seen (0)[0].discont);
+}
+GST_END_TEST;
+
+/* The pipeline takes a new base time, so running time begins at 0 again. */
+GST_START_TEST (test_running_time_begins_anew_after_a_flush_that_resets_it)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=free-run");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 50));
+  gst_element_send_event (p.source (), gst_event_new_flush_start ());
+  gst_element_send_event (p.source (), gst_event_new_flush_stop (TRUE));
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  p.forget ();
+  gst_element_set_start_time (p.pipeline (), 0);
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 20));
+  const auto pictures = p.seen (0);
+  const GstClockTime step = pictures[19].pts - pictures[10].pts;
+  fail_unless (step > 5 * kPeriod, "9 pictures in %" G_GUINT64_FORMAT " ns", step);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstream_may_want_another_size_mid_stream)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  for (int side = 0; side < 2; side++) {
+    GstPad *pad = gst_element_get_static_pad (p.source (), kSides[side]);
+    GstPad *peer = gst_pad_get_peer (pad);
+    GstElement *filter = gst_pad_get_parent_element (peer);
+    GstCaps *caps = gst_caps_from_string ("video/x-raw,format=GRAY8,width=32,framerate=50/1");
+    g_object_set (filter, "caps", caps, nullptr);
+    gst_caps_unref (caps);
+    gst_object_unref (filter);
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+  }
+  GstPad *pad = gst_element_get_static_pad (p.source (), "right");
+  int width = 0;
+  for (int i = 0; i < 1000 && width != 32; i++, g_usleep (10000))
+    if (GstCaps *caps = gst_pad_get_current_caps (pad)) {
+      gst_structure_get_int (gst_caps_get_structure (caps, 0), "width", &width);
+      gst_caps_unref (caps);
+    }
+  fail_unless_equals_int (width, 32);
+  gst_object_unref (pad);
+  p.forget ();
+  fail_unless (p.wait_for_pictures (0, 10) && p.wait_for_pictures (1, 10));
+}
+GST_END_TEST;
+
+static Suite *
+stereocamsrc_suite ()
+{
+  Suite *suite = suite_create ("stereocamsrc");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_software_pairs_share_pts_and_capture_time_on_ticks);
+  tcase_add_test (tc, test_third_camera_belongs_to_the_set);
+  tcase_add_test (tc, test_third_pad_is_there_only_while_its_camera_is_named);
+  tcase_add_test (tc, test_pixels_are_not_copied);
+  tcase_add_test (tc, test_downstream_chooses_format_size_and_rate);
+  tcase_add_test (tc, test_formats_that_nobody_has_are_one_error_that_lists_the_cameras);
+  tcase_add_test (tc, test_rig_file_names_the_cameras);
+  tcase_add_test (tc, test_cameras_that_are_not_named_are_one_error);
+  tcase_add_test (tc, test_blocked_branch_does_not_hold_up_the_other);
+  tcase_add_test (tc, test_one_pad_alone_may_be_linked);
+  tcase_add_test (tc, test_downstream_that_refuses_is_one_error_and_eos);
+  tcase_add_test (tc, test_runs_again_after_null_and_after_ready);
+  tcase_add_test (tc, test_states_may_change_at_once);
+  tcase_add_test (tc, test_it_is_live_and_says_its_latency);
+  tcase_add_test (tc, test_no_picture_is_taken_while_paused);
+  tcase_add_test (tc, test_eos_event_ends_all_pads);
+  tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);
+  tcase_add_test (tc, test_flush_goes_out_on_all_pads_and_pictures_go_on);
+  tcase_add_test (tc, test_running_time_begins_anew_after_a_flush_that_resets_it);
+  tcase_add_test (tc, test_downstream_may_want_another_size_mid_stream);
+  return suite;
+}
+
+GST_CHECK_MAIN (stereocamsrc);

@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* stereocamsrc: who fires the cameras, and by which clock. */
+#include "stereocam-check.hpp"
+
+#include <gst/net/net.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static constexpr std::int64_t kPeriod = GST_SECOND / 50;
+
+GST_START_TEST (test_free_running_pairs_share_pts_near_the_exposure)
+{
+  TestCameras cameras;
+  CameraPipeline p ("num-buffers=60");
+  p.play_to_the_end ();
+  expect_pairs (p, 2, kPeriod / 2);
+  for (const SeenPicture &picture : p.seen (0)) {
+    const auto off = static_cast<std::int64_t> (picture.capture) - picture.mark.taken_ns;
+    fail_unless (std::llabs (off) < kPeriod / 2, "capture time is off by %d us", int (off / 1000));
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_left_camera_fires_the_others_by_its_line)
+{
+  TestCameras cameras (3);
+  CameraPipeline p ("trigger=hardware trigger-line=Line0 output-line=Line1 num-buffers=30", 3);
+  p.play_to_the_end ();
+  expect_pairs (p, 3, kPeriod / 2);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_action_command_fires_all_on_ticks)
+{
+  TestCameras cameras (3);
+  CameraPipeline p ("trigger=action num-buffers=30", 3);
+  p.play_to_the_end ();
+  expect_pairs (p, 3, kPeriod / 2);
+  for (const SeenPicture &picture : p.seen (0))
+    fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
+}
+GST_END_TEST;
+
+/* The fake cameras' clock that follows PTP is CLOCK_MONOTONIC, which the pipeline's is, too. */
+GST_START_TEST (test_scheduled_action_fires_at_the_tick_itself)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=action action-scheduled=true num-buffers=30");
+  p.play_to_the_end ();
+  expect_pairs (p, 2, kPeriod / 2);
+  for (const SeenPicture &picture : p.seen (0))
+    fail_unless (picture.mark.taken_ns >= static_cast<std::int64_t> (picture.capture));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_element_that_does_not_send_takes_what_another_fires)
+{
+  TestCameras cameras (4);
+  const std::string second =
+      "trigger=action action-send=false num-buffers=20 left=" + camera_address (2) +
+      " right=" + camera_address (3);
+  CameraPipeline sender ("trigger=action"),
+      taker (second, 2, "video/x-raw,format=GRAY8,framerate=50/1", false);
+  gst_pipeline_use_clock (GST_PIPELINE (sender.pipeline ()), gst_system_clock_obtain ());
+  sender.play ();
+  taker.play_to_the_end ();
+  for (int side = 0; side < 2; side++)
+    for (const SeenPicture &picture : taker.seen (side)) {
+      fail_unless_equals_int (picture.mark.camera, side + 2);
+      fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
+      const auto off = picture.mark.taken_ns - static_cast<std::int64_t> (picture.capture);
+      fail_unless (std::llabs (off) < kPeriod, "tick is off by %d us", int (off / 1000));
+    }
+}
+GST_END_TEST;
+
+/* ---- single shots ---- */
+
+static bool
+capture (CameraPipeline &p, GstClockTime time)
+{
+  gboolean taken = FALSE;
+  g_signal_emit_by_name (p.source (), "capture", guint64 (time), &taken);
+  return taken;
+}
+
+/* Waits for the cameras: before they stream a shot is refused. */
+static void
+capture_when_ready (CameraPipeline &p, GstClockTime time)
+{
+  for (int i = 0; i < 1000; i++, g_usleep (10000))
+    if (capture (p, time))
+      return;
+  fail ("capture was refused all the time");
+}
+
+GST_START_TEST (test_single_shots_come_only_when_asked_for)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  fail_if (capture (p, GST_CLOCK_TIME_NONE), "it does not play");
+  p.play ();
+  for (int i = 1; i <= 4; i++) {
+    capture_when_ready (p, GST_CLOCK_TIME_NONE);
+    fail_unless (p.wait_for_pictures (0, i) && p.wait_for_pictures (1, i));
+    g_usleep (100000);
+    fail_unless_equals_int (int (p.seen (0).size ()), i);
+  }
+  expect_pairs (p, 2, 20 * GST_MSECOND);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_capture_is_one_picture_with_the_time_when_it_was_taken)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  p.play ();
+  capture_when_ready (p, GST_CLOCK_TIME_NONE);
+  fail_unless (p.wait_for_pictures (1, 1));
+  g_usleep (300000);
+  fail_unless (capture (p, gst_element_get_base_time (p.source ()) + 1)); /* long ago */
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (p.wait_for_pictures (0, 4) && p.wait_for_pictures (1, 4));
+  expect_pairs (p, 2, 20 * GST_MSECOND);
+  for (const SeenPicture &picture : p.seen (0)) {
+    const auto off = picture.mark.taken_ns - static_cast<std::int64_t> (picture.capture);
+    fail_unless (
+        off >= 0 && off < 200 * std::int64_t (GST_MSECOND), "off by %d us", int (off / 1000));
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_at_once_overtakes_one_that_waits)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  p.play ();
+  capture_when_ready (p, GST_CLOCK_TIME_NONE);
+  fail_unless (p.wait_for_pictures (1, 1));
+  GstClock *clock = gst_element_get_clock (p.source ());
+  fail_unless (capture (p, gst_clock_get_time (clock) + 3600 * GST_SECOND));
+  gst_object_unref (clock);
+  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
+  fail_unless (p.wait_for_pictures (0, 2));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_single_shot_has_the_time_that_was_asked_for)
+{
+  TestCameras cameras;
+  CameraPipeline p (
+      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
+  p.play ();
+  capture_when_ready (p, GST_CLOCK_TIME_NONE);
+  fail_unless (p.wait_for_pictures (1, 1));
+  GstClock *clock = gst_element_get_clock (p.source ());
+  const GstClockTime time = gst_clock_get_time (clock) + 300 * GST_MSECOND + 12345;
+  gst_object_unref (clock);
+  fail_unless (capture (p, time));
+  fail_unless (p.wait_for_pictures (0, 2) && p.wait_for_pictures (1, 2));
+  fail_unless_equals_uint64 (p.seen (0)[1].capture, time);
+  fail_unless_equals_uint64 (p.seen (1)[1].capture, time);
+  fail_unless (p.seen (0)[1].mark.taken_ns >= static_cast<std::int64_t> (time));
+}
+GST_END_TEST;
+
+/* ---- clocks ---- */
+
+GST_START_TEST (test_clock_of_a_server_is_provided_and_ticks_are_its_multiples)
+{
+  TestCameras cameras;
+  GstClock *server = GST_CLOCK (g_object_new (GST_TYPE_SYSTEM_CLOCK, "name", "server", nullptr));
+  /* an hour ahead of this machine's */
+  gst_clock_set_calibration (server, 0, 3600 * GST_SECOND, 1, 1);
+  GstNetTimeProvider *provider = gst_net_time_provider_new (server, "127.0.0.1", 0);
+  gint port = 0;
+  g_object_get (provider, "port", &port, nullptr);
+  CameraPipeline p (
+      "trigger=software num-buffers=20 clock-server=127.0.0.1:" + std::to_string (port));
+  p.play ();
+  fail_unless (p.says ("stereocamsrc-clock"));
+  GstClock *used = gst_element_get_clock (p.source ());
+  fail_unless (GST_IS_NET_CLIENT_CLOCK (used));
+  gst_object_unref (used);
+  p.wait_for_eos ();
+  expect_pairs (p, 2, kPeriod / 2);
+  for (const SeenPicture &picture : p.seen (0)) {
+    fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
+    const auto ahead = static_cast<std::int64_t> (picture.capture) - picture.mark.taken_ns;
+    fail_unless (std::llabs (ahead - 3600 * std::int64_t (GST_SECOND)) < std::int64_t (GST_SECOND),
+        "ahead by %" G_GINT64_FORMAT " ns", ahead);
+  }
+  p.stop ();
+  gst_object_unref (provider);
+  gst_object_unref (server);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_clock_server_that_never_answers_is_one_error)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software clock-server=127.0.0.1:9");
+  p.play ();
+  const std::string text = p.next_text (GST_MESSAGE_ERROR);
+  fail_unless (text.find ("127.0.0.1:9 does not answer") != std::string::npos, "%s", text.c_str ());
+}
+GST_END_TEST;
+
+static Suite *
+stereocamsrctriggers_suite ()
+{
+  Suite *suite = suite_create ("stereocamsrctriggers");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_free_running_pairs_share_pts_near_the_exposure);
+  tcase_add_test (tc, test_left_camera_fires_the_others_by_its_line);
+  tcase_add_test (tc, test_action_command_fires_all_on_ticks);
+  tcase_add_test (tc, test_scheduled_action_fires_at_the_tick_itself);
+  tcase_add_test (tc, test_element_that_does_not_send_takes_what_another_fires);
+  tcase_add_test (tc, test_single_shots_come_only_when_asked_for);
+  tcase_add_test (tc, test_each_capture_is_one_picture_with_the_time_when_it_was_taken);
+  tcase_add_test (tc, test_capture_at_once_overtakes_one_that_waits);
+  tcase_add_test (tc, test_single_shot_has_the_time_that_was_asked_for);
+  tcase_add_test (tc, test_clock_of_a_server_is_provided_and_ticks_are_its_multiples);
+  tcase_add_test (tc, test_clock_server_that_never_answers_is_one_error);
+  return suite;
+}
+
+GST_CHECK_MAIN (stereocamsrctriggers);
