@@ -143,7 +143,7 @@ CamSourceSession::start_cameras ()
     }
   }
   for (const auto &pad : pads_)
-    pad->set_caps (format_.caps);
+    pad->set_caps (stream_, format_.caps);
   read_clocks ();
   if (settings_.follows_left ()) {
     look_.start (cameras_[0], {cameras_.begin () + 1, cameras_.end ()},
@@ -204,7 +204,9 @@ CamSourceSession::start_ticker ()
   }
   const bool scheduled = settings_.trigger == TriggerMode::kAction && settings_.action_scheduled;
   CamSourceTicker::Actions actions;
-  actions.may_fire = [this] { return pairing_.may_fire (g_get_monotonic_time () * 1000); };
+  actions.may_fire = [this] {
+    return pairing_.may_fire (settings_.single_shot, g_get_monotonic_time () * 1000);
+  };
   actions.fire = [this] (GstClockTime tick) { fire (tick); };
   ticker_.start ({format_.fps_n, format_.fps_d}, settings_.single_shot, scheduled ? kActionLead : 0,
       std::move (actions));

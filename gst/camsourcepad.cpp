@@ -17,29 +17,39 @@ CamSourcePad::~CamSourcePad ()
 
 /* ---- the queue ---- */
 
-/* With the lock. A picture, or whatever is there. */
+/* With the lock. */
 void
-CamSourcePad::let_oldest_go (bool any)
+CamSourcePad::remove (guint index)
+{
+  GstMiniObject *item = ring_[(first_ + index) % kMostItems];
+  pictures_ -= GST_IS_BUFFER (item);
+  for (guint i = index; i > 0; i--)
+    ring_[(first_ + i) % kMostItems] = ring_[(first_ + i - 1) % kMostItems];
+  first_ = (first_ + 1) % kMostItems;
+  count_--;
+  gst_mini_object_unref (item);
+}
+
+/* With the lock. @return false: there is none */
+bool
+CamSourcePad::let_oldest_go (bool gap_too)
 {
   for (guint i = 0; i < count_; i++) {
     GstMiniObject *item = ring_[(first_ + i) % kMostItems];
-    if (!any && !GST_IS_BUFFER (item))
-      continue;
-    pictures_ -= GST_IS_BUFFER (item);
-    for (guint j = i; j > 0; j--)
-      ring_[(first_ + j) % kMostItems] = ring_[(first_ + j - 1) % kMostItems];
-    first_ = (first_ + 1) % kMostItems;
-    count_--;
-    gst_mini_object_unref (item);
-    return;
+    const bool gap = GST_IS_EVENT (item) && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_GAP;
+    if (GST_IS_BUFFER (item) || (gap && gap_too)) {
+      remove (i);
+      return true;
+    }
   }
+  return false;
 }
 
 void
 CamSourcePad::clear ()
 {
   while (count_ > 0)
-    let_oldest_go (true);
+    remove (0);
 }
 
 /* Takes it; with the lock. */
@@ -55,8 +65,9 @@ CamSourcePad::put (GstMiniObject *item)
     let_oldest_go (false);
     overrun_++;
     discont_ = true;
-  } else if (count_ >= kMostItems) {
-    let_oldest_go (true);
+  } else if (count_ >= kMostItems && !let_oldest_go (true)) {
+    gst_mini_object_unref (item); /* that many changes of caps have no sense */
+    return;
   }
   if (picture && discont_) {
     GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
@@ -68,36 +79,41 @@ CamSourcePad::put (GstMiniObject *item)
 }
 
 void
-CamSourcePad::set_caps (GstCaps *caps)
+CamSourcePad::set_caps (guint stream, GstCaps *caps)
 {
   std::lock_guard guard (lock_);
-  if (caps_ && gst_caps_is_equal (caps_, caps))
+  if (stream != group_id_ || (caps_ && gst_caps_is_equal (caps_, caps)))
     return;
   gst_caps_replace (&caps_, caps);
   put (GST_MINI_OBJECT_CAST (gst_event_new_caps (caps)));
 }
 
 void
-CamSourcePad::send (GstBuffer *buffer)
+CamSourcePad::send (guint stream, GstBuffer *buffer)
 {
   std::lock_guard guard (lock_);
-  put (GST_MINI_OBJECT_CAST (buffer));
+  if (stream == group_id_)
+    put (GST_MINI_OBJECT_CAST (buffer));
+  else
+    gst_buffer_unref (buffer);
 }
 
 /* Of many in a row some do: it is the same silence. Before there are caps nobody waits. */
 void
-CamSourcePad::send_gap (GstClockTime begin, GstClockTime duration)
+CamSourcePad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
   discont_ = true;
-  if (caps_ && count_ < kMostItems / 2)
+  if (stream == group_id_ && caps_ && count_ < kMostItems / 2)
     put (GST_MINI_OBJECT_CAST (gst_event_new_gap (begin, duration)));
 }
 
 void
-CamSourcePad::send_eos (guint32 seqnum)
+CamSourcePad::send_eos (guint stream, guint32 seqnum)
 {
   std::lock_guard guard (lock_);
+  if (stream != group_id_)
+    return;
   GstEvent *event = gst_event_new_eos ();
   gst_event_set_seqnum (event, seqnum);
   put (GST_MINI_OBJECT_CAST (event));

@@ -32,14 +32,17 @@ public:
   /** For the pad's activatemode function. */
   bool activate (bool active);
 
+  /* Each with the group id of the stream that it is for: of an older one nothing is taken. */
+
   /** All but the first of equal caps do nothing. Transfer none. */
-  void set_caps (GstCaps *caps);
+  void set_caps (guint stream, GstCaps *caps);
   /** Takes the buffer; its PTS is set. */
-  void send (GstBuffer *buffer);
+  void send (guint stream, GstBuffer *buffer);
   /** Nothing comes for that time. */
-  void send_gap (GstClockTime begin, GstClockTime duration);
+  void send_gap (guint stream, GstClockTime begin, GstClockTime duration);
   /** What waits goes out first; nothing is taken after it, until a flush. */
-  void send_eos (guint32 seqnum);
+  void send_eos (guint stream, guint32 seqnum);
+
   void flush_start (GstEvent *event);
   void flush_stop (GstEvent *event);
 
@@ -55,7 +58,8 @@ private:
   void one_item ();
   GstMiniObject *next_item ();
   void put (GstMiniObject *item);
-  void let_oldest_go (bool any);
+  void remove (guint index);
+  bool let_oldest_go (bool gap_too);
   void clear ();
   void push_stream_start ();
   void push_segment ();
@@ -72,9 +76,9 @@ private:
   guint first_ = 0, count_ = 0, pictures_ = 0;
   bool flushing_ = true, ended_ = false, discont_ = true;
   GstCaps *caps_ = nullptr; ///< the last that were put
+  guint group_id_ = 0;
 
   /* The task's, and theirs who made it stand still. */
-  guint group_id_ = 0;
   bool needs_start_ = true, needs_segment_ = true;
   GstFlowReturn last_flow_ = GST_FLOW_OK;
 };

@@ -112,7 +112,7 @@ CamSourcePairing::drop_waiting ()
 /* ---- shots ---- */
 
 bool
-CamSourcePairing::may_fire (std::int64_t now_ns)
+CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
 {
   std::lock_guard guard (lock_);
   const auto finders = std::span (finders_).first (static_cast<std::size_t> (cameras_));
@@ -121,7 +121,7 @@ CamSourcePairing::may_fire (std::int64_t now_ns)
       finder.start (static_cast<std::int64_t> (period_));
       lone_shots_ = 0;
     }
-  if (std::ranges::all_of (finders, [] (const auto &f) { return f.settled (); }))
+  if (!alone && std::ranges::all_of (finders, [] (const auto &f) { return f.settled (); }))
     return true;
   if (lone_shots_ > kMostLoneShots) {
     for (auto &finder : finders)
@@ -217,9 +217,10 @@ CamSourcePairing::learn_interval (int camera, std::int64_t taken)
   const std::int64_t last = std::exchange (last_taken_ns_[camera], taken);
   if (last == 0 || taken <= last)
     return;
+  const auto period = static_cast<std::int64_t> (period_);
   intervals_.add (taken - last);
   if (++counted_intervals_ % 16 == 0)
-    tolerance_ = std::min (static_cast<std::int64_t> (period_), intervals_.quantile (0.25)) / 2;
+    tolerance_ = std::clamp (intervals_.quantile (0.25), period / 8, period) / 2;
   sets_.set_tolerance (tolerance_);
 }
 
@@ -233,8 +234,9 @@ CamSourcePairing::place_by_time (int camera, CameraFrame frame)
   if (frame.buffer)
     delay_.add (frame.arrived_us * 1000 - taken);
   else if (frame.camera_time_ns == 0)
-    return; /* came too late to say when it was taken */
-  learn_interval (camera, taken);
+    return;                 /* came too late to say when it was taken */
+  if (stamp_of (frame) > 0) /* arrivals come in bursts */
+    learn_interval (camera, taken);
   put (camera, taken, std::move (frame), taken);
 }
 

@@ -59,8 +59,10 @@ public:
   bool clocks_are_off ();
 
   /** Whether a shot may be fired now. While a camera's delay is not known, one must be over before
-   * the next. @param now_ns  g_get_monotonic_time */
-  bool may_fire (std::int64_t now_ns);
+   * the next.
+   *  @param alone   no shot may be under way in any case: a camera that exposes takes no other
+   *  @param now_ns  g_get_monotonic_time */
+  bool may_fire (bool alone, std::int64_t now_ns);
   /** A shot is about to be fired: answers count from now on.
    *  @param tick  when it is due, on the pipeline's clock
    *  @param fired_ns  when the cameras are told, g_get_monotonic_time */

@@ -31,7 +31,10 @@ CamSourceSession::serve ()
         return End::kFault;
       taken_.swap (inbox_);
       if (std::exchange (flushed_, false)) /* running time may begin anew */
+      {
         last_pts_ = sent_until_ = GST_CLOCK_TIME_NONE;
+        gap_until_ = 0;
+      }
       playing = playing_ && !eos_;
     }
     if (playing && !was_playing_)
@@ -137,6 +140,8 @@ CamSourceSession::send (CamSourceSet &set)
   GstClockTime pts = 0, capture = 0;
   if (!stamp (set, pts, capture))
     return;
+  if (pts < gap_until_) /* it was said that there is nothing */
+    return;
   const GstClockTime period = format_.period ();
   for (std::size_t i = 0; i < pads_.size (); i++) {
     GstBuffer *buffer = set.pictures[i].release ();
@@ -147,7 +152,7 @@ CamSourceSession::send (CamSourceSet &set)
     GST_BUFFER_OFFSET (buffer) = sent_;
     GST_BUFFER_OFFSET_END (buffer) = sent_ + 1;
     gst_range_buffer_set_capture_time (buffer, capture);
-    pads_[i]->send (buffer);
+    pads_[i]->send (stream_, buffer);
   }
   sent_++;
   last_pts_ = pts;
@@ -159,20 +164,21 @@ CamSourceSession::send (CamSourceSet &set)
 
 /* So that branches, and what waits for them elsewhere, go on. */
 void
-CamSourceSession::send_gaps ()
+CamSourceSession::send_gaps (GstClockTime until_ago)
 {
-  const GstClockTime now = running_time ();
+  GstClockTime now = running_time ();
   {
     std::lock_guard guard (lock_);
     if (!playing_ || eos_ || !GST_CLOCK_TIME_IS_VALID (now))
       return;
   }
+  now -= MIN (now, until_ago);
   const GstClockTime begin = GST_CLOCK_TIME_IS_VALID (sent_until_) ? sent_until_ : 0;
   if (now <= begin)
     return;
   for (const auto &pad : pads_)
-    pad->send_gap (begin, now - begin);
-  sent_until_ = now;
+    pad->send_gap (stream_, begin, now - begin);
+  sent_until_ = gap_until_ = now;
 }
 
 /* ---- ten times a second ---- */
@@ -187,7 +193,7 @@ CamSourceSession::watch_cameras (std::int64_t now_ns)
   const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
   if (GST_CLOCK_TIME_IS_VALID (sent_until_) && last_sent_ns_ > 0 &&
       now_ns - last_sent_ns_ > std::max (kSilence, most / 2))
-    send_gaps ();
+    send_gaps (latency_); /* what is under way may still come */
   if (fires () && now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) > most) {
     fail ({CameraFault::kTimedOut,
         "the pipeline's clock does not go on: no tick for " + std::to_string (most / kSecond) +
@@ -230,10 +236,11 @@ CamSourceSession::warn_once (const CameraStatistics &all)
 void
 CamSourceSession::raise_latency ()
 {
-  const auto delay = static_cast<GstClockTime> (pairing_.stats ().delay_p99_ns);
-  if (delay <= latency_)
+  const std::int64_t delay = std::min (pairing_.stats ().delay_p99_ns, kSecond);
+  const auto told = static_cast<std::int64_t> (latency_.load ());
+  if (delay <= told + told / 10)
     return;
-  latency_ = delay + delay / 4;
+  latency_ = static_cast<GstClockTime> (delay + delay / 4);
   gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
 }
 

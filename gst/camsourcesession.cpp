@@ -19,7 +19,7 @@ static constexpr GstClockTime kClockPatience = 10 * GST_SECOND;
 CamSourceSession::CamSourceSession (Setup setup)
     : element_ (GST_ELEMENT (gst_object_ref (setup.element))),
       settings_ (std::move (setup.settings)), names_ (std::move (setup.names)),
-      pads_ (std::move (setup.pads)),
+      pads_ (std::move (setup.pads)), stream_ (setup.stream),
       clock_ (setup.clock ? GST_CLOCK (gst_object_ref (setup.clock)) : nullptr),
       previous_ (std::move (setup.previous)), ticker_ (setup.element)
 {
@@ -281,7 +281,7 @@ CamSourceSession::finish (guint32 seqnum)
   }
   ticker_.set_playing (false);
   for (const auto &pad : pads_)
-    pad->send_eos (seqnum);
+    pad->send_eos (stream_, seqnum);
 }
 
 /* ---- any thread ---- */

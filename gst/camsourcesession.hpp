@@ -36,7 +36,8 @@ public:
     CamSourceSettings settings;
     CameraNames names;
     CamSourcePads pads;
-    GstClock *clock = nullptr;                  ///< to be waited for; transfer none; may be null
+    guint stream = 0;          ///< the pads' group id: what comes for another one they do not take
+    GstClock *clock = nullptr; ///< to be waited for; transfer none; may be null
     std::shared_ptr<CamSourceSession> previous; ///< must have ended first; may be null
   };
 
@@ -115,7 +116,7 @@ private:
   void warn_if_not_ptp (GstClock *clock);
   void raise_latency ();
   void look_around ();
-  void send_gaps ();
+  void send_gaps (GstClockTime until_ago = 0);
   void watch_cameras (std::int64_t now_ns);
   void warn_once (const CameraStatistics &all);
   CameraStatistics camera_statistics ();
@@ -124,6 +125,7 @@ private:
   const CamSourceSettings settings_;
   const CameraNames names_;
   const CamSourcePads pads_;
+  const guint stream_;
   GstClock *clock_;
   std::shared_ptr<CamSourceSession> previous_;
   std::atomic<GstClockTime> latency_ = 0;
@@ -159,5 +161,5 @@ private:
                last_stats_ns_ = 0, last_sent_ns_ = 0;
   guint64 sent_ = 0;
   std::array<std::int64_t, kMaxCameras> shortest_trip_us_{}; ///< to a camera's clock and back
-  GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE;
+  GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE, gap_until_ = 0;
 };

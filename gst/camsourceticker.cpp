@@ -6,6 +6,9 @@
 #include <sched.h>
 #include <sys/prctl.h>
 
+/* A picture that was asked for in time may be taken so much later: the host is busy. */
+static constexpr GstClockTime kLateWake = 20 * GST_MSECOND;
+
 /* ---- the clock ---- */
 
 void
@@ -17,6 +20,7 @@ CamSourceTicker::start (
   lead_ = lead;
   actions_ = std::move (actions);
   last_tick_ = -1;
+  last_asked_ = 0;
   std::lock_guard guard (lock_);
   only_when_asked_ = only_when_asked || !rate.valid ();
   running_ = paused_since_tick_ = true;
@@ -124,7 +128,10 @@ CamSourceTicker::asked_shot (GstClockTime time, GstClockTime now, bool may)
     if (const auto it = std::ranges::find (asked_, time); it != asked_.end ())
       asked_.erase (it);
   }
-  actions_.fire (now + lead_ <= time + GST_MSECOND + lead_ / 2 ? time : now + lead_);
+  GstClockTime taken = now + lead_ <= time + kLateWake + lead_ / 2 ? time : now + lead_;
+  taken = MAX (taken, last_asked_ + 1);
+  last_asked_ = taken;
+  actions_.fire (taken);
 }
 
 /* A tick is fired until half a period behind it; with what passed then, it is missed. */

@@ -62,8 +62,9 @@ private:
   Actions actions_;
   std::atomic<guint64> missed_ = 0;
   std::atomic<gint64> last_shot_ns_ = 0;
-  gint64 last_tick_ = -1;   ///< the thread's
-  guint64 seen_wishes_ = 0; ///< the thread's
+  gint64 last_tick_ = -1;       ///< the thread's
+  guint64 seen_wishes_ = 0;     ///< the thread's
+  GstClockTime last_asked_ = 0; ///< the thread's: a picture that was asked for
 
   std::mutex lock_; /* guards what follows */
   std::condition_variable changed_;

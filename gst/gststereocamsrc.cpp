@@ -245,29 +245,25 @@ open_clock (GstStereoCamSrc *self)
   return true;
 }
 
+/* Names and pads of the session that start() begins. */
 static bool
-prepare_pads (GstStereoCamSrc *self)
+prepare (GstStereoCamSrc *self, CamSourceSession::Setup &setup)
 {
-  CamSourceSettings settings;
-  CameraNames names;
-  if (!check_settings (self, settings, names))
+  if (!check_settings (self, setup.settings, setup.names))
     return false;
-  add_third_pad (self, !names[2].empty (), gst_util_group_id_next ());
-  gst_element_no_more_pads (GST_ELEMENT (self));
+  setup.element = GST_ELEMENT (self);
+  setup.clock = self->priv->clock.clock ();
+  setup.stream = gst_util_group_id_next ();
+  add_third_pad (self, !setup.names[2].empty (), setup.stream);
+  gst_element_no_more_pads (setup.element);
+  setup.pads = self->priv->pads;
   return true;
 }
 
 /* The pads are active. */
 static bool
-start (GstStereoCamSrc *self)
+start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
 {
-  CamSourceSession::Setup setup;
-  if (!check_settings (self, setup.settings, setup.names))
-    return false;
-  setup.element = GST_ELEMENT (self);
-  setup.clock = self->priv->clock.clock ();
-  setup.pads = self->priv->pads;
-  setup.names[2] = setup.pads.size () > 2 ? setup.names[2] : "";
   setup.previous = self->priv->current ();
   auto session = CamSourceSession::begin (std::move (setup));
   if (!session) {
@@ -303,7 +299,8 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
   auto self = GST_STEREO_CAM_SRC (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !open_clock (self))
     return GST_STATE_CHANGE_FAILURE;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare_pads (self))
+  CamSourceSession::Setup setup;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare (self, setup))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     self->priv->current ()->set_playing (false);
@@ -311,14 +308,20 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     stop (self);
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->change_state (element, transition);
+  const bool began = transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+                     result != GST_STATE_CHANGE_FAILURE && start (self, std::move (setup));
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !began) { /* back, as far as we are */
+    GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)
+        ->change_state (element, GST_STATE_CHANGE_PAUSED_TO_READY);
+    remove_third_pad (self);
+    return GST_STATE_CHANGE_FAILURE;
+  }
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
     remove_third_pad (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL)
     close (self);
   if (result == GST_STATE_CHANGE_FAILURE)
     return result;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start (self))
-    return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
     self->priv->current ()->set_playing (true);
   const bool to_paused = transition == GST_STATE_CHANGE_READY_TO_PAUSED ||

@@ -20,10 +20,8 @@ frame_id_step (std::uint64_t from, std::uint64_t to)
 void
 ShotFinder::start (std::int64_t period_ns)
 {
-  const std::uint64_t skipped = skipped_ids_;
   *this = {};
   period_ns_ = period_ns;
-  skipped_ids_ = skipped;
 }
 
 void
@@ -70,9 +68,6 @@ ShotFinder::by_id (std::uint64_t frame_id, std::int64_t &shot) const
 void
 ShotFinder::accept (std::uint64_t frame_id, const Found &found)
 {
-  if (const std::int64_t step = frame_id_step (last_id_, frame_id);
-      last_id_ && frame_id && step > 1 && step < kShots)
-    skipped_ids_ += static_cast<std::uint64_t> (step - 1);
   last_id_ = frame_id;
   last_shot_ = found.shot;
   strangers_ = 0;

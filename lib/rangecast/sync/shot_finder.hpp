@@ -43,8 +43,6 @@ public:
   [[nodiscard]] bool lost_step () const { return strangers_ >= kMostStrangers; }
   /** A camera that does not answer lone shots is settled by what it said so far. */
   void settle () { settled_ = learnt_; }
-  /** Numbers that were skipped: frames of which nothing came. */
-  [[nodiscard]] std::uint64_t skipped_ids () const { return skipped_ids_; }
 
 private:
   static constexpr int kShots = 64, kMostStrangers = 8, kMostContradictions = 3;
@@ -71,7 +69,6 @@ private:
   std::int64_t last_shot_ = 0, learnt_shot_ = -1;
   std::int64_t contradiction_ = 0; ///< by how many shots arrival differs from the number
   int contradictions_ = 0, strangers_ = 0;
-  std::uint64_t skipped_ids_ = 0;
 };
 
 /** How far one frame number lies behind another: 16-bit numbers go from 65535 to 1.
