@@ -16,23 +16,31 @@
 #include "camera_setup.hpp"
 #include "frame_counter.hpp"
 #include "frame_store.hpp"
+#include "receive_buffer.hpp"
 
 using namespace std::chrono_literals;
 
 static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
+static constexpr std::size_t kMostExtra = 1 << 20; /* bytes that chunks may add to a picture */
 
 namespace {
 
-/* Work that may have to wait for a camera that does not answer. */
+/* Work that may have to wait for a camera that does not answer: one after the other, in threads of
+ * its own. One that is late makes the next ones not be waited for. */
 class TakeDown {
 public:
-  void run (std::function<void ()> work)
+  void run (std::function<void ()> work, bool patient)
   {
-    wait (kLongest);
-    std::packaged_task<void ()> task (std::move (work));
+    patient = patient && wait (0s);
+    std::packaged_task<void ()> task ([before = done_, work = std::move (work)] {
+      if (before.valid ())
+        before.wait ();
+      work ();
+    });
     done_ = task.get_future ().share ();
     std::thread (std::move (task)).detach ();
-    wait (kPatience);
+    if (patient)
+      wait (kPatience);
   }
   /* @return false: still at work */
   bool wait (std::chrono::milliseconds limit)
@@ -40,10 +48,11 @@ public:
     return !done_.valid () || done_.wait_for (limit) == std::future_status::ready;
   }
 
-  static constexpr std::chrono::milliseconds kPatience = 1s;
   static constexpr std::chrono::milliseconds kLongest = 15s; /* Aravis' tries end before */
 
 private:
+  static constexpr std::chrono::milliseconds kPatience = 1s;
+
   std::shared_future<void> done_;
 };
 
@@ -279,7 +288,8 @@ Camera::~Camera ()
   stop ();
   g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
   impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
-                             std::move (impl_->control))] () mutable { control.reset (); });
+                             std::move (impl_->control))] () mutable { control.reset (); },
+      !is_lost ());
 }
 
 const CameraInfo &
@@ -367,8 +377,10 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
   const std::size_t wanted = settings.socket_buffer > 0
                                  ? std::size_t (settings.socket_buffer)
                                  : std::max (2 * format.size (), kLeastSocketBuffer);
+  const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-      int (std::min<std::size_t> (wanted, G_MAXINT)), nullptr);
+      bytes, nullptr);
+  (void)enlarge_receive_buffer (arv_gv_stream_get_port (ARV_GV_STREAM (stream)), bytes);
 }
 
 CameraStatus
@@ -401,7 +413,7 @@ Camera::Impl::fill (Run &run)
   const auto guard = control->lock ();
   const guint payload = arv_camera_get_payload (control->camera (), &error);
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
-  if (status.ok () && payload < format.size ())
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMostExtra))
     status = control->refuse (CameraFault::kUnsupported,
         "sends " + std::to_string (payload) + " bytes a picture; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
@@ -459,13 +471,17 @@ Camera::start (Arrived arrived, Lost lost)
 void
 Camera::Impl::end (const std::shared_ptr<Run> &run)
 {
-  take_down.run ([control = control.get (), run, lost = watch->lost.load ()] {
-    if (!lost) {
-      const auto guard = control->lock ();
-      arv_camera_stop_acquisition (control->camera (), nullptr);
-    }
-    g_object_unref (run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
-  });
+  const bool answers = !watch->lost;
+  take_down.run (
+      [control = control.get (), run, answers] {
+        if (answers) {
+          const auto guard = control->lock ();
+          arv_camera_stop_acquisition (control->camera (), nullptr);
+        }
+        g_object_unref (
+            run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
+      },
+      answers);
 }
 
 void
@@ -552,6 +568,42 @@ Camera::clock_is_ptp ()
   return status == "Slave" || status == "Master";
 }
 
+/* GigE Vision's bootstrap registers, which every GigE camera has: the latch keeps the clock for
+ * reading. */
+static constexpr guint64 kTimestampControl = 0x0944, kTimestampHigh = 0x0948,
+                         kTimestampLow = 0x094c;
+static constexpr guint32 kTimestampLatch = 2;
+
+static std::uint64_t
+ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
+{
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  if (frequency == 0)
+    return 0;
+  return ticks / frequency * kSecond +
+         gst_util_uint64_scale (ticks % frequency, kSecond, frequency);
+}
+
+static GError *
+read_gige_clock (ArvDevice *device, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  GError *error = nullptr;
+  guint32 high = 0, low = 0;
+  const std::int64_t before = g_get_monotonic_time ();
+  arv_device_write_register (device, kTimestampControl, kTimestampLatch, &error);
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (!error)
+    arv_device_read_register (device, kTimestampHigh, &high, &error);
+  if (!error)
+    arv_device_read_register (device, kTimestampLow, &low, &error);
+  if (error)
+    return error;
+  const guint64 frequency =
+      arv_gv_device_get_timestamp_tick_frequency (ARV_GV_DEVICE (device), &error);
+  time_ns = ticks_to_ns (std::uint64_t (high) << 32 | low, frequency);
+  return error;
+}
+
 CameraStatus
 Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
 {
@@ -559,21 +611,21 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
   if (is_lost ())
     return control.refuse (CameraFault::kLost, "was lost");
   const auto guard = control.lock ();
-  const bool modern = control.has ("TimestampLatch");
-  const char *latch = modern ? "TimestampLatch" : "GevTimestampControlLatch";
-  const std::int64_t before = g_get_monotonic_time ();
-  CameraStatus status = control.execute (latch);
-  read_at_us = (before + g_get_monotonic_time ()) / 2;
-  if (!status.ok ())
-    return impl_->judged (status);
-  std::int64_t ticks = 0, frequency = 1'000'000'000;
-  if (!control.read (modern ? "TimestampLatchValue" : "GevTimestampValue", ticks))
+  CameraStatus status;
+  if (is_gige ()) {
+    GError *error = read_gige_clock (control.device (), camera_time_ns, read_at_us);
+    status = control.status ("its clock", error, CameraFault::kFailed);
+  } else { /* USB3 Vision: nanoseconds */
+    std::int64_t ticks = 0;
+    const std::int64_t before = g_get_monotonic_time ();
+    status = control.execute ("TimestampLatch");
+    read_at_us = (before + g_get_monotonic_time ()) / 2;
+    if (status.ok () && control.read ("TimestampLatchValue", ticks))
+      camera_time_ns = ticks;
+    else if (status.ok ())
+      status = control.refuse (CameraFault::kFailed, "has no feature 'TimestampLatchValue'");
+  }
+  if (status.ok () && camera_time_ns == 0)
     return control.refuse (CameraFault::kFailed, "does not tell its clock");
-  if (!modern)
-    (void)control.read ("GevTimestampTickFrequency", frequency);
-  const std::uint64_t whole = frequency > 0 ? ticks / frequency : 0;
-  const std::uint64_t rest = frequency > 0 ? ticks % frequency : 0;
-  camera_time_ns = whole * 1'000'000'000 + gst_util_uint64_scale (rest, 1'000'000'000,
-                                               std::max<std::int64_t> (frequency, 1));
-  return {};
+  return impl_->judged (status);
 }

@@ -141,7 +141,8 @@ not_found (const std::string &name, const std::vector<ListedCamera> &list)
   text += describe (list);
   for (const ForbiddenCamera &camera : forbidden_usb_cameras ()) {
     if (list.empty () || name == camera.serial)
-      return {CameraFault::kNoPermission, "camera '" + name + "': " + permission_text (camera)};
+      return {CameraFault::kNoPermission,
+          (name.empty () ? "" : "camera '" + name + "': ") + permission_text (camera)};
     text += "; besides, " + permission_text (camera);
   }
   return {CameraFault::kNotFound, text};
@@ -235,33 +236,45 @@ open_by_other_name (const std::string &name, const std::vector<ListedCamera> &li
   return status;
 }
 
+/* From the list as it is, or afresh. kNotFound: nothing in the list is called so. */
+static CameraStatus
+open_listed (const std::string &name, bool afresh, std::vector<ListedCamera> &list,
+    ArvDevice *&device, CameraInfo &info)
+{
+  list = discover (afresh);
+  const ListedCamera *chosen = nullptr;
+  CameraStatus status = choose (name, list, chosen);
+  if (!status.ok ())
+    return status;
+  if (!chosen)
+    return {CameraFault::kNotFound, ""};
+  info = chosen->info;
+  const char *protocol = "";
+  return open_by_id (name.empty () ? info.id : name, info.id, device, protocol);
+}
+
 CameraStatus
 open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &info)
 {
   std::lock_guard guard (list_lock);
   device = nullptr;
   info = {};
-  const bool is_address = g_hostname_is_ip_address (name.c_str ());
-  const ListedCamera *chosen = nullptr;
   std::vector<ListedCamera> list;
-  for (const bool afresh : {false, true}) {
-    if (chosen || (afresh && is_address))
-      break; /* an address is asked directly: it may lie behind a router */
-    list = discover (afresh);
-    const CameraStatus status = choose (name, list, chosen);
-    if (!status.ok () && afresh)
+  /* What was just listed need not be listed again, but may be gone. */
+  CameraStatus status (CameraFault::kNotFound, "");
+  if (!name.empty ())
+    status = open_listed (name, false, list, device, info);
+  if (status.ok () || status.fault () == CameraFault::kBusy)
+    return status;
+  if (!g_hostname_is_ip_address (name.c_str ())) { /* an address may lie behind a router */
+    status = open_listed (name, true, list, device, info);
+    if (status.fault () != CameraFault::kNotFound)
       return status;
-    if (!status.ok ())
-      chosen = nullptr;
+    if (name.empty ())
+      return not_found (name, list);
   }
   const char *protocol = "";
-  CameraStatus status;
-  if (chosen) {
-    info = chosen->info;
-    return open_by_id (name, chosen->info.id, device, protocol);
-  }
-  if (name.empty ())
-    return not_found (name, list);
+  info = {};
   status = open_by_other_name (name, list, device, protocol);
   info.protocol = protocol;
   return status;

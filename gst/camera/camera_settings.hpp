@@ -69,9 +69,12 @@ struct CameraSettings {
   int packet_size =
       0; ///< GigE: bytes with IP and UDP headers; 0: the largest that gets through; -1: as set
   std::int64_t packet_delay_ns = -1; ///< GigE: pause between packets; -1: as set
-  bool packet_resend = true;         ///< GigE: missing packets are asked for again
-  int socket_buffer = 0; ///< GigE: receive buffer, bytes; 0: two pictures, at least 1 MiB. The
-                         ///< system gives no more than net.core.rmem_max
+  /** GigE: packets come through a memory-mapped packet socket, where the process may have one
+   *  (CAP_NET_RAW): less work, but later (see docs/cameras.md). */
+  bool packet_socket = false;
+  bool packet_resend = true; ///< GigE: missing packets are asked for again
+  int socket_buffer = 0;     ///< GigE: receive buffer, bytes; 0: two pictures, at least 1 MiB. The
+                             ///< system gives no more than net.core.rmem_max
   int packet_timeout_us = 20000;   ///< GigE: when a packet counts as missing and is asked for
   int frame_retention_us = 100000; ///< GigE: when a picture that lacks packets is given up
   int n_buffers = 8; ///< pictures that may be under way at once, in the camera and downstream; >= 2

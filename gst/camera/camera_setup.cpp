@@ -9,6 +9,8 @@
 #include "camera_features.hpp"
 #include "camera_format.hpp"
 
+/* What a camera says decides how much memory is taken: 512 MiB a picture are enough. */
+static constexpr std::uint64_t kLargestPicture = 512 << 20;
 static constexpr int kGigEMinimumPacket = 576; /* bytes; GigE Vision */
 
 /* An error that only says that the camera lacks something is no reason to fail. */
@@ -31,6 +33,11 @@ read_sizes (CameraControl &control, CameraAbilities &abilities)
   arv_camera_get_height_bounds (camera, &low, &high, nullptr);
   abilities.min_height = low;
   abilities.max_height = std::max (abilities.max_height, high);
+  std::int64_t whole = 0; /* with binning, less than the sensor has */
+  if (control.read ("WidthMax", whole) && whole > 0 && whole <= G_MAXINT)
+    abilities.max_width = int (whole);
+  if (control.read ("HeightMax", whole) && whole > 0 && whole <= G_MAXINT)
+    abilities.max_height = int (whole);
   abilities.width_step = std::max (1, arv_camera_get_width_increment (camera, nullptr));
   abilities.height_step = std::max (1, arv_camera_get_height_increment (camera, nullptr));
   if (arv_camera_is_frame_rate_available (camera, nullptr))
@@ -193,6 +200,10 @@ read_format (CameraControl &control, CameraFormat &format)
             " " + format.pixel_format + " cannot be carried");
   format.video_format = pixel->video_format;
   format.bayer = pixel->bayer;
+  if (std::uint64_t (format.width) * format.height * pixel->bytes > kLargestPicture)
+    return control.refuse (CameraFault::kUnsupported,
+        "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
+            " are too large: expected at most " + std::to_string (kLargestPicture) + " bytes");
   format.stride = format.width * pixel->bytes;
   return {};
 }
@@ -421,9 +432,9 @@ set_transport (CameraControl &control, const CameraSettings &settings)
   if (!arv_camera_is_gv_device (camera))
     return {};
   GError *error = nullptr;
-  /* Memory-mapped packet sockets need a privilege, so only some users would have them, and hand
-   * packets over in blocks, late. */
-  arv_camera_gv_set_stream_options (camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  arv_camera_gv_set_stream_options (camera, settings.packet_socket
+                                                ? ARV_GV_STREAM_OPTION_NONE
+                                                : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   arv_camera_gv_set_packet_size_adjustment (camera, settings.packet_size == 0
                                                         ? ARV_GV_PACKET_SIZE_ADJUSTMENT_ONCE
                                                         : ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);

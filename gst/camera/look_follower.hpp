@@ -2,16 +2,14 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
-#include <thread>
+#include <memory>
 #include <vector>
 
 #include "camera.hpp"
 
 /** Keeps the look of cameras equal: reads what the leader's regulators chose, and writes it into
- * the followers, from a thread of its own. The cameras must outlive it or stop() comes first. */
+ * the followers, from a thread of its own. */
 class LookFollower {
 public:
   using Failed = std::function<void (const CameraStatus &)>;
@@ -23,19 +21,13 @@ public:
 
   /** @param failed  from its thread; the first time that a camera refuses, and again after a
    * success */
-  void start (Camera &leader, std::vector<Camera *> followers, std::chrono::milliseconds period,
-      Failed failed);
+  void start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
+      std::chrono::milliseconds period, Failed failed);
+  /** `failed` does not come after it. A camera that does not answer is not waited for: its thread
+   *  lets it go when Aravis gives up, within seconds. */
   void stop ();
 
 private:
-  void run ();
-
-  Camera *leader_ = nullptr;
-  std::vector<Camera *> followers_;
-  std::chrono::milliseconds period_{200};
-  Failed failed_;
-  std::mutex lock_; /* guards quit_ */
-  std::condition_variable changed_;
-  bool quit_ = false;
-  std::thread thread_;
+  struct Work;
+  std::shared_ptr<Work> work_;
 };

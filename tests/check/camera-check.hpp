@@ -60,8 +60,12 @@ inline bool has_own_network = false;
 /** Aravis' fake GigE Vision camera (real GVCP and GVSP over sockets), in this process. */
 class FakeCamera {
 public:
-  explicit FakeCamera (const std::string &address = "127.0.0.1", const char *serial = "GV01")
-      : camera_ (arv_gv_fake_camera_new (address.c_str (), serial)), address_ (address)
+  /** @param genicam  file with its features; empty: Aravis' own */
+  explicit FakeCamera (const std::string &address = "127.0.0.1", const char *serial = "GV01",
+      const std::string &genicam = "")
+      : camera_ (arv_gv_fake_camera_new_full (
+            address.c_str (), serial, genicam.empty () ? nullptr : genicam.c_str ())),
+        address_ (address)
   {
     fail_unless (arv_gv_fake_camera_is_running (camera_), "no fake camera at %s", address.c_str ());
   }

@@ -3,42 +3,40 @@
 #include <camera.hpp>
 
 #include <deque>
+#include <glib/gstdio.h>
+#include <look_follower.hpp>
 
 #include "camera-check.hpp"
 
 using namespace rangecast::testing;
 
-/** Keeps what a camera's callbacks say. */
+/** Keeps what a camera's callbacks say, which may come until the camera was stopped. */
 class Listener {
 public:
-  Camera::Arrived arrived ()
+  Camera::Arrived arrived () const
   {
-    return [this] (CameraFrame frame) {
-      std::lock_guard guard (lock_);
-      if (!keep_ && frame.state == FrameState::kComplete)
-        frame.buffer.reset ();
-      frames_.push_back (std::move (frame));
-      changed_.notify_all ();
+    return [heard = heard_] (CameraFrame frame) {
+      std::lock_guard guard (heard->lock);
+      heard->frames.push_back (std::move (frame));
+      heard->changed.notify_all ();
     };
   }
-  Camera::Lost lost ()
+  Camera::Lost lost () const
   {
-    return [this] (CameraStatus status) {
-      std::lock_guard guard (lock_);
-      losses_.push_back (std::move (status));
-      changed_.notify_all ();
+    return [heard = heard_] (CameraStatus status) {
+      std::lock_guard guard (heard->lock);
+      heard->losses.push_back (std::move (status));
+      heard->changed.notify_all ();
     };
   }
-  /** false: buffers go back at once. */
-  void keep_buffers (bool keep) { keep_ = keep; }
   /** The next frame; fails the test if none comes. */
   CameraFrame next ()
   {
-    std::unique_lock guard (lock_);
-    const auto some = [this] { return !frames_.empty (); };
-    fail_unless (changed_.wait_for (guard, std::chrono::seconds (20), some), "no frame came");
-    CameraFrame frame = std::move (frames_.front ());
-    frames_.pop_front ();
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->frames.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (20), some), "no frame");
+    CameraFrame frame = std::move (heard_->frames.front ());
+    heard_->frames.pop_front ();
     return frame;
   }
   CameraFrame next_complete ()
@@ -51,28 +49,30 @@ public:
   }
   CameraStatus wait_for_loss ()
   {
-    std::unique_lock guard (lock_);
-    const auto some = [this] { return !losses_.empty (); };
-    fail_unless (changed_.wait_for (guard, std::chrono::seconds (60), some), "no loss was told");
-    return losses_.front ();
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->losses.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (60), some), "no loss");
+    return heard_->losses.front ();
   }
   std::size_t n_losses ()
   {
-    std::lock_guard guard (lock_);
-    return losses_.size ();
+    std::lock_guard guard (heard_->lock);
+    return heard_->losses.size ();
   }
   std::size_t n_frames ()
   {
-    std::lock_guard guard (lock_);
-    return frames_.size ();
+    std::lock_guard guard (heard_->lock);
+    return heard_->frames.size ();
   }
 
 private:
-  std::mutex lock_;
-  std::condition_variable changed_;
-  std::deque<CameraFrame> frames_;
-  std::vector<CameraStatus> losses_;
-  std::atomic<bool> keep_{true};
+  struct Heard {
+    std::mutex lock;
+    std::condition_variable changed;
+    std::deque<CameraFrame> frames;
+    std::vector<CameraStatus> losses;
+  };
+  std::shared_ptr<Heard> heard_ = std::make_shared<Heard> ();
 };
 
 static std::unique_ptr<Camera>
@@ -420,6 +420,77 @@ GST_START_TEST (test_features_win_over_settings)
 }
 GST_END_TEST;
 
+/** A file with the features of Aravis' fake camera, and one text of them replaced. */
+class Features {
+public:
+  Features (const std::string &from, const std::string &to)
+  {
+    ArvFakeCamera *fake = arv_fake_camera_new ("any");
+    std::size_t size = 0;
+    const char *text = arv_fake_camera_get_genicam_xml (fake, &size);
+    std::string xml (text, size);
+    g_object_unref (fake);
+    const std::size_t at = xml.find (from);
+    fail_unless (at != std::string::npos, "the fake camera's features have no '%s'", from.c_str ());
+    xml.replace (at, from.size (), to);
+    gchar *name = nullptr;
+    const int fd = g_file_open_tmp ("rangecast-features-XXXXXX.xml", &name, nullptr);
+    fail_unless (fd >= 0);
+    close (fd);
+    path_ = name;
+    g_free (name);
+    fail_unless (g_file_set_contents (path_.c_str (), xml.c_str (), xml.size (), nullptr));
+  }
+  Features (const Features &) = delete;
+  Features &operator= (const Features &) = delete;
+  ~Features () { g_unlink (path_.c_str ()); }
+  [[nodiscard]] const std::string &path () const { return path_; }
+
+private:
+  std::string path_;
+};
+
+GST_START_TEST (test_camera_that_sends_another_size_than_its_pictures_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const char *formula = "<Formula>WIDTH * HEIGHT * ((PIXELFORMAT>>16)&amp;0xFF) / 8</Formula>";
+  for (const char *wrong : {"<Formula>4000000000</Formula>", "<Formula>WIDTH</Formula>"}) {
+    const Features features (formula, wrong);
+    FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+    const auto camera = open_camera ("127.0.0.1");
+    configure (*camera, small_pictures ());
+    Listener listener;
+    assert_refused (camera->start (listener.arrived (), listener.lost ()),
+        CameraFault::kUnsupported, "bytes a picture; expected 3072 for 64x48 Mono8");
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_without_a_usable_pixel_format_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const Features features ("Name=\"PixelFormat\"", "Name=\"OtherFormat\"");
+  FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+  const auto camera = open_camera ("127.0.0.1");
+  const CameraStatus status = camera->configure (small_pictures ());
+  fail_unless (!status.ok ());
+  fail_unless (
+      status.message ().find ("camera '127.0.0.1'") == 0, "%s", status.message ().c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_without_a_width_is_refused)
+{
+  SKIP_WITHOUT_NETWORK ();
+  const Features features ("Name=\"Width\"", "Name=\"Breadth\"");
+  FakeCamera fake ("127.0.0.1", "GV01", features.path ());
+  const auto camera = open_camera ("127.0.0.1");
+  fail_unless (!camera->configure (small_pictures ()).ok ());
+  Listener listener;
+  fail_unless (!camera->start (listener.arrived (), listener.lost ()).ok ());
+}
+GST_END_TEST;
+
 /* Streaming */
 
 GST_START_TEST (test_frames_arrive_whole_numbered_and_in_order)
@@ -761,6 +832,49 @@ GST_START_TEST (test_software_trigger_takes_one_picture_a_call)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
+{
+  SKIP_WITHOUT_NETWORK ();
+  FakeCamera left ("127.0.0.2", "left"), right ("127.0.0.3", "right");
+  const std::shared_ptr<Camera> leader = open_camera ("127.0.0.2"),
+                                follower = open_camera ("127.0.0.3");
+  CameraSettings settings = small_pictures ();
+  settings.exposure_mode = settings.gain_mode = AutoMode::kManual;
+  settings.exposure_us = 1000;
+  settings.gain = 1;
+  configure (*leader, settings);
+  settings.gain = 2;
+  configure (*follower, settings);
+  Listener from_leader, from_follower;
+  start (*leader, from_leader);
+  start (*follower, from_follower);
+  LookFollower look;
+  std::atomic<int> n_refusals{0};
+  look.start (leader, {follower}, std::chrono::milliseconds (5),
+      [&] (const CameraStatus &) { n_refusals++; });
+  for (const guint32 exposure : {3000u, 700u, 12000u}) {
+    /* as the camera's own regulator would */
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, exposure);
+    arv_fake_camera_write_register (
+        left.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, exposure % 7);
+    guint32 got_exposure = 0, got_gain = 0;
+    for (int i = 0; i < 2000 && (got_exposure != exposure || got_gain != exposure % 7); i++) {
+      g_usleep (5000);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, &got_exposure);
+      arv_fake_camera_read_register (
+          right.registers (), ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, &got_gain);
+    }
+    assert_equals_int (got_exposure, exposure);
+    assert_equals_int (got_gain, exposure % 7);
+  }
+  assert_equals_int (n_refusals, 0);
+  (void)from_follower.next_complete ();
+  look.stop ();
+}
+GST_END_TEST;
+
 GST_START_TEST (test_eight_cameras_stream_at_once)
 {
   SKIP_WITHOUT_NETWORK ();
@@ -803,6 +917,9 @@ camera_suite ()
   tcase_add_test (tc, test_refused_settings_say_what_the_camera_accepts);
   tcase_add_test (tc, test_refused_features_name_feature_value_and_range);
   tcase_add_test (tc, test_features_win_over_settings);
+  tcase_add_test (tc, test_camera_that_sends_another_size_than_its_pictures_is_refused);
+  tcase_add_test (tc, test_camera_without_a_usable_pixel_format_is_refused);
+  tcase_add_test (tc, test_camera_without_a_width_is_refused);
   tcase_add_test (tc, test_frames_arrive_whole_numbered_and_in_order);
   tcase_add_test (tc, test_pixels_are_those_of_the_frame_as_long_as_it_is_held);
   tcase_add_test (tc, test_buffers_are_used_again_with_all_that_a_frame_wrote_gone);
@@ -815,6 +932,7 @@ camera_suite ()
   tcase_add_test (tc, test_vanished_camera_is_told_once_and_is_no_hang);
   tcase_add_test (tc, test_camera_that_came_back_opens_again);
   tcase_add_test (tc, test_software_trigger_takes_one_picture_a_call);
+  tcase_add_test (tc, test_followers_take_over_the_look_of_the_leader);
   tcase_add_test (tc, test_eight_cameras_stream_at_once);
   return suite;
 }
