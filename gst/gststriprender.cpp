@@ -233,6 +233,7 @@ gst_strip_render_transform (GstBaseTransform *base, GstBuffer *in, GstBuffer *ou
 {
   auto self = GST_STRIP_RENDER (base);
   strip_sync_values (self, GST_BUFFER_PTS (in));
+  strip_mark_discont (self, out);
   return strip_draw_frame (self, in, out, strip_running_time (self, GST_BUFFER_PTS (in)), false);
 }
 
@@ -329,6 +330,7 @@ gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
         strip_drain (self);
       break;
     case GST_EVENT_SEGMENT:
+    case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_STREAM_START:
     case GST_EVENT_EOS:
       strip_drain_and_reset (self);

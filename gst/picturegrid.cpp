@@ -34,9 +34,12 @@ PictureGrid::period () const
 }
 
 void
-PictureGrid::drop_first ()
+PictureGrid::drop (std::size_t i)
 {
-  gst_clear_buffer (&at (0).buffer);
+  gst_clear_buffer (&at (i).buffer);
+  for (; i > 0; i--)
+    at (i) = at (i - 1);
+  at (0).buffer = nullptr;
   first_ = (first_ + 1) % ring_.size ();
   count_--;
 }
@@ -45,7 +48,7 @@ void
 PictureGrid::drop_frame_sets ()
 {
   while (count_ > 0)
-    drop_first ();
+    drop (0);
 }
 
 void
@@ -69,6 +72,19 @@ PictureGrid::end () const
   return count_ > 0 ? at (count_ - 1).end : 0;
 }
 
+/* By how much a picture is before the end of what it shows, at least: ends are not quite even. */
+GstClockTime
+PictureGrid::slack (const FrameSet &set) const
+{
+  return std::min (tolerance (), (set.end - set.begin) / 4);
+}
+
+GstClockTime
+PictureGrid::until_the_end () const
+{
+  return count_ > 0 ? end () + tolerance () - slack (at (count_ - 1)) : 0;
+}
+
 void
 PictureGrid::add (GstBuffer *frame_set, GstClockTime duration)
 {
@@ -77,14 +93,17 @@ PictureGrid::add (GstBuffer *frame_set, GstClockTime duration)
   GstClockTime begin = GST_BUFFER_PTS (frame_set);
   if (!GST_CLOCK_TIME_IS_VALID (begin))
     begin = end ();
+  duration = std::min (duration, kLongest);
+  while (later_by (begin, duration) < known_until ())
+    drop (count_ - 1);
   begin = std::max (begin, known_until ());
   if (begin >= G_MAXINT64) {
     gst_buffer_unref (frame_set);
     return;
   }
   if (count_ == ring_.size ())
-    drop_first ();
-  at (count_++) = {frame_set, begin, later_by (begin, std::min (duration, kLongest))};
+    drop (1); /* the first one is on the screen */
+  at (count_++) = {frame_set, begin, begin + duration};
 }
 
 /* Of the pictures that may show that frame set. */
@@ -119,7 +138,7 @@ PictureGrid::find (GstClockTime &pts, std::size_t &index) const
     if (!newest && pts + tolerance () >= at (index + 1).begin)
       continue;
     const GstClockTime limit = later_by (at (index).end, hold ());
-    if (pts < G_MAXINT64 && pts + tolerance () < limit)
+    if (pts < G_MAXINT64 && pts + slack (at (index)) < limit)
       return true;
     if (!newest)
       pts = std::max (pts, first_showing (at (index + 1)));
@@ -143,7 +162,7 @@ PictureGrid::take (GstClockTime until, Picture &picture)
   if (!find (pts, index) || pts + tolerance () >= until)
     return false;
   for (; index > 0; index--)
-    drop_first ();
+    drop (0);
   const bool follows = GST_CLOCK_TIME_IS_VALID (last_) && pts <= last_ + period () + 1;
   picture = {at (0).buffer, pts, period (), !follows};
   last_ = pts;

@@ -55,9 +55,11 @@ public:
   /** Stream position at which that picture ends; 0: there was none. */
   [[nodiscard]] GstClockTime covered () const { return covered_; }
 
-  /** The next frame set of the stream. Times that go back count as the last one's. The oldest one
-   *  that waits gives way where too many do. One that is more than G_MAXINT64 ns, 292 years, from
-   *  the stream's beginning is dropped.
+  /** The next frame set of the stream. Times that go back a little count as the last one's; if by
+   *  more than the frame set's duration, those that lie in its future are forgotten: their times
+   *  were wrong, and would keep back all that follows. The oldest one that waits to be shown gives
+   *  way where too many do. One that is more than G_MAXINT64 ns, 292 years, from the stream's
+   *  beginning is dropped.
    *  @param frame_set  transfer full; without PTS it follows the last one at once
    *  @param duration   ns, kLongest counts for more; 0 or GST_CLOCK_TIME_NONE: the output's period
    */
@@ -68,6 +70,9 @@ public:
   [[nodiscard]] GstClockTime known_until () const;
   /** Stream position at which the newest frame set ends, ns. */
   [[nodiscard]] GstClockTime end () const;
+  /** What take() is to be told when no frame set follows: has all pictures before that end, without
+   *  the wait for a frame set that might come just after a picture's time. */
+  [[nodiscard]] GstClockTime until_the_end () const;
 
   /** Frame sets that are held, the oldest first, for whoever puts copies in their place. */
   [[nodiscard]] std::size_t frame_sets () const { return count_; }
@@ -103,7 +108,8 @@ private:
   {
     return ring_[(first_ + i) % ring_.size ()];
   }
-  void drop_first ();
+  void drop (std::size_t i);
+  [[nodiscard]] GstClockTime slack (const FrameSet &set) const;
   [[nodiscard]] GstClockTime first_showing (const FrameSet &set) const;
   [[nodiscard]] GstClockTime first_after (GstClockTime pts) const;
   bool find (GstClockTime &pts, std::size_t &index) const;

@@ -64,7 +64,7 @@ fixate_rate (GstStructure *s, const GstCaps *input)
   g_value_init (&none, GST_TYPE_FRACTION);
   gst_value_set_fraction (&none, 0, 1);
   const GValue *wanted = gst_structure_get_value (s, "framerate");
-  if (n == 0 && wanted && !gst_value_can_intersect (wanted, &none))
+  if (n == 0 && wanted && !gst_value_intersect (nullptr, wanted, &none))
     n = 30;
   g_value_unset (&none);
   gst_structure_fixate_field_nearest_fraction (s, "framerate", n, d);

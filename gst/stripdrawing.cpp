@@ -58,8 +58,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   const StripRenderSettings &settings = *job.settings;
   const rangecast::SceneFrame &frame = job.scene->frame ();
   const rangecast::Eye eye = {place.side * settings.eye_distance_m / 2, settings.convergence_m};
-  const auto matrices =
-      rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye, job.scene->hull ());
+  const auto matrices = rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye,
+      job.scene->hull (), 2 * settings.view_gap_m /* of a view that looks the other way */);
   if (result.width == 0) {
     result.matrices = matrices;
     result.width = place.width;

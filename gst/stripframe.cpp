@@ -20,7 +20,19 @@ orbit_time (GstStripRenderPrivate *priv, GstClockTime running)
 GstClockTime
 strip_running_time (GstStripRender *self, GstClockTime pts)
 {
-  return gst_segment_to_running_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  if (segment.format != GST_FORMAT_TIME) /* then nothing has a time */
+    return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
+}
+
+GstClockTime
+strip_stream_time (GstStripRender *self, GstClockTime pts)
+{
+  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  if (segment.format != GST_FORMAT_TIME)
+    return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
 }
 
 /* Running time of the clock, or GST_CLOCK_TIME_NONE. */
@@ -112,8 +124,7 @@ strip_draw_frame (
 void
 strip_sync_values (GstStripRender *self, GstClockTime pts)
 {
-  const GstClockTime time =
-      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstClockTime time = strip_stream_time (self, pts);
   if (GST_CLOCK_TIME_IS_VALID (time))
     gst_object_sync_values (GST_OBJECT (self), time);
 }

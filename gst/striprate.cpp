@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include <algorithm>
+#include <utility>
 
 #include "striprenderstate.hpp"
 
@@ -33,17 +34,25 @@ strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts, GstC
   {
     std::lock_guard guard (priv->lock);
     dropped = priv->stats.dropped += count;
+    priv->discont = true;
     drawn = priv->stats.frames;
     earliest = priv->earliest;
   }
-  const GstClockTime stream =
-      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  const GstClockTime stream = strip_stream_time (self, pts);
   GstMessage *message =
       gst_message_new_qos (GST_OBJECT (self), priv->live, running, stream, pts, duration);
   if (GST_CLOCK_TIME_IS_VALID (earliest))
     gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), 1.0, 1000000);
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, drawn, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
+}
+
+void
+strip_mark_discont (GstStripRender *self, GstBuffer *out)
+{
+  std::lock_guard guard (self->priv->lock);
+  if (std::exchange (self->priv->discont, false))
+    GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
 }
 
 bool
@@ -143,6 +152,7 @@ draw_picture (GstStripRender *self, const PictureGrid::Picture &picture, GstBuff
     GST_BUFFER_FLAG_SET (*out, GST_BUFFER_FLAG_DISCONT);
   else
     GST_BUFFER_FLAG_UNSET (*out, GST_BUFFER_FLAG_DISCONT);
+  strip_mark_discont (self, *out);
   strip_sync_values (self, picture.pts);
   const GstFlowReturn drawn = strip_draw_frame (
       self, picture.frame_set, *out, strip_running_time (self, picture.pts), true);
@@ -188,7 +198,7 @@ drain_all (GstStripRender *self)
   GstClockTime end;
   {
     std::lock_guard guard (priv->lock);
-    end = priv->grid.end ();
+    end = priv->grid.until_the_end ();
   }
   if (strip_has_own_rate (self))
     drain (self, end);
@@ -210,6 +220,7 @@ strip_drain_and_reset (GstStripRender *self)
   drain_all (self);
   std::lock_guard guard (self->priv->lock);
   self->priv->grid.reset ();
+  self->priv->flow = GST_FLOW_OK; /* what comes is another stream: it may be let in */
 }
 
 void
@@ -517,6 +528,7 @@ strip_reset_rate (GstStripRender *self)
   priv->grid.reset ();
   priv->earliest = GST_CLOCK_TIME_NONE;
   priv->flow = GST_FLOW_OK;
+  priv->discont = false;
 }
 
 /* A live picture is begun when its frame set is sure, a quarter of a period after its time, and has

@@ -44,6 +44,7 @@ struct GstStripRenderPrivate {
   GstClockTime latency = 0;                    /* of upstream */
   GstClockTime pipeline_latency = 0;           /* as the LATENCY event tells */
   GstFlowReturn flow = GST_FLOW_OK;            /* of the drawing thread's last push */
+  bool discont = false;                        /* pictures before the next one were left out */
 
   /* written with both stream locks, read with either */
   gstrange::RangeInfo info;
@@ -122,6 +123,8 @@ strip_guarded (GstStripRender *self, const Work &work)
 
 /** Running time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
 GstClockTime strip_running_time (GstStripRender *self, GstClockTime pts);
+/** Stream time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
+GstClockTime strip_stream_time (GstStripRender *self, GstClockTime pts);
 /** Running time of the clock, or GST_CLOCK_TIME_NONE without a clock. Any thread. */
 GstClockTime strip_running_now (GstStripRender *self);
 /** Gives controlled properties their values of that stream position. One outside the segment, as of
@@ -142,6 +145,8 @@ bool strip_is_late (GstStripRender *self, GstClockTime running);
  *  last one. */
 void strip_drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts,
     GstClockTime duration, GstClockTime running);
+/** Flags the next picture that is drawn after such ones. */
+void strip_mark_discont (GstStripRender *self, GstBuffer *out);
 /** @} */
 
 /** @name striprate.cpp, an output with a frame rate of its own @{ */

@@ -62,6 +62,7 @@ render_harness (const Rig &rig, const char *properties)
 struct RenderedPicture {
   int width = 0, height = 0;
   GstClockTime pts = 0, duration = 0, shows = 0; ///< `shows`: capture time of the frame set
+  bool discont = false;
   std::vector<guint8> rgba;
 
   [[nodiscard]] const guint8 *at (int x, int y) const { return &rgba[4 * (width * y + x)]; }
@@ -90,6 +91,7 @@ take_rendered (GstBuffer *buffer, int width)
   picture.height = int (picture.rgba.size () / 4) / width;
   picture.pts = GST_BUFFER_PTS (buffer);
   picture.duration = GST_BUFFER_DURATION (buffer);
+  picture.discont = GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   picture.shows = gst_range_buffer_get_capture_time (buffer);
   gst_buffer_unref (buffer);
   return picture;

@@ -363,6 +363,68 @@ GST_START_TEST (test_views_of_one_surface_do_not_shine_through_each_other)
 }
 GST_END_TEST;
 
+/* However close the near plane is: points lie behind the viewer. */
+GST_START_TEST (test_view_gap_is_metres_also_where_the_viewer_is_among_the_points)
+{
+  Rig rig = ring_rig (9);
+  rig.views.resize (2);
+  const auto green = [&] (const char *gap, double green_nearer_m) {
+    const std::string properties =
+        std::string ("azimuth=20 distance=0.3 field-of-view=40 view-gap=") + gap;
+    GstHarness *h = render_harness (rig, properties.c_str ());
+    if (!h)
+      return -1;
+    GstBuffer *walls = wall_of_two (rig);
+    {
+      gstrange::RangeFrameMap frame (walls, GST_MAP_READWRITE);
+      for (const RangeImage &image : frame.views ())
+        for (int y = 0; y < 240; y++)
+          for (int x = 0; x < 320; x++)
+            if (image.view_id == 1)
+              image.depth.at (x, y) -= guint16 (std::lround (green_nearer_m * 10000));
+      frame.views ()[0].depth.at (0, 0) = 3100; /* behind the viewer */
+    }
+    const RenderedPicture picture = render (h, walls);
+    int n = 0;
+    for (int y = 100; y < 140; y++)
+      for (int x = 140; x < 180; x++)
+        n += picture.at (x, y, 1) > 100;
+    gst_harness_teardown (h);
+    return n;
+  };
+  if (green ("0", 0.02) < 0)
+    RANGECAST_SKIP ("no OpenGL context");
+  /* both views look 20 degrees past the viewer: neither is behind the other by more than noise */
+  fail_unless_equals_int (green ("0.2", 0.02), 40 * 40);
+  fail_unless_equals_int (green ("0.2", -0.02), 0);
+  fail_unless_equals_int (green ("1", -0.02), 0);
+}
+GST_END_TEST;
+
+/* The far plane has room for what is moved behind its place. */
+GST_START_TEST (test_largest_view_gap_throws_nothing_out)
+{
+  const Rig rig = ring_rig (3);
+  const auto drawn = [&] (const char *properties) {
+    GstHarness *h = render_harness (rig, properties);
+    if (!h)
+      return -1;
+    const RenderedPicture picture = render (h, wall_of_two (rig));
+    int n = 0;
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++)
+        n += !is_background (picture, x, y);
+    gst_harness_teardown (h);
+    return n;
+  };
+  if (drawn ("") < 0)
+    RANGECAST_SKIP ("no OpenGL context");
+  for (const std::string camera : {"azimuth=60", "azimuth=40 distance=0.2", "azimuth=180"})
+    fail_unless_equals_int (drawn ((camera + " back-faces=true view-gap=1").c_str ()),
+        drawn ((camera + " back-faces=true view-gap=0").c_str ()));
+}
+GST_END_TEST;
+
 /* A step in depth is no surface: from the side one sees between the two. */
 GST_START_TEST (test_strips_stop_at_depth_steps)
 {
@@ -509,6 +571,8 @@ strippicture_suite ()
   tcase_add_test (tc, test_surfaces_seen_from_behind_are_left_out_unless_wanted);
   tcase_add_test (tc, test_one_camera_is_drawn_from_behind_too);
   tcase_add_test (tc, test_views_of_one_surface_do_not_shine_through_each_other);
+  tcase_add_test (tc, test_view_gap_is_metres_also_where_the_viewer_is_among_the_points);
+  tcase_add_test (tc, test_largest_view_gap_throws_nothing_out);
   tcase_add_test (tc, test_strips_stop_at_depth_steps);
   tcase_add_test (tc, test_uploads_the_planes_of_the_roi_and_vertices_alone);
   tcase_add_test (tc, test_view_of_one_pixel_is_one_dot);

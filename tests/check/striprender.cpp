@@ -355,29 +355,73 @@ GST_START_TEST (test_pictures_carry_a_sync_point)
 }
 GST_END_TEST;
 
+static constexpr GLenum kStates[] = {GL_CULL_FACE, GL_DEPTH_TEST, GL_SCISSOR_TEST, 0x8642};
+
+/* Bits of kStates, the last of which is GL_PROGRAM_POINT_SIZE. */
 static void
-read_point_size_state (GstGLContext *context, gpointer user_data)
+read_states (GstGLContext *context, gpointer user_data)
 {
   const auto is_enabled = reinterpret_cast<GLboolean (*) (GLenum)> (
       gst_gl_context_get_proc_address (context, "glIsEnabled"));
-  *static_cast<bool *> (user_data) = is_enabled (0x8642); /* GL_PROGRAM_POINT_SIZE */
+  for (std::size_t i = 0; i < std::size (kStates); i++)
+    if (is_enabled (kStates[i]))
+      *static_cast<guint *> (user_data) |= 1u << i;
 }
 
-GST_START_TEST (test_points_leave_opengl_as_it_was)
+GST_START_TEST (test_opengl_is_left_as_it_was)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "mode=points");
+  for (const char *properties : {"mode=points", "mode=strips back-faces=true show-cameras=true",
+           "mode=rectangles show-stats=true samples=4 background=0"}) {
+    GstHarness *h = render_harness (rig, properties);
+    if (!h)
+      RANGECAST_SKIP ("no OpenGL context");
+    render (h, wall (rig));
+    GstElement *element = gst_harness_find_element (h, "striprender");
+    GstGLContext *context = nullptr;
+    g_object_get (element, "context", &context, nullptr);
+    guint enabled = 0;
+    gst_gl_context_thread_add (context, read_states, &enabled);
+    fail_unless (enabled == 0, "%s: %u", properties, enabled);
+    gst_object_unref (context);
+    gst_object_unref (element);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_begins_auto_orbit_anew)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig, "auto-orbit=40");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
-  render (h, wall (rig));
-  GstElement *element = gst_harness_find_element (h, "striprender");
-  GstGLContext *context = nullptr;
-  g_object_get (element, "context", &context, nullptr);
-  bool enabled = true;
-  gst_gl_context_thread_add (context, read_point_size_state, &enabled);
-  fail_if (enabled);
-  gst_object_unref (context);
-  gst_object_unref (element);
+  const RenderedPicture first = render (h, wall (rig, GST_SECOND));
+  fail_if (render (h, wall (rig, 2 * GST_SECOND)).rgba == first.rgba);
+  gst_harness_push_event (h, gst_event_new_flush_start ());
+  gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_harness_push_event (h, gst_event_new_segment (&segment));
+  fail_unless (render (h, wall (rig, GST_SECOND / 2)).rgba == first.rgba);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_input_without_a_rate_gets_30_where_downstream_wants_one)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (
+      rig, RenderOptions{"", "width=64,height=48,framerate=(fraction)[1/1,60/1]", 0, 1});
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  gst_harness_push (h, wall (rig));
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  int n = 0, d = 0;
+  fail_unless (caps != nullptr);
+  gst_structure_get_fraction (gst_caps_get_structure (caps, 0), "framerate", &n, &d);
+  fail_unless_equals_int (n, 30);
+  gst_caps_unref (caps);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -488,7 +532,9 @@ striprender_suite ()
   tcase_add_test (tc, test_gap_and_eos_and_flush_pass_and_it_goes_on);
   tcase_add_test (tc, test_late_frames_are_dropped_undrawn);
   tcase_add_test (tc, test_pictures_carry_a_sync_point);
-  tcase_add_test (tc, test_points_leave_opengl_as_it_was);
+  tcase_add_test (tc, test_opengl_is_left_as_it_was);
+  tcase_add_test (tc, test_flush_begins_auto_orbit_anew);
+  tcase_add_test (tc, test_input_without_a_rate_gets_30_where_downstream_wants_one);
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
   tcase_add_test (tc, test_keeps_pts_and_capture_time_and_counts);
   tcase_add_test (tc, test_new_rig_and_states_twice);

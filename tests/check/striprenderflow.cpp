@@ -175,7 +175,34 @@ GST_START_TEST (test_gap_before_the_first_frame_set_goes_on)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_segment_is_done_after_its_last_picture)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  gst_harness_set_live (live.h, FALSE);
+  Passing passing (live.src);
+  live.push (0);
+  gst_harness_push_event (live.h, gst_event_new_segment_done (GST_FORMAT_TIME, 2 * kPeriod));
+  passing.expect ("P0+100 P100+100");
+}
+GST_END_TEST;
+
 /* ---- times that no clock shows ---- */
+
+GST_START_TEST (test_segment_that_is_not_of_time_passes)
+{
+  Live live ("auto-orbit=5", "framerate=5/1");
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_BYTES);
+  gst_harness_push_event (live.h, gst_event_new_segment (&segment));
+  live.push (0);
+  live.push (GST_SECOND);
+  fail_unless_equals_uint64 (stats_field (live.r, "frames"), 2);
+}
+GST_END_TEST;
 
 static std::string
 pictures_of (std::initializer_list<std::pair<GstClockTime, GstClockTime>> sets)
@@ -183,7 +210,7 @@ pictures_of (std::initializer_list<std::pair<GstClockTime, GstClockTime>> sets)
   Live live;
   gst_harness_set_live (live.h, FALSE);
   Passing passing (live.src);
-  for (auto [pts, duration] : sets) {
+  for (const auto &[pts, duration] : sets) {
     GstBuffer *set = make_frame_set (live.rig, pts);
     GST_BUFFER_DURATION (set) = duration;
     fail_unless_equals_int (gst_harness_push (live.h, set), GST_FLOW_OK);
@@ -424,6 +451,34 @@ GST_START_TEST (test_picture_that_fails_while_the_stream_stalls_is_an_error_and_
 }
 GST_END_TEST;
 
+GST_START_TEST (test_new_stream_is_drawn_after_the_last_one_failed)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  live.next ();
+  const gulong probe = gst_pad_add_probe (live.src, GST_PAD_PROBE_TYPE_BUFFER, refuse_with,
+      GINT_TO_POINTER (int (GST_FLOW_EOS)), nullptr);
+  fail_unless (gst_harness_crank_single_clock_wait (live.h));
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (int tries = 0; tries < 200 && flow == GST_FLOW_OK; tries++) {
+    g_usleep (10000);
+    flow = gst_harness_push (live.h, make_frame_set (live.rig, 2 * kPeriod));
+  }
+  fail_unless_equals_int (flow, GST_FLOW_EOS);
+  gst_pad_remove_probe (live.src, probe);
+  gst_harness_push_event (live.h, gst_event_new_stream_start ("another"));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_harness_push_event (live.h, gst_event_new_segment (&segment));
+  while (GstBuffer *rest = gst_harness_try_pull (live.h)) /* of the last one */
+    gst_buffer_unref (rest);
+  live.push (GST_SECOND);
+  fail_unless_equals_uint64 (live.next ().pts, GST_SECOND);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_flush_or_end_of_downstream_while_the_stream_stalls_is_no_error)
 {
   if (!opengl_works ())
@@ -496,12 +551,15 @@ striprenderflow_suite ()
   tcase_add_test (tc, test_gap_comes_between_the_pictures_beside_it);
   tcase_add_test (tc, test_gap_of_a_file_is_filled_as_long_as_hold_time_says_and_the_rest_goes_on);
   tcase_add_test (tc, test_gap_before_the_first_frame_set_goes_on);
+  tcase_add_test (tc, test_segment_is_done_after_its_last_picture);
+  tcase_add_test (tc, test_segment_that_is_not_of_time_passes);
   tcase_add_test (tc, test_times_at_the_end_of_all_numbers_are_no_endless_work);
   tcase_add_test (tc, test_absurd_durations_and_holes_are_filled_for_a_minute_at_most);
   tcase_add_test (tc, test_drain_gives_all_buffers_back_and_the_picture_stays);
   tcase_add_test (tc, test_pool_of_downstream_is_used_with_its_own_wishes);
   tcase_add_test (tc, test_pool_that_refuses_is_replaced_by_one_of_its_own);
   tcase_add_test (tc, test_picture_that_fails_while_the_stream_stalls_is_an_error_and_the_end);
+  tcase_add_test (tc, test_new_stream_is_drawn_after_the_last_one_failed);
   tcase_add_test (tc, test_flush_or_end_of_downstream_while_the_stream_stalls_is_no_error);
   tcase_add_test (tc, test_caps_that_nobody_can_make_while_the_stream_stalls_are_an_error);
   tcase_add_test (tc, test_memory_that_ends_is_one_error_and_no_crash);

@@ -153,6 +153,19 @@ GST_START_TEST (test_without_a_request_every_frame_set_keeps_its_time)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_end_of_stream_leaves_no_picture_out_that_begins_before_it)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const GstClockTime ms = GST_MSECOND, d = 33 * ms;
+  expect_pictures (convert ("", "framerate=5/1", 30, {{0, d}}), 0, 200 * ms, {0});
+  expect_pictures (convert ("hold-time=0", "framerate=5/1", 30, {{0, d}}), 0, 200 * ms, {0});
+  expect_pictures (
+      convert ("", "framerate=4/1", 30, {{0, d}, {300 * ms, d}, {480 * ms, d}, {733 * ms, d}}), 0,
+      250 * ms, {0, 300, 480, 733});
+}
+GST_END_TEST;
+
 GST_START_TEST (test_times_that_go_back_or_lack_do_no_harm)
 {
   if (!opengl_works ())
@@ -270,6 +283,35 @@ GST_START_TEST (test_new_frame_set_is_shown_and_times_never_go_back)
   live.push (820 * GST_MSECOND); /* for the next but one: a quarter of a period is its slack */
   fail_unless_equals_uint64 (live.next ().shows, 820 * GST_MSECOND);
   fail_unless_equals_uint64 (live.next ().pts, 9 * kPeriod);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_one_time_far_ahead_does_not_freeze_the_view)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  live.next ();
+  live.push (3600 * GST_SECOND); /* a sender's clock jumps, and comes back */
+  for (guint64 i = 1; i < 100; i++) {
+    live.push (i * 2 * kPeriod);
+    live.next ();
+    fail_unless_equals_uint64 (live.next ().shows, i * 2 * kPeriod);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_stays_where_a_clock_is_ahead_for_good)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  live.push (0);
+  for (guint64 i = 0; i < 100; i++)
+    live.push (3600 * GST_SECOND + i * kPeriod);
+  for (guint64 i = 0; i < 3; i++)
+    fail_unless_equals_uint64 (live.next ().shows, 0);
 }
 GST_END_TEST;
 
@@ -495,7 +537,10 @@ GST_START_TEST (test_late_pictures_of_a_held_frame_set_are_left_out_and_counted)
   /* earliest: twice as late again, 300 ms */
   for (int i = 1; i < 4; i++)
     fail_unless (gst_harness_crank_single_clock_wait (live.h));
-  fail_unless_equals_uint64 (live.next ().pts, 4 * kPeriod);
+  const RenderedPicture next = live.next ();
+  fail_unless_equals_uint64 (next.pts, 4 * kPeriod);
+  fail_unless (next.discont);
+  fail_if (live.next ().discont);
   fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 3);
   GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_QOS);
   guint64 running = 0;
@@ -554,6 +599,8 @@ GST_START_TEST (test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_o
       live.h, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2, GST_SECOND / 4, GST_SECOND));
   live.push (GST_SECOND);
   live.push (3 * GST_SECOND);
+  gst_buffer_unref (gst_harness_pull (live.h));
+  fail_unless (take_rendered (gst_harness_pull (live.h), 320).discont);
   fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 1);
   fail_unless_equals_uint64 (stats_field (live.r, "frames"), 2);
   g_object_set (live.r, "qos", FALSE, nullptr);
@@ -592,12 +639,15 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_pictures_are_at_multiples_of_the_period_wherever_the_stream_begins);
   tcase_add_test (tc, test_hole_in_a_file_is_filled_as_long_as_hold_time_says);
   tcase_add_test (tc, test_without_a_request_every_frame_set_keeps_its_time);
+  tcase_add_test (tc, test_end_of_stream_leaves_no_picture_out_that_begins_before_it);
   tcase_add_test (tc, test_times_that_go_back_or_lack_do_no_harm);
   tcase_add_test (tc, test_live_stream_that_stalls_is_drawn_on_and_turns);
   tcase_add_test (tc, test_held_frame_set_that_turns_is_uploaded_once);
   tcase_add_test (tc, test_held_picture_follows_keys_and_properties);
   tcase_add_test (tc, test_controlled_path_goes_on_over_a_held_frame_set);
   tcase_add_test (tc, test_new_frame_set_is_shown_and_times_never_go_back);
+  tcase_add_test (tc, test_one_time_far_ahead_does_not_freeze_the_view);
+  tcase_add_test (tc, test_view_stays_where_a_clock_is_ahead_for_good);
   tcase_add_test (tc, test_picture_waits_for_upstreams_latency_so_that_its_frame_set_is_there);
   tcase_add_test (tc, test_latency_is_upstreams_where_the_rate_is_the_inputs);
   tcase_add_test (tc, test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change_any_time);

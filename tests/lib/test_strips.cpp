@@ -372,6 +372,29 @@ TEST (Strips, empty_view_has_no_vertices)
   EXPECT_TRUE (packed.empty ());
 }
 
+TEST (Orbit, turns_about_the_middle_between_two_cameras_that_face_each_other)
+{
+  Rig rig = ring_rig (2);
+  SceneFrame scene = scene_frame (rig);
+  EXPECT_NEAR (norm (scene.target), 0, 1e-9);
+  EXPECT_NEAR (scene.distance_m, 0.8, 1e-9);
+  rig.views[1].world_from_view.translation.x += 0.02; /* not quite on one axis */
+  EXPECT_NEAR (norm (scene_frame (rig).target), 0, 0.02);
+}
+
+TEST (Orbit, cameras_side_by_side_or_behind_each_other_have_no_middle)
+{
+  Rig rig = ring_rig (1);
+  const double expected = scene_frame (rig).distance_m;
+  for (const Vec3 shift : {Vec3{0.3, 0, 0}, {0, 0, 1.5}}) {
+    rig = ring_rig (1);
+    rig.views.push_back (rig.views[0]);
+    rig.views[1].id = 1;
+    rig.views[1].world_from_view.translation = rig.views[0].world_from_view.translation + shift;
+    EXPECT_NEAR (scene_frame (rig).distance_m, expected, 1e-9);
+  }
+}
+
 TEST (Orbit, ring_looks_at_its_middle_from_the_first_view)
 {
   const SceneFrame scene = scene_frame (ring_rig (4));

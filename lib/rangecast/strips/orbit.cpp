@@ -35,12 +35,16 @@ solve (const Mat3 &a, Vec3 b, Vec3 &x)
   return true;
 }
 
-/* The point with the least sum of squared distances to all optical axes. */
+/* The point with the least sum of squared distances to all optical axes; of many, where cameras
+ * face each other, that nearest to the middle of all cameras. */
 bool
 meeting_point (const Rig &rig, Vec3 &point)
 {
+  constexpr double kPull = 1e-4; /* towards that middle, beside the axes' pull */
   Mat3 a{};
-  Vec3 b;
+  Vec3 b, middle;
+  for (const View &view : rig.views)
+    middle = middle + 1.0 / double (rig.views.size ()) * view.world_from_view.translation;
   for (const View &view : rig.views) {
     const Vec3 d = column (view.world_from_view.rotation, 2);
     const double axis[] = {d.x, d.y, d.z};
@@ -52,7 +56,16 @@ meeting_point (const Rig &rig, Vec3 &point)
       a[i] += off[i] / double (rig.views.size ());
     b = b + 1.0 / double (rig.views.size ()) * (off * view.world_from_view.translation);
   }
-  return rig.views.size () > 1 && solve (a, b, point);
+  if (rig.views.size () < 2 || solve (a, b, point))
+    return rig.views.size () > 1;
+  const auto forward = [] (const View &v) { return column (v.world_from_view.rotation, 2); };
+  const bool face_each_other = std::ranges::any_of (rig.views,
+      [&] (const View &view) { return dot (forward (view), forward (rig.views[0])) < 0; });
+  if (!face_each_other)
+    return false;
+  for (std::size_t i = 0; i < 3; i++)
+    a[4 * i] += kPull;
+  return solve (a, b + kPull * middle, point);
 }
 
 /* Column-major product. */
@@ -85,13 +98,13 @@ struct Planes {
   double near_m, far_m;
 };
 
-/* Room for what is drawn beside its points: bands' ends, surfaces moved behind others. Twice
- * the range costs a bit of the depth buffer, which has 24. */
+/* Room for what is drawn beside its points, as the ends of bands. Twice the range costs a bit of
+ * the depth buffer, which has 24. */
 constexpr double kRoom = 2;
 constexpr double kMostFarToNear = 2000;
 
 Planes
-planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m)
+planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m, double room_m)
 {
   double nearest = 1e30, farthest = 0;
   for (const Vec3 &p : hull) {
@@ -101,7 +114,7 @@ planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m)
   }
   if (farthest <= 0) /* nothing, or nothing that is before the camera */
     return {distance_m / 50, distance_m * 20};
-  const double far_m = kRoom * farthest;
+  const double far_m = kRoom * farthest + room_m;
   return {std::max (nearest / kRoom, far_m / kMostFarToNear), far_m};
 }
 
@@ -136,7 +149,7 @@ scene_frame (const Rig &rig)
 
 OrbitMatrices
 orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y,
-    const Eye &eye, std::span<const Vec3> hull)
+    const Eye &eye, std::span<const Vec3> hull, double room_m)
 {
   const Vec3 right = normalised (cross (scene.up, scene.to_first));
   const double azimuth = orbit.azimuth_deg * kDegree;
@@ -156,7 +169,7 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
 
   const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
   const double half = std::tan (fov / 2); /* of the picture's height, at a distance of 1 */
-  const auto [near, far] = planes_round (hull, stand, distance);
+  const auto [near, far] = planes_round (hull, stand, distance, room_m);
   const double down = flip_y ? -1 : 1;
   /* eyes look in parallel; their pictures are shifted, not turned, so that no eye's is higher */
   const double converged = eye.convergence_m > 0 ? eye.convergence_m : distance;

@@ -58,9 +58,10 @@ struct Eye {
  *  @param hull    world points that surround all that is drawn: the near plane is at half the
  *                 distance of the nearest, the far plane at twice that of the farthest; empty: at
  *                 1/50 and 20 times the target's. The near plane is no nearer than 1/2000 of the
- * far one's distance, where a depth buffer would be too coarse */
+ *                 far one's distance, where a depth buffer would be too coarse
+ *  @param room_m  by which the far plane is farther still: for what is drawn behind its place */
 OrbitMatrices orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect,
-    bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {});
+    bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {}, double room_m = 0);
 
 /** A part of a picture: its share of the width and height, and where its middle is, from -1 (left,
  *  or where clip coordinates begin) to 1. */
