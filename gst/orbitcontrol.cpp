@@ -9,6 +9,8 @@ using rangecast::Orbit;
 
 static constexpr double kZoomStep = 1.1;
 static constexpr double kKeyTurnDeg = 5;
+static constexpr double kSteepest = 89;   /* degrees */
+static constexpr double kFarthest = 1000; /* metres, as the properties allow */
 
 Orbit
 OrbitControl::at (guint64 running_ns) const
@@ -19,28 +21,48 @@ OrbitControl::at (guint64 running_ns) const
 }
 
 void
-OrbitControl::shown (const rangecast::OrbitMatrices &matrices, int width, int height)
+OrbitControl::shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
+    int width, int height)
 {
-  distance_m_ = matrices.distance_m;
+  home_distance_m_ = scene.distance_m;
+  home_elevation_deg_ = scene.elevation_deg;
   pan_right_ = matrices.pan_right;
   pan_down_ = matrices.pan_down;
   width_ = width;
   height_ = height;
 }
 
-/* Keeps within what the properties allow: all round, but not over the top. */
+/* Keeps within what the properties allow and what is shown: all round, but not over the top, which
+ * is less far where the first view itself looks down or up. */
 void
 OrbitControl::turn (double azimuth_deg, double elevation_deg)
 {
   orbit.azimuth_deg = std::fmod (orbit.azimuth_deg + azimuth_deg, 360.0);
-  orbit.elevation_deg = std::clamp (orbit.elevation_deg + elevation_deg, -89.0, 89.0);
+  orbit.elevation_deg = std::clamp (orbit.elevation_deg + elevation_deg,
+      std::max (-kSteepest, -kSteepest - home_elevation_deg_),
+      std::min (kSteepest, kSteepest - home_elevation_deg_));
 }
 
 void
 OrbitControl::zoom (double factor)
 {
-  orbit.distance_m = std::clamp (distance_m_ * factor, 0.01, 1000.0);
-  distance_m_ = orbit.distance_m; /* further steps may come before the next picture */
+  const double distance_m = orbit.distance_m > 0 ? orbit.distance_m : home_distance_m_;
+  orbit.distance_m = std::clamp (distance_m * factor, 0.01, kFarthest);
+}
+
+/* What hands have changed; the field of view they cannot. */
+void
+OrbitControl::go_back ()
+{
+  orbit = {.fov_deg = orbit.fov_deg, .pan = {}};
+}
+
+/* Of the screen: nobody has one as large, and what follows of larger ones is no number any more. */
+static bool
+is_place (double x, double y)
+{
+  constexpr double kMost = 1e6; /* pixels */
+  return std::abs (x) <= kMost && std::abs (y) <= kMost;
 }
 
 bool
@@ -53,6 +75,8 @@ OrbitControl::press (GstEvent *event)
     zoom (button == 4 ? 1 / kZoomStep : kZoomStep);
     return true;
   }
+  if (!is_place (x, y))
+    return false;
   button_ = button;
   x_ = x;
   y_ = y;
@@ -70,7 +94,9 @@ OrbitControl::turn_by_hand (double dx, double dy)
 void
 OrbitControl::move_by_hand (double dx, double dy)
 {
-  orbit.pan = orbit.pan - dx / width_ * pan_right_ - dy / height_ * pan_down_;
+  const rangecast::Vec3 pan = orbit.pan - dx / width_ * pan_right_ - dy / height_ * pan_down_;
+  const auto limited = [] (double metres) { return std::clamp (metres, -kFarthest, kFarthest); };
+  orbit.pan = {limited (pan.x), limited (pan.y), limited (pan.z)};
 }
 
 bool
@@ -80,6 +106,8 @@ OrbitControl::drag (GstEvent *event)
     return false;
   double x = 0, y = 0;
   gst_navigation_event_parse_mouse_move_event (event, &x, &y);
+  if (!is_place (x, y))
+    return false;
   if (button_ == 1)
     turn_by_hand (x - x_, y - y_);
   else
@@ -94,6 +122,8 @@ OrbitControl::touch_down (GstEvent *event)
 {
   Finger finger{true, 0, 0, 0};
   gst_navigation_event_parse_touch_event (event, &finger.identifier, &finger.x, &finger.y, nullptr);
+  if (!is_place (finger.x, finger.y))
+    return false;
   const auto free = std::ranges::find (fingers_, false, &Finger::down);
   if (free != fingers_.end ())
     *free = finger;
@@ -117,6 +147,8 @@ OrbitControl::touch_move (GstEvent *event)
 {
   Finger to;
   gst_navigation_event_parse_touch_event (event, &to.identifier, &to.x, &to.y, nullptr);
+  if (!is_place (to.x, to.y))
+    return false;
   for (Finger &finger : fingers_) {
     const Finger &other = &finger == &fingers_[0] ? fingers_[1] : fingers_[0];
     if (!finger.down || finger.identifier != to.identifier)
@@ -147,18 +179,21 @@ OrbitControl::scroll (GstEvent *event)
   return true;
 }
 
+/* Names are those of X11's keys; some windows tell them without Shift, so that + is equal. */
 bool
 OrbitControl::key (const char *name)
 {
   const std::string_view k = name;
   if (k == "r")
-    orbit = {};
+    go_back ();
   else if (k == "Left" || k == "Right")
     turn (k == "Left" ? -kKeyTurnDeg : kKeyTurnDeg, 0);
   else if (k == "Up" || k == "Down")
     turn (0, k == "Up" ? kKeyTurnDeg : -kKeyTurnDeg);
-  else if (k == "plus" || k == "minus")
-    zoom (k == "plus" ? 1 / kZoomStep : kZoomStep);
+  else if (k == "plus" || k == "equal" || k == "KP_Add")
+    zoom (1 / kZoomStep);
+  else if (k == "minus" || k == "KP_Subtract")
+    zoom (kZoomStep);
   else
     return false;
   return true;

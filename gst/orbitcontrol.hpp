@@ -17,8 +17,10 @@ public:
    *  @return the orbit at that time */
   [[nodiscard]] rangecast::Orbit at (guint64 running_ns) const;
 
-  /** Tells what is on the screen, which is what a hand drags. */
-  void shown (const rangecast::OrbitMatrices &matrices, int width, int height);
+  /** Tells what is on the screen, which is what a hand drags, and where the camera of the scene
+   *  stands while properties are 0. */
+  void shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
+      int width, int height);
 
   /** @return whether the event meant something to us */
   bool handle (GstEvent *event);
@@ -42,6 +44,7 @@ private:
   void move_by_hand (double dx, double dy);
   void turn (double azimuth_deg, double elevation_deg);
   void zoom (double factor);
+  void go_back ();
 
   struct Finger {
     bool down = false;
@@ -52,7 +55,7 @@ private:
   int button_ = 0;                /* that is down; 0: none */
   double x_ = 0, y_ = 0;          /* where the mouse was, pixels */
   std::array<Finger, 2> fingers_; /* further ones do nothing */
-  double distance_m_ = 1;
+  double home_distance_m_ = 1, home_elevation_deg_ = 0;
   rangecast::Vec3 pan_right_, pan_down_;
   int width_ = 640, height_ = 480;
 };

@@ -102,7 +102,7 @@ draw_frame (
     return GST_FLOW_ERROR;
   }
   std::lock_guard guard (priv->lock);
-  priv->settings.camera.shown (result.matrices, result.width, result.height);
+  priv->settings.camera.shown (result.matrices, priv->scene.frame (), result.width, result.height);
   priv->scene.count_into (priv->stats);
   priv->stats.uploaded_bytes = result.uploaded;
   priv->stats.uploaded_total += result.uploaded;

@@ -206,28 +206,133 @@ GST_START_TEST (test_moving_with_the_mouse_follows_the_hand)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_arrow_keys_go_round_and_tell)
-{
+/* An element without a stream, to be sent navigation events; and its camera. */
+struct Idle {
   GstElement *element = gst_element_factory_make ("striprender", nullptr);
   GstPad *src = gst_element_get_static_pad (element, "src");
-  gst_pad_set_active (src, TRUE);
-  double azimuth = 0;
+
+  Idle () { gst_pad_set_active (src, TRUE); }
+  ~Idle ()
+  {
+    gst_object_unref (src);
+    gst_object_unref (element);
+  }
+  void key (const char *name)
+  {
+    gst_pad_send_event (
+        src, gst_navigation_event_new_key_press (name, GST_NAVIGATION_MODIFIER_NONE));
+  }
+  void drag (int button, double from_x, double from_y, double to_x, double to_y)
+  {
+    const auto none = GST_NAVIGATION_MODIFIER_NONE;
+    gst_pad_send_event (
+        src, gst_navigation_event_new_mouse_button_press (button, from_x, from_y, none));
+    gst_pad_send_event (src, gst_navigation_event_new_mouse_move (to_x, to_y, none));
+    gst_pad_send_event (
+        src, gst_navigation_event_new_mouse_button_release (button, to_x, to_y, none));
+  }
+  double get (const char *property)
+  {
+    double value = 0;
+    g_object_get (element, property, &value, nullptr);
+    return value;
+  }
+};
+
+GST_START_TEST (test_arrow_keys_go_round_and_tell)
+{
+  Idle idle;
   int told = 0;
   g_signal_connect_swapped (
-      element, "notify::azimuth", G_CALLBACK (+[] (int *count) { ++*count; }), &told);
+      idle.element, "notify::azimuth", G_CALLBACK (+[] (int *count) { ++*count; }), &told);
   for (int i = 0; i < 80; i++)
-    gst_pad_send_event (
-        src, gst_navigation_event_new_key_press ("Right", GST_NAVIGATION_MODIFIER_NONE));
-  g_object_get (element, "azimuth", &azimuth, nullptr);
-  fail_unless (azimuth == 40, "azimuth %f", azimuth);
+    idle.key ("Right");
+  fail_unless (idle.get ("azimuth") == 40, "azimuth %f", idle.get ("azimuth"));
   fail_unless_equals_int (told, 80);
   for (int i = 0; i < 160; i++)
-    gst_pad_send_event (
-        src, gst_navigation_event_new_key_press ("Left", GST_NAVIGATION_MODIFIER_NONE));
-  g_object_get (element, "azimuth", &azimuth, nullptr);
-  fail_unless (azimuth == -40, "azimuth %f", azimuth);
+    idle.key ("Left");
+  fail_unless (idle.get ("azimuth") == -40, "azimuth %f", idle.get ("azimuth"));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_plus_and_minus_zoom_on_every_keyboard)
+{
+  for (auto [in, out] : {std::pair{"plus", "minus"}, {"equal", "minus"}, {"KP_Add", "KP_Subtract"}}) {
+    Idle idle;
+    idle.key (in);
+    fail_unless (std::abs (idle.get ("distance") - 1 / 1.1) < 1e-9, "%s: %f", in,
+        idle.get ("distance"));
+    idle.key (out);
+    fail_unless (std::abs (idle.get ("distance") - 1) < 1e-9, "%s: %f", out, idle.get ("distance"));
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_r_goes_back_from_where_hands_went_at_once)
+{
+  Idle idle;
+  g_object_set (idle.element, "field-of-view", 60.0, nullptr);
+  for (int i = 0; i < 5; i++)
+    idle.key ("minus");
+  idle.key ("r");
+  idle.key ("plus"); /* from the scene's own distance, no longer from the one before */
+  fail_unless (std::abs (idle.get ("distance") - 1 / 1.1) < 1e-9, "%f", idle.get ("distance"));
+  fail_unless_equals_float (idle.get ("field-of-view"), 60);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_absurd_places_leave_the_camera_within_its_limits)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig);
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  render (h, wall (rig));
+  Idle idle;
+  for (double place : {1e308, 1e300, 999999.0})
+    for (int button : {1, 3})
+      for (int i = 0; i < 5; i++)
+        idle.drag (button, place, -place, -place, place);
+  for (const char *name : {"azimuth", "elevation", "distance", "pan-x", "pan-y", "pan-z"}) {
+    auto range = G_PARAM_SPEC_DOUBLE (
+        g_object_class_find_property (G_OBJECT_GET_CLASS (idle.element), name));
+    const double value = idle.get (name);
+    fail_unless (value >= range->minimum && value <= range->maximum, "%s: %f", name, value);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* The first camera looks down 40 degrees: 49 more, and one looks straight down. */
+GST_START_TEST (test_turning_stops_where_the_picture_does)
+{
+  Rig rig = ring_rig (4);
+  const double s = std::sin (40 * M_PI / 180), c = std::cos (40 * M_PI / 180);
+  for (View &view : rig.views) {
+    const Mat3 down = {1, 0, 0, 0, c, s, 0, -s, c};
+    view.world_from_view.rotation = view.world_from_view.rotation * down;
+    view.world_from_view.translation.y = 0.8 * s / c;
+  }
+  GstHarness *h = render_harness (rig);
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  render (h, wall (rig));
+  GstElement *element = gst_harness_find_element (h, "striprender");
+  GstPad *src = gst_element_get_static_pad (element, "src");
+  const auto turn = [&] (const char *key) {
+    for (int i = 0; i < 60; i++)
+      gst_pad_send_event (
+          src, gst_navigation_event_new_key_press (key, GST_NAVIGATION_MODIFIER_NONE));
+    double elevation = 0;
+    g_object_get (element, "elevation", &elevation, nullptr);
+    return elevation;
+  };
+  const double up = turn ("Up"), down = turn ("Down");
+  fail_unless (std::abs (up - 49) < 1e-6, "%f", up);
+  fail_unless_equals_float (down, -89);
   gst_object_unref (src);
   gst_object_unref (element);
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -527,6 +632,10 @@ striprender_suite ()
   tcase_add_test (tc, test_mouse_turns_and_zooms_and_r_goes_back);
   tcase_add_test (tc, test_moving_with_the_mouse_follows_the_hand);
   tcase_add_test (tc, test_arrow_keys_go_round_and_tell);
+  tcase_add_test (tc, test_plus_and_minus_zoom_on_every_keyboard);
+  tcase_add_test (tc, test_r_goes_back_from_where_hands_went_at_once);
+  tcase_add_test (tc, test_absurd_places_leave_the_camera_within_its_limits);
+  tcase_add_test (tc, test_turning_stops_where_the_picture_does);
   tcase_add_test (tc, test_azimuth_can_be_controlled);
   tcase_add_test (tc, test_output_size_changes_in_mid_stream);
   tcase_add_test (tc, test_gap_and_eos_and_flush_pass_and_it_goes_on);
