@@ -216,6 +216,16 @@ on_view_changed (GObject *, GParamSpec *, gpointer user_data)
   g_idle_add (redraw_if_paused, user_data);
 }
 
+/* That its window was closed glimagesink tells with its next picture only. */
+static gboolean
+look_for_window (gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  if (viewer.paused && !viewer.seeking)
+    redraw (viewer);
+  return G_SOURCE_CONTINUE;
+}
+
 static void
 toggle_pause (Viewer &viewer)
 {
@@ -413,9 +423,7 @@ build_view (Viewer &viewer)
     gst_util_set_object_arg (G_OBJECT (viewer.render), "mode", options.mode);
   if (!viewer.is_file)
     g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
-  /* Also while a stream stalls the view turns, where striprender can do that. */
-  if (!viewer.is_file &&
-      g_object_class_find_property (G_OBJECT_GET_CLASS (viewer.render), "keep-rate"))
+  if (!viewer.is_file) /* the view turns while the stream stalls, too */
     g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
   GstElement *before = viewer.first;
   if (!options.no_filter) {
@@ -498,17 +506,31 @@ build_opener (Viewer &viewer, const char *uri)
   g_signal_connect (opener, "source-setup", G_CALLBACK (on_source_setup), &viewer);
 }
 
+/* Whether a plugin opens such URIs; says it if not. */
+static bool
+is_supported (const char *uri)
+{
+  gchar *scheme = gst_uri_get_protocol (uri);
+  const bool supported = scheme && gst_uri_protocol_is_supported (GST_URI_SRC, scheme);
+  if (!supported)
+    g_printerr ("viewer: %s: no plugin of GStreamer opens %s://\n", uri, scheme ? scheme : "");
+  g_free (scheme);
+  return supported;
+}
+
 /* The input as a URI; nullptr after saying why there is none. */
 static gchar *
 input_uri (const char *input)
 {
   if (gst_uri_is_valid (input))
-    return g_strdup (input);
-  if (!g_file_test (input, G_FILE_TEST_IS_REGULAR)) {
-    g_printerr ("viewer: %s: no such file\n", input);
-    return nullptr;
-  }
-  return gst_filename_to_uri (input, nullptr);
+    return is_supported (input) ? g_strdup (input) : nullptr;
+  if (g_file_test (input, G_FILE_TEST_IS_REGULAR))
+    return gst_filename_to_uri (input, nullptr);
+  g_printerr ("viewer: %s: %s\n", input,
+      g_file_test (input, G_FILE_TEST_IS_DIR)   ? "is a folder; expected a .rcnc recording in it"
+      : g_file_test (input, G_FILE_TEST_EXISTS) ? "is no ordinary file; expected a .rcnc recording"
+                                                : "no such file");
+  return nullptr;
 }
 
 static bool
@@ -616,6 +638,7 @@ show (Viewer &viewer)
   g_unix_signal_add (SIGINT, on_signal, &viewer);
   g_unix_signal_add (SIGTERM, on_signal, &viewer);
   g_timeout_add_seconds (5, say_that_nothing_comes, &viewer);
+  g_timeout_add (500, look_for_window, &viewer);
   gst_element_set_state (viewer.pipeline, GST_STATE_PLAYING); /* errors are on the bus */
   g_main_loop_run (viewer.loop);
   gst_element_set_state (viewer.pipeline, GST_STATE_NULL);

@@ -96,6 +96,39 @@ test_paused_file_still_turns_with_the_mouse () {
   in_display turns_while_paused
 }
 
+# What a window manager sends when somebody clicks on the cross.
+ask_to_close () { # window
+  python3 - "$1" <<'END'
+import ctypes, sys
+x = ctypes.CDLL("libX11.so.6")
+x.XOpenDisplay.restype, x.XInternAtom.restype = ctypes.c_void_p, ctypes.c_ulong
+display, window = ctypes.c_void_p(x.XOpenDisplay(None)), int(sys.argv[1])
+class ClientMessage(ctypes.Structure):
+    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int), ("display", ctypes.c_void_p),
+        ("window", ctypes.c_ulong), ("message_type", ctypes.c_ulong), ("format", ctypes.c_int), ("data", ctypes.c_long * 5),
+        ("room", ctypes.c_long * 24)]
+event = ClientMessage(33, 0, 1, display, window, x.XInternAtom(display, b"WM_PROTOCOLS", 0), 32)
+event.data[0] = x.XInternAtom(display, b"WM_DELETE_WINDOW", 0)
+assert x.XSendEvent(display, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
+x.XSync(display, 0)
+END
+}
+
+closes_while_paused () {
+  open_viewer still.rcnc --size 320x240
+  press space
+  sleep 1
+  ask_to_close "$window"
+  wait_for has_ended
+  wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
+}
+
+test_window_of_a_paused_file_can_be_closed () {
+  need_display
+  record_still
+  in_display closes_while_paused
+}
+
 follows_the_window () {
   open_viewer still.rcnc --size 320x240
   xdotool windowsize "$window" 200 260
@@ -155,6 +188,9 @@ test_input_that_cannot_be_shown_is_named () {
 test_wrong_usage_is_named () {
   expect_error "expected one file" viewer
   expect_error "nowhere.rcnc: no such file" viewer nowhere.rcnc
+  expect_error "is a folder" viewer .
+  expect_error "is no ordinary file" viewer /dev/null
+  expect_error "no plugin of GStreamer opens foo://" viewer foo://bar
   expect_error "--listen" viewer --listen 99999
   expect_error "--size" viewer --size 640 x.rcnc
   expect_error "--mode" viewer --mode nice x.rcnc
