@@ -189,12 +189,12 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
   if (priv->no_context || !choose_pool (self, query) ||
       !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
     return FALSE;
-  if (priv->gl_error && !priv->gl_error_posted) {
-    priv->gl_error_posted = true;
-    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-        ("OpenGL cannot be used: %s", priv->gl_error->message), (nullptr));
-  }
-  return priv->gl_error == nullptr;
+  const GError *error = priv->gl_error ? priv->gl_error : priv->output_error;
+  if (error && !priv->gl_error_posted)
+    GST_ELEMENT_ERROR (
+        self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
+  priv->gl_error_posted = error != nullptr;
+  return error == nullptr;
 }
 
 /* ---- OpenGL's life ---- */
@@ -225,7 +225,9 @@ static gboolean
 gst_strip_render_gl_set_caps (GstGLBaseFilter *filter, GstCaps *, GstCaps *)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
-  return priv->drawing.set_output (filter->context, priv->out);
+  g_clear_error (&priv->output_error);
+  priv->drawing.set_output (filter->context, priv->out, &priv->output_error);
+  return TRUE;
 }
 
 static GstFlowReturn
@@ -469,6 +471,7 @@ gst_strip_render_finalize (GObject *object)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   g_clear_error (&priv->gl_error);
+  g_clear_error (&priv->output_error);
   delete priv;
   G_OBJECT_CLASS (gst_strip_render_parent_class)->finalize (object);
 }

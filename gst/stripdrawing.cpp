@@ -34,14 +34,20 @@ StripDrawing::stop ()
 }
 
 bool
-StripDrawing::set_output (GstGLContext *context, const GstVideoInfo &info)
+StripDrawing::set_output (GstGLContext *context, const GstVideoInfo &info, GError **error)
 {
   gst_clear_object (&framebuffer_);
   width_ = GST_VIDEO_INFO_WIDTH (&info);
   height_ = GST_VIDEO_INFO_HEIGHT (&info);
   eyes_ = EyePlaces (info);
-  framebuffer_ =
-      gst_gl_framebuffer_new_with_default_depth (context, guint (width_), guint (height_));
+  gint largest = 0;
+  context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest);
+  if (std::max (width_, height_) <= largest)
+    framebuffer_ =
+        gst_gl_framebuffer_new_with_default_depth (context, guint (width_), guint (height_));
+  if (!framebuffer_)
+    g_set_error (error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED,
+        "pictures of %dx%d pixels, expected no more than %dx%d", width_, height_, largest, largest);
   return framebuffer_ != nullptr;
 }
 
@@ -96,14 +102,17 @@ struct StripDrawing::Call {
 };
 
 /* Once for all pictures of a scene: for both eyes, and for as long as it is held. */
-void
+bool
 StripDrawing::upload (Call &call)
 {
   const StripScene &scene = *call.job->scene;
   if (uploaded_ == scene.serial ())
-    return;
+    return true;
+  if (!painter_.fits (scene.layers ()))
+    return false;
   call.result.uploaded += painter_.upload (scene.layers ());
   uploaded_ = scene.serial ();
+  return true;
 }
 
 /* Scissors keep the painter, which clears and draws whole pictures, to this eye's part. */
@@ -184,7 +193,10 @@ StripDrawing::draw_memories (Call &call)
 {
   const guint memories = eyes_.all ().back ().memory + 1;
   bool drawn = true;
-  upload (call);
+  if (!upload (call)) {
+    call.result.reason = "a view is larger than its textures can be";
+    return;
+  }
   for (guint i = 0; i < memories && drawn; i++) {
     call.memory = i;
     drawn = gst_gl_framebuffer_draw_to_texture (

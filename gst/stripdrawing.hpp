@@ -25,7 +25,8 @@ public:
   /** @name In the GL thread @{ */
   bool start (GstGLContext *context, GError **error);
   void stop ();
-  bool set_output (GstGLContext *context, const GstVideoInfo &info);
+  /** @return false if OpenGL has no framebuffer as large as the pictures; `error` names sizes */
+  bool set_output (GstGLContext *context, const GstVideoInfo &info, GError **error);
   /** @} */
 
   struct Result {
@@ -43,7 +44,7 @@ private:
   struct Call;
   static void draw_in_gl_thread (GstGLContext *context, gpointer call);
   static gboolean draw_bound (gpointer call);
-  void upload (Call &call);
+  bool upload (Call &call);
   void draw_memory (Call &call);
   void draw_memories (Call &call);
   void draw_eye (Call &call, const EyePlace &place, bool antialiased);

@@ -117,6 +117,7 @@ StripPainter::start (GstGLContext *context, GError **error)
         "OpenGL has no glVertexAttribIPointer");
     return false;
   }
+  context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
   for (std::size_t i = 0; i < shaders_.size (); i++) {
     const std::string source = std::string (kVariants[i]) + kVertexShader;
     shaders_[i] = make_shader (context, source.c_str (), kColourFragmentShader, error);
@@ -147,7 +148,23 @@ StripPainter::stop ()
   context_ = nullptr;
 }
 
-/* Makes the objects of a view, or larger textures. */
+bool
+StripPainter::fits (std::span<const Layer> layers) const
+{
+  return std::ranges::all_of (layers, [&] (const Layer &layer) {
+    return std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
+  });
+}
+
+/* A ROI that follows somebody about shall not cost new textures in each picture. */
+static int
+rounded_up (int pixels, int most)
+{
+  constexpr int kStep = 64;
+  return std::min ((pixels + kStep - 1) / kStep * kStep, most);
+}
+
+/* Makes the objects of a view, or larger textures, which stay that large. */
 void
 StripPainter::prepare (ViewObjects &objects, int width, int height)
 {
@@ -162,10 +179,10 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
     gl->EnableVertexAttribArray (0); /* as the shaders' layout says */
     attribute_pointer_ (0, 1, GL_UNSIGNED_INT, sizeof (StripVertex), nullptr);
   }
-  if (objects.width == width && objects.height == height)
+  if (objects.width >= width && objects.height >= height)
     return;
-  objects.width = width;
-  objects.height = height;
+  objects.width = width = std::max (objects.width, rounded_up (width, largest_));
+  objects.height = height = std::max (objects.height, rounded_up (height, largest_));
   const auto allocate = [&] (guint texture, guint internal, guint format, guint type) {
     gl->BindTexture (GL_TEXTURE_2D, texture);
     gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -184,7 +201,7 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
   const auto &colour = layer.image.colour;
-  prepare (objects, layer.view->width, layer.view->height);
+  prepare (objects, depth.width, depth.height);
   gl->PixelStorei (GL_UNPACK_ALIGNMENT, 2);
   gl->PixelStorei (GL_UNPACK_ROW_LENGTH, gint (depth.stride / 2));
   gl->BindTexture (GL_TEXTURE_2D, objects.depth);

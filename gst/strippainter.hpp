@@ -37,7 +37,10 @@ public:
     const rangecast::View *view;
     std::span<const rangecast::StripVertex> vertices;
   };
-  /** Hands a frame set to OpenGL: depth, colour and vertices of its layers. @return their bytes */
+  /** Whether OpenGL's textures can be as large as the layers' ROIs. */
+  [[nodiscard]] bool fits (std::span<const Layer> layers) const;
+  /** Hands a frame set to OpenGL: depth, colour and vertices of its layers, which must fit.
+   *  @return their bytes */
   guint64 upload (std::span<const Layer> layers);
   /** Draws one picture of what was uploaded last into the bound framebuffer. May be called as often
    *  as there are pictures of it: of two eyes, or of a camera that moves.
@@ -50,7 +53,7 @@ public:
 private:
   struct ViewObjects { /* OpenGL names of one view */
     guint depth = 0, colour = 0, vertices = 0, array = 0;
-    int width = 0, height = 0;
+    int width = 0, height = 0; /* of the textures, pixels */
   };
   void prepare (ViewObjects &objects, int width, int height);
   guint64 upload_layer (ViewObjects &objects, const Layer &layer);
@@ -66,6 +69,7 @@ private:
 
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
+  gint largest_ = 0;                       /* side of a texture, pixels */
   std::array<GstGLShader *, 3> shaders_{}; /* by mode */
   /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};

@@ -60,6 +60,7 @@ struct GstStripRenderPrivate {
   rangecast::StatsPanel stats_panel;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first frame: where auto-orbit began */
   GError *gl_error = nullptr;                       /* why OpenGL cannot be used */
+  GError *output_error = nullptr;                   /* why it cannot have pictures of that size */
   bool no_context = false;
   bool gl_error_posted = false; /* negotiation is tried again, the error is not */
   StreamGap gap; /* to go downstream between pictures, as far as they do not fill it */

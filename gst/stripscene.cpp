@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "stripscene.hpp"
 
+#include <algorithm>
 #include <rangecast/parallel.hpp>
 #include <rangecast/strips/scene_hull.hpp>
 #include <rangecast/strips/view_tint.hpp>
@@ -18,7 +19,7 @@ StripScene::set_rig (const rangecast::Rig &rig)
   lines_.clear ();
   for (std::size_t i = 0; i < rig.views.size (); i++)
     rangecast::append_camera_lines (rig.views[i], rangecast::camera_colour (i), lines_);
-  count_ = images_ = 0;
+  count_ = 0;
   complete_ = false;
 }
 
@@ -26,12 +27,17 @@ Status
 StripScene::check (std::span<const RangeImage> images) const
 {
   for (const RangeImage &image : images) {
+    const std::string name = "range buffer: view " + std::to_string (image.view_id);
     const rangecast::View *view = rig_->find (image.view_id);
-    if (view && (image.roi.x + image.roi.width > view->width ||
-                    image.roi.y + image.roi.height > view->height))
-      return {StatusCode::kBadSize, "range buffer: the ROI of view " +
-                                        std::to_string (image.view_id) +
-                                        " does not lie in the view's image"};
+    const rangecast::Roi &roi = image.roi;
+    if (!view)
+      return {StatusCode::kNotFound, name + " is not in the rig of the caps"};
+    if (roi.x + roi.width > view->width || roi.y + roi.height > view->height)
+      return {StatusCode::kBadSize, name + ": its ROI does not lie in the view's image"};
+    if (std::max (roi.width, roi.height) > rangecast::kMaxStripSide)
+      return {StatusCode::kBadSize, name + " has an ROI of " + std::to_string (roi.width) + "x" +
+                                        std::to_string (roi.height) + " pixels, expected at most " +
+                                        std::to_string (rangecast::kMaxStripSide) + " each way"};
   }
   return {};
 }
@@ -39,7 +45,7 @@ StripScene::check (std::span<const RangeImage> images) const
 bool
 StripScene::is_built (std::size_t images, const StripRenderSettings &settings) const
 {
-  return complete_ && images_ == images && built_with_ == settings.strips_serial;
+  return complete_ && count_ == images && built_with_ == settings.strips_serial;
 }
 
 void
@@ -60,12 +66,9 @@ StripScene::build (
     results_[i] = {};
     rangecast::build_strips (images[i], settings.strips, memory_[i].vertices, results_[i]);
   });
-  count_ = 0;
   for (std::size_t i = 0; i < images.size (); i++) {
     const rangecast::View *view = rig_->find (images[i].view_id);
-    if (!view)
-      continue;
-    StripPainter::Layer &layer = layers_[count_++];
+    StripPainter::Layer &layer = layers_[i];
     const auto tinted = layer.image.colour;
     layer = {images[i], view, memory_[i].vertices};
     if (settings.show_units)
@@ -75,12 +78,12 @@ StripScene::build (
                       rangecast::camera_colour (std::size_t (view - rig_->views.data ())),
                       memory_[i].tinted);
   }
+  count_ = images.size ();
   if (!built) {
     surround ();
     serial_++;
   }
   built_with_ = settings.strips_serial;
-  images_ = images.size ();
   complete_ = true;
 }
 
@@ -88,7 +91,7 @@ void
 StripScene::count_into (RenderStats &stats) const
 {
   stats.points = stats.strips = stats.isolated = stats.triangles = stats.vertices = 0;
-  for (std::size_t i = 0; i < images_; i++) {
+  for (std::size_t i = 0; i < count_; i++) {
     stats.points += results_[i].points;
     stats.strips += results_[i].strips;
     stats.isolated += results_[i].isolated;

@@ -21,12 +21,13 @@ public:
   /** Where the rig's cameras stand and what they see. */
   [[nodiscard]] std::span<const rangecast::LineVertex> camera_lines () const { return lines_; }
 
-  /** @return kBadSize if an ROI does not lie in its view's image */
+  /** @return kNotFound if a view is not in the rig; kBadSize if an ROI does not lie in its view's
+   *  image, or is larger than kMaxStripSide */
   [[nodiscard]] rangecast::Status check (std::span<const rangecast::RangeImage> images) const;
 
-  /** Makes the strips; if it is the same frame set as the last time and nothing that strips depend
-   *  on has changed, all is still there. Colours are of the images, or tinted (show-units).
-   *  The images must stay mapped as long as the layers are used. */
+  /** Makes the strips of images that check() has found good; if it is the same frame set as the
+   * last time and nothing that strips depend on has changed, all is still there. Colours are of the
+   * images, or tinted (show-units). The images must stay mapped as long as the layers are used. */
   void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,
       bool same_frame_set);
   /** Another one after each build() that made something else than the one before; never 0. */
@@ -55,7 +56,7 @@ private:
   std::array<ViewMemory, rangecast::kMaxViews> memory_; /* by number in the buffer */
   std::array<rangecast::StripResult, rangecast::kMaxViews> results_{};
   std::array<StripPainter::Layer, rangecast::kMaxViews> layers_;
-  std::size_t count_ = 0, images_ = 0;
+  std::size_t count_ = 0; /* of the layers */
   std::vector<rangecast::Vec3> hull_;
   guint built_with_ = 0;  /* StripRenderSettings::strips_serial */
   bool complete_ = false; /* the last build() was not broken off, and the rig is still that one */

@@ -257,11 +257,12 @@ GST_END_TEST;
 
 GST_START_TEST (test_plus_and_minus_zoom_on_every_keyboard)
 {
-  for (auto [in, out] : {std::pair{"plus", "minus"}, {"equal", "minus"}, {"KP_Add", "KP_Subtract"}}) {
+  for (auto [in, out] :
+      {std::pair{"plus", "minus"}, {"equal", "minus"}, {"KP_Add", "KP_Subtract"}}) {
     Idle idle;
     idle.key (in);
-    fail_unless (std::abs (idle.get ("distance") - 1 / 1.1) < 1e-9, "%s: %f", in,
-        idle.get ("distance"));
+    fail_unless (
+        std::abs (idle.get ("distance") - 1 / 1.1) < 1e-9, "%s: %f", in, idle.get ("distance"));
     idle.key (out);
     fail_unless (std::abs (idle.get ("distance") - 1) < 1e-9, "%s: %f", out, idle.get ("distance"));
   }
@@ -569,6 +570,70 @@ GST_START_TEST (test_old_opengl_is_one_error_that_says_so)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_pictures_larger_than_opengl_has_are_one_error)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *pipeline = gst_parse_launch ("avatartestsrc num-buffers=3 ! striprender name=r ! "
+                                           "video/x-raw(memory:GLMemory),width=70000,height=16 ! "
+                                           "fakesink",
+      nullptr);
+  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), "r");
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (found.find ("70000x16") != std::string::npos, "'%s'", found.c_str ());
+  while (GstMessage *more = gst_bus_timed_pop_filtered (bus, GST_SECOND / 4, GST_MESSAGE_ERROR)) {
+    fail_if (GST_MESSAGE_SRC (more) == GST_OBJECT (element));
+    gst_message_unref (more);
+  }
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (element);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
+{
+  GstHarness *h = render_harness (ring_rig (1));
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *element = gst_harness_find_element (h, "striprender");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (element, bus);
+  fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (2))), GST_FLOW_ERROR);
+  const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (found.find ("view 1 is not in the rig") != std::string::npos, "%s", found.c_str ());
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_set_bus (element, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (element);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_roi_that_grows_and_shrinks_is_drawn_whole)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig, "azimuth=10");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const Roi rois[] = {{100, 80, 60, 40}, {90, 10, 65, 200}, {0, 0, 320, 240}, {10, 100, 300, 30}};
+  RenderedPicture fresh[std::size (rois)];
+  for (std::size_t i = 0; i < std::size (rois); i++) {
+    GstHarness *other = render_harness (rig, "azimuth=10");
+    fresh[i] = render (other, make_frame_set (rig, 0, rois[i]));
+    gst_harness_teardown (other);
+  }
+  for (int round = 0; round < 3; round++)
+    for (std::size_t i = 0; i < std::size (rois); i++)
+      fail_unless (
+          render (h, make_frame_set (rig, 0, rois[i])).rgba == fresh[i].rgba, "%d", int (i));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_keeps_pts_and_capture_time_and_counts)
 {
   const Rig rig = ring_rig (2);
@@ -645,6 +710,9 @@ striprender_suite ()
   tcase_add_test (tc, test_flush_begins_auto_orbit_anew);
   tcase_add_test (tc, test_input_without_a_rate_gets_30_where_downstream_wants_one);
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
+  tcase_add_test (tc, test_pictures_larger_than_opengl_has_are_one_error);
+  tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
+  tcase_add_test (tc, test_roi_that_grows_and_shrinks_is_drawn_whole);
   tcase_add_test (tc, test_keeps_pts_and_capture_time_and_counts);
   tcase_add_test (tc, test_new_rig_and_states_twice);
   tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
