@@ -85,6 +85,11 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
+  if (strip_has_flags_as_text (out)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("The caps' multiview-flags are text, expected (GstVideoMultiviewFlagsSet)"), (nullptr));
+    return FALSE;
+  }
   if (strip_guarded (self, [&] { return take_input_caps (self, in); }) != GST_FLOW_OK ||
       !gst_video_info_from_caps (&priv->out, out))
     return FALSE;

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-static constexpr int kMostRate = 1000; /* pictures a second */
-
 static GstClockTime
 later_by (GstClockTime time, GstClockTime more)
 {
@@ -22,7 +20,6 @@ earlier_by (GstClockTime time, GstClockTime less)
 void
 PictureGrid::set_rate (int n, int d)
 {
-  /* Beyond that the grid is finer than times can be. */
   rate_n_ = gst_util_fraction_compare (n, std::max (d, 1), kMostRate, 1) > 0 ? 0 : n;
   rate_d_ = std::max (d, 1);
 }

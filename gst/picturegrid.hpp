@@ -22,6 +22,8 @@ struct FrameRate {
  *  nor skip one. Holds no lock: whoever shares it between threads does. Allocates nothing. */
 class PictureGrid {
 public:
+  /** Pictures a second; beyond that the grid is finer than times can be. */
+  static constexpr int kMostRate = 1000;
   /** ns: longer durations and holes of a stream are more likely errors than meant; each would be
    *  filled with pictures. */
   static constexpr GstClockTime kLongest = 60 * GST_SECOND;

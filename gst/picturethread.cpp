@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "picturethread.hpp"
 
+#include <pthread.h>
+
 #include <exception>
 
 bool
@@ -85,8 +87,27 @@ PictureThread::wait_for_clock (
   waiting_ = false;
 }
 
+/* Applications give threads their priorities then. */
+static void
+tell (GstElement *element, GstStreamStatusType type)
+{
+  gst_element_post_message (
+      element, gst_message_new_stream_status (GST_OBJECT (element), type, element));
+}
+
 void
 PictureThread::run (GstElement *element, Tick tick)
+{
+#ifdef __GLIBC__
+  pthread_setname_np (pthread_self (), "rangecast:draw");
+#endif
+  tell (element, GST_STREAM_STATUS_TYPE_ENTER);
+  draw (element, tick);
+  tell (element, GST_STREAM_STATUS_TYPE_LEAVE);
+}
+
+void
+PictureThread::draw (GstElement *element, Tick tick)
 {
   std::unique_lock guard (lock_);
   while (!quit_) {

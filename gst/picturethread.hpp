@@ -8,7 +8,8 @@
 #include <thread>
 
 /** A thread that calls back at times of an element's clock while the element plays. Its own lock is
- *  held neither in the callback nor while it waits for the clock. */
+ *  held neither in the callback nor while it waits for the clock. STREAM_STATUS messages tell of
+ * its begin and end. */
 class PictureThread {
 public:
   PictureThread () = default;
@@ -31,6 +32,7 @@ public:
 
 private:
   void run (GstElement *element, Tick tick);
+  void draw (GstElement *element, Tick tick);
   void interrupt ();
   void wait_for_clock (std::unique_lock<std::mutex> &guard, GstElement *element, GstClockTime due);
 

@@ -3,7 +3,9 @@
 
 #include <gst/video/video.h>
 
-static constexpr int kMostPicturesASecond = 1000;
+#include "picturegrid.hpp"
+
+static constexpr int kMostPicturesASecond = PictureGrid::kMostRate;
 
 /* The frame rate of caps that are one structure, else nullptr. */
 static const GValue *
@@ -99,6 +101,13 @@ strip_fixate_output (GstCaps *caps, const GstCaps *input)
   else
     gst_structure_set (s, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
   return gst_caps_fixate (caps);
+}
+
+bool
+strip_has_flags_as_text (const GstCaps *output)
+{
+  const GstStructure *s = gst_caps_get_structure (output, 0);
+  return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
 }
 
 FrameRate

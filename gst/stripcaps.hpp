@@ -17,5 +17,9 @@ GstCaps *strip_input_caps (const GstCaps *output, GstCaps *input_template, GstCa
  *  each eye. @param caps  transfer full. Returns: (transfer full) */
 GstCaps *strip_fixate_output (GstCaps *caps, const GstCaps *input);
 
+/** Whether multiview-flags are what gst-launch-1.0 makes of them without a type: text, which would
+ * be passed on and mean nothing. */
+bool strip_has_flags_as_text (const GstCaps *output);
+
 /** The output's frame rate; none if the caps have none. */
 FrameRate strip_output_rate (const GstCaps *input, const GstCaps *output);

@@ -134,7 +134,7 @@ void strip_sync_values (GstStripRender *self, GstClockTime pts);
 /** Draws a frame set as it is to be seen at `running`. Posts what goes wrong.
  *  @param keep  more pictures may be drawn of it: what was made of it stays */
 GstFlowReturn strip_draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool again);
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep);
 /** @} */
 
 /** @name striprate.cpp, late pictures @{ */

@@ -168,6 +168,24 @@ GST_START_TEST (test_half_aspect_squeezes_each_eyes_picture)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_flags_as_text_are_one_error)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc num-buffers=1 ! striprender ! video/x-raw(memory:GLMemory),"
+                        "multiview-mode=side-by-side,multiview-flags=half-aspect ! fakesink",
+          nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("multiview-flags") != std::string::npos, "'%s'", text.c_str ());
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 static GstPadProbeReturn
 take_memories (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
@@ -577,6 +595,7 @@ striprendereyes_suite ()
   tcase_add_test (tc, test_all_packings_hold_the_same_two_pictures);
   tcase_add_test (tc, test_two_eyes_cost_one_upload);
   tcase_add_test (tc, test_half_aspect_squeezes_each_eyes_picture);
+  tcase_add_test (tc, test_flags_as_text_are_one_error);
   tcase_add_test (tc, test_separated_pictures_are_memories_of_one_buffer);
   tcase_add_test (tc, test_what_is_far_beyond_the_target_or_close_to_the_eye_is_not_clipped);
   tcase_add_test (tc, test_viewer_among_the_points_still_sees_what_other_views_see);
