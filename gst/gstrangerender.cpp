@@ -139,7 +139,8 @@ gst_range_render_init (GstRangeRender *self)
   if (self->missing)
     return;
   gst_element_link_many (cylinder, render, download, nullptr);
-  show_pad (self, cylinder, "sink", &sink_template);
+  GstPad *sink = show_pad (self, cylinder, "sink", &sink_template);
+  GST_PAD_SET_ACCEPT_INTERSECT (sink); /* caps that lack a field are for cylinderfilter to refuse */
   GstPad *src = show_pad (self, download, "src", &src_template);
   GstProxyPad *inner = gst_proxy_pad_get_internal (GST_PROXY_PAD (src));
   gst_pad_set_query_function (GST_PAD (inner), query_downstream);

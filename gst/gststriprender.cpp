@@ -26,6 +26,7 @@
 #include <algorithm>
 #include <exception>
 #include <gstrange/gstrangestatus.hpp>
+#include <utility>
 
 #include "stripcaps.hpp"
 #include "striprenderstate.hpp"
@@ -75,6 +76,9 @@ take_input_caps (GstStripRender *self, GstCaps *in)
 {
   GstStripRenderPrivate *priv = self->priv;
   const Status status = gstrange::parse_caps (in, priv->info);
+  const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
+  if (told && !status.ok ())
+    return GST_FLOW_ERROR;
   if (status.ok ())
     priv->scene.set_rig (priv->info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -408,7 +412,7 @@ gst_strip_render_start (GstBaseTransform *base)
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->gl_error_posted = priv->no_context = false;
+  priv->gl_error_posted = priv->no_context = priv->caps_refused = false;
   priv->live = false;
   priv->stats_text = {};
   strip_reset_rate (self);

@@ -50,6 +50,7 @@ struct GstStripRenderPrivate {
   gstrange::RangeInfo info;
   GstVideoInfo out;
   bool live = false, live_known = false;
+  bool caps_refused = false; /* the last ones, with an error */
 
   /* with the source pad's stream lock, or on the streaming thread where that one draws; or in the
    * GL thread while whoever has them waits for it */

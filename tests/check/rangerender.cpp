@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* rangerender, and that decodebin and playbin find it. */
-#include "rangecast-check.hpp"
+#include "render-check.hpp"
 
 #include <glib/gstdio.h>
 #include <gst/app/gstappsink.h>
@@ -9,20 +9,6 @@
 
 using namespace rangecast;
 using namespace rangecast::testing;
-
-static bool
-have_gl ()
-{
-  GstElement *probe = gst_parse_launch ("gltestsrc num-buffers=1 ! gldownload ! fakesink", nullptr);
-  if (!probe)
-    return false;
-  gst_element_set_state (probe, GST_STATE_PAUSED);
-  const bool usable =
-      gst_element_get_state (probe, nullptr, nullptr, 60 * GST_SECOND) == GST_STATE_CHANGE_SUCCESS;
-  gst_element_set_state (probe, GST_STATE_NULL);
-  gst_object_unref (probe);
-  return usable;
-}
 
 /* A recording of 8 frame sets of two views, 10 a second, in the folder for temporary files. */
 struct Recording {
@@ -91,7 +77,7 @@ count_pictures (GstElement *pipeline, GstElement *appsink)
 
 GST_START_TEST (test_draws_into_system_memory_of_the_size_asked_for)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (2);
   GstHarness *h = gst_harness_new ("rangerender");
@@ -108,7 +94,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_picture_stays_in_opengl_where_downstream_takes_that)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (1);
   GstHarness *h = gst_harness_new ("rangerender");
@@ -123,7 +109,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_decodebin_shows_a_recording_as_pictures)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Recording recording;
   const std::string launch = "filesrc location=" + recording.path +
@@ -158,7 +144,7 @@ GST_END_TEST;
  * looks for decoders whose output it takes. */
 GST_START_TEST (test_playbin_shows_a_recording_to_a_sink_of_plain_video)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Recording recording;
   GstElement *playbin = gst_element_factory_make ("playbin", nullptr);
@@ -175,7 +161,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_playbin_seeks_to_the_frame_set_at_a_time)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Recording recording;
   GstElement *playbin = gst_element_factory_make ("playbin", nullptr);
@@ -215,7 +201,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_rate_that_downstream_limits_is_kept_to)
 {
-  if (!have_gl ())
+  if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   GstElement *pipeline = gst_parse_launch (
       "avatartestsrc num-buffers=4 views=1 ! video/x-range,width=64,height=48,framerate=30/1 ! "
@@ -226,12 +212,33 @@ GST_START_TEST (test_rate_that_downstream_limits_is_kept_to)
 }
 GST_END_TEST;
 
+/* By cylinderfilter's error, which names the field. */
+GST_START_TEST (test_caps_without_a_size_are_named)
+{
+  GstHarness *h = gst_harness_new ("rangerender");
+  GstBus *bus = gst_bus_new ();
+  GstElement *cylinder = gst_bin_get_by_name (GST_BIN (h->element), "cylinder");
+  gst_element_set_bus (cylinder, bus);
+  GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
+  gst_harness_push_event (h, gst_event_new_stream_start ("a"));
+  gst_harness_push_event (h, gst_event_new_caps (caps));
+  gst_caps_unref (caps);
+  const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
+  fail_unless (found.find ("width") != std::string::npos, "'%s'", found.c_str ());
+  gst_element_set_bus (cylinder, nullptr);
+  gst_object_unref (cylinder);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 rangerender_suite ()
 {
   Suite *suite = suite_create ("rangerender");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_caps_without_a_size_are_named);
   tcase_add_test (tc, test_draws_into_system_memory_of_the_size_asked_for);
   tcase_add_test (tc, test_picture_stays_in_opengl_where_downstream_takes_that);
   tcase_add_test (tc, test_decodebin_shows_a_recording_as_pictures);

@@ -15,16 +15,34 @@ using namespace rangecast;
 using namespace rangecast::testing;
 
 /* Memory ends at one piece larger than this: operator new is ours in this program, and in the
- * elements that it loads. */
+ * elements that it loads. All of its forms, so that what one of them gives another one takes. */
 static std::atomic<std::size_t> largest_piece = SIZE_MAX;
+
+[[gnu::noinline]] void *
+operator new (std::size_t size, const std::nothrow_t &) noexcept
+{
+  return size > largest_piece ? nullptr : std::malloc (size > 0 ? size : 1);
+}
 
 [[gnu::noinline]] void *
 operator new (std::size_t size)
 {
-  void *memory = size > largest_piece ? nullptr : std::malloc (size > 0 ? size : 1);
+  void *memory = operator new (size, std::nothrow);
   if (!memory)
     throw std::bad_alloc ();
   return memory;
+}
+
+void *
+operator new[] (std::size_t size)
+{
+  return operator new (size);
+}
+
+void *
+operator new[] (std::size_t size, const std::nothrow_t &) noexcept
+{
+  return operator new (size, std::nothrow);
 }
 
 [[gnu::noinline]] void
@@ -33,10 +51,34 @@ operator delete (void *memory) noexcept
   std::free (memory);
 }
 
-[[gnu::noinline]] void
+void
 operator delete (void *memory, std::size_t) noexcept
 {
-  std::free (memory);
+  operator delete (memory);
+}
+
+void
+operator delete (void *memory, const std::nothrow_t &) noexcept
+{
+  operator delete (memory);
+}
+
+void
+operator delete[] (void *memory) noexcept
+{
+  operator delete (memory);
+}
+
+void
+operator delete[] (void *memory, std::size_t) noexcept
+{
+  operator delete (memory);
+}
+
+void
+operator delete[] (void *memory, const std::nothrow_t &) noexcept
+{
+  operator delete (memory);
 }
 
 /* ---- gaps ---- */
