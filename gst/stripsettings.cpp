@@ -162,9 +162,8 @@ install_strip_settings (GObjectClass *object_class)
   g_object_class_install_property (object_class, PROP_HOLD_TIME,
       g_param_spec_uint64 ("hold-time", "Hold time",
           "ns for which the last frame set is drawn on, at the output's frame rate, when none "
-          "follows; only if that rate is not the input's, or with keep-rate (0 to "
-          "18446744073709551615, default "
-          "18446744073709551615: for ever)",
+          "follows; only if that rate is not the input's, or with keep-rate; a minute at most "
+          "unless live (0 to 18446744073709551615, default 18446744073709551615: for ever)",
           0, G_MAXUINT64, G_MAXUINT64, kRateFlags));
   return PROP_LAST;
 }
