@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <opencv2/core/utility.hpp>
 
+#include "../parallel.hpp"
 #include "furnishing.hpp"
 #include "mesh.hpp"
 #include "model.hpp"
@@ -456,22 +456,14 @@ Scene::render_range (std::span<const RangeImage> images, double time_s, bool emp
   if (boxes.size () != images.size () || images.size () > kMaxViews)
     return {StatusCode::kBadSize, "scene: expected one box for each range image"};
   std::array<Status, kMaxViews> results;
-  const auto work = [&] (const cv::Range &range) {
-    for (int i = range.start; i < range.end; i++) {
-      const auto k = static_cast<std::size_t> (i);
-      const RangeImage &image = images[k];
-      results[k] =
-          render (image.view_id, SceneCamera::kLeft, time_s, empty, image.colour, image.depth, {});
-      if (results[k].ok ())
-        boxes[k] = impl_->bounding_box (
-            impl_->cameras[static_cast<std::size_t> (image.view_id * kCamerasPerView)]);
-    }
-  };
-  const cv::Range all (0, static_cast<int> (images.size ()));
-  if (n_threads == 1)
-    work (all);
-  else
-    cv::parallel_for_ (all, work, n_threads > 0 ? n_threads : -1);
+  in_parallel (images.size (), n_threads, [&] (std::size_t i) {
+    const RangeImage &image = images[i];
+    results[i] =
+        render (image.view_id, SceneCamera::kLeft, time_s, empty, image.colour, image.depth, {});
+    if (results[i].ok ())
+      boxes[i] = impl_->bounding_box (
+          impl_->cameras[static_cast<std::size_t> (image.view_id * kCamerasPerView)]);
+  });
   for (std::size_t i = 0; i < images.size (); i++)
     if (!results[i].ok ())
       return results[i];
