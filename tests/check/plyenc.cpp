@@ -362,6 +362,8 @@ GST_END_TEST;
 
 GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
 {
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
   fail_unless (run_out_of_memory ("plyenc", ring_rig (2, 32, 24)) > 2);
   fail_unless (run_out_of_memory ("plyenc format=pcd normals=true", ring_rig (2, 32, 24)) > 2);
 }
