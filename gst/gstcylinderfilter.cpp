@@ -536,8 +536,8 @@ install_axis_properties (GObjectClass *object_class, GParamFlags flags)
           GST_TYPE_CYLINDER_FILTER_AXIS, int (rangecast::AxisMode::kPrincipal), controllable));
   g_object_class_install_property (object_class, PROP_AXIS_POSITION,
       vector_spec ("axis-position", "Axis position",
-          "For axis=fixed: a point of the axis, <x, y, z> in the world, metres (default: <0, 0, "
-          "0>)",
+          "For axis=fixed: a point of the axis, <x, y, z> in the world, metres, less than 1e6 from "
+          "0 (default: <0, 0, 0>)",
           flags));
   g_object_class_install_property (object_class, PROP_BODIES,
       g_param_spec_int ("bodies", "Bodies",
@@ -546,7 +546,8 @@ install_axis_properties (GObjectClass *object_class, GParamFlags flags)
           1, rangecast::kMaxBodies, kDefaultBodies, controllable));
   g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
       vector_spec ("axis-direction", "Axis direction",
-          "For axis=fixed: its direction, <x, y, z> in the world, any length (default: <0, 1, 0>)",
+          "For axis=fixed: its direction, <x, y, z> in the world, length 1e-6 to 1e6 (default: <0, "
+          "1, 0>)",
           flags));
 }
 

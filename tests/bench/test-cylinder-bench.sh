@@ -105,6 +105,10 @@ test_wrong_options_are_named () {
   refuse 2 "--mesh" --truth --bunny somewhere
   refuse 2 "--truth" --json out.json
   refuse 2 "--colour" --truth --colour
+  refuse 1 "expected the beginning of one of 'bust, 4 x 320x240'" --only foo
+  refuse 2 "--model: expected --truth" --model nowhere.glb
+  refuse 2 "--noise: expected --truth" --noise exact
+  refuse 2 "--only: expected neither" --truth --only bust
   refuse 1 "nowhere.glb" --truth --model nowhere.glb
   refuse 1 "nowhere/out.json" --truth --size 64x64 --views 4 --noise exact --pose-mm 0 --rounds 1 --json nowhere/out.json
 }

@@ -303,6 +303,8 @@ GST_END_TEST;
 
 GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
 {
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
   /* On one thread: OpenCV's pool waits for ever where it has no memory for its own threads. */
   const Rig rig = same_place_rig (2, 32, 24);
   fail_unless (run_out_of_memory ("cylinderfilter n-threads=1 mode=blend", rig) > 20);

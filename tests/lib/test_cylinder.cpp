@@ -471,6 +471,26 @@ TEST (Decision, a_loser_fills_the_hole_of_the_winner)
   EXPECT_LT (shots.points_of (0).size (), plain.points_of (0).size () + 30);
 }
 
+TEST (Decision, scraps_go_and_what_is_a_surface_stays)
+{
+  /* Eight views: seams everywhere, and along them single points that overlap with nothing's end. */
+  Shots shots (ring_rig (8), bust ());
+  const auto lone = [&] {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < 8; i++) {
+      const auto depth = shots.depth[i].view ();
+      for (int v = 0; v < depth.height; v++)
+        for (int u = 1; u + 1 < depth.width; u++)
+          n += depth.at (u, v) && !depth.at (u - 1, v) && !depth.at (u + 1, v);
+    }
+    return n;
+  };
+  const std::vector<Vec3> before = shots.points ();
+  shots.filter ({});
+  EXPECT_LT (lone (), shots.points ().size () / 200);
+  EXPECT_LT (farthest_gap (before, shots.points ()), 0.006);
+}
+
 TEST (Decision, what_the_winner_cannot_see_stays_although_one_unit_holds_both)
 {
   /* A shoulder: what lies behind its edge for one camera is open to the other. */

@@ -2,6 +2,7 @@
 /* The cylinder filter beside its peers in the same run: milliseconds, and what is left against the
  * true surface. */
 #include <cstdio>
+#include <functional>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "../options.hpp"
@@ -46,7 +47,9 @@ const char *const kUsage =
     "                  distance_mm, distance95_mm: of what is left to the true surface, median "
     "and\n"
     "                  95 %; uncovered: share of the true visible surface with no point within 2\n"
-    "                  pixels; new_holes: that, less what was before; strips, isolated: as\n"
+    "                  pixels along it and 20 mm across it; new_holes: that, less what was\n"
+    "                  before; uncovered_6mm, new_holes_6mm: no point within 6 mm across it, less\n"
+    "                  than stereo's errors; strips, isolated: as\n"
     "                  striprender draws what is left; ms\n"
     "  --picture FILE  draws that slice, points in their views' colours, before and after; with\n"
     "                  --colour the head between two cameras: winner, balanced, and blended\n"
@@ -62,22 +65,46 @@ const char *const kUsage =
     "points\n"
     "                  within 10 mm of another view's; balance_ms, filter_ms, blend_ms\n";
 
-void
+struct SpeedScene {
+  std::string name;
+  std::function<FrameSet ()> make;
+};
+
+std::vector<SpeedScene>
+speed_scenes (const FrameSet *bunny)
+{
+  std::vector<SpeedScene> scenes;
+  if (bunny)
+    scenes.push_back ({"bunny, 6 x 320x240", [bunny] { return *bunny; }});
+  const auto add = [&] (int views, int width) {
+    const int height = width * 3 / 4;
+    const std::string size =
+        std::to_string (views) + " x " + std::to_string (width) + "x" + std::to_string (height);
+    scenes.push_back ({"bust, " + size, [=] { return render_bust (views, width, height); }});
+    scenes.push_back (
+        {"all pixels, " + size, [=] { return render_pillar (views, width, height); }});
+  };
+  for (int views : {4, 8})
+    for (int width : {320, 640})
+      add (views, width);
+  add (16, 320);
+  return scenes;
+}
+
+/* @return what was expected of `only`, or nothing if some scene is meant */
+std::string
 run_speed (const std::string &only, const FrameSet *bunny, int rounds)
 {
-  auto wanted = [&] (const std::string &name) { return name.starts_with (only); };
-  if (bunny && wanted ("bunny"))
-    measure_speed ("bunny, 6 x 320x240", *bunny, rounds);
-  for (int views : {4, 8})
-    for (int width : {320, 640}) {
-      const int height = width * 3 / 4;
-      const std::string size =
-          std::to_string (views) + " x " + std::to_string (width) + "x" + std::to_string (height);
-      if (wanted ("bust, " + size))
-        measure_speed ("bust, " + size, render_bust (views, width, height), rounds);
-      if (wanted ("all pixels, " + size))
-        measure_speed ("all pixels, " + size, render_pillar (views, width, height), rounds);
-    }
+  std::string names;
+  bool found = false;
+  for (const SpeedScene &scene : speed_scenes (bunny)) {
+    names += (names.empty () ? "'" : ", '") + scene.name + "'";
+    if (!scene.name.starts_with (only))
+      continue;
+    found = true;
+    measure_speed (scene.name, scene.make (), rounds);
+  }
+  return found ? "" : "the beginning of one of " + names;
 }
 
 std::string
@@ -131,8 +158,37 @@ run (Job &job)
   if (!truth.bunny.empty ())
     if (Status s = load_bunny (truth.bunny, bunny); !s.ok ())
       return s;
-  run_speed (job.only, truth.bunny.empty () ? nullptr : &bunny, job.rounds ? job.rounds : 50);
+  const std::string expected =
+      run_speed (job.only, truth.bunny.empty () ? nullptr : &bunny, job.rounds ? job.rounds : 50);
+  return expected.empty ()
+             ? Status{}
+             : Status{StatusCode::kBadValue, "--only " + job.only + ": expected " + expected};
+}
+
+/* An option that says something of a measurement which is not asked for; empty: there is none. */
+std::string
+idle_option (const Job &job)
+{
+  const TruthJob &truth = job.truth;
+  const bool of_head = job.want_truth || job.want_colour || !job.picture.empty ();
+  const std::pair<const char *, bool> of_heads[] = {{"--model", !truth.model.empty ()},
+      {"--views", truth.views != 0}, {"--noise", truth.noise.has_value ()},
+      {"--pose-mm", truth.pose_mm >= 0}, {"--pose-deg", truth.pose_deg >= 0},
+      {"--mesh", !truth.mesh.empty ()}};
+  for (const auto &[name, given] : of_heads)
+    if (given && !of_head)
+      return std::string (name) + ": expected --truth, --colour or --picture, too";
+  if (!job.only.empty () && of_head)
+    return "--only: expected neither --truth, --colour nor --picture";
   return {};
+}
+
+/* Before what takes minutes. */
+bool
+can_write (const std::string &path)
+{
+  std::FILE *file = std::fopen (path.c_str (), "a");
+  return file && std::fclose (file) == 0;
 }
 
 } // namespace
@@ -170,6 +226,14 @@ main (int argc, char **argv)
     return options.refuse ("--json: expected --truth or --colour, too");
   if (job.want_colour && (job.want_truth || !truth.bunny.empty ()))
     return options.refuse ("--colour: expected neither --truth nor --bunny");
+  if (const std::string wrong = idle_option (job); !wrong.empty ())
+    return options.refuse (wrong);
+  if (!job.json.empty () && !can_write (job.json)) {
+    std::fprintf (stderr,
+        "cylinder_bench: --json %s: cannot be written, expected a file to write\n",
+        job.json.c_str ());
+    return 1;
+  }
   if (const Status s = run (job); !s.ok ()) {
     std::fprintf (stderr, "cylinder_bench: %s\n", s.message ().c_str ());
     return 1;
