@@ -83,7 +83,7 @@ struct Camera::Impl {
 static std::string
 text_of (const char *text)
 {
-  return text ? text : "";
+  return text ? valid_utf8 (text) : "";
 }
 
 void
@@ -131,7 +131,7 @@ Camera::open (const std::string &name, std::unique_ptr<Camera> &camera)
   }
   g_clear_error (&error);
   const std::string called = name.empty () ? impl->info.id : name;
-  std::string label = "camera '" + called + "'";
+  std::string label = "camera '" + valid_utf8 (called) + "'";
   if (!impl->info.model.empty () && impl->info.id != called)
     label +=
         " (" + impl->info.vendor + " " + impl->info.model + ", serial " + impl->info.serial + ")";

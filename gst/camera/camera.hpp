@@ -25,8 +25,9 @@
 struct CameraInfo {
   std::string id; ///< Aravis' name for it, unique: as "Aravis-Fake-GV01"
   std::string vendor, model, serial;
-  std::string address;  ///< GigE: IP address; USB: USB vendor, product and serial
-  std::string protocol; ///< "GigEVision", "USB3Vision"
+  std::string address;     ///< GigE: IP address; USB: USB vendor, product and serial
+  std::string physical_id; ///< GigE: MAC address; USB: GUID
+  std::string protocol;    ///< "GigEVision", "USB3Vision"
 };
 
 /** All cameras that answer now. Takes about a second, looks at every network interface and USB. Any

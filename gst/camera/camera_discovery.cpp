@@ -29,7 +29,7 @@ struct ListedCamera {
 static std::string
 text_of (const char *text)
 {
-  return text ? text : "";
+  return text ? valid_utf8 (text) : "";
 }
 
 /* list_lock is held, also while the list is used. */
@@ -50,7 +50,7 @@ discover (bool afresh)
     camera.info.serial = text_of (arv_get_device_serial_nbr (i));
     camera.info.address = text_of (arv_get_device_address (i));
     camera.info.protocol = text_of (arv_get_device_protocol (i));
-    camera.physical_id = text_of (arv_get_device_physical_id (i));
+    camera.info.physical_id = text_of (arv_get_device_physical_id (i));
     if (camera.info.protocol != "Fake") /* Aravis' own, which has no pictures of anything */
       list.push_back (std::move (camera));
   }
@@ -76,7 +76,7 @@ first_line (const std::filesystem::path &file)
   std::ifstream in (file);
   std::string line;
   std::getline (in, line);
-  return line;
+  return valid_utf8 (line);
 }
 
 /* Class EF (miscellaneous), subclass 05 (USB3 Vision), protocol 00 (control). */
@@ -116,7 +116,7 @@ static std::string
 permission_text (const ForbiddenCamera &camera)
 {
   return "no permission to open " + camera.node + " (" + camera.product + " " + camera.serial +
-         "): copy docs/99-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
+         "): copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
 }
 
 /* Names */
@@ -125,7 +125,7 @@ static bool
 is_called (const ListedCamera &camera, const std::string &name)
 {
   return camera.info.id == name || camera.info.serial == name || camera.info.address == name ||
-         camera.physical_id == name;
+         camera.info.physical_id == name;
 }
 
 static std::string

@@ -44,6 +44,7 @@ GST_START_TEST (test_all_cameras_are_listed)
     fail_unless (camera.serial == "left" || camera.serial == "right");
     assert_equals_string (camera.model.c_str (), "Fake");
     assert_equals_string (camera.protocol.c_str (), "GigEVision");
+    fail_unless (!camera.physical_id.empty ());
   }
 }
 GST_END_TEST;

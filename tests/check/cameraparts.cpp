@@ -96,6 +96,14 @@ GST_START_TEST (test_any_bytes_are_parsed_or_refused)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_texts_of_devices_are_made_valid)
+{
+  const CameraStatus status (CameraFault::kFailed, "camera '\xff\xfe': gone");
+  fail_unless (g_utf8_validate (status.message ().c_str (), -1, nullptr));
+  fail_unless (status.message ().find ("': gone") != std::string::npos);
+}
+GST_END_TEST;
+
 /* Action commands. The expected bytes were written down from the standard's table. */
 
 GST_START_TEST (test_action_command_has_the_bytes_of_the_standard)
@@ -364,6 +372,7 @@ cameraparts_suite ()
   tcase_add_test (tc, test_quotes_keep_spaces_and_empty_values);
   tcase_add_test (tc, test_wrong_features_strings_are_refused_at_the_place);
   tcase_add_test (tc, test_any_bytes_are_parsed_or_refused);
+  tcase_add_test (tc, test_texts_of_devices_are_made_valid);
   tcase_add_test (tc, test_action_command_has_the_bytes_of_the_standard);
   tcase_add_test (tc, test_scheduled_action_command_carries_the_time);
   tcase_add_test (tc, test_action_command_is_heard_once_from_each_interface);
