@@ -1,8 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <glib.h>
 #include <string>
-#include <utility>
+
+/** Text that came from a device, fit for messages and properties. */
+inline std::string
+valid_utf8 (const std::string &text)
+{
+  gchar *valid = g_utf8_make_valid (text.c_str (), gssize (text.size ()));
+  std::string copy = valid;
+  g_free (valid);
+  return copy;
+}
 
 /** What went wrong with a camera, coarsely: enough for a caller to decide whether to try again. */
 enum class CameraFault {
@@ -22,8 +32,8 @@ enum class CameraFault {
 class [[nodiscard]] CameraStatus {
 public:
   CameraStatus () = default;
-  CameraStatus (CameraFault fault, std::string message)
-      : fault_ (fault), message_ (std::move (message))
+  CameraStatus (CameraFault fault, const std::string &message)
+      : fault_ (fault), message_ (valid_utf8 (message))
   {
   }
 
