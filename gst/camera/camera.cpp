@@ -5,55 +5,20 @@
 
 #include <arv.h>
 #include <atomic>
-#include <chrono>
-#include <future>
 #include <mutex>
-#include <thread>
 
 #include "camera_control.hpp"
 #include "camera_discovery.hpp"
 #include "camera_format.hpp"
+#include "camera_run.hpp"
 #include "camera_setup.hpp"
-#include "frame_counter.hpp"
-#include "frame_store.hpp"
 #include "receive_buffer.hpp"
-
-using namespace std::chrono_literals;
+#include "take_down.hpp"
 
 static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
+static constexpr std::size_t kMostExtra = 1 << 20; /* bytes that chunks may add to a picture */
 
 namespace {
-
-/* Work that may have to wait for a camera that does not answer: one after the other, in threads of
- * its own. One that is late makes the next ones not be waited for. */
-class TakeDown {
-public:
-  void run (std::function<void ()> work, bool patient)
-  {
-    patient = patient && wait (0s);
-    std::packaged_task<void ()> task ([before = done_, work = std::move (work)] {
-      if (before.valid ())
-        before.wait ();
-      work ();
-    });
-    done_ = task.get_future ().share ();
-    std::thread (std::move (task)).detach ();
-    if (patient)
-      wait (kPatience);
-  }
-  /* @return false: still at work */
-  bool wait (std::chrono::milliseconds limit)
-  {
-    return !done_.valid () || done_.wait_for (limit) == std::future_status::ready;
-  }
-
-  static constexpr std::chrono::milliseconds kLongest = 15s; /* Aravis' tries end before */
-
-private:
-  static constexpr std::chrono::milliseconds kPatience = 1s;
-
-  std::shared_future<void> done_;
-};
 
 /* Outlives the camera where its device's signal is just being emitted. */
 struct LossWatch {
@@ -75,105 +40,6 @@ struct LossWatch {
   }
 };
 
-/* One run from start() to stop(). */
-struct Run {
-  std::mutex lock; /* guards all of it, held while `arrived` runs; only the stream's thread waits */
-  Camera::Arrived arrived;
-  ArvStream *stream = nullptr; /* transfer full; deleted by take-down */
-  std::shared_ptr<FrameStore> store;
-  FrameCounter counter;
-  CameraFormat format;
-  ArvPixelFormat code = 0;
-  std::uint64_t missing_packets = 0; /* told so far */
-  bool stopped = false;
-
-  void on_done ();
-  void deliver (ArvBuffer *buffer);
-  [[nodiscard]] bool fits (ArvBuffer *buffer) const;
-};
-
-void
-Run::on_done ()
-{
-  std::lock_guard guard (lock);
-  while (!stopped && stream) {
-    ArvBuffer *buffer = arv_stream_try_pop_buffer (stream);
-    if (!buffer)
-      break;
-    deliver (buffer);
-  }
-}
-
-bool
-Run::fits (ArvBuffer *buffer) const
-{
-  const ArvBufferPayloadType type = arv_buffer_get_payload_type (buffer);
-  if (type != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && type != ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA)
-    return false;
-  std::size_t size = 0, all = 0;
-  gint x_padding = 0, y_padding = 0;
-  if (arv_buffer_get_image_data (buffer, &size) != arv_buffer_get_data (buffer, &all))
-    return false;
-  arv_buffer_get_image_padding (buffer, &x_padding, &y_padding);
-  return size >= format.size () && x_padding == 0 &&
-         arv_buffer_get_image_width (buffer) == format.width &&
-         arv_buffer_get_image_height (buffer) == format.height &&
-         arv_buffer_get_image_pixel_format (buffer) == code;
-}
-
-/* buffer: transfer full */
-void
-Run::deliver (ArvBuffer *buffer)
-{
-  const ArvBufferStatus status = arv_buffer_get_status (buffer);
-  const std::uint64_t id = arv_buffer_get_frame_id (buffer);
-  if (id == FrameStore::kNoId || status == ARV_BUFFER_STATUS_ABORTED ||
-      status == ARV_BUFFER_STATUS_CLEARED) { /* nobody knows which one it is: a gap */
-    store->give_back (buffer);
-    return;
-  }
-  CameraFrame frame;
-  frame.id = id;
-  frame.number = counter.number (id);
-  frame.arrived_us = g_get_monotonic_time ();
-  frame.system_time_ns = arv_buffer_get_system_timestamp (buffer);
-  const std::int64_t age_us = g_get_real_time () - std::int64_t (frame.system_time_ns / 1000);
-  frame.began_us = frame.arrived_us - std::max<std::int64_t> (age_us, 0);
-  const std::uint64_t taken = arv_buffer_get_timestamp (buffer);
-  frame.camera_time_ns = taken == frame.system_time_ns ? 0 : taken; /* Aravis' makeshift */
-  if (ARV_IS_GV_STREAM (stream)) {
-    guint64 missing = 0;
-    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), nullptr, &missing);
-    frame.missing_packets = missing - missing_packets;
-    missing_packets = missing;
-  }
-  if (status != ARV_BUFFER_STATUS_SUCCESS)
-    frame.state = FrameState::kMissing;
-  else
-    frame.state = fits (buffer) ? FrameState::kComplete : FrameState::kUnfit;
-  if (frame.state == FrameState::kComplete)
-    frame.buffer = store->wrap (buffer);
-  else
-    store->give_back (buffer);
-  arrived (std::move (frame));
-}
-
-CameraStatistics
-count (ArvStream *stream)
-{
-  CameraStatistics numbers;
-  guint64 completed = 0, failures = 0, underruns = 0, resent = 0, missing = 0;
-  arv_stream_get_statistics (stream, &completed, &failures, &underruns);
-  if (ARV_IS_GV_STREAM (stream))
-    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), &resent, &missing);
-  numbers.completed = completed;
-  numbers.failures = failures;
-  numbers.underruns = underruns;
-  numbers.resent_packets = resent;
-  numbers.missing_packets = missing;
-  return numbers;
-}
-
 } // namespace
 
 struct Camera::Impl {
@@ -188,17 +54,21 @@ struct Camera::Impl {
   TakeDown take_down;
 
   std::mutex run_lock; /* guards what follows */
-  std::shared_ptr<Run> run;
+  std::shared_ptr<CameraRun> run;
   CameraStatistics last_statistics;
 
-  std::mutex look_lock; /* guards written */
+  /* Guards what follows, and features that consist of several (a selector and its value, a latch
+   * and what it keeps). Taken before the control's, which triggers wait for and which is therefore
+   * held for one feature at a time. */
+  std::mutex look_lock;
   CameraLook written;
+  guint64 tick_frequency = 0; /* of the camera's clock, 1/s; 0: not yet read */
 
-  void describe (const std::string &name);
-  CameraStatus create_stream (const std::shared_ptr<Run> &run);
+  void describe ();
+  CameraStatus create_stream (const std::shared_ptr<CameraRun> &run);
   void set_stream_properties (ArvStream *stream) const;
-  CameraStatus fill (Run &run);
-  void end (const std::shared_ptr<Run> &run);
+  CameraStatus fill (CameraRun &run);
+  void end (const std::shared_ptr<CameraRun> &run);
   /* A fault is a loss where the camera is known to be lost. */
   CameraStatus judged (CameraStatus status) const
   {
@@ -217,7 +87,7 @@ text_of (const char *text)
 }
 
 void
-Camera::Impl::describe (const std::string &name)
+Camera::Impl::describe ()
 {
   ArvCamera *camera = control->camera ();
   if (info.vendor.empty ())
@@ -240,7 +110,6 @@ Camera::Impl::describe (const std::string &name)
   ArvGvDevice *device = ARV_GV_DEVICE (control->device ());
   interface = address (arv_gv_device_get_interface_address (device));
   info.address = address (arv_gv_device_get_device_address (device));
-  (void)name;
 }
 
 CameraStatus
@@ -267,7 +136,7 @@ Camera::open (const std::string &name, std::unique_ptr<Camera> &camera)
     label +=
         " (" + impl->info.vendor + " " + impl->info.model + ", serial " + impl->info.serial + ")";
   impl->control = std::make_unique<CameraControl> (arv, label);
-  impl->describe (name);
+  impl->describe ();
   impl->watch->label = label;
   impl->watch_handler = g_signal_connect_data (
       impl->control->device (), "control-lost", G_CALLBACK (+[] (ArvDevice *, gpointer watch) {
@@ -383,7 +252,7 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
 }
 
 CameraStatus
-Camera::Impl::create_stream (const std::shared_ptr<Run> &run)
+Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
 {
   const auto guard = control->lock ();
   GError *error = nullptr;
@@ -391,7 +260,7 @@ Camera::Impl::create_stream (const std::shared_ptr<Run> &run)
       control->camera (),
       [] (void *data, ArvStreamCallbackType type, ArvBuffer *) {
         if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE)
-          static_cast<Run *> (data)->on_done ();
+          static_cast<CameraRun *> (data)->on_done ();
       },
       run.get (), nullptr, &error); /* end() keeps the run until the stream is gone */
   if (!stream)
@@ -406,13 +275,13 @@ Camera::Impl::create_stream (const std::shared_ptr<Run> &run)
 }
 
 CameraStatus
-Camera::Impl::fill (Run &run)
+Camera::Impl::fill (CameraRun &run)
 {
   GError *error = nullptr;
   const auto guard = control->lock ();
   const guint payload = arv_camera_get_payload (control->camera (), &error);
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
-  if (status.ok () && payload < format.size ())
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMostExtra))
     status = control->refuse (CameraFault::kUnsupported,
         "sends " + std::to_string (payload) + " bytes a picture; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
@@ -437,7 +306,7 @@ Camera::start (Arrived arrived, Lost lost)
   stop ();
   if (!impl_->take_down.wait (TakeDown::kLongest))
     return control.refuse (CameraFault::kTimedOut, "still ends what it did before");
-  auto run = std::make_shared<Run> ();
+  auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
   run->format = impl_->format;
   run->code = find_pixel_format (impl_->format.pixel_format)->code;
@@ -468,7 +337,7 @@ Camera::start (Arrived arrived, Lost lost)
 
 /* The acquisition ends before the thread that receives it, which ends before its buffers go. */
 void
-Camera::Impl::end (const std::shared_ptr<Run> &run)
+Camera::Impl::end (const std::shared_ptr<CameraRun> &run)
 {
   const bool answers = !watch->lost;
   take_down.run (
@@ -490,14 +359,14 @@ Camera::stop ()
     std::lock_guard guard (impl_->watch->lock);
     impl_->watch->report = nullptr;
   }
-  std::shared_ptr<Run> run;
+  std::shared_ptr<CameraRun> run;
   {
     std::lock_guard guard (impl_->run_lock);
     run = std::move (impl_->run);
     impl_->run = nullptr;
     if (!run)
       return;
-    impl_->last_statistics = count (run->stream);
+    impl_->last_statistics = count_stream (run->stream);
   }
   {
     std::lock_guard guard (run->lock);
@@ -520,7 +389,7 @@ Camera::statistics () const
   std::lock_guard guard (impl_->run_lock);
   if (!impl_->run)
     return impl_->last_statistics;
-  CameraStatistics numbers = count (impl_->run->stream);
+  CameraStatistics numbers = count_stream (impl_->run->stream);
   numbers.buffers_out = impl_->run->store->out ();
   return numbers;
 }
@@ -544,6 +413,7 @@ Camera::read_look (CameraLook &look)
 {
   if (is_lost ())
     return impl_->control->refuse (CameraFault::kLost, "was lost");
+  std::lock_guard guard (impl_->look_lock);
   return impl_->judged (::read_look (*impl_->control, look));
 }
 
@@ -583,48 +453,57 @@ ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
          gst_util_uint64_scale (ticks % frequency, kSecond, frequency);
 }
 
+/* Registers, no features: the control's lock is not needed. */
 static GError *
-read_gige_clock (ArvDevice *device, std::uint64_t &time_ns, std::int64_t &read_at_us)
+read_gige_clock (
+    ArvDevice *device, guint64 &frequency, std::uint64_t &time_ns, std::int64_t &read_at_us)
 {
   GError *error = nullptr;
   guint32 high = 0, low = 0;
+  if (frequency == 0)
+    frequency = arv_gv_device_get_timestamp_tick_frequency (ARV_GV_DEVICE (device), &error);
   const std::int64_t before = g_get_monotonic_time ();
-  arv_device_write_register (device, kTimestampControl, kTimestampLatch, &error);
+  if (!error)
+    arv_device_write_register (device, kTimestampControl, kTimestampLatch, &error);
   read_at_us = (before + g_get_monotonic_time ()) / 2;
   if (!error)
     arv_device_read_register (device, kTimestampHigh, &high, &error);
   if (!error)
     arv_device_read_register (device, kTimestampLow, &low, &error);
-  if (error)
-    return error;
-  const guint64 frequency =
-      arv_gv_device_get_timestamp_tick_frequency (ARV_GV_DEVICE (device), &error);
-  time_ns = ticks_to_ns (std::uint64_t (high) << 32 | low, frequency);
+  if (!error)
+    time_ns = ticks_to_ns (std::uint64_t (high) << 32 | low, frequency);
   return error;
+}
+
+static CameraStatus
+read_usb_clock (CameraControl &control, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  std::int64_t ticks = 0;
+  const std::int64_t before = g_get_monotonic_time ();
+  CameraStatus status = control.execute ("TimestampLatch");
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (status.ok () && !control.read ("TimestampLatchValue", ticks))
+    return control.refuse (CameraFault::kFailed, "has no feature 'TimestampLatchValue'");
+  time_ns = static_cast<std::uint64_t> (std::max<std::int64_t> (ticks, 0)); /* USB3 Vision: ns */
+  return status;
 }
 
 CameraStatus
 Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
 {
   CameraControl &control = *impl_->control;
+  camera_time_ns = 0;
   if (is_lost ())
     return control.refuse (CameraFault::kLost, "was lost");
-  const auto guard = control.lock ();
+  std::lock_guard guard (impl_->look_lock);
   CameraStatus status;
-  if (is_gige ()) {
-    GError *error = read_gige_clock (control.device (), camera_time_ns, read_at_us);
-    status = control.status ("its clock", error, CameraFault::kFailed);
-  } else { /* USB3 Vision: nanoseconds */
-    std::int64_t ticks = 0;
-    const std::int64_t before = g_get_monotonic_time ();
-    status = control.execute ("TimestampLatch");
-    read_at_us = (before + g_get_monotonic_time ()) / 2;
-    if (status.ok () && control.read ("TimestampLatchValue", ticks))
-      camera_time_ns = ticks;
-    else if (status.ok ())
-      status = control.refuse (CameraFault::kFailed, "has no feature 'TimestampLatchValue'");
-  }
-  if (status.ok () && camera_time_ns == 0)
+  if (is_gige ())
+    status = control.status ("its clock",
+        read_gige_clock (control.device (), impl_->tick_frequency, camera_time_ns, read_at_us),
+        CameraFault::kFailed);
+  else
+    status = read_usb_clock (control, camera_time_ns, read_at_us);
+  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kLatestTime_ns))
     return control.refuse (CameraFault::kFailed, "does not tell its clock");
   return impl_->judged (status);
 }

@@ -23,7 +23,7 @@
 
 /** A camera as discovery sees it. */
 struct CameraInfo {
-  std::string id; ///< Aravis' name for it, unique: "Vendor-Serial"
+  std::string id; ///< Aravis' name for it, unique: as "Aravis-Fake-GV01"
   std::string vendor, model, serial;
   std::string address;  ///< GigE: IP address; USB: USB vendor, product and serial
   std::string protocol; ///< "GigEVision", "USB3Vision"
@@ -98,8 +98,8 @@ public:
   using Lost = std::function<void (CameraStatus)>;
 
   /** Finds, opens and takes control of a camera.
-   *  @param name  its user-defined name, serial number, Aravis id ("Vendor-Serial"), MAC address,
-   * or IP address or host name. Empty: the only camera that there is.
+   *  @param name  its serial number, Aravis id (as "Aravis-Fake-GV01"), MAC address, IP address,
+   * user-defined name (GigE), or host name with a dot in it. Empty: the only camera that there is.
    *  @param[out] camera  set if ok
    *  @return kNotFound (the text says which cameras answered), kBusy (another program has control),
    * kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "camera_control.hpp"
+#include "user_name.hpp"
 
 static std::mutex list_lock;
 
@@ -20,7 +21,9 @@ static constexpr guint64 kControlRegister = 0x0a00; /* GigE Vision: control chan
 
 struct ListedCamera {
   CameraInfo info;
-  std::string physical_id; /* MAC address, or USB GUID */
+  std::string physical_id;              /* MAC address, or USB GUID */
+  std::optional<std::string> user_name; /* once asked for; GigE */
+  bool was_asked = false;
 };
 
 static std::string
@@ -29,11 +32,11 @@ text_of (const char *text)
   return text ? text : "";
 }
 
-/* list_lock is held. */
-static std::vector<ListedCamera>
+/* list_lock is held, also while the list is used. */
+static std::vector<ListedCamera> &
 discover (bool afresh)
 {
-  static std::vector<ListedCamera> list;
+  static auto &list = *new std::vector<ListedCamera>; /* threads may outlive main() */
   static std::int64_t listed_at = G_MININT64 / 2;
   if (!afresh && g_get_monotonic_time () - listed_at < kListLifetime_us)
     return list;
@@ -60,8 +63,8 @@ list_cameras ()
 {
   std::lock_guard guard (list_lock);
   std::vector<CameraInfo> cameras;
-  for (ListedCamera &camera : discover (true))
-    cameras.push_back (std::move (camera.info));
+  for (const ListedCamera &camera : discover (true))
+    cameras.push_back (camera.info);
   return cameras;
 }
 
@@ -90,10 +93,11 @@ forbidden_usb_cameras (const std::string &devices, const std::string &nodes)
 {
   std::vector<ForbiddenCamera> found;
   std::error_code error;
-  for (const auto &entry : std::filesystem::directory_iterator (devices, error)) {
-    const std::string name = entry.path ().filename ();
+  for (std::filesystem::directory_iterator entry (devices, error), end; !error && entry != end;
+       entry.increment (error)) { /* devices may go meanwhile */
+    const std::string name = entry->path ().filename ();
     const std::size_t colon = name.find (':'); /* "2-1:1.0" is interface 0 of device "2-1" */
-    if (colon == std::string::npos || !is_usb3_vision (entry.path ()))
+    if (colon == std::string::npos || !is_usb3_vision (entry->path ()))
       continue;
     const std::filesystem::path device = std::filesystem::path (devices) / name.substr (0, colon);
     int bus = 0, number = 0;
@@ -141,7 +145,8 @@ not_found (const std::string &name, const std::vector<ListedCamera> &list)
   text += describe (list);
   for (const ForbiddenCamera &camera : forbidden_usb_cameras ()) {
     if (list.empty () || name == camera.serial)
-      return {CameraFault::kNoPermission, "camera '" + name + "': " + permission_text (camera)};
+      return {CameraFault::kNoPermission,
+          (name.empty () ? "" : "camera '" + name + "': ") + permission_text (camera)};
     text += "; besides, " + permission_text (camera);
   }
   return {CameraFault::kNotFound, text};
@@ -223,33 +228,51 @@ open_by_id (
   return status;
 }
 
-/* A name that no camera has as id, serial number or address may be a user-defined name, which
- * Aravis keeps to itself, or a host name. An unknown one costs a DNS query. */
-static CameraStatus
-open_by_other_name (const std::string &name, const std::vector<ListedCamera> &list,
-    ArvDevice *&device, const char *&protocol)
+/* Asks each GigE camera of the list for its user-defined name, once. */
+static const ListedCamera *
+find_by_user_name (const std::string &name, std::vector<ListedCamera> &list)
 {
-  CameraStatus status = open_by_id (name, name, device, protocol);
-  if (status.fault () == CameraFault::kNotFound)
+  for (ListedCamera &camera : list) {
+    if (!camera.was_asked && camera.info.protocol == "GigEVision")
+      camera.user_name = read_user_name (camera.info.address);
+    camera.was_asked = true;
+    if (camera.user_name == name)
+      return &camera;
+  }
+  return nullptr;
+}
+
+/* A host's name has a dot: others would cost a DNS query for each that is just not there. */
+static CameraStatus
+open_by_other_name (
+    const std::string &name, std::vector<ListedCamera> &list, ArvDevice *&device, CameraInfo &info)
+{
+  const char *protocol = "GigEVision";
+  info = {};
+  if (const ListedCamera *camera = find_by_user_name (name, list)) {
+    info = camera->info;
+    return open_by_id (name, info.id, device, protocol);
+  }
+  if (name.find ('.') == std::string::npos || name.find (' ') != std::string::npos)
     return not_found (name, list);
-  return status;
+  const CameraStatus status = open_by_id (name, name, device, protocol);
+  info.protocol = protocol;
+  return status.fault () == CameraFault::kNotFound ? not_found (name, list) : status;
 }
 
 /* From the list as it is, or afresh. kNotFound: nothing in the list is called so. */
 static CameraStatus
-open_listed (const std::string &name, bool afresh, std::vector<ListedCamera> &list,
-    ArvDevice *&device, CameraInfo &info)
+open_listed (const std::string &name, bool afresh, ArvDevice *&device, CameraInfo &info)
 {
-  list = discover (afresh);
   const ListedCamera *chosen = nullptr;
-  CameraStatus status = choose (name, list, chosen);
+  CameraStatus status = choose (name, discover (afresh), chosen);
   if (!status.ok ())
     return status;
   if (!chosen)
     return {CameraFault::kNotFound, ""};
   info = chosen->info;
   const char *protocol = "";
-  return open_by_id (name, info.id, device, protocol);
+  return open_by_id (name.empty () ? info.id : name, info.id, device, protocol);
 }
 
 CameraStatus
@@ -258,23 +281,18 @@ open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &inf
   std::lock_guard guard (list_lock);
   device = nullptr;
   info = {};
-  std::vector<ListedCamera> list;
   /* What was just listed need not be listed again, but may be gone. */
   CameraStatus status (CameraFault::kNotFound, "");
   if (!name.empty ())
-    status = open_listed (name, false, list, device, info);
+    status = open_listed (name, false, device, info);
   if (status.ok () || status.fault () == CameraFault::kBusy)
     return status;
   if (!g_hostname_is_ip_address (name.c_str ())) { /* an address may lie behind a router */
-    status = open_listed (name, true, list, device, info);
+    status = open_listed (name, true, device, info);
     if (status.fault () != CameraFault::kNotFound)
       return status;
     if (name.empty ())
-      return not_found (name, list);
+      return not_found (name, discover (false));
   }
-  const char *protocol = "";
-  info = {};
-  status = open_by_other_name (name, list, device, protocol);
-  info.protocol = protocol;
-  return status;
+  return open_by_other_name (name, discover (false), device, info);
 }

@@ -32,9 +32,6 @@ struct CameraFrame {
    * which begins anywhere, or that of IEEE 1588 (see Camera::clock_is_ptp). 0: the camera does not
    * tell. */
   std::uint64_t camera_time_ns = 0;
-  std::uint64_t system_time_ns =
-      0;                       ///< when its first packet came, ns since 1970 on this host's clock
-  std::int64_t began_us = 0;   ///< the same, g_get_monotonic_time()
   std::int64_t arrived_us = 0; ///< when its last packet came, g_get_monotonic_time()
   /** Packets of this stream that were given up since the frame before: mostly this one's. */
   std::uint64_t missing_packets = 0;

@@ -9,6 +9,9 @@
 #include "camera_features.hpp"
 #include "camera_format.hpp"
 
+/* What a camera says decides how much memory is taken: 512 MiB a picture are enough. */
+static constexpr std::uint64_t kLargestPicture = 512 << 20;
+static constexpr int kLongestSide = 65535;     /* pixels */
 static constexpr int kGigEMinimumPacket = 576; /* bytes; GigE Vision */
 
 /* An error that only says that the camera lacks something is no reason to fail. */
@@ -31,8 +34,16 @@ read_sizes (CameraControl &control, CameraAbilities &abilities)
   arv_camera_get_height_bounds (camera, &low, &high, nullptr);
   abilities.min_height = low;
   abilities.max_height = std::max (abilities.max_height, high);
+  std::int64_t whole = 0; /* with binning, less than the sensor has */
+  if (control.read ("WidthMax", whole) && whole > 0 && whole <= G_MAXINT)
+    abilities.max_width = int (whole);
+  if (control.read ("HeightMax", whole) && whole > 0 && whole <= G_MAXINT)
+    abilities.max_height = int (whole);
   abilities.width_step = std::max (1, arv_camera_get_width_increment (camera, nullptr));
   abilities.height_step = std::max (1, arv_camera_get_height_increment (camera, nullptr));
+  for (int *side : {&abilities.max_width, &abilities.max_height, &abilities.min_width,
+           &abilities.min_height, &abilities.width_step, &abilities.height_step})
+    *side = std::clamp (*side, 0, kLongestSide);
   if (arv_camera_is_frame_rate_available (camera, nullptr))
     arv_camera_get_frame_rate_bounds (
         camera, &abilities.min_frame_rate, &abilities.max_frame_rate, nullptr);
@@ -187,12 +198,17 @@ read_format (CameraControl &control, CameraFormat &format)
   if (!control.read ("PixelFormat", format.pixel_format))
     return control.refuse (CameraFault::kFailed, "does not tell its pixel format");
   const PixelFormat *pixel = find_pixel_format (format.pixel_format);
-  if (!pixel || format.width < 1 || format.height < 1)
+  if (!pixel || format.width < 1 || format.height < 1 || format.width > kLongestSide ||
+      format.height > kLongestSide)
     return control.refuse (CameraFault::kUnsupported,
         "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
             " " + format.pixel_format + " cannot be carried");
   format.video_format = pixel->video_format;
   format.bayer = pixel->bayer;
+  if (std::uint64_t (format.width) * format.height * pixel->bytes > kLargestPicture)
+    return control.refuse (CameraFault::kUnsupported,
+        "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
+            " are too large: expected at most " + std::to_string (kLargestPicture) + " bytes");
   format.stride = format.width * pixel->bytes;
   return {};
 }
@@ -481,17 +497,22 @@ CameraStatus
 read_look (CameraControl &control, CameraLook &look)
 {
   look = {};
-  const auto guard = control.lock ();
   ArvCamera *camera = control.camera ();
   GError *error = nullptr;
-  if (arv_camera_is_exposure_time_available (camera, nullptr))
-    look.exposure_us = arv_camera_get_exposure_time (camera, &error);
+  { /* one feature at a time: triggers wait for the lock */
+    const auto guard = control.lock ();
+    if (arv_camera_is_exposure_time_available (camera, nullptr))
+      look.exposure_us = arv_camera_get_exposure_time (camera, &error);
+  }
   CameraStatus status = control.status ("exposure", error, CameraFault::kFailed);
   error = nullptr;
-  if (status.ok () && arv_camera_is_gain_available (camera, nullptr)) {
-    look.gain = arv_camera_get_gain (camera, &error);
-    status = control.status ("gain", error, CameraFault::kFailed);
+  if (status.ok ()) {
+    const auto guard = control.lock ();
+    if (arv_camera_is_gain_available (camera, nullptr))
+      look.gain = arv_camera_get_gain (camera, &error);
   }
+  if (status.ok ())
+    status = control.status ("gain", error, CameraFault::kFailed);
   const char *ratio = status.ok () ? balance_feature (control) : nullptr;
   for (int colour = 0; ratio && colour < 3; colour++) {
     double value = 0;
@@ -548,7 +569,6 @@ write_look (CameraControl &control, const CameraLook &look, CameraLook &written)
     CameraLook wanted = look;
     if (!differs (balance_of (wanted, colour), balance_of (written, colour)))
       continue;
-    const auto guard = control.lock ();
     status = control.assign ("BalanceRatioSelector", kBalanceColours[colour]);
     if (status.ok ())
       status = control.assign (ratio, number_text (*balance_of (wanted, colour)));

@@ -16,6 +16,7 @@ CameraStatus set_look (CameraControl &control, const CameraSettings &settings, d
 CameraStatus set_transport (CameraControl &control, const CameraSettings &settings);
 CameraStatus set_features (CameraControl &control, const std::string &features);
 
+/* Selectors are state: one of these at a time. */
 CameraStatus read_look (CameraControl &control, CameraLook &look);
 /** Sets what differs from `written` by more than a thousandth, and notes it there. */
 CameraStatus write_look (CameraControl &control, const CameraLook &look, CameraLook &written);

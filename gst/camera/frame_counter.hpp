@@ -11,21 +11,35 @@ public:
 
   explicit FrameCounter (Ids ids = Ids::kGigE) : ids_ (ids) {}
 
-  /** The number of that id, 0 for the first id that there is. Ids come in order, with gaps of less
-   *  than half their range; one that is not above the last one begins a new round. */
+  /** Whether the standard has such an id. */
+  [[nodiscard]] bool is_id (std::uint64_t id) const { return ids_ == Ids::kUsb || id != 0; }
+  /** The number of that id, 0 for the first id that there is. Grows strictly: an id that makes no
+   * sense after the last one (a camera that begins anew, a leap) is the next. */
   std::uint64_t number (std::uint64_t id)
   {
-    if (ids_ == Ids::kUsb)
-      return id;
-    if (id < last_id_ && last_id_ <= kRound && last_id_ - id > kRound / 2)
-      rounds_ += kRound;
+    if (!begun_)
+      number_ = id < kLeap ? id - (ids_ == Ids::kGigE) : 0;
+    else
+      number_ += step_to (id);
+    begun_ = true;
     last_id_ = id;
-    return rounds_ + id - 1;
+    return number_;
   }
 
 private:
   static constexpr std::uint64_t kRound = 65535;
+  static constexpr std::uint64_t kLeap = std::uint64_t (1) << 31;
+
+  [[nodiscard]] std::uint64_t step_to (std::uint64_t id) const
+  {
+    if (id > last_id_)
+      return id - last_id_ < kLeap ? id - last_id_ : 1;
+    if (ids_ == Ids::kGigE && last_id_ <= kRound && last_id_ - id > kRound / 2)
+      return id + kRound - last_id_;
+    return 1;
+  }
 
   Ids ids_;
-  std::uint64_t last_id_ = 0, rounds_ = 0;
+  bool begun_ = false;
+  std::uint64_t last_id_ = 0, number_ = 0;
 };

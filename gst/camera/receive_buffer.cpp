@@ -24,8 +24,9 @@ enlarge_receive_buffer (std::uint16_t port, int bytes)
 {
   bool found = false;
   std::error_code error;
-  for (const auto &entry : std::filesystem::directory_iterator ("/proc/self/fd", error)) {
-    const int fd = std::atoi (entry.path ().filename ().c_str ());
+  for (std::filesystem::directory_iterator entry ("/proc/self/fd", error), end;
+       !error && entry != end; entry.increment (error)) {
+    const int fd = std::atoi (entry->path ().filename ().c_str ());
     if (is_udp_at (fd, port))
       found |= setsockopt (fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes) == 0;
   }

@@ -3,7 +3,10 @@
 #pragma once
 
 #include <arv.h>
+#include <camera.hpp>
 #include <condition_variable>
+#include <deque>
+#include <memory>
 #include <mutex>
 #include <net/if.h>
 #include <netinet/in.h>
@@ -60,8 +63,12 @@ inline bool has_own_network = false;
 /** Aravis' fake GigE Vision camera (real GVCP and GVSP over sockets), in this process. */
 class FakeCamera {
 public:
-  explicit FakeCamera (const std::string &address = "127.0.0.1", const char *serial = "GV01")
-      : camera_ (arv_gv_fake_camera_new (address.c_str (), serial)), address_ (address)
+  /** @param genicam  file with its features; empty: Aravis' own */
+  explicit FakeCamera (const std::string &address = "127.0.0.1", const char *serial = "GV01",
+      const std::string &genicam = "")
+      : camera_ (arv_gv_fake_camera_new_full (
+            address.c_str (), serial, genicam.empty () ? nullptr : genicam.c_str ())),
+        address_ (address)
   {
     fail_unless (arv_gv_fake_camera_is_running (camera_), "no fake camera at %s", address.c_str ());
   }
@@ -83,5 +90,114 @@ private:
   ArvGvFakeCamera *camera_;
   std::string address_;
 };
+
+/** Keeps what a camera's callbacks say, which may come until the camera was stopped. */
+class Listener {
+public:
+  Camera::Arrived arrived () const
+  {
+    return [heard = heard_] (CameraFrame frame) {
+      std::lock_guard guard (heard->lock);
+      heard->frames.push_back (std::move (frame));
+      heard->changed.notify_all ();
+    };
+  }
+  Camera::Lost lost () const
+  {
+    return [heard = heard_] (CameraStatus status) {
+      std::lock_guard guard (heard->lock);
+      heard->losses.push_back (std::move (status));
+      heard->changed.notify_all ();
+    };
+  }
+  /** The next frame; fails the test if none comes. */
+  CameraFrame next ()
+  {
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->frames.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (20), some), "no frame");
+    CameraFrame frame = std::move (heard_->frames.front ());
+    heard_->frames.pop_front ();
+    return frame;
+  }
+  CameraFrame next_complete ()
+  {
+    for (;;) {
+      CameraFrame frame = next ();
+      if (frame.state == FrameState::kComplete)
+        return frame;
+    }
+  }
+  CameraStatus wait_for_loss ()
+  {
+    std::unique_lock guard (heard_->lock);
+    const auto some = [this] { return !heard_->losses.empty (); };
+    fail_unless (heard_->changed.wait_for (guard, std::chrono::seconds (60), some), "no loss");
+    return heard_->losses.front ();
+  }
+  std::size_t n_losses ()
+  {
+    std::lock_guard guard (heard_->lock);
+    return heard_->losses.size ();
+  }
+  std::size_t n_frames ()
+  {
+    std::lock_guard guard (heard_->lock);
+    return heard_->frames.size ();
+  }
+
+private:
+  struct Heard {
+    std::mutex lock;
+    std::condition_variable changed;
+    std::deque<CameraFrame> frames;
+    std::vector<CameraStatus> losses;
+  };
+  std::shared_ptr<Heard> heard_ = std::make_shared<Heard> ();
+};
+
+inline std::unique_ptr<Camera>
+open_camera (const std::string &name)
+{
+  std::unique_ptr<Camera> camera;
+  const CameraStatus status = Camera::open (name, camera);
+  fail_unless (status.ok (), "%s", status.message ().c_str ());
+  return camera;
+}
+
+inline CameraSettings
+small_pictures (double frame_rate = 100)
+{
+  CameraSettings settings;
+  settings.width = 64;
+  settings.height = 48;
+  settings.pixel_format = "Mono8";
+  settings.frame_rate = frame_rate;
+  return settings;
+}
+
+inline void
+configure (Camera &camera, const CameraSettings &settings)
+{
+  const CameraStatus status = camera.configure (settings);
+  fail_unless (status.ok (), "%s", status.message ().c_str ());
+}
+
+inline void
+start (Camera &camera, Listener &listener)
+{
+  const CameraStatus status = camera.start (listener.arrived (), listener.lost ());
+  fail_unless (status.ok (), "%s", status.message ().c_str ());
+}
+
+inline void
+assert_refused (const CameraStatus &status, CameraFault fault, const char *text)
+{
+  fail_unless (!status.ok ());
+  fail_unless (
+      status.fault () == fault, "fault %d: %s", int (status.fault ()), status.message ().c_str ());
+  fail_unless (status.message ().find (text) != std::string::npos, "'%s' has no '%s'",
+      status.message ().c_str (), text);
+}
 
 } // namespace rangecast::testing

@@ -10,6 +10,7 @@
 #include <receive_buffer.hpp>
 #include <sys/socket.h>
 #include <unistd.h>
+#include <user_name.hpp>
 
 #include "rangecast-check.hpp"
 
@@ -253,11 +254,57 @@ GST_END_TEST;
 GST_START_TEST (test_64_bit_frame_ids_need_no_rounds)
 {
   FrameCounter gige, usb (FrameCounter::Ids::kUsb);
-  for (const std::uint64_t id : {65534ull, 65535ull, 65536ull, 65537ull, 1ull << 40}) {
+  for (const std::uint64_t id : {65534ull, 65535ull, 65536ull, 65537ull, 1ull << 30}) {
     assert_equals_uint64 (gige.number (id), id - 1);
     assert_equals_uint64 (usb.number (id), id);
   }
-  assert_equals_uint64 (usb.number (0), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_frame_numbers_grow_whatever_the_camera_says)
+{
+  FrameCounter counter, usb (FrameCounter::Ids::kUsb);
+  fail_unless (!counter.is_id (0) && usb.is_id (0));
+  std::uint64_t last = counter.number (100);
+  for (const std::uint64_t id :
+      {100ull, 1ull, 50ull, ~0ull, 5ull, 1ull << 63, 0ull, 65535ull, 65535ull, 2ull, 1ull}) {
+    const std::uint64_t number = counter.number (id);
+    fail_unless (number > last && number < last + 100000, "%d after %d", int (number), int (last));
+    last = number;
+  }
+  assert_equals_uint64 (usb.number (~0ull), 0);
+  assert_equals_uint64 (usb.number (0), 1);
+}
+GST_END_TEST;
+
+/* User-defined names */
+
+GST_START_TEST (test_user_name_is_asked_for_with_the_bytes_of_the_standard)
+{
+  static const guint8 expected[] = {
+      0x42, 0x01, 0x00, 0x84, 0x00, 0x08, 0x12, 0x34, 0, 0, 0, 0xe8, 0, 0, 0, 16};
+  const auto request = user_name_request (0x1234);
+  assert_equals_int (request.size (), sizeof expected);
+  fail_unless (memcmp (request.data (), expected, sizeof expected) == 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_user_name_is_taken_from_answers_of_the_standard_alone)
+{
+  const std::vector<guint8> answer = {0x00, 0x00, 0x00, 0x85, 0x00, 0x14, 0x12, 0x34, 0, 0, 0, 0xe8,
+      'l', 'e', 'f', 't', 0, 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x'};
+  fail_unless (user_name_in (answer, 0x1234) == "left");
+  fail_unless (!user_name_in (answer, 0x1235));
+  for (std::size_t size = 0; size < answer.size (); size++)
+    fail_unless (
+        !user_name_in (std::vector<guint8> (answer.begin (), answer.begin () + size), 0x1234));
+  std::vector<guint8> refused = answer, longer = answer, full = answer;
+  refused[0] = 0x80;
+  fail_unless (!user_name_in (refused, 0x1234));
+  longer.push_back (0);
+  fail_unless (!user_name_in (longer, 0x1234));
+  full[16] = '-';
+  fail_unless (user_name_in (full, 0x1234) == "left-xxxxxxxxxxx");
 }
 GST_END_TEST;
 
@@ -325,6 +372,9 @@ cameraparts_suite ()
   tcase_add_test (tc, test_receive_buffer_of_a_port_is_enlarged);
   tcase_add_test (tc, test_frame_numbers_count_on_over_16_bits);
   tcase_add_test (tc, test_64_bit_frame_ids_need_no_rounds);
+  tcase_add_test (tc, test_frame_numbers_grow_whatever_the_camera_says);
+  tcase_add_test (tc, test_user_name_is_asked_for_with_the_bytes_of_the_standard);
+  tcase_add_test (tc, test_user_name_is_taken_from_answers_of_the_standard_alone);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
   return suite;
 }
