@@ -5,7 +5,7 @@
 #include <sched.h>
 
 /** While it lives, the calling thread and the threads that it starts come before ordinary ones
- *  (SCHED_RR), where the user may have that (RLIMIT_RTPRIO); else nothing is different. For what
+ *  (SCHED_RR, lowest priority), where the user may have that (RLIMIT_RTPRIO); else nothing is different. For what
  * takes microseconds and must happen at its time: answers about the clock, triggers. */
 class PromptThread {
 public:
@@ -13,7 +13,7 @@ public:
   {
     if (pthread_getschedparam (pthread_self (), &policy_, &priority_) == 0 &&
         policy_ == SCHED_OTHER) {
-      const sched_param prompt = {10};
+      const sched_param prompt = {1};
       changed_ = pthread_setschedparam (pthread_self (), SCHED_RR, &prompt) == 0;
     }
   }

@@ -22,13 +22,15 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --trigger HOW   free-run, software (default), hardware or action, for cameras
   --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
                   there (default: this machine's)
+  --action-send yes|no  with --trigger action, whether this host sends the commands, which reach the
+                  cameras of all hosts of the network: one does (default: the host of view 0)
   --reconnect     wait for cameras that are gone or not there yet, instead of ending
   --learn N       frames from which the background is learnt (default 20)
 END
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= reconnect=false
+format=rgb trigger=software clock_server= action_send= reconnect=false
 while [ $# -gt 0 ]; do
   case "$1" in
     --view) view=${2:-}; shift ;;
@@ -42,6 +44,7 @@ while [ $# -gt 0 ]; do
     --format) format=${2:-}; shift ;;
     --trigger) trigger=${2:-}; shift ;;
     --clock-server) clock_server=${2:-}; shift ;;
+    --action-send) action_send=${2:-}; shift ;;
     --reconnect) reconnect=true ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
@@ -56,6 +59,12 @@ need_size "$size" --size
 case "$trigger" in
   free-run | software | hardware | action) ;;
   *) die "--trigger: expected free-run, software, hardware or action, got '$trigger'" ;;
+esac
+[ -n "$action_send" ] || { [ "$view" = 0 ] && action_send=yes || action_send=no; }
+case "$action_send" in
+  yes) action_send=true ;;
+  no) action_send=false ;;
+  *) die "--action-send: expected yes or no, got '$action_send'" ;;
 esac
 if [ -n "$clock_server" ]; then
   split_address "$clock_server" --clock-server
@@ -83,7 +92,7 @@ read_side () { # left|right
 # Sets `cameras` to stereocamsrc and what leads from it.
 read_cameras () {
   local name names side
-  cameras=(stereocamsrc name=cameras "trigger=$trigger" "reconnect=$reconnect")
+  cameras=(stereocamsrc name=cameras "trigger=$trigger" "reconnect=$reconnect" "action-send=$action_send")
   [ -z "$clock_server" ] || cameras+=("clock-server=$clock_server")
   if [ "$input" = cameras ]; then
     cameras+=("rig=$rig" "view-id=$view")

@@ -20,6 +20,8 @@ using rangecast::StatusCode;
 
 static constexpr std::int64_t kSecond = 1000000000;
 static constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
+static constexpr std::uint64_t kLatestAction = std::uint64_t (1)
+                                               << 62; /* ns; so sums stay numbers */
 
 struct GigeCamera::Frame {
   GvspPicture picture;
@@ -231,6 +233,7 @@ GigeCamera::wrote (std::uint32_t address, std::uint32_t value, const sockaddr_in
 {
   switch (address) {
     case kRegisterControl:
+      heard_ns_ = now ();
       if (value != 0)
         controller_ = from;
       else
@@ -399,7 +402,7 @@ void
 GigeCamera::take_action (const GvcpCommand &command, const sockaddr_in &from)
 {
   ActionCommand action;
-  if (!parse_action (command, action))
+  if (!parse_action (command, action) || action.time_ns > kLatestAction)
     return refuse (command, from, GvcpStatus::kInvalidParameter);
   {
     std::lock_guard guard (lock_);

@@ -279,6 +279,15 @@ GST_START_TEST (test_scheduled_action_waits_for_its_time)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_action_at_an_absurd_time_is_refused)
+{
+  Cameras cameras (1);
+  ByHand sender;
+  sender.send (address_of (0), action (5, 1, G_MAXINT64));
+  fail_unless_equals_uint64 (sender.receive (), 0x80020101);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_output_line_fires_the_wired_camera)
 {
   Cameras cameras (2);
@@ -368,6 +377,7 @@ fakecameras_suite ()
   tcase_add_test (tc, test_program_that_falls_silent_loses_control);
   tcase_add_test (tc, test_broadcast_action_fires_the_cameras_of_its_keys);
   tcase_add_test (tc, test_scheduled_action_waits_for_its_time);
+  tcase_add_test (tc, test_action_at_an_absurd_time_is_refused);
   tcase_add_test (tc, test_output_line_fires_the_wired_camera);
   tcase_add_test (tc, test_broadcast_discovery_is_answered_by_each);
   tcase_add_test (tc, test_nonsense_does_no_harm);
