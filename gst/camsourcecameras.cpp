@@ -271,7 +271,7 @@ CamSourceSession::read_clocks ()
     if (!offset && !read_offset (*cameras_[i], shortest_trip_us_[i], offset) && !ptp)
       return;
     if (offset)
-      pairing_.set_clock_offset (static_cast<int> (i), *offset);
+      pairing_.set_clock_offset (static_cast<int> (i), offset.value_or (0));
   }
 }
 

@@ -19,10 +19,12 @@ struct FoundCamera {
 
   bool operator== (const FoundCamera &) const = default;
 
-  /** Whether `name`, as the stereocamsrc properties and rig files take it, means this camera. */
+  /** Whether `name`, as the stereocamsrc properties and rig files take it, means this camera. A
+   *  user-defined name may, too, but no search tells it. */
   [[nodiscard]] bool is_called (const std::string &name) const
   {
-    return !name.empty () && (name == serial || name == id || name == address);
+    const bool has_ip = transport == Transport::kGigEVision;
+    return !name.empty () && (name == serial || name == id || (has_ip && name == address));
   }
 };
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "gstcameradevice.h"
 
+#include "camera/camera.hpp"
 #include "cameradevices.hpp"
 
 /* What the device monitor lists: one camera, or a stereo pair of a known rig. */
@@ -13,12 +14,6 @@ struct _GstCameraDevice {
 G_DEFINE_TYPE (GstCameraDevice, gst_camera_device, GST_TYPE_DEVICE)
 
 namespace {
-
-constexpr char kCaps[] = "video/x-raw, format=(string){ GRAY8, RGB }, width=(int)[ 1, max ], "
-                         "height=(int)[ 1, max ], framerate=(fraction)[ 0/1, max ]; "
-                         "video/x-bayer, format=(string){ bggr, gbrg, grbg, rggb }, "
-                         "width=(int)[ 1, max ], height=(int)[ 1, max ], "
-                         "framerate=(fraction)[ 0/1, max ]";
 
 /** "stereocamsrc left=1 right=2", as a launch string has it. */
 std::string
@@ -40,7 +35,7 @@ new_device (const std::string &name, const gchar *klass, GstStructure *propertie
 {
   const auto line = launch_string (factory, settings);
   gst_structure_set (properties, "launch", G_TYPE_STRING, line.c_str (), nullptr);
-  GstCaps *caps = gst_caps_from_string (kCaps);
+  GstCaps *caps = camera_caps (); // the camera's own are known only to who opens it
   auto self = GST_CAMERA_DEVICE (g_object_new (GST_TYPE_CAMERA_DEVICE, "display-name",
       name.c_str (), "device-class", klass, "caps", caps, "properties", properties, nullptr));
   gst_caps_unref (caps);

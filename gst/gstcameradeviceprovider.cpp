@@ -5,7 +5,7 @@
  *
  * Lists machine-vision cameras, GigE Vision by Aravis' discovery and USB3 Vision by libusb, and the
  * stereo pairs of known rigs whose cameras are all there. While it is started, USB cameras appear
- * and disappear as they are plugged; the networks are asked again every three seconds.
+ * and disappear as they are plugged; the networks are asked again every 3 to 12 seconds.
  *
  * ## Example launch line
  * |[
@@ -39,7 +39,15 @@ using rangecast::UsbCameras;
 
 namespace {
 
-constexpr auto kDiscoveryPeriod = std::chrono::seconds (3);
+using Clock = std::chrono::steady_clock;
+
+/* The networks are asked often while cameras come and go, seldom where nothing happens: each search
+ * is a broadcast, and keeps others of this process from opening cameras for its second. */
+constexpr Clock::duration kShortestPeriod = std::chrono::seconds (3);
+constexpr Clock::duration kLongestPeriod = std::chrono::seconds (12);
+/* A search takes about a second, more on a host with many networks; who starts a monitor gets what
+ * was found by then, and the rest as messages. */
+constexpr auto kPatience = std::chrono::milliseconds (1500);
 constexpr int kMissesAllowed = 1; // an answer to the discovery may be lost: it is UDP
 
 /** What is there now, as devices are made from it. */
@@ -59,7 +67,6 @@ template <typename What> struct Announced {
 struct Watch {
   GstDeviceProvider *provider = nullptr;
   std::thread thread;
-  std::unique_ptr<UsbCameras> usb;
   FoundCameras gige, usb_cameras;
   std::vector<int> gige_misses; // in a row, per camera of `gige`
   std::vector<Announced<FoundCamera>> cameras;
@@ -71,6 +78,8 @@ struct Watch {
   bool is_over = false;
   bool has_usb_changed = false;
   bool is_listed = false; // the first search has ended
+
+  std::unique_ptr<UsbCameras> usb; // last, so that it goes first: its thread uses what is above
 };
 
 } // namespace
@@ -173,8 +182,9 @@ announce (GstDeviceProvider *provider, std::vector<Announced<What>> &announced,
     }
 }
 
-/** The cameras that answered, and those that did until just now. */
-static void
+/** The cameras that answered, and those that did until just now.
+ *  @return whether all is as it was */
+static bool
 discover_gige (Watch &watch)
 {
   auto answered = find_gige_cameras ();
@@ -186,8 +196,11 @@ discover_gige (Watch &watch)
       misses.push_back (watch.gige_misses[i] + 1);
     }
   }
+  const bool is_same =
+      answered == watch.gige && std::ranges::count (misses, 0) == std::ssize (misses);
   watch.gige = std::move (answered);
   watch.gige_misses = std::move (misses);
+  return is_same;
 }
 
 static void
@@ -203,7 +216,7 @@ update (Watch &watch)
 /** Sleeps until there is something to look for.
  *  @return whether the watch goes on; `is_usb` then says whether USB devices came or went */
 static bool
-wait_for_change (Watch &watch, std::chrono::steady_clock::time_point until, bool &is_usb)
+wait_for_change (Watch &watch, Clock::time_point until, bool &is_usb)
 {
   std::unique_lock guard (watch.lock);
   watch.changed.wait_until (guard, until, [&] { return watch.is_over || watch.has_usb_changed; });
@@ -214,14 +227,15 @@ wait_for_change (Watch &watch, std::chrono::steady_clock::time_point until, bool
 static void
 run_watch (Watch &watch)
 {
-  auto next_discovery = std::chrono::steady_clock::now ();
+  auto period = kShortestPeriod;
+  auto next_discovery = Clock::now ();
   bool is_usb = true;
   do {
     if (is_usb && watch.usb)
       watch.usb_cameras = watch.usb->list ();
-    if (std::chrono::steady_clock::now () >= next_discovery) {
-      discover_gige (watch);
-      next_discovery = std::chrono::steady_clock::now () + kDiscoveryPeriod;
+    if (Clock::now () >= next_discovery) {
+      period = discover_gige (watch) ? std::min (2 * period, kLongestPeriod) : kShortestPeriod;
+      next_discovery = Clock::now () + period;
     }
     update (watch);
     {
@@ -254,8 +268,8 @@ gst_camera_device_provider_start (GstDeviceProvider *provider)
     delete std::exchange (self->watch, nullptr);
     return FALSE;
   }
-  std::unique_lock guard (watch.lock); // the list is there when start() returns
-  watch.changed.wait (guard, [&] { return watch.is_listed; });
+  std::unique_lock guard (watch.lock);
+  watch.changed.wait_for (guard, kPatience, [&] { return watch.is_listed; });
   return TRUE;
 }
 

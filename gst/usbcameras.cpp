@@ -99,7 +99,7 @@ opening_problem (int error, const std::string &node)
     return {};
   if (error == LIBUSB_ERROR_ACCESS)
     return "no permission to open " + node +
-           ": copy docs/99-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
+           ": copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
   return "cannot open " + node + ": " + libusb_strerror (libusb_error (error));
 }
 

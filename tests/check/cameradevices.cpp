@@ -19,7 +19,7 @@ using namespace rangecast;
 
 namespace {
 
-constexpr char kUdevRule[] = "docs/99-usb3vision.rules";
+constexpr char kUdevRule[] = "docs/70-usb3vision.rules";
 
 /** A root hub: devices hang below one. */
 constexpr char kRootHub[] = "P: /devices/usb2\n"
