@@ -3,6 +3,8 @@
 
 #include <gst/net/net.h>
 
+#include "promptthread.hpp"
+
 using rangecast::Status;
 using rangecast::StatusCode;
 
@@ -52,6 +54,7 @@ CamSourceClock::open (const std::string &text)
   if (Status s = parse_clock_server (text, server); !s.ok ())
     return s;
   if (!server.ptp) {
+    const PromptThread prompt; /* that asks: what it is late is error of the clock */
     clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
   } else {
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))
