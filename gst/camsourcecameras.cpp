@@ -3,13 +3,15 @@
 #include "camsourcesession.hpp"
 
 #include <algorithm>
-#include <optional>
+#include <cstdint>
 
 GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
 /* Scheduled action commands go out so much before their tick. */
 static constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
+
+static constexpr std::int64_t kNotRead = INT64_MIN;
 
 static constexpr gint64 kPtpPatience = 30 * G_USEC_PER_SEC;
 
@@ -236,7 +238,7 @@ CamSourceSession::fire (GstClockTime tick)
 /* The middle of the round trip is only as good as the trip is short: of several, the shortest;
  * later ones only if they are no longer than twice that. @return false: the camera does not tell */
 static bool
-read_offset (Camera &camera, std::int64_t &shortest_us, std::optional<std::int64_t> &offset_ns)
+read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
 {
   const bool first = shortest_us == 0;
   for (int i = 0; i < (first ? 5 : 1); i++) {
@@ -264,14 +266,14 @@ CamSourceSession::read_clocks ()
   bool ptp = true;
   for (const auto &camera : cameras_)
     ptp = ptp && camera->clock_is_ptp ();
-  std::optional<std::int64_t> offset;
+  std::int64_t offset = kNotRead;
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     if (i == 0 || !ptp)
-      offset.reset ();
-    if (!offset && !read_offset (*cameras_[i], shortest_trip_us_[i], offset) && !ptp)
+      offset = kNotRead;
+    if (offset == kNotRead && !read_offset (*cameras_[i], shortest_trip_us_[i], offset) && !ptp)
       return;
-    if (offset)
-      pairing_.set_clock_offset (static_cast<int> (i), *offset);
+    if (offset != kNotRead)
+      pairing_.set_clock_offset (static_cast<int> (i), offset);
   }
 }
 

@@ -204,7 +204,7 @@ SimultaneousCalls::start (int count, std::function<void (int)> call)
   busy_ = 0;
   running_ = true;
   for (int i = 0; i < count; i++)
-    threads_[i] = std::thread ([this, i] { loop (i); });
+    threads_[i] = std::thread ([this, i, seen = round_] { loop (i, seen); });
 }
 
 void
@@ -233,11 +233,10 @@ SimultaneousCalls::run ()
 }
 
 void
-SimultaneousCalls::loop (int index)
+SimultaneousCalls::loop (int index, guint64 seen)
 {
   make_thread_punctual ();
   std::unique_lock guard (lock_);
-  guint64 seen = round_;
   for (;;) {
     begin_.wait (guard, [&] { return !running_ || round_ != seen; });
     if (round_ == seen)

@@ -94,7 +94,8 @@ public:
   void run ();
 
 private:
-  void loop (int index);
+  /** @param seen  the round when it was started, for it may begin to run after the next one has */
+  void loop (int index, guint64 seen);
 
   std::function<void (int)> call_;
   std::mutex lock_; /* guards what follows */
