@@ -169,6 +169,10 @@ void
 DepthFill::advance (const RangeImage &image, const cv::Mat &allowed)
 {
   next_front_.clear ();
+  for (std::size_t i = 0; i < front_.size ();
+       i++) /* what looked like nothing may be reached again */
+    if (found_[i] == kInvalidDepth)
+      seen_.at<std::uint8_t> (front_[i]) = 0;
   for (std::size_t i = 0; i < front_.size (); i++) {
     if (found_[i] == kInvalidDepth)
       continue;
