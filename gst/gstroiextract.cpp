@@ -61,6 +61,7 @@ enum {
   PROP_MIN_AREA,
   PROP_MAX_HOLE,
   PROP_MAX_PEOPLE,
+  PROP_FILL,
   PROP_FRINGE,
   PROP_FOLLOW_LIGHT,
   PROP_ADAPT_TIME,
@@ -538,6 +539,9 @@ set_segmentation (rangecast::SegmentationSettings &settings, guint id, const GVa
     case PROP_MAX_PEOPLE:
       settings.max_people = g_value_get_int (value);
       return true;
+    case PROP_FILL:
+      settings.fill = g_value_get_int (value);
+      return true;
     case PROP_FRINGE:
       settings.fringe = g_value_get_int (value);
       return true;
@@ -627,6 +631,9 @@ get_segmentation (const rangecast::SegmentationSettings &settings, guint id, GVa
       return true;
     case PROP_MAX_PEOPLE:
       g_value_set_int (value, settings.max_people);
+      return true;
+    case PROP_FILL:
+      g_value_set_int (value, settings.fill);
       return true;
     case PROP_FRINGE:
       g_value_set_int (value, settings.fringe);
@@ -780,6 +787,11 @@ install_region_properties (GObjectClass *object_class)
   install_int (PROP_MAX_PEOPLE, "max-people", "Maximum people",
       "Only so many of the largest islands stay (0 to 1000, default 0: all)", 1000,
       kDefaults.max_people);
+  install_int (PROP_FILL, "fill", "Fill",
+      "Depth is extended so many pixels to what has none, where colour says that it is no "
+      "background "
+      "(0 to 1000, default 4; 0: no depth is made)",
+      1000, kDefaults.fill);
   install_int (PROP_FRINGE, "fringe", "Fringe",
       "What is nearer but looks like the background beside it must be so wide, pixels (0 to 99, "
       "default 9; 0: depth is taken at its word, for cameras whose depth ends at the silhouette)",

@@ -103,6 +103,10 @@ static const NumberRow<int> kIntegers[] = {
         "default "
         "12)",
         0, 1000, kDefaults.gap_width, [] (Settings &s) -> int & { return s.core.gap_width; }},
+    {"refine", "Refine",
+        "Turns in which disparities become smoother and fit the pictures better (0 = off, to 20, "
+        "default 3)",
+        0, 20, kDefaults.refine, [] (Settings &s) -> int & { return s.core.refine; }},
     {"refresh-interval", "Refresh interval",
         "When downstream wants only a part, one full picture every so many frames (0: always all, "
         "to "

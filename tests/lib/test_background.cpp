@@ -158,7 +158,9 @@ TEST (Background, small_island_in_space_goes_although_it_touches_the_person_in_t
   frame.put (20, 10, 20, 20, 12000, {190, 90, 80, 0});
   frame.put (40, 10, 5, 5, 12600, {190, 90, 80, 0}); /* 60 mm behind the person's edge */
   frame.put (40, 20, 5, 5, 12200, {190, 90, 80, 0}); /* 20 mm: still the person */
-  segment (frame);
+  SegmentationSettings settings;
+  settings.fill = 0; /* the person's surface would go on there */
+  segment (frame, settings);
   EXPECT_EQ (frame.valid (40, 10, 5, 5), 0);
   EXPECT_EQ (frame.valid (40, 20, 5, 5), 25);
   EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);

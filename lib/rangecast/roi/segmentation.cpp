@@ -360,6 +360,20 @@ Segmenter::remove_small_in_space (
   }
 }
 
+/* Not to single pixels that stick out of the silhouette, which may be chance; nor, with colour, to
+ * what looks just like the background: a hole that was closed may be one. */
+void
+Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &settings)
+{
+  if (settings.fill <= 0)
+    return;
+  cv::medianBlur (mask_, opened_, 3);
+  cv::bitwise_and (opened_, mask_, opened_);
+  if (settings.cue != Cue::kDepth)
+    opened_.setTo (0, calm_);
+  fill_.fill (image, opened_, settings.fill);
+}
+
 static void
 clear_where (const cv::Mat &mask, const RangeImage &image)
 {
@@ -408,6 +422,7 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
     clear_where (inverse_, image);
     remove_small_in_space (
         image, depth_unit_m, background.depth_noise () / depth_unit_m, settings.min_area);
+    extend_depth (image, settings);
   } catch (const cv::Exception &) {
     return kFailed;
   }

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "background.hpp"
+#include "depth_fill.hpp"
 
 namespace rangecast {
 
@@ -23,6 +24,7 @@ struct SegmentationSettings {
   int min_area = 150;              ///< smaller islands go, pixels
   int max_hole = 100;              ///< smaller holes close, pixels
   int max_people = 0;              ///< only so many of the largest islands stay; 0 = all
+  int fill = 4; ///< pixels that depth is extended where colour speaks for a pixel; 0 = off
 };
 
 /** Separates what has come into the scene from its background. Keeps its memory between frames.
@@ -49,9 +51,10 @@ public:
       double depth_unit_m, const SegmentationSettings &settings);
 
   /** Clears the depth of every pixel that decide() found to be background. Closing a hole made no
-   *  depth; it decided which valid pixels stay. Last, islands in space go: patches of fewer than
-   *  min_area pixels whose neighbours are invalid or nearer or farther by more than 30 mm and more
-   *  than the noise of depth there. */
+   *  depth; it decided which valid pixels stay. After that islands in space go: patches of fewer
+   * than min_area pixels whose neighbours are invalid or nearer or farther by more than 30 mm and
+   * more than the noise of depth there. Then what stays but has no depth gets some, `fill` pixels
+   * far (DepthFill); not where it looks just like the background, be it a small hole or not. */
   Status clear (const RangeImage &image, const BackgroundModel &background, double depth_unit_m,
       const SegmentationSettings &settings);
 
@@ -78,12 +81,14 @@ private:
   void remove_small_in_space (
       const RangeImage &image, double depth_unit_m, double noise, int min_area);
   void make_steps (double depth_unit_m, double noise);
+  void extend_depth (const RangeImage &image, const SegmentationSettings &settings);
 
   std::array<float, 3> light_ = {1, 1, 1};
   cv::Mat other_, nearer_, same_, calm_, quiet_; /* classes of pixels, 255 = yes */
   cv::Mat ratio_, tolerance_; /* of brightness to the background's, and how far noise moves it */
   cv::Mat behind_, light_beside_, opened_, kernel_, guard_;
   cv::Mat mask_, inverse_, labels_, stats_, centroids_, steps_, speckles_;
+  DepthFill fill_;
   std::vector<int> areas_;
   std::vector<std::int16_t> step_of_depth_; /* for every depth, see make_steps() */
   double step_unit_m_ = 0, step_noise_ = -1;

@@ -132,7 +132,7 @@ DisparityFinder::match ()
   }
   const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
             above = kMargin - 2, below = 2;
-      /* no path of three goes up */ /* no path of three goes up */
+  /* no path of three goes up */ /* no path of three goes up */
   for (const cv::Rect &part : parts_) {
     const int top = std::max (0, part.y - above),
               bottom = std::min (all.height, part.br ().y + below);
@@ -205,6 +205,9 @@ DisparityFinder::filter (const cv::Mat &left)
   }
   if (!limited)
     filter_.clear_doubled (grey, window_[1], right_x, least, pieces_, core_);
+  if (settings_.refine > 0)
+    refiner_.apply (
+        {grey, window_[1], right_x, std::max (least, far_), settings_.refine}, pieces_, core_);
   if (!limited && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, least, far_);
 }

@@ -6,6 +6,7 @@
 #include "../geometry/range_image.hpp"
 #include "background_disparity.hpp"
 #include "disparity_filter.hpp"
+#include "disparity_refiner.hpp"
 #include "matching.hpp"
 #include "pieces.hpp"
 #include "silhouette_filter.hpp"
@@ -16,8 +17,9 @@ struct StereoSettings {
   MatchSettings match;
   double patch_tolerance = 1;      ///< share of its contrast that a patch may differ by; 0 = off
   double flying_pixel_step = 0.02; ///< share of the depth that neighbours may differ; 0 = off
-  int silhouette_radius = 8;      ///< pixels around that say what is beside a silhouette; 0 = off
+  int silhouette_radius = 8;       ///< pixels around that say what is beside a silhouette; 0 = off
   int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
+  int refine = 3;                  ///< turns that take the noise off disparities; 0 = off
   /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
    *  matched so as not to be taken for something nearer. */
   double search_far_m = 0;
@@ -83,6 +85,7 @@ private:
   int far_ = 0;              /* disparity, 1/16 pixel, of the farthest depth of interest */
   DisparityFilter filter_;
   SilhouetteFilter silhouettes_;
+  DisparityRefiner refiner_;
   BackgroundDisparity background_;
   cv::Rect window_at_, core_at_; /* of the picture: what is needed; the ROI and its margin */
   Pieces pieces_;                /* of the core: where to look */

@@ -28,6 +28,8 @@ public:
   }
 
   [[nodiscard]] const std::vector<cv::Rect> &parts () const { return parts_; }
+  /** What each() calls work for. */
+  [[nodiscard]] const std::vector<cv::Rect> &pieces () const { return pieces_; }
   /** The smallest rectangle that holds all parts; empty if there are none. */
   [[nodiscard]] cv::Rect hull () const
   {

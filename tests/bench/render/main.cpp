@@ -199,10 +199,10 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
     target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg, job.view_gap_m));
     const cv::Mat rgba = target.read ();
     score.add (shot, rgba);
-    if (!job.pictures.empty ())
-      cv::imwrite (job.pictures + "/" + row.depth + "-" + row.mode + "-" +
-                       std::to_string (int (shot.azimuth_deg)) + ".png",
-          comparison (shot, rgba));
+    const std::string path = job.pictures + "/" + row.depth + "-" + row.mode + "-" +
+                             std::to_string (int (shot.azimuth_deg)) + ".png";
+    if (!job.pictures.empty () && !cv::imwrite (path, comparison (shot, rgba)))
+      job.status = {StatusCode::kNotFound, "--pictures: " + path + " cannot be written"};
   }
   row.holes = score.holes ();
   row.spill = score.spill ();
@@ -260,11 +260,28 @@ run (Job &job)
   return status;
 }
 
+/* Whether an argument is one of some names; if not, says so. */
+bool
+is_one_of (const char *option, const std::string &value, std::initializer_list<const char *> names)
+{
+  std::string expected;
+  for (const char *name : names) {
+    if (value.empty () || value == name)
+      return true;
+    expected += (expected.empty () ? "" : ", ") + std::string (name);
+  }
+  std::fprintf (stderr, "render_bench: %s %s: expected one of %s\n", option, value.c_str (),
+      expected.c_str ());
+  return false;
+}
+
 void
 run_in_gl_thread (GstGLContext *, gpointer data)
 {
   auto &job = *static_cast<Job *> (data);
-  job.status = run (job);
+  const Status status = run (job);
+  if (!status.ok ())
+    job.status = status;
   job.painter.stop ();
   job.held_painter.stop ();
 }
@@ -287,6 +304,10 @@ main (int argc, char **argv)
   options.text ("--pictures", job.pictures);
   if (const auto status = options.parse (argc, argv))
     return *status;
+  if (!is_one_of ("--mode", job.mode,
+          {"strips", "rectangles", "points", "strips-merged", "grid", "point-cloud"}) ||
+      !is_one_of ("--depth", job.depth, {"exact", "stereo", "noise"}))
+    return 2;
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY")) { /* software, if nothing is chosen */
     g_setenv ("GST_GL_PLATFORM", "egl", FALSE);
     g_setenv ("GST_GL_WINDOW", "egl-device", FALSE);

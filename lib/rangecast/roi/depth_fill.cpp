@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "depth_fill.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+namespace rangecast {
+namespace {
+
+/* Pixels around one that make its plane: all of the nearest, of the others every second one of
+ * every second row, which counts for four. */
+constexpr int kAll = 2, kAround = 6;
+/* A surface's depth differs by no more than this share for each pixel in between; nor does a new
+ * pixel's from its neighbour's. */
+constexpr float kSlant = 0.02f, kStep = 0.03f;
+/* Levels, sum of R, G, B, at which a colour counts 0.6, and the weight of samples that is enough:
+ * one neighbour of the same colour, or some that are like it. */
+constexpr float kLike = 25, kEnough = 1;
+/* Square pixels that the spread of samples is taken to be larger: a few in a line, or noise, tilt
+ * no plane. */
+constexpr float kFlat = 0.1f;
+
+struct Sample {
+  int x, y;
+  float weight, slant;
+};
+
+constexpr int kSamples =
+    (2 * kAll + 1) * (2 * kAll + 1) - 1 + (kAround + 1) * (kAround + 1) - (kAll + 1) * (kAll + 1);
+
+constexpr auto kPattern = [] {
+  std::array<Sample, kSamples> pattern{};
+  std::size_t n = 0;
+  for (int y = -kAround; y <= kAround; y++)
+    for (int x = -kAround; x <= kAround; x++) {
+      const int far = std::max (x < 0 ? -x : x, y < 0 ? -y : y);
+      if (far == 0 || (far > kAll && (x % 2 != 0 || y % 2 != 0)))
+        continue;
+      const float near = 1 / (1 + 0.25f * float (x * x + y * y));
+      pattern[n++] = {x, y, far > kAll ? 4 * near : near, kSlant * float (far)};
+    }
+  return pattern;
+}();
+
+const std::array<float, 3 * 255 + 1> &
+weights_of_colour ()
+{
+  static const auto weights = [] {
+    std::array<float, 3 * 255 + 1> w;
+    for (std::size_t i = 0; i < w.size (); i++)
+      w[i] = std::exp (-0.5f * float (i * i) / (kLike * kLike));
+    return w;
+  }();
+  return weights;
+}
+
+std::size_t
+unlike (Rgbx a, Rgbx b)
+{
+  return std::size_t (std::abs (a.r - b.r) + std::abs (a.g - b.g) + std::abs (a.b - b.b));
+}
+
+/* Calls visit (u, v) for the pixels beside one that lie in the picture. */
+template <typename Visit>
+void
+for_neighbours (const RangeImage &image, int x, int y, const Visit &visit)
+{
+  for (int v = std::max (0, y - 1); v <= std::min (image.depth.height - 1, y + 1); v++)
+    for (int u = std::max (0, x - 1); u <= std::min (image.depth.width - 1, x + 1); u++)
+      visit (u, v);
+}
+
+/* The depth beside a pixel that looks most like it, or kInvalidDepth. */
+std::uint16_t
+likeliest (const RangeImage &image, int x, int y)
+{
+  std::uint16_t depth = kInvalidDepth;
+  std::size_t least = SIZE_MAX;
+  for_neighbours (image, x, y, [&] (int u, int v) {
+    const std::uint16_t d = image.depth.at (u, v);
+    const std::size_t difference = unlike (image.colour.at (u, v), image.colour.at (x, y));
+    if (d != kInvalidDepth && difference < least) {
+      least = difference;
+      depth = d;
+    }
+  });
+  return depth;
+}
+
+/* Weighted least squares of a plane, seen from its origin. */
+class PlaneFit {
+public:
+  void add (float x, float y, float value, float weight)
+  {
+    const float wx = weight * x, wy = weight * y;
+    n_ += weight, x_ += wx, y_ += wy, value_ += weight * value;
+    xx_ += wx * x, xy_ += wx * y, yy_ += wy * y, xv_ += wx * value, yv_ += wy * value;
+  }
+  [[nodiscard]] float weight () const { return n_; }
+  /* Of some weight. */
+  [[nodiscard]] float at_origin () const
+  {
+    const float mx = x_ / n_, my = y_ / n_, mv = value_ / n_;
+    const float xx = xx_ - mx * x_ + kFlat * n_, yy = yy_ - my * y_ + kFlat * n_,
+                xy = xy_ - mx * y_, xv = xv_ - mx * value_, yv = yv_ - my * value_,
+                det = xx * yy - xy * xy;
+    return mv - (mx * (xv * yy - yv * xy) + my * (yv * xx - xv * xy)) / det;
+  }
+
+private:
+  float n_ = 0, x_ = 0, y_ = 0, value_ = 0, xx_ = 0, xy_ = 0, yy_ = 0, xv_ = 0, yv_ = 0;
+};
+
+/* What depth a pixel has if the surface beside it goes on; kInvalidDepth if none does. */
+std::uint16_t
+depth_of (const RangeImage &image, int x, int y)
+{
+  const std::uint16_t beside = likeliest (image, x, y);
+  if (beside == kInvalidDepth)
+    return kInvalidDepth;
+  const auto &weights = weights_of_colour ();
+  const Rgbx own = image.colour.at (x, y);
+  PlaneFit plane;
+  for (const Sample &s : kPattern) {
+    const int u = x + s.x, v = y + s.y;
+    if (u < 0 || v < 0 || u >= image.depth.width || v >= image.depth.height)
+      continue;
+    const std::uint16_t d = image.depth.at (u, v);
+    const float away = float (d) - float (beside);
+    if (d == kInvalidDepth || std::abs (away) > s.slant * float (beside))
+      continue;
+    plane.add (
+        float (s.x), float (s.y), away, s.weight * weights[unlike (image.colour.at (u, v), own)]);
+  }
+  if (plane.weight () < kEnough)
+    return kInvalidDepth;
+  const float most = kStep * float (beside), by = std::clamp (plane.at_origin (), -most, most);
+  return static_cast<std::uint16_t> (std::clamp (float (beside) + by + 0.5f, 1.f, 65535.f));
+}
+
+} // namespace
+
+/* The front is what has no depth beside what has. */
+void
+DepthFill::begin (const RangeImage &image, const cv::Mat &allowed)
+{
+  front_.clear ();
+  seen_.create (allowed.size (), CV_8U);
+  seen_.setTo (0);
+  for (int y = 0; y < image.depth.height; y++) {
+    const std::uint16_t *depth = image.depth.row (y);
+    const auto may = allowed.ptr<std::uint8_t> (y);
+    for (int x = 0; x < image.depth.width; x++) {
+      if (depth[x] != kInvalidDepth || !may[x])
+        continue;
+      bool known = false;
+      for_neighbours (image, x, y, [&] (int u, int v) { known |= image.depth.at (u, v) != 0; });
+      if (!known)
+        continue;
+      front_.emplace_back (x, y);
+      seen_.at<std::uint8_t> (y, x) = 1;
+    }
+  }
+}
+
+void
+DepthFill::advance (const RangeImage &image, const cv::Mat &allowed)
+{
+  next_front_.clear ();
+  for (std::size_t i = 0; i < front_.size ();
+       i++) /* what looked like nothing may be reached again */
+    if (found_[i] == kInvalidDepth)
+      seen_.at<std::uint8_t> (front_[i]) = 0;
+  for (std::size_t i = 0; i < front_.size (); i++) {
+    if (found_[i] == kInvalidDepth)
+      continue;
+    for_neighbours (image, front_[i].x, front_[i].y, [&] (int u, int v) {
+      std::uint8_t &seen = seen_.at<std::uint8_t> (v, u);
+      if (seen || !allowed.at<std::uint8_t> (v, u) || image.depth.at (u, v) != kInvalidDepth)
+        return;
+      seen = 1;
+      next_front_.emplace_back (u, v);
+    });
+  }
+  std::swap (front_, next_front_);
+}
+
+int
+DepthFill::fill (const RangeImage &image, const cv::Mat &allowed, int reach)
+{
+  int filled = 0;
+  begin (image, allowed);
+  for (int ring = 0; ring < reach && !front_.empty (); ring++) {
+    found_.clear ();
+    for (const cv::Point &at : front_)
+      found_.push_back (depth_of (image, at.x, at.y));
+    for (std::size_t i = 0; i < front_.size (); i++) {
+      image.depth.at (front_[i].x, front_[i].y) = found_[i]; /* was invalid, or still is */
+      filled += found_[i] != kInvalidDepth;
+    }
+    advance (image, allowed);
+  }
+  return filled;
+}
+
+} // namespace rangecast

@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "disparity_refiner.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <opencv2/core/hal/intrin.hpp>
+
+namespace rangecast {
+namespace {
+
+/* Pixels around one that make its plane, and whose greys are compared. */
+constexpr int kPlane = 3, kPatch = 4, kPad = std::max (kPlane, kPatch);
+/* Neighbours in one surface differ by no more, pixels: beside each other, and more for each pixel
+ * between them. */
+constexpr float kStep = 1, kSlant = 0.5f;
+/* What the squares of grey's slope must come to in a patch to say more than noise does. */
+constexpr float kDull = 15;
+/* Greys that differ by more show different things, levels. */
+constexpr float kUnlike = 20;
+/* No turn moves a disparity farther, nor do all turns, pixels. */
+constexpr float kMost = 0.5f, kMostOfAll = 1;
+
+/* Where bytes that follow each other in memory lie in a word. */
+constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
+constexpr int kByte[] = {
+    kFirst, std::abs (kFirst - 8), std::abs (kFirst - 16), std::abs (kFirst - 24)};
+
+/* Sums over windows of kSide columns, and kSide rows, one row of them after the other. */
+template <int kSide, typename T> class WindowSums {
+public:
+  /** @param first   column and row of the picture where the first window begins
+   *  @param width   windows in a row
+   *  @param columns memory to use; @param[out] sums  the row's, after next() */
+  WindowSums (const cv::Mat &from, const cv::Point &first, int width, std::vector<T> &columns,
+      std::vector<T> &sums)
+      : from_ (from), x_ (first.x), y_ (first.y), n_ (width + kSide - 1)
+  {
+    columns.assign (std::size_t (n_), 0);
+    sums.resize (std::size_t (n_));
+    columns_ = columns.data ();
+    sums_ = sums.data ();
+    for (int k = 0; k < kSide - 1; k++)
+      add (y_ + k);
+  }
+  void next ()
+  {
+    add (y_ + kSide - 1);
+    /* Of two, four and eight columns, as far as needed. */
+    std::copy_n (columns_, n_, sums_);
+    constexpr int kPower = int (std::bit_floor (unsigned (kSide)));
+    for (int reach = 1; reach < kPower; reach *= 2)
+      for (int x = 0; x < n_ - reach; x++)
+        sums_[x] = T (sums_[x] + sums_[x + reach]);
+    static_assert (kSide - kPower <= 3);
+    const int last = n_ - kSide + 1;
+    for (int x = 0; x < last; x++) {
+      T sum = sums_[x];
+      for (int k = kPower; k < kSide; k++)
+        sum = T (sum + columns_[x + k]);
+      sums_[x] = sum;
+    }
+    const T *gone = from_.ptr<T> (y_++) + x_;
+    for (int x = 0; x < n_; x++)
+      columns_[x] = T (columns_[x] - gone[x]);
+  }
+
+private:
+  void add (int y)
+  {
+    const T *row = from_.ptr<T> (y) + x_;
+    for (int x = 0; x < n_; x++)
+      columns_[x] = T (columns_[x] + row[x]);
+  }
+  const cv::Mat &from_;
+  const int x_;
+  int y_;
+  const int n_;
+  T *columns_, *sums_;
+};
+
+} // namespace
+
+void
+DisparityRefiner::make_room (const cv::Size &size, const Pieces &pieces)
+{
+  const cv::Size all (size.width + 2 * kPad + 8, size.height + 2 * kPad); /* 8: ends of vectors */
+  for (cv::Mat *m : {&first_, &now_, &next_, &products_, &squares_, &slopes_, &differences_}) {
+    m->create (all, CV_32F);
+    m->setTo (0);
+  }
+  steps_.create (all, CV_8U);
+  steps_.setTo (1);
+  valid_.create (all, CV_8U);
+  valid_.setTo (0);
+  parts_ = pieces.pieces ();
+  memory_.reserve (pieces.workers ());
+}
+
+/* Takes over what a part of the picture has, and makes it as narrow as that. From then on parts
+ * lie in the planes with a border. */
+void
+DisparityRefiner::take (const Job &job, const cv::Mat &disparity, cv::Rect &part)
+{
+  int begin = part.width, end = 0;
+  for (int y = 0; y < part.height; y++) {
+    const auto d = disparity.ptr<std::int16_t> (part.y + y) + part.x;
+    auto first = first_.ptr<float> (part.y + y + kPad) + part.x + kPad,
+         now = now_.ptr<float> (part.y + y + kPad) + part.x + kPad;
+    for (int x = 0; x < part.width; x++)
+      now[x] = first[x] = float (std::max (d[x] - job.nearest + 1, 0)) * (1 / 16.f);
+    int x0 = 0, x1 = part.width;
+    while (x0 < begin && d[x0] < job.nearest)
+      x0++;
+    while (x1 > end && d[x1 - 1] < job.nearest)
+      x1--;
+    begin = std::min (begin, x0);
+    end = std::max (end, x1);
+  }
+  part = cv::Rect (part.x + kPad + begin, part.y + kPad, std::max (0, end - begin), part.height);
+}
+
+void
+DisparityRefiner::mark_steps (const cv::Rect &part)
+{
+  for (int y = part.y; y < part.br ().y; y++) {
+    const auto above = first_.ptr<float> (y - 1) + part.x, own = first_.ptr<float> (y) + part.x,
+               below = first_.ptr<float> (y + 1) + part.x;
+    auto steps = steps_.ptr<std::uint8_t> (y) + part.x,
+         valid = valid_.ptr<std::uint8_t> (y) + part.x;
+    for (int x = 0; x < part.width; x++) {
+      const float rows = std::max (std::abs (own[x] - above[x]), std::abs (own[x] - below[x])),
+                  columns =
+                      std::max (std::abs (own[x] - own[x - 1]), std::abs (own[x] - own[x + 1]));
+      steps[x] = (std::max (rows, columns) > kStep) | (own[x] <= 0);
+      valid[x] = own[x] > 0;
+    }
+  }
+}
+
+/* The plane through what belongs to a pixel's surface, at that pixel: least squares. */
+float
+DisparityRefiner::on_plane (int x, int y) const
+{
+  constexpr int kLanes = 2 * kPlane + 2; /* columns; the last one never counts */
+  static_assert (kLanes == 8 && kPlane == 3);
+  constexpr float kA = kStep, kB = kStep + kSlant, kC = kStep + 2 * kSlant;
+  alignas (16) static constexpr float kMostAt[kPlane + 1][kLanes] = {
+      {kC, kB, kA, kA, kA, kB, kC, -1}, {kC, kB, kA, kA, kA, kB, kC, -1},
+      {kC, kB, kB, kB, kB, kB, kC, -1}, {kC, kC, kC, kC, kC, kC, kC, -1}};
+  using Lanes = cv::v_float32x4;
+  const float own = now_.ptr<float> (y)[x];
+  const Lanes centre = cv::v_setall_f32 (own), zero = cv::v_setzero_f32 (),
+              one = cv::v_setall_f32 (1);
+  float n = 0, sx = 0, sy = 0, sd = 0, sxx = 0, sxy = 0, syy = 0, sxd = 0, syd = 0;
+  for (int part = 0; part < kLanes; part += 4) {
+    Lanes count = zero, count_y = zero, count_yy = zero, off = zero, off_y = zero; /* by column */
+    for (int v = -kPlane; v <= kPlane; v++) {
+      const Lanes d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
+                  most = cv::v_load_aligned (kMostAt[std::abs (v)] + part), away = d - centre;
+      const Lanes belongs = (cv::v_abs (away) <= most) & (d > zero);
+      const Lanes w = belongs & one, e = belongs & away, row = cv::v_setall_f32 (float (v));
+      count += w;
+      off += e;
+      count_y = cv::v_muladd (row, w, count_y);
+      count_yy = cv::v_muladd (row * row, w, count_yy);
+      off_y = cv::v_muladd (row, e, off_y);
+    }
+    const float u = float (part - kPlane);
+    const Lanes column (u, u + 1, u + 2, u + 3);
+    n += cv::v_reduce_sum (count);
+    sx += cv::v_reduce_sum (column * count);
+    sxx += cv::v_reduce_sum (column * column * count);
+    sy += cv::v_reduce_sum (count_y);
+    sxy += cv::v_reduce_sum (column * count_y);
+    syy += cv::v_reduce_sum (count_yy);
+    sd += cv::v_reduce_sum (off);
+    sxd += cv::v_reduce_sum (column * off);
+    syd += cv::v_reduce_sum (off_y);
+  }
+  const float mx = sx / n, my = sy / n, md = sd / n;
+  const float few = 0.02f * n; /* pixels in a line make no plane */
+  const float cxx = sxx - sx * mx + few, cyy = syy - sy * my + few, cxy = sxy - sx * my,
+              cxd = sxd - sx * md, cyd = syd - sy * md, det = cxx * cyy - cxy * cxy;
+  return own + md - (mx * (cxd * cyy - cyd * cxy) + my * (cyd * cxx - cxd * cxy)) / det;
+}
+
+/* From now_ to next_. In the middle of a surface the plane's disparity is the mean. */
+void
+DisparityRefiner::smooth (const cv::Rect &part, Memory &m)
+{
+  constexpr int kSide = 2 * kPlane + 1;
+  const cv::Point first (part.x - kPlane, part.y - kPlane);
+  WindowSums<kSide, std::uint8_t> steps (steps_, first, part.width, m.steps[0], m.steps[1]);
+  WindowSums<kSide, float> sums (now_, first, part.width, m.columns[0], m.sums[0]);
+  for (int y = part.y; y < part.br ().y; y++) {
+    steps.next ();
+    sums.next ();
+    const auto now = now_.ptr<float> (y) + part.x;
+    auto next = next_.ptr<float> (y) + part.x;
+    for (int x = 0; x < part.width; x++)
+      next[x] = m.sums[0][std::size_t (x)] * (1.f / (kSide * kSide));
+    for (int x = 0; x < part.width; x++)
+      if (m.steps[1][std::size_t (x)] != 0)
+        next[x] = now[x] > 0 ? std::max (on_plane (part.x + x, y), 1 / 16.f) : 0;
+  }
+}
+
+/* Of next_: how the left picture's grey differs from the right one's, and that one's slope. */
+void
+DisparityRefiner::compare (const Job &job, const cv::Rect &part, Memory &m)
+{
+  const auto n = std::size_t (part.width);
+  m.at.resize (n);
+  m.greys.resize (n);
+  m.sums[0].resize (n + 2 * kPad);
+  std::int32_t *at = m.at.data ();
+  float *shares = m.sums[0].data ();
+  const std::int32_t last = job.right.cols - 3;
+  const float origin = float (job.right_x + part.x - kPad) - float (job.nearest - 1) * (1 / 16.f);
+  for (int y = part.y; y < part.br ().y; y++) {
+    const auto left = job.left.ptr<std::uint8_t> (y - kPad) + part.x - kPad,
+               right = job.right.ptr<std::uint8_t> (y - kPad);
+    const auto d = next_.ptr<float> (y) + part.x;
+    auto products = products_.ptr<float> (y) + part.x, squares = squares_.ptr<float> (y) + part.x,
+         slopes = slopes_.ptr<float> (y) + part.x,
+         differences = differences_.ptr<float> (y) + part.x;
+    for (std::int32_t x = 0; x < part.width; x++) {
+      const float there = origin + float (x) - d[x];
+      at[x] = std::clamp (std::int32_t (there), std::int32_t{1}, last);
+      shares[x] = std::min (std::max (there - float (at[x]), 0.f), 1.f);
+    }
+    for (std::size_t x = 0; x < n; x++)
+      std::memcpy (&m.greys[x], right + at[x] - 1, 4);
+    for (int x = 0; x < part.width; x++) {
+      const std::uint32_t g = m.greys[std::size_t (x)];
+      const auto g0 = float (int (g >> kByte[0] & 255)), g1 = float (int (g >> kByte[1] & 255)),
+                 g2 = float (int (g >> kByte[2] & 255)), g3 = float (int (g >> kByte[3] & 255));
+      const float f = shares[x], slope = 0.5f * ((g2 - g0) * (1 - f) + (g3 - g1) * f),
+                  differs = float (left[x]) - (g1 + f * (g2 - g1));
+      const float counts = d[x] > 0 ? slope : 0;
+      differences[x] = d[x] > 0 ? std::min (std::max (differs, -kUnlike), kUnlike) : 0;
+      slopes[x] = counts;
+      products[x] = differences[x] * counts;
+      squares[x] = counts * counts;
+    }
+  }
+}
+
+/* From next_ to now_: the shift that leaves least difference between both pictures, but for a mean
+ * difference in brightness, which cameras may have. */
+void
+DisparityRefiner::move (const cv::Rect &part, Memory &m)
+{
+  constexpr int kSide = 2 * kPatch + 1;
+  const cv::Point begin (part.x - kPatch, part.y - kPatch);
+  using Sums = WindowSums<kSide, float>;
+  Sums sums[] = {{products_, begin, part.width, m.columns[0], m.sums[0]},
+      {squares_, begin, part.width, m.columns[1], m.sums[1]},
+      {slopes_, begin, part.width, m.columns[2], m.sums[2]},
+      {differences_, begin, part.width, m.columns[3], m.sums[3]}};
+  WindowSums<kSide, std::uint8_t> counts (valid_, begin, part.width, m.steps[0], m.steps[1]);
+  for (int y = part.y; y < part.br ().y; y++) {
+    for (Sums &s : sums)
+      s.next ();
+    counts.next ();
+    const float *product = m.sums[0].data (), *square = m.sums[1].data (),
+                *slope = m.sums[2].data (), *difference = m.sums[3].data ();
+    const std::uint8_t *count = m.steps[1].data ();
+    const auto first = first_.ptr<float> (y) + part.x, d = next_.ptr<float> (y) + part.x;
+    auto to = now_.ptr<float> (y) + part.x;
+    for (int x = 0; x < part.width; x++) {
+      const float mean = slope[x] / float (std::max<int> (count[x], 1));
+      const float by = -(product[x] - mean * difference[x]) / (square[x] - mean * slope[x] + kDull),
+                  moved = d[x] + std::min (std::max (by, -kMost), kMost),
+                  low = std::max (first[x] - kMostOfAll, 1 / 16.f), high = first[x] + kMostOfAll;
+      to[x] = d[x] > 0 ? std::min (std::max (moved, low), high) : 0;
+    }
+  }
+}
+
+void
+DisparityRefiner::put_back (const Job &job, const cv::Rect &part, cv::Mat &disparity) const
+{
+  for (int y = part.y; y < part.br ().y; y++) {
+    auto to = disparity.ptr<std::int16_t> (y - kPad) + part.x - kPad;
+    const auto d = next_.ptr<float> (y) + part.x;
+    for (int x = 0; x < part.width; x++)
+      if (d[x] > 0)
+        to[x] =
+            std::int16_t (std::min (std::max (int (16 * d[x] + 0.5f), 1) + job.nearest - 1, 32767));
+  }
+}
+
+void
+DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparity)
+{
+  if (job.turns <= 0 || job.right.cols < 4)
+    return;
+  make_room (disparity.size (), pieces);
+  const auto each = [&] (const auto &work) {
+    in_parallel (parts_.size (), pieces.n_threads (),
+        [&] (std::size_t i, std::size_t worker) { work (parts_[i], memory_.of (worker)); });
+  };
+  each ([&] (cv::Rect &part, Memory &) { take (job, disparity, part); });
+  std::erase_if (parts_, [] (const cv::Rect &part) { return part.empty (); });
+  each ([&] (const cv::Rect &part, Memory &) { mark_steps (part); });
+  each ([&] (const cv::Rect &part, Memory &m) { smooth (part, m); });
+  for (int turn = 0; turn < job.turns; turn++) {
+    each ([&] (const cv::Rect &part, Memory &m) { compare (job, part, m); });
+    each ([&] (const cv::Rect &part, Memory &m) { move (part, m); });
+    each ([&] (const cv::Rect &part, Memory &m) { smooth (part, m); });
+  }
+  each ([&] (const cv::Rect &part, Memory &) { put_back (job, part, disparity); });
+}
+
+} // namespace rangecast
