@@ -302,7 +302,7 @@ gst_camera_device_provider_class_init (GstCameraDeviceProviderClass *klass)
   provider_class->start = gst_camera_device_provider_start;
   provider_class->stop = gst_camera_device_provider_stop;
   gst_device_provider_class_set_static_metadata (provider_class,
-      "Machine-vision cameras and stereo pairs", "Source/Video",
+      "Machine-vision cameras and stereo pairs", "Source/Video/Stereo",
       "Lists GigE Vision and USB3 Vision cameras, and the stereo pairs of known rigs",
       "gst-rangecast");
   GST_DEBUG_CATEGORY_INIT (gst_camera_device_provider_debug, "rangecastdeviceprovider", 0,

@@ -143,9 +143,9 @@ struct Monitor {
   GstDeviceMonitor *monitor = gst_device_monitor_new ();
   GstBus *bus = gst_device_monitor_get_bus (monitor);
 
-  Monitor ()
+  explicit Monitor (const char *classes = "Video/Source")
   {
-    fail_unless (gst_device_monitor_add_filter (monitor, "Video/Source", nullptr) != 0);
+    fail_unless (gst_device_monitor_add_filter (monitor, classes, nullptr) != 0);
     fail_unless (gst_device_monitor_start (monitor));
   }
   ~Monitor ()
@@ -356,8 +356,9 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
 
   TestBed bed;
   bed.add (usb_camera (1, "SN1"));
-  Monitor monitor;
+  Monitor monitor ("Video/Source/Stereo"); // pairs only
   fail_unless (monitor.find ("rig.file", file) == nullptr);
+  fail_unless (monitor.find ("camera.serial", "SN1") == nullptr);
   bed.plug (2, "SN2");
   monitor.wait_for (GST_MESSAGE_DEVICE_ADDED, "rig.file", file);
   GstDevice *device = monitor.find ("rig.file", file);
