@@ -1,10 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <sstream> /* before check.h, whose macro `fail` it does not survive */
+
 #include "failing-memory.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstring>
+#include <map>
 #include <random>
+#include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #ifdef RANGECAST_HAVE_ASSIMP
@@ -298,31 +305,142 @@ GST_END_TEST;
 
 /* ---- formats ---- */
 
-GST_START_TEST (test_pcd_has_the_fields_that_its_header_names)
+/* A file as a reader of PCD finds it: by its header, of which it knows nothing before
+ * ("The PCD (Point Cloud Data) file format", pointclouds.org). */
+class Pcd {
+public:
+  explicit Pcd (GstBuffer *buffer)
+  {
+    GstMapInfo map;
+    fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
+    bytes_.assign (reinterpret_cast<const char *> (map.data), map.size);
+    gst_buffer_unmap (buffer, &map);
+    std::size_t at = 0;
+    while (!words_.contains ("DATA"))
+      at = take_line (at);
+    data_ = at;
+    find_fields ();
+    fail_unless_equals_int (bytes_.size () - data_, points () * stride_);
+  }
+
+  /** What a line of the header says after its name. */
+  [[nodiscard]] const std::vector<std::string> &words (const char *name) const
+  {
+    const auto found = words_.find (name);
+    fail_unless (found != words_.end (), "no %s in the header", name);
+    return found->second;
+  }
+  [[nodiscard]] std::size_t points () const { return std::stoul (words ("POINTS").at (0)); }
+  /** Bytes of one point's field. */
+  template <typename T> [[nodiscard]] T value (std::size_t point, const std::string &field) const
+  {
+    const auto found = fields_.find (field);
+    fail_unless (found != fields_.end (), "no field %s", field.c_str ());
+    fail_unless_equals_int (found->second.size, sizeof (T));
+    fail_unless (found->second.type == (std::is_floating_point_v<T> ? "F" : "U"));
+    T value;
+    std::memcpy (
+        &value, bytes_.data () + data_ + point * stride_ + found->second.offset, sizeof value);
+    return value;
+  }
+  /** Red, green, blue: of a float whose bits are 0x00rrggbb, as PCL packs them. */
+  [[nodiscard]] std::array<guint8, 3> colour (std::size_t point) const
+  {
+    const auto bits = std::bit_cast<guint32> (value<float> (point, "rgb"));
+    fail_unless_equals_int (bits >> 24, 0);
+    return {guint8 (bits >> 16), guint8 (bits >> 8), guint8 (bits)};
+  }
+
+private:
+  struct Field {
+    std::size_t offset, size;
+    std::string type;
+  };
+
+  std::size_t take_line (std::size_t at)
+  {
+    const std::size_t end = bytes_.find ('\n', at);
+    fail_unless (end != bytes_.npos, "the header has no end");
+    std::istringstream line (bytes_.substr (at, end - at));
+    std::string name, word;
+    line >> name;
+    if (!name.starts_with ('#')) {
+      fail_if (words_.contains (name), "two lines %s", name.c_str ());
+      auto &words = words_[name];
+      while (line >> word)
+        words.push_back (word);
+    }
+    return end + 1;
+  }
+
+  void find_fields ()
+  {
+    const auto &names = words ("FIELDS");
+    for (const char *name : {"SIZE", "TYPE", "COUNT"})
+      fail_unless_equals_int (words (name).size (), names.size ());
+    for (std::size_t i = 0; i < names.size (); i++) {
+      const std::size_t size = std::stoul (words ("SIZE")[i]);
+      fail_unless_equals_string (words ("COUNT")[i].c_str (), "1");
+      fields_[names[i]] = {stride_, size, words ("TYPE")[i]};
+      stride_ += size;
+    }
+  }
+
+  std::string bytes_;
+  std::map<std::string, std::vector<std::string>> words_;
+  std::map<std::string, Field> fields_;
+  std::size_t data_ = 0, stride_ = 0;
+};
+
+/* The same frame set as PLY or PCD, with all that a file can have. */
+static GstBuffer *
+whole_file (const Rig &rig, const char *format)
+{
+  const std::string launch = std::string ("plyenc normals=true view-id=true format=") + format;
+  GstHarness *h = gst_harness_new_parse (launch.c_str ());
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 5, 40, 30}));
+  gst_harness_teardown (h);
+  return output;
+}
+
+GST_START_TEST (test_pcd_read_by_its_header_has_the_points_of_the_ply)
 {
   const Rig rig = ring_rig (2);
-  GstHarness *h = gst_harness_new_parse ("plyenc format=pcd normals=true view-id=true");
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-  gst_harness_set_sink_caps_str (h, "application/x-pcd");
-  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 5, 40, 30}));
-  GstMapInfo map;
-  fail_unless (gst_buffer_map (output, &map, GST_MAP_READ));
-  const std::string_view text (reinterpret_cast<const char *> (map.data), map.size);
-  for (const char *line : {"VERSION 0.7\n", "FIELDS x y z normal_x normal_y normal_z rgb view_id\n",
-           "SIZE 4 4 4 4 4 4 4 1\n", "TYPE F F F F F F F U\n", "COUNT 1 1 1 1 1 1 1 1\n",
-           "HEIGHT 1\n", "VIEWPOINT 0 0 0 1 0 0 0\n"})
-    fail_unless (text.find (line) != text.npos, "no %s", line);
-  const std::size_t points = std::strtoul (text.data () + text.find ("\nPOINTS ") + 8, nullptr, 10);
-  const std::size_t data = text.find ("DATA binary\n") + 12;
-  fail_unless (points > 500);
-  fail_unless_equals_int (map.size - data, points * 29);
-  const guint8 *last = map.data + map.size - 29; /* of view 1; x from 0 at the left of the ROI */
-  fail_unless_equals_int (last[28], 1);
-  fail_unless_equals_int (last[24], guint8 (last[26] + 2 * last[25] + 40)); /* blue, green, red */
-  fail_unless_equals_int (last[27], 0);
-  gst_buffer_unmap (output, &map);
-  gst_buffer_unref (output);
-  gst_harness_teardown (h);
+  GstBuffer *ply_file = whole_file (rig, "ply"), *pcd_file = whole_file (rig, "pcd");
+  const Ply ply = parse_ply (ply_file, true, true);
+  const Pcd pcd (pcd_file);
+  fail_unless (ply.points > 500);
+  fail_unless_equals_int (pcd.points (), ply.points);
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < ply.points; i++) {
+    const char *const place[] = {"x", "y", "z"}, *const normal[] = {
+                                                     "normal_x", "normal_y", "normal_z"};
+    const auto rgb = pcd.colour (i);
+    for (std::size_t k = 0; k < 3; k++)
+      wrong += pcd.value<float> (i, place[k]) != ply.xyz[3 * i + k] ||
+               pcd.value<float> (i, normal[k]) != ply.normals[3 * i + k] ||
+               rgb[k] != ply.rgb[3 * i + k];
+    wrong += pcd.value<guint8> (i, "view_id") != ply.view_id[i];
+  }
+  fail_unless_equals_int (wrong, 0);
+  gst_buffer_unref (ply_file);
+  gst_buffer_unref (pcd_file);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pcd_header_says_what_readers_ask_for)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *file = whole_file (rig, "pcd");
+  const Pcd pcd (file);
+  using Words = std::vector<std::string>;
+  fail_unless (pcd.words ("VERSION") == Words{"0.7"});
+  fail_unless (pcd.words ("WIDTH") == pcd.words ("POINTS"));
+  fail_unless (pcd.words ("HEIGHT") == Words{"1"}); /* a cloud, not a picture */
+  fail_unless ((pcd.words ("VIEWPOINT") == Words{"0", "0", "0", "1", "0", "0", "0"}));
+  fail_unless (pcd.words ("DATA") == Words{"binary"});
+  gst_buffer_unref (file);
 }
 GST_END_TEST;
 
@@ -415,7 +533,8 @@ plyenc_suite ()
   tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
   tcase_add_test (tc, test_normals_of_noise_have_length_1_and_face_the_camera);
   tcase_add_test (tc, test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_image);
-  tcase_add_test (tc, test_pcd_has_the_fields_that_its_header_names);
+  tcase_add_test (tc, test_pcd_read_by_its_header_has_the_points_of_the_ply);
+  tcase_add_test (tc, test_pcd_header_says_what_readers_ask_for);
   tcase_add_test (tc, test_format_set_while_playing_waits_for_ready);
   tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
 #ifdef RANGECAST_HAVE_ASSIMP

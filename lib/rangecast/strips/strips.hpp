@@ -18,7 +18,7 @@ struct StripSettings {
   StripMode mode = StripMode::kStrips;
   double depth_step = 0.03; ///< neighbours that differ by more than this share of their depth do
                             ///< not belong to one surface
-  int max_gap = 6; ///< invalid pixels that a strip bridges if its two ends are near in depth
+  int max_gap = 2; ///< invalid pixels that a strip bridges if its two ends are near in depth
   /** Successive pixels on a straight line become one longer piece; 0: none do. Times this, depth
    *  may be off the line by kMergeDepth and R, G, B by kMergeColour; where a pixel equals the one
    *  before it, by kMergeCopyDepth and kMergeCopyColour: it may be a copy that the neighbour code

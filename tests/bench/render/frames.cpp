@@ -95,12 +95,12 @@ private:
 };
 
 Status
-filter (FrameSet &set)
+filter (FrameSet &set, const CylinderSettings &settings)
 {
   CylinderFilter cylinder;
   CylinderResult result;
   const Status status = cylinder.set_rig (set.rig);
-  return status.ok () ? cylinder.process (set.images, {}, result) : status;
+  return status.ok () ? cylinder.process (set.images, settings, result) : status;
 }
 
 } // namespace
@@ -123,7 +123,7 @@ exact_frames (SceneSettings settings, FrameSet &set)
 }
 
 Status
-stereo_frames (const SceneSettings &settings, FrameSet &set)
+stereo_frames (const SceneSettings &settings, const CylinderSettings &cylinder, FrameSet &set)
 {
   std::unique_ptr<Scene> scene;
   if (Status status = Scene::create (settings, scene); !status.ok ())
@@ -137,7 +137,7 @@ stereo_frames (const SceneSettings &settings, FrameSet &set)
     set.rig.views[i] = host.range_view ();
   }
   const Status coded = code (set, {});
-  return coded.ok () ? filter (set) : coded;
+  return coded.ok () ? filter (set, cylinder) : coded;
 }
 
 Status

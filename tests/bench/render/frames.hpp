@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <rangecast/cylinder/cylinder_filter.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <vector>
@@ -29,7 +30,8 @@ rangecast::Status exact_frames (rangecast::SceneSettings settings, FrameSet &set
 /** What the demo's viewer has: the scene's stereo pairs with sensor noise, matched, freed of the
  *  background that was learnt before, through the neighbour code with its defaults, and through
  *  the cylinder. */
-rangecast::Status stereo_frames (const rangecast::SceneSettings &settings, FrameSet &set);
+rangecast::Status stereo_frames (const rangecast::SceneSettings &settings,
+    const rangecast::CylinderSettings &cylinder, FrameSet &set);
 
 /** Codes and decodes, which leaves runs of equal pixels. */
 rangecast::Status code (FrameSet &set, const rangecast::EncoderSettings &settings);

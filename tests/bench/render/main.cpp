@@ -45,6 +45,8 @@ const char *const kUsage =
     "  --rounds N      times are medians of so many (default 15)\n"
     "  --merge N       of the strips (default 1)\n"
     "  --view-gap M    of the strips, metres (default 0.012)\n"
+    "  --max-gap N     of the strips, pixels (default: the element's)\n"
+    "  --hidden-gap M  of the cylinder, metres (default: the element's)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
     "  --json FILE     writes the rows (but noise) there\n"
@@ -79,6 +81,8 @@ struct Job {
   int rounds = 15;
   double merge = StripSettings{}.merge;
   double view_gap_m = StripPainter::Picture{}.view_gap_m;
+  int max_gap = StripSettings{}.max_gap;
+  CylinderSettings cylinder;
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
   std::vector<RenderRow> rows;
   GstGLContext *context = nullptr;
@@ -120,6 +124,7 @@ make_ways (Job &job, Kind &kind)
     StripSettings settings;
     settings.mode = mode;
     settings.merge = job.merge;
+    settings.max_gap = job.max_gap;
     kind.ways.push_back (make_strip_way (name, job.painter, set, settings));
   };
   strips ("strips", kind.set, StripMode::kStrips);
@@ -129,6 +134,7 @@ make_ways (Job &job, Kind &kind)
     strips ("strips-merged", kind.coded, StripMode::kStrips);
     StripSettings settings;
     settings.merge = job.merge;
+    settings.max_gap = job.max_gap;
     kind.ways.push_back (
         make_strip_way ("strips-held", job.held_painter, kind.set, settings, true));
   }
@@ -149,8 +155,8 @@ Status
 make_kind (Job &job, const char *depth, Kind &kind)
 {
   const std::string name = kind.depth = depth;
-  Status status =
-      name == "stereo" ? stereo_frames (job.scene, kind.set) : exact_frames (job.scene, kind.set);
+  Status status = name == "stereo" ? stereo_frames (job.scene, job.cylinder, kind.set)
+                                   : exact_frames (job.scene, kind.set);
   if (status.ok () && name == "exact") {
     EncoderSettings settings;
     settings.colour_threshold = 8;
@@ -298,6 +304,8 @@ main (int argc, char **argv)
   options.number ("--rounds", job.rounds, 1, 100000);
   options.number ("--merge", job.merge, 0, 100);
   options.number ("--view-gap", job.view_gap_m, 0, 1);
+  options.number ("--max-gap", job.max_gap, 0, 1000);
+  options.number ("--hidden-gap", job.cylinder.hidden_gap_m, 0, 100);
   options.text ("--mode", job.mode);
   options.text ("--depth", job.depth);
   options.text ("--json", job.json);

@@ -44,19 +44,25 @@ luma_in (const cv::Mat &rgba, const cv::Mat &where)
   return luma;
 }
 
+/* Windows see only the pixels that both pictures have, which `where` tells: the zeros beyond would
+ * be an edge that both have in common, and make pictures alike along their outlines. */
 double
 sum_of_ssim (const cv::Mat &a, const cv::Mat &b, const cv::Mat &where)
 {
-  const auto blurred = [] (const cv::Mat &m) {
+  const auto sums = [] (const cv::Mat &m) {
     cv::Mat out;
     cv::GaussianBlur (m, out, {11, 11}, 1.5);
     return out;
   };
+  cv::Mat ones;
+  where.convertTo (ones, CV_32F, 1 / 255.0);
+  const cv::Mat weights = cv::max (sums (ones), 1e-6);
+  const auto mean = [&] (const cv::Mat &m) -> cv::Mat { return sums (m) / weights; };
   constexpr double kC1 = 0.01 * 255 * 0.01 * 255, kC2 = 0.03 * 255 * 0.03 * 255;
-  const cv::Mat ma = blurred (a), mb = blurred (b), maa = ma.mul (ma), mbb = mb.mul (mb),
+  const cv::Mat ma = mean (a), mb = mean (b), maa = ma.mul (ma), mbb = mb.mul (mb),
                 mab = ma.mul (mb);
-  const cv::Mat va = blurred (a.mul (a)) - maa, vb = blurred (b.mul (b)) - mbb,
-                vab = blurred (a.mul (b)) - mab;
+  const cv::Mat va = mean (a.mul (a)) - maa, vb = mean (b.mul (b)) - mbb,
+                vab = mean (a.mul (b)) - mab;
   const cv::Mat above = (2 * mab + kC1).mul (2 * vab + kC2);
   const cv::Mat below = (maa + mbb + kC1).mul (va + vb + kC2);
   cv::Mat ssim, inside;

@@ -41,7 +41,7 @@ public:
   [[nodiscard]] double psnr () const;
   /** Of luma, mean over the same pixels (Z. Wang et al., "Image quality assessment: from error
    *  visibility to structural similarity", IEEE Trans. Image Processing 13, 2004: Gaussian window
-   *  of 1.5 pixels). */
+   *  of 1.5 pixels, of which only the part counts where both have something). */
   [[nodiscard]] double ssim () const { return both_ > 0 ? ssim_ / both_ : 0; }
 
 private:
