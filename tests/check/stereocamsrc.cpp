@@ -121,6 +121,19 @@ GST_START_TEST (test_downstream_chooses_format_size_and_rate)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_left_cameras_present_format_is_taken_where_any_will_do)
+{
+  TestCameras cameras;
+  for (const std::uint32_t format : {kRgb8, kMono8}) {
+    cameras.list[0]->regulate (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, format);
+    while (read_register (0, ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT) != format)
+      g_usleep (1000);
+    expect_caps (
+        "", "ANY", format == kRgb8 ? "video/x-raw,format=RGB" : "video/x-raw,format=GRAY8");
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_formats_that_nobody_has_are_one_error_that_lists_the_cameras)
 {
   TestCameras cameras;
@@ -424,6 +437,7 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_third_pad_is_there_only_while_its_camera_is_named);
   tcase_add_test (tc, test_pixels_are_not_copied);
   tcase_add_test (tc, test_downstream_chooses_format_size_and_rate);
+  tcase_add_test (tc, test_left_cameras_present_format_is_taken_where_any_will_do);
   tcase_add_test (tc, test_formats_that_nobody_has_are_one_error_that_lists_the_cameras);
   tcase_add_test (tc, test_rig_file_names_the_cameras);
   tcase_add_test (tc, test_cameras_that_are_not_named_are_one_error);
