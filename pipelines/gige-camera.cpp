@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "gige-description.hpp"
@@ -148,6 +149,8 @@ GigeCamera::fill_registers ()
   set (kRegisterMacHigh, 0x0200); /* one of those that anybody may use */
   set (kRegisterMacLow, ip);
   set (kRegisterActionSignals, 1);
+  for (std::uint32_t colour = 0; colour < 3; colour++)
+    set (kRegisterBalanceRatio + 4 * colour, std::bit_cast<std::uint32_t> (1.0f));
   sockaddr_in source{};
   socklen_t source_size = sizeof source;
   getsockname (stream_, reinterpret_cast<sockaddr *> (&source), &source_size);
@@ -424,6 +427,16 @@ GigeCamera::line_rises ()
   eventfd_write (wake_, 1);
 }
 
+void
+GigeCamera::regulate (std::uint32_t address, std::uint32_t value)
+{
+  {
+    std::lock_guard guard (lock_);
+    regulated_.emplace_back (address, value);
+  }
+  eventfd_write (wake_, 1);
+}
+
 /* ---- the camera's thread ---- */
 
 void
@@ -456,6 +469,9 @@ GigeCamera::take_wake_ups (std::int64_t now_ns)
   bool due = false;
   {
     std::lock_guard guard (lock_);
+    for (const auto &[address, value] : regulated_)
+      set (address, value);
+    regulated_.clear ();
     const auto time = std::int64_t (camera_time (now_ns));
     due = std::erase_if (scheduled_ns_, [&] (std::int64_t at) { return at <= time; }) > 0;
   }
@@ -530,7 +546,8 @@ GigeCamera::expose (std::int64_t now_ns)
   last_block_ = last_block_ == 65535 ? 1 : last_block_ + 1;
   scenery_.exposed (last_block_, now_ns);
   Frame &frame = frames_[last_block_ % kFramesKept];
-  frame.picture = {last_block_, camera_time (now_ns), format, std::uint32_t (region.width),
+  const std::uint64_t stamp = camera_time (now_ns + stamp_off_ns_.exchange (0));
+  frame.picture = {last_block_, stamp, format, std::uint32_t (region.width),
       std::uint32_t (region.height), std::uint32_t (region.x), std::uint32_t (region.y)};
   frame.chunk = size - kGvspOverhead;
   frame.pixels.resize (

@@ -66,6 +66,10 @@ public:
   void take_action (const GvcpCommand &command, const sockaddr_in &from);
   /** The signal on the input line. */
   void line_rises ();
+  /** As the camera's own regulators do: sets a register, whoever has control. Soon after. */
+  void regulate (std::uint32_t address, std::uint32_t value);
+  /** The stamp of the next picture, and of that one only, is wrong by so much. */
+  void mistake_stamp (std::int64_t by_ns) { stamp_off_ns_ = by_ns; }
 
   [[nodiscard]] const GigeCameraSettings &settings () const { return settings_; }
   [[nodiscard]] std::uint64_t pictures () const { return pictures_; }
@@ -117,7 +121,10 @@ private:
   std::atomic<std::uint64_t> pictures_{0};
   std::thread thread_;
 
-  std::mutex lock_; /* guards the two below */
+  std::atomic<std::int64_t> stamp_off_ns_{0};
+
+  std::mutex lock_;                                                /* guards the three below */
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> regulated_; /* registers and values */
   std::vector<std::int64_t> scheduled_ns_;
   std::uint32_t device_key_ = 0, group_key_ = 0, group_mask_ = 0;
 

@@ -63,13 +63,27 @@ line_features ()
          enumeration_node ("LineSource", 0x418, entry ("Off", 0) + entry ("ExposureActive", 1));
 }
 
+static std::string
+balance_features ()
+{
+  return enumeration_node ("BalanceRatioSelector", kRegisterBalanceSelector,
+             entry ("Red", 0) + entry ("Green", 1) + entry ("Blue", 2)) +
+         "<Float Name=\"BalanceRatio\" NameSpace=\"Standard\"><pValue>BalanceRatioRegister</pValue>"
+         "<Min>0.1</Min><Max>16</Max></Float>\n<FloatReg Name=\"BalanceRatioRegister\" "
+         "NameSpace=\"Custom\"><Address>" +
+         hex (kRegisterBalanceRatio) +
+         "</Address><pIndex Offset=\"4\">BalanceRatioSelectorRegister</pIndex><Length>4</Length>"
+         "<AccessMode>RW</AccessMode><pPort>Device</pPort><Endianess>BigEndian</Endianess>"
+         "</FloatReg>\n";
+}
+
 /* They can be set and read; the pictures stay the same. */
 static std::string
 look_features ()
 {
   const std::string modes = entry ("Off", 0) + entry ("Once", 1) + entry ("Continuous", 2);
   return enumeration_node ("ExposureAuto", 0x420, modes) +
-         enumeration_node ("BalanceWhiteAuto", 0x424, modes);
+         enumeration_node ("BalanceWhiteAuto", 0x424, modes) + balance_features ();
 }
 
 static std::string

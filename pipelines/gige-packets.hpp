@@ -42,6 +42,9 @@ inline constexpr std::uint32_t kRegisterMacHigh = 0x0008, kRegisterMacLow = 0x00
                                kRegisterStreamAddress = 0x0d18, kRegisterStreamSourcePort = 0x0d1c,
                                kRegisterActionGroupKey = 0x9800, kRegisterActionGroupMask = 0x9804;
 
+/** Features that Aravis' fake camera lacks: BalanceRatio, a float each of red, green, blue. */
+inline constexpr std::uint32_t kRegisterBalanceSelector = 0x430, kRegisterBalanceRatio = 0x434;
+
 inline constexpr std::size_t kDiscoveryBytes = 0xf8;
 inline constexpr std::size_t kMaxGvcpBytes = 576; ///< with IP and UDP header; GVCP's own limit
 /** IP, UDP and GVSP header: counted in a packet size, besides the picture's bytes. */

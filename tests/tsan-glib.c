@@ -14,9 +14,13 @@
 #include <sanitizer/tsan_interface.h>
 
 #define GLIBS(name)                                                                                \
-  static __typeof__ (&name) glibs;                                                                 \
-  if (!glibs)                                                                                      \
-  glibs = (__typeof__ (&name))dlsym (RTLD_NEXT, #name)
+  static __typeof__ (&name) found;                                                                 \
+  __typeof__ (&name) glibs = __atomic_load_n (&found, __ATOMIC_RELAXED);                           \
+  if (!glibs) {                                                                                    \
+    glibs = (__typeof__ (&name))dlsym (RTLD_NEXT, #name);                                          \
+    __atomic_store_n (&found, glibs, __ATOMIC_RELAXED);                                            \
+  }                                                                                                \
+  (void)0
 
 void
 g_mutex_lock (GMutex *mutex)

@@ -56,8 +56,8 @@ struct CameraFormat {
 /** What a camera could be configured to, for caps: the pixel formats that can be carried, and
  * sizes. */
 struct CameraAbilities {
-  std::vector<std::string>
-      pixel_formats; ///< GenICam's names; those that we can carry, in the camera's order
+  std::vector<std::string> pixel_formats; ///< GenICam's names; those that we can carry; the present
+                                          ///< one, then the camera's order
   std::vector<std::string> other_formats; ///< the rest, for messages
   int max_width = 0, max_height = 0;      ///< pixels
   int min_width = 0, min_height = 0, width_step = 1, height_step = 1;

@@ -65,6 +65,9 @@ read_abilities (CameraControl &control, CameraAbilities &abilities)
   CameraStatus status = control.status ("list of pixel formats", error, CameraFault::kFailed);
   if (!status.ok ())
     return status;
+  const char *current = arv_camera_get_pixel_format_as_string (control.camera (), nullptr);
+  std::ranges::stable_partition (abilities.pixel_formats,
+      [&] (const std::string &name) { return current && name == current; });
   read_sizes (control, abilities);
   for (const std::string &source : control.entries ("TriggerSource")) {
     abilities.software_trigger |= source == "Software";

@@ -25,13 +25,14 @@ address_of (int camera)
          std::to_string (camera + 1);
 }
 
-/* Cameras whose pictures hold the number of pictures so far, and who fire each other's lines. */
-struct Cameras {
+/* Cameras whose pictures hold the number of pictures so far, and who fire each other's lines. Their
+ * threads look at it: on no test's stack, which a test that fails may leave without destructors. */
+struct CamerasOnSockets {
+  Moments moments{kPeriodNs};
   std::vector<std::unique_ptr<GigeCamera>> list;
   std::unique_ptr<GigeListener> listener;
-  Moments moments{kPeriodNs};
 
-  explicit Cameras (int count, double loss = 0, bool resend = true)
+  explicit CamerasOnSockets (int count, double loss, bool resend)
   {
     for (int i = 0; i < count; i++) {
       GigeCameraSettings settings;
@@ -64,7 +65,32 @@ struct Cameras {
     listener = std::make_unique<GigeListener> (list);
     fail_unless (listener->start () > 0);
   }
-  ~Cameras () { listener.reset (); }
+  ~CamerasOnSockets ()
+  {
+    listener.reset ();
+    list.clear ();
+  }
+};
+
+/* Those of the test that runs; those of one that failed go before the next begins, or at exit. */
+struct Cameras {
+  explicit Cameras (int count, double loss = 0, bool resend = true)
+      : cameras ((of_this_process ().reset (), new CamerasOnSockets (count, loss, resend))),
+        list (cameras->list)
+  {
+    of_this_process ().reset (cameras);
+  }
+  ~Cameras () { of_this_process ().reset (); }
+  Cameras (const Cameras &) = delete;
+  Cameras &operator= (const Cameras &) = delete;
+
+  static std::unique_ptr<CamerasOnSockets> &of_this_process ()
+  {
+    static std::unique_ptr<CamerasOnSockets> cameras;
+    return cameras;
+  }
+  CamerasOnSockets *cameras;
+  std::vector<std::unique_ptr<GigeCamera>> &list;
 };
 
 /* One of them, opened by Aravis. */

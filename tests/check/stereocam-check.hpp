@@ -2,6 +2,8 @@
 /* Fake cameras whose pictures say when they were taken, and stereocamsrc in front of them. */
 #pragma once
 
+#include <arpa/inet.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
@@ -36,14 +38,37 @@ struct PictureMark {
   std::int32_t camera = 0;
 };
 
-/** Two or three cameras of 64x48 on sockets of this machine, in this process. */
-struct TestCameras {
+/** A register of a camera, as a program reads it that has no control. */
+inline std::uint32_t
+read_register (int camera, std::uint32_t address)
+{
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons (kGvcpPort);
+  inet_pton (AF_INET, camera_address (camera).c_str (), &to.sin_addr);
+  const std::uint32_t command[] = {htonl (0x42010080), htonl (0x00040001), htonl (address)};
+  std::uint32_t answer[3] = {};
+  const timeval patience = {2, 0};
+  const int fd = socket (AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  setsockopt (fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  sendto (fd, command, sizeof command, 0, reinterpret_cast<sockaddr *> (&to), sizeof to);
+  const ssize_t got = recv (fd, answer, sizeof answer, 0);
+  close (fd);
+  fail_unless_equals_int (int (got), int (sizeof answer));
+  fail_unless_equals_int (int (ntohl (answer[0])), 0x0081); /* READREG_ACK, success */
+  return ntohl (answer[2]);
+}
+
+/** Two or three cameras of 64x48 on sockets of this machine, in this process. Their threads look at
+ *  it: a test that fails where tests share one process (CK_FORK=no) jumps out without destructors,
+ *  so what they look at is no test's stack, see TestCameras. */
+struct CamerasOnSockets {
   GigeCameraSettings settings;
   std::mutex lock; ///< guards the list against the cameras' threads
   std::vector<std::unique_ptr<GigeCamera>> list;
   std::unique_ptr<GigeListener> listener;
 
-  explicit TestCameras (int count = 2, double loss = 0)
+  explicit CamerasOnSockets (int count, double loss)
   {
     settings.width = 64;
     settings.height = 48;
@@ -57,8 +82,17 @@ struct TestCameras {
     listener = std::make_unique<GigeListener> (list);
     fail_unless (listener->start () > 0);
   }
-  ~TestCameras () { listener.reset (); }
+  ~CamerasOnSockets ()
+  {
+    listener.reset ();
+    list.clear ();
+  }
 
+  void resize (int count)
+  {
+    std::lock_guard guard (lock);
+    list.resize (count);
+  }
   void plug (int i)
   {
     settings.address = camera_address (i);
@@ -98,12 +132,62 @@ struct TestCameras {
   }
 };
 
+/** Those of the test that runs, which go when it ends; those of a test that failed go when the next
+ *  one begins, or at exit. */
+class TestCameras {
+public:
+  explicit TestCameras (int count = 2, double loss = 0)
+      : cameras ((of_this_process ().reset (), new CamerasOnSockets (count, loss))),
+        list (cameras->list), listener (cameras->listener)
+  {
+    of_this_process ().reset (cameras);
+  }
+  ~TestCameras () { of_this_process ().reset (); }
+  TestCameras (const TestCameras &) = delete;
+  TestCameras &operator= (const TestCameras &) = delete;
+
+  void resize (int count) { cameras->resize (count); }
+  void plug (int i) { cameras->plug (i); }
+  void unplug (int i) { cameras->unplug (i); }
+
+private:
+  static std::unique_ptr<CamerasOnSockets> &of_this_process ()
+  {
+    static std::unique_ptr<CamerasOnSockets> cameras;
+    return cameras;
+  }
+  CamerasOnSockets *cameras;
+
+public:
+  std::vector<std::unique_ptr<GigeCamera>> &list;
+  std::unique_ptr<GigeListener> &listener;
+};
+
 /** What a pad gave. */
 struct SeenPicture {
   GstClockTime pts, capture, duration;
   PictureMark mark;
   bool discont;
   const void *memory;
+};
+
+/** What a streaming thread adds to and a test looks at. */
+template <typename T> class SharedList {
+public:
+  void add (T item)
+  {
+    std::lock_guard guard (lock_);
+    list_.push_back (item);
+  }
+  [[nodiscard]] std::vector<T> all ()
+  {
+    std::lock_guard guard (lock_);
+    return list_;
+  }
+
+private:
+  std::mutex lock_;
+  std::vector<T> list_;
 };
 
 /** A pipeline of stereocamsrc, and a fakesink with a capsfilter before it on each pad. */

@@ -74,8 +74,13 @@ GST_END_TEST;
 GST_START_TEST (test_features_reach_the_cameras)
 {
   TestCameras cameras;
-  CameraPipeline p ("trigger=software num-buffers=2 features=\"OffsetX=0 ExposureTimeAbs=3000\"");
+  CameraPipeline p ("trigger=software num-buffers=2 features=\"GainRaw=5 ExposureTimeAbs=3000\"");
   p.play_to_the_end ();
+  for (int camera = 0; camera < 2; camera++) {
+    fail_unless_equals_int (int (read_register (camera, ARV_FAKE_CAMERA_REGISTER_GAIN_RAW)), 5);
+    fail_unless_equals_int (
+        int (read_register (camera, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US)), 3000);
+  }
 }
 GST_END_TEST;
 
@@ -150,20 +155,39 @@ GST_START_TEST (test_camera_that_comes_late_is_waited_for)
   p.play ();
   expect_text (p.next_text (GST_MESSAGE_WARNING), "pad right");
   cameras.listener.reset ();
-  cameras.list.resize (2);
+  cameras.resize (2);
   cameras.plug (1);
   fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
 }
 GST_END_TEST;
 
-/* A camera that does not answer costs seconds a call: no state change waits for that long. */
-GST_START_TEST (test_null_while_cameras_are_looked_for_returns)
+static GstBusSyncReply
+count_errors (GstBus *, GstMessage *message, gpointer count)
 {
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR)
+    ++*static_cast<std::atomic<int> *> (count);
+  return GST_BUS_PASS;
+}
+
+/* No state change waits for the search: it goes on for a second, but nobody wants its result. */
+GST_START_TEST (test_search_that_null_ended_says_nothing)
+{
+  std::atomic<int> errors = 0;
+  CameraPipeline p ("trigger=software");
+  g_object_set (p.pipeline (), "auto-flush-bus", FALSE, nullptr);
+  gst_bus_set_sync_handler (p.bus (), count_errors, &errors, nullptr);
   for (int i = 0; i < 3; i++) {
-    CameraPipeline p ("trigger=software");
     p.play ();
     g_usleep (i * 100000);
+    p.stop ();
   }
+  g_usleep (4000000);
+  fail_unless_equals_int (errors, 0);
+  p.play (); /* the next search does say that it found nothing */
+  for (int i = 0; i < 2000 && errors == 0; i++)
+    g_usleep (10000);
+  fail_unless_equals_int (errors, 1);
+  gst_bus_set_sync_handler (p.bus (), nullptr, nullptr, nullptr);
 }
 GST_END_TEST;
 
@@ -212,7 +236,7 @@ stereocamsrcfaults_suite ()
   tcase_add_test (tc, test_camera_that_is_killed_comes_back_and_pairs_stay_exact);
   tcase_add_test (tc, test_free_running_camera_that_is_killed_comes_back);
   tcase_add_test (tc, test_camera_that_comes_late_is_waited_for);
-  tcase_add_test (tc, test_null_while_cameras_are_looked_for_returns);
+  tcase_add_test (tc, test_search_that_null_ended_says_nothing);
   tcase_add_test (tc, test_downstream_that_keeps_all_buffers_is_warned_once);
   return suite;
 }

@@ -2,6 +2,7 @@
 /* stereocamsrc: who fires the cameras, and by which clock. */
 #include "stereocam-check.hpp"
 
+#include <bit>
 #include <gst/net/net.h>
 
 using namespace rangecast;
@@ -21,6 +22,67 @@ GST_START_TEST (test_free_running_pairs_share_pts_near_the_exposure)
   }
 }
 GST_END_TEST;
+
+GST_START_TEST (test_stamp_that_is_an_hour_off_once_does_not_end_the_pairs)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=free-run");
+  p.play ();
+  for (const std::int64_t hours : {1, -1}) {
+    fail_unless (p.wait_for_pictures (0, 20) && p.wait_for_pictures (1, 20));
+    cameras.list[0]->mistake_stamp (hours * 3600 * std::int64_t (GST_SECOND));
+    p.forget ();
+    fail_unless (p.wait_for_pictures (0, 40) && p.wait_for_pictures (1, 40));
+    const auto pictures = p.seen (0);
+    const GstClockTime took = pictures.back ().pts - pictures.front ().pts;
+    fail_unless (took < 60 * GST_SECOND, "they span %d s", int (took / GST_SECOND));
+  }
+  p.stop ();
+  expect_pairs (p, 2, kPeriod / 2);
+}
+GST_END_TEST;
+
+/* ---- one look ---- */
+
+static bool
+follows (std::uint32_t address, std::uint32_t value)
+{
+  std::uint32_t right = 0, third = 0;
+  for (int i = 0; i < 1000; i++, g_usleep (10000)) {
+    right = read_register (1, address);
+    third = read_register (2, address);
+    if (right == value && third == value)
+      return true;
+  }
+  g_print ("register 0x%x: right has %u, third %u, expected %u\n", address, right, third, value);
+  return false;
+}
+
+GST_START_TEST (test_right_and_third_follow_what_the_left_regulates)
+{
+  TestCameras cameras (3);
+  CameraPipeline p (
+      "trigger=software auto-exposure=true auto-gain=true auto-white-balance=true", 3);
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+  const auto bits = [] (float ratio) { return std::bit_cast<std::uint32_t> (ratio); };
+  const struct {
+    std::uint32_t address, value;
+  } rows[] = {
+      {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 4321},
+      {ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, 7},
+      {kRegisterBalanceRatio, bits (1.5F)},
+      {kRegisterBalanceRatio + 4, bits (0.75F)},
+      {kRegisterBalanceRatio + 8, bits (2.25F)},
+  };
+  for (const auto &row : rows)
+    cameras.list[0]->regulate (row.address, row.value);
+  for (const auto &row : rows)
+    fail_unless (follows (row.address, row.value));
+}
+GST_END_TEST;
+
+/* ---- who fires ---- */
 
 GST_START_TEST (test_left_camera_fires_the_others_by_its_line)
 {
@@ -218,6 +280,8 @@ stereocamsrctriggers_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_free_running_pairs_share_pts_near_the_exposure);
+  tcase_add_test (tc, test_stamp_that_is_an_hour_off_once_does_not_end_the_pairs);
+  tcase_add_test (tc, test_right_and_third_follow_what_the_left_regulates);
   tcase_add_test (tc, test_left_camera_fires_the_others_by_its_line);
   tcase_add_test (tc, test_action_command_fires_all_on_ticks);
   tcase_add_test (tc, test_scheduled_action_fires_at_the_tick_itself);
