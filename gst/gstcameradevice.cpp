@@ -66,8 +66,11 @@ new_camera_device (const FoundCamera &camera)
   auto name = camera.vendor + " " + camera.model + " (" + camera.serial + ")";
   if (!camera.problem.empty ())
     name += ", not usable: " + camera.problem;
+  /* By its name, Aravis would take the network that answered first, which may not be the one that
+   * pictures can come by. */
+  const auto &camera_name = is_usb ? camera.id : camera.address;
   return new_device (name, "Source/Video", properties, "aravissrc",
-      gst_structure_new ("settings", "camera-name", G_TYPE_STRING, camera.id.c_str (), nullptr));
+      gst_structure_new ("settings", "camera-name", G_TYPE_STRING, camera_name.c_str (), nullptr));
 }
 
 GstDevice *

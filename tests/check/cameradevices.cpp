@@ -333,6 +333,7 @@ GST_START_TEST (test_gige_camera_is_listed_and_goes)
   fail_unless (device != nullptr);
   expect_text (device, "camera.protocol", "GigEVision");
   expect_text (device, "camera.address", "127.0.0.1");
+  expect_text (device, "launch", "aravissrc camera-name=127.0.0.1");
   gst_object_unref (device);
   camera.reset ();
   monitor.wait_for (GST_MESSAGE_DEVICE_REMOVED, "camera.serial", "GIGE1");
