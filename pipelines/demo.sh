@@ -75,7 +75,7 @@ start_fake_cameras () {
   pids+=($!)
   names[$!]=fake-cameras
   for ((i = 0; i < 600; i++)); do
-    ! grep -q '^ready' "$log" || return 0
+    ! grep -qs '^ready' "$log" || return 0 # the log may not be there yet
     kill -0 "${pids[-1]}" 2>/dev/null || break
     sleep 0.1
   done

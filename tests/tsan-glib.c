@@ -4,7 +4,7 @@
  *
  *   gcc -shared -fPIC -fsanitize=thread tests/tsan-glib.c -o build-tsan/tsan-glib.so \
  *     $(pkg-config --cflags --libs glib-2.0)
- *   LD_PRELOAD=build-tsan/tsan-glib.so G_SLICE=always-malloc GST_REGISTRY_FORK=no \
+ *   LD_PRELOAD=build-tsan/tsan-glib.so G_SLICE=always-malloc GST_REGISTRY_FORK=no CK_FORK=no \
  *     TSAN_OPTIONS="suppressions=tests/tsan.supp ignore_noninstrumented_modules=1" \
  *     build-tsan/tests/check/check_striprender
  */
