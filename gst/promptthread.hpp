@@ -5,8 +5,9 @@
 #include <sched.h>
 
 /** While it lives, the calling thread and the threads that it starts come before ordinary ones
- *  (SCHED_RR, lowest priority), where the user may have that (RLIMIT_RTPRIO); else nothing is different. For what
- * takes microseconds and must happen at its time: answers about the clock, triggers. */
+ *  (SCHED_RR, lowest priority), where the user may have that (RLIMIT_RTPRIO); else nothing is
+ * different. For what takes microseconds and must happen at its time: answers about the clock,
+ * triggers. */
 class PromptThread {
 public:
   PromptThread ()
