@@ -35,7 +35,7 @@ need_size "$size" --size
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
-  source=(udpsrc "port=$listen" reuse=false "caps=$rtp_caps" ! rtpjitterbuffer latency=50 ! rtpneighbourcodedepay)
+  source=(udpsrc "port=$listen" reuse=false buffer-size=4194304 "caps=$rtp_caps" ! rtpjitterbuffer latency=50 ! rtpneighbourcodedepay)
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)

@@ -73,7 +73,7 @@ add (std::map<int, ViewReport> &reports, const FrameSet &frame_set)
 /* One line a frame set: capture time of its oldest view, and a letter a view: its number if it is
  * whole, ! if slices are missing. */
 void
-print_frame_set (const FrameSet &frame_set, std::int64_t &origin)
+print_frame_set (const FrameSet &frame_set)
 {
   std::int64_t oldest = INT64_MAX;
   std::string views;
@@ -81,9 +81,7 @@ print_frame_set (const FrameSet &frame_set, std::int64_t &origin)
     oldest = std::min (oldest, view.capture_ms);
     views += view.covered == view.pixels ? std::to_string (id) + " " : "! ";
   }
-  if (origin == INT64_MIN)
-    origin = oldest;
-  std::printf ("%" PRId64 " %s\n", oldest - origin, views.c_str ());
+  std::printf ("%" PRId64 " %s\n", oldest, views.c_str ());
 }
 
 } // namespace
@@ -105,7 +103,6 @@ main (int argc, char **argv)
   std::span<const std::uint8_t> rest (
       reinterpret_cast<const std::uint8_t *> (content.data ()), content.size ());
   std::map<int, ViewReport> reports;
-  std::int64_t origin = INT64_MIN;
   while (!rest.empty ()) {
     const StreamPart part = next_part (rest, true);
     if (part.length > kStreamPrefixSize) {
@@ -113,7 +110,7 @@ main (int argc, char **argv)
           read_frame_set (rest.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
       add (reports, frame_set);
       if (list && !frame_set.empty ())
-        print_frame_set (frame_set, origin);
+        print_frame_set (frame_set);
     }
     const std::size_t used = std::max (part.rubbish, part.length);
     if (used == 0)
