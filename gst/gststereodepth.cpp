@@ -460,36 +460,14 @@ take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, Gst
   GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
   if (!pad)
     return GST_FLOW_OK;
-  const auto sink = GST_AGGREGATOR_PAD (pad);
-  const GstClockTime left = priv->pair.running;
-  const GstClockTime tolerance = gstrange::pairing_tolerance (frame_duration);
-  GstFlowReturn flow = GST_FLOW_OK;
-  while (true) {
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (sink);
-    if (!buffer) {
-      flow =
-          gst_aggregator_pad_is_eos (sink) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
-      break;
-    }
-    const GstClockTime time = gstrange::running_time_of (sink, buffer);
-    const bool gap = gstrange::is_gap (buffer);
-    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (left);
-    const GstClockTime last =
-        timed && gap ? gstrange::gap_end (time, buffer, tolerance) : time + tolerance;
-    gst_buffer_unref (buffer);
-    if (timed && (time > left + tolerance || (gap && last >= left)))
-      break;
-    if (!gap && (!timed || last >= left)) {
-      *third = gst_aggregator_pad_pop_buffer (sink);
-      break;
-    }
-    gst_aggregator_pad_drop_buffer (sink);
-    std::lock_guard guard (priv->lock);
-    priv->dropped_third += !gap;
-  }
+  guint64 dropped = 0;
+  const GstFlowReturn flow = gstrange::take_companion (GST_AGGREGATOR_PAD (pad), priv->pair.running,
+      gstrange::pairing_tolerance (frame_duration), timeout, dropped, third);
   gst_object_unref (pad);
   if (*third && !priv->have_info[2]) /* of a pad that was released just now */
     gst_clear_buffer (third);
+  std::lock_guard guard (priv->lock);
+  priv->dropped_third += dropped;
   return flow;
 }
 
