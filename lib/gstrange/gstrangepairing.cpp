@@ -207,4 +207,46 @@ stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
   gst_range_buffer_set_capture_time (buffer, capture_time);
 }
 
+void
+GapSender::note_buffer (GstClockTime running_time, GstClockTime duration)
+{
+  segment_sent_ = true; /* GstAggregator sends it with the first buffer */
+  if (GST_CLOCK_TIME_IS_VALID (running_time))
+    position_ = running_time + (GST_CLOCK_TIME_IS_VALID (duration) ? duration : 0);
+}
+
+bool
+GapSender::cut (GstClockTime &begin, GstClockTime end) const
+{
+  begin = std::max (begin, position_);
+  return begin < end;
+}
+
+/* GstAggregator sends it with buffers only. It comes again with the first one, which changes
+ * nothing. */
+static void
+push_segment (GstAggregator *aggregator, GstAggregatorPad *cause, const GstSegment &segment)
+{
+  GstEvent *event = gst_event_new_segment (&segment);
+  GstEvent *reason = gst_pad_get_sticky_event (GST_PAD (cause), GST_EVENT_SEGMENT, 0);
+  if (reason)
+    gst_event_set_seqnum (event, gst_event_get_seqnum (reason));
+  gst_clear_event (&reason);
+  gst_pad_push_event (aggregator->srcpad, event);
+}
+
+void
+GapSender::push (
+    GstAggregator *aggregator, GstAggregatorPad *cause, GstClockTime begin, GstClockTime end)
+{
+  GST_OBJECT_LOCK (aggregator);
+  const GstSegment segment = GST_AGGREGATOR_PAD (aggregator->srcpad)->segment;
+  GST_OBJECT_UNLOCK (aggregator);
+  if (!segment_sent_)
+    push_segment (aggregator, cause, segment);
+  segment_sent_ = true;
+  position_ = end;
+  gst_pad_push_event (aggregator->srcpad, gst_event_new_gap (segment.start + begin, end - begin));
+}
+
 } // namespace gstrange

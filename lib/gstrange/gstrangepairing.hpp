@@ -95,4 +95,24 @@ GST_RANGE_API GstClockTime capture_time_of (GstAggregatorPad *pad, GstBuffer *bu
 GST_RANGE_API void stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
     GstClockTime duration, GstClockTime capture_time);
 
+/** Tells downstream of an aggregator of times of which nothing will come, so that it does not wait
+ *  for it. For the streaming thread. Running times, ns. */
+class GST_RANGE_API GapSender {
+public:
+  /** A buffer goes out. Both may be GST_CLOCK_TIME_NONE. */
+  void note_buffer (GstClockTime running_time, GstClockTime duration);
+  /** Cuts off what has come out already. @return whether anything is left */
+  bool cut (GstClockTime &begin, GstClockTime end) const;
+  /** Sends a GAP, in front of it the segment if that did not go out yet; caps must have.
+   *  @param cause  of that segment: its sequence number is that of this pad's */
+  void push (
+      GstAggregator *aggregator, GstAggregatorPad *cause, GstClockTime begin, GstClockTime end);
+  /** After a flush, or at a start. */
+  void reset () { *this = GapSender (); }
+
+private:
+  bool segment_sent_ = false;
+  GstClockTime position_ = 0; /* where the output so far ends */
+};
+
 } // namespace gstrange
