@@ -36,6 +36,7 @@
 
 #include "controlledvalues.hpp"
 #include "roisettings.hpp"
+#include "statsreporter.hpp"
 
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
@@ -78,6 +79,7 @@ struct GstRoiExtractPrivate {
   guint64 frames = 0, points_in = 0, points_out = 0;
   Roi last_roi;
 
+  StatsReporter reporter; /* has locks of its own */
   std::atomic<bool> relearn{false};
 
   /* streaming thread only */
@@ -220,6 +222,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   const RoiSettings settings = copy_settings (priv);
   Status status = gstrange::parse_caps (caps, priv->info);
   if (status.ok ()) {
+    priv->reporter.set_views (priv->info.rig);
     prepare_views (priv, settings.background_frames);
     if (!settings.background_file.empty () && !all_learnt (priv))
       status = load_background_file (priv, settings.background_file);
@@ -409,6 +412,7 @@ gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const Status status = process_frame (self, frame, settings);
   if (status.ok ())
     after_frame (self, frame, settings);
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
@@ -423,10 +427,20 @@ gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
     if (settings.adapt_time_s > 0)
       save_when_all_learnt (self, settings.save_background);
   }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    self->priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_roi_extract_parent_class)->sink_event (base, event);
 }
 
 /* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->frames, .points = priv->points_out}}};
+}
 
 static gboolean
 gst_roi_extract_start (GstBaseTransform *base)
@@ -437,6 +451,7 @@ gst_roi_extract_start (GstBaseTransform *base)
     return FALSE;
   priv->refused.clear ();
   priv->unsaved.clear ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->points_in = priv->points_out = 0;
   priv->last_roi = {};
@@ -447,6 +462,7 @@ static gboolean
 gst_roi_extract_stop (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  priv->reporter.stop ();
   priv->info = {};
   priv->relearn = false;
   for (auto &state : priv->views)
@@ -464,6 +480,10 @@ static void
 gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
+  if (id == prop_stats + 1) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
   std::lock_guard guard (priv->lock);
   if (!set_roi_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -486,6 +506,8 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
   std::lock_guard guard (priv->lock);
   if (id == prop_stats)
     g_value_take_boxed (value, make_stats (priv));
+  else if (id == prop_stats + 1)
+    g_value_set_uint (value, priv->reporter.interval ());
   else if (!get_roi_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -519,6 +541,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, points-in, points-out; and the last ROI of the first view",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, prop_stats + 1);
 
   /**
    * GstRoiExtract::capture-background:

@@ -14,9 +14,13 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
+
+#include "latency-trace.hpp"
+#include "stats-sender.hpp"
 
 struct Options {
   gint64 base_time = -1;
@@ -25,6 +29,7 @@ struct Options {
   gboolean turn = FALSE;
   gint timeout_s = 0;
   gboolean progress = FALSE;
+  gchar *stats = nullptr, *trace = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
   gchar **launch = nullptr;
@@ -35,6 +40,8 @@ struct Runner {
   GstElement *pipeline = nullptr;
   GMainLoop *loop = nullptr;
   GstElement *turned = nullptr; /* a striprender */
+  std::unique_ptr<StatsSender> stats;
+  std::unique_ptr<LatencyTrace> trace;
   bool failed = false;
   bool ending = false;
 
@@ -342,6 +349,14 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
     case GST_MESSAGE_LATENCY:
       gst_bin_recalculate_latency (GST_BIN (runner->pipeline));
       break;
+    case GST_MESSAGE_CLOCK_LOST:
+      gst_element_set_state (runner->pipeline, GST_STATE_PAUSED);
+      gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
+      break;
+    case GST_MESSAGE_ELEMENT:
+      if (runner->stats)
+        runner->stats->take (message);
+      break;
     case GST_MESSAGE_EOS:
       g_main_loop_quit (runner->loop);
       break;
@@ -381,6 +396,8 @@ play (Runner &runner)
     runner.turned = gst_bin_get_by_name (GST_BIN (runner.pipeline), "view");
   add_probe (runner, "decoder", count_views);
   add_probe (runner, "rendered", count_rendered);
+  if (runner.options.trace)
+    runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     runner.failed = true; /* the reason is on the bus; on_message() prints it and quits */
@@ -391,6 +408,10 @@ play (Runner &runner)
   if (!runner.failed && runner.options.snapshot)
     runner.failed = !write_snapshot (runner);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
+  if (runner.trace && !runner.trace->write (runner.options.trace)) {
+    g_printerr ("rangecast-run: %s: cannot be written\n", runner.options.trace);
+    runner.failed = true;
+  }
   gst_bus_remove_watch (bus);
   gst_clear_object (&runner.turned);
   gst_object_unref (bus);
@@ -412,6 +433,12 @@ parse_arguments (int *argc, char ***argv, Options &options)
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
           "Fail if it has not ended by then (default 0: never)", "SECONDS"},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &options.progress, "Print a line every 2 s", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_STRING, &options.stats,
+          "Send the elements' statistics there, for top.sh: udp://HOST:PORT or a file (default: "
+          "environment RANGECAST_STATS, else nowhere)",
+          "ADDRESS"},
+      {"trace-latency", 0, 0, G_OPTION_ARG_FILENAME, &options.trace,
+          "Write when each buffer passed each pad", "FILE"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &options.report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &options.snapshot,
           "Write the last picture of the sink named snapshot", "PNG"},
@@ -431,11 +458,26 @@ parse_arguments (int *argc, char ***argv, Options &options)
   return parsed && options.launch;
 }
 
+/* @return false if there is something wrong with the address */
+static bool
+open_stats (Runner &runner)
+{
+  const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
+  if (!address || !*address)
+    return true;
+  const char *host = g_getenv ("RANGECAST_HOST");
+  std::string error;
+  runner.stats = StatsSender::open (address, host && *host ? host : g_get_host_name (), error);
+  if (!runner.stats)
+    g_printerr ("rangecast-run: statistics: %s\n", error.c_str ());
+  return runner.stats != nullptr;
+}
+
 int
 main (int argc, char **argv)
 {
   Runner runner;
-  if (!parse_arguments (&argc, &argv, runner.options))
+  if (!parse_arguments (&argc, &argv, runner.options) || !open_stats (runner))
     return 2;
   GError *error = nullptr;
   GstElement *parsed =
@@ -455,6 +497,8 @@ main (int argc, char **argv)
   play (runner);
   gst_object_unref (runner.pipeline);
   g_free (runner.options.report);
+  g_free (runner.options.stats);
+  g_free (runner.options.trace);
   g_free (runner.options.snapshot);
   g_strfreev (runner.options.launch);
   return runner.failed ? 1 : 0;
