@@ -18,6 +18,8 @@
 #include <string>
 #include <vector>
 
+#include "srtp-key.hpp"
+
 struct Options {
   gint64 base_time = -1;
   gint frames = 0;
@@ -27,6 +29,7 @@ struct Options {
   gboolean progress = FALSE;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
+  gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
 
@@ -415,6 +418,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &options.report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &options.snapshot,
           "Write the last picture of the sink named snapshot", "PNG"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
@@ -452,10 +457,14 @@ main (int argc, char **argv)
     runner.pipeline = gst_pipeline_new (nullptr);
     gst_bin_add (GST_BIN (runner.pipeline), parsed);
   }
-  play (runner);
+  if (runner.options.srtp_key && !give_srtp_key (runner.pipeline, runner.options.srtp_key))
+    runner.failed = true;
+  else
+    play (runner);
   gst_object_unref (runner.pipeline);
   g_free (runner.options.report);
   g_free (runner.options.snapshot);
+  g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
   return runner.failed ? 1 : 0;
 }
