@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "latency-trace.hpp"
+#include "srtp-key.hpp"
 #include "stats-sender.hpp"
 
 struct Options {
@@ -37,6 +38,7 @@ struct Options {
   gchar *snapshot = nullptr;
   gchar *frame_log = nullptr;
   gchar *threads_left = nullptr;
+  gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
 
@@ -503,6 +505,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
           "Write a line for each frame: its time, latency and views with points", "CSV"},
       {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &options.threads_left,
           "Write the names of threads that still run when the pipeline is gone", "FILE"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
@@ -555,7 +559,9 @@ main (int argc, char **argv)
     runner.pipeline = gst_pipeline_new (nullptr);
     gst_bin_add (GST_BIN (runner.pipeline), parsed);
   }
-  if (runner.options.frame_log && !(runner.frame_log = open_frame_log (runner.options.frame_log)))
+  if ((runner.options.frame_log &&
+          !(runner.frame_log = open_frame_log (runner.options.frame_log))) ||
+      (runner.options.srtp_key && !give_srtp_key (runner.pipeline, runner.options.srtp_key)))
     runner.failed = true;
   else
     play (runner);
@@ -570,6 +576,7 @@ main (int argc, char **argv)
   g_free (runner.options.snapshot);
   g_free (runner.options.frame_log);
   g_free (runner.options.threads_left);
+  g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
   gst_deinit (); /* tracers write now what they found */
   return runner.failed ? 1 : 0;
