@@ -45,8 +45,7 @@ if [ -n "$out" ]; then
 fi
 
 launch udpsrc "port=$listen" reuse=false buffer-size=4194304 "caps=$rtp_caps" \
-  ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay \
-  ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
-  ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
+  ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay ! neighbourcodedec name=decoder \
+  ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
   ! identity name=rendered ! tee name=picture "${sinks[@]}"
