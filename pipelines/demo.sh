@@ -12,7 +12,7 @@ absolute () { case "$1" in /*) echo "$1" ;; *) echo "$called_from/$1" ;; esac; }
 usage () {
   cat <<'END'
 usage: demo.sh [options]
-  --input WHAT  avatar (default), avatar=MODEL.glb, a folder of recorded pairs with its rig.yaml
+  --input WHAT  avatar (default), avatar=MODEL.glb, range, a folder of recorded pairs with its rig.yaml
                 (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
                 shows, made on this machine's loopback network by fake-cameras
   --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
@@ -65,7 +65,7 @@ need_number "$port" --port 1024 65000
 [ -n "$out" ] || die "--out: expected a folder"
 out=$(absolute "$out")
 case "$input" in
-  avatar | cameras) ;;
+  avatar | range | cameras) ;;
   avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
   *) input=$(absolute "$input") ;;
 esac
@@ -103,11 +103,11 @@ case "$input" in
     need_number "$views" --views 1 64
     command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras was not built; it needs Aravis (libaravis-dev)"
     start_fake_cameras ;;
-  avatar | avatar=*)
+  avatar | avatar=* | range)
     views=${views:-4}
     need_number "$views" --views 1 64
     model=()
-    [ "$input" = avatar ] || model=("location=${input#avatar=}")
+    [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")
     gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
       ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
   *)
@@ -132,7 +132,7 @@ start () { # name command...
 # Recorded pictures must begin at the same clock time on all hosts.
 run_options=
 case "$input" in
-  avatar | avatar=* | cameras) ;;
+  avatar | avatar=* | range | cameras) ;;
   *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
