@@ -36,7 +36,7 @@ MuxPad::reset ()
   other_rig = clash = {};
   seen = since = GST_CLOCK_TIME_NONE;
   said = state = MuxState::kIn;
-  received = late = out_of_step = left_out = matched = 0;
+  received = late = out_of_step = left_out = matched = views = 0;
   last_skew = offset = 0;
 }
 

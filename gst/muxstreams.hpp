@@ -53,6 +53,7 @@ struct MuxPad {
 
   /* the element's lock */
   MuxState state = MuxState::kIn;
+  guint64 views = 0; ///< bits by view-id, for statistics
   guint64 received = 0, late = 0, out_of_step = 0, left_out = 0, matched = 0;
   GstClockTimeDiff last_skew = 0; ///< ns behind the oldest of its frame set
   GstClockTimeDiff offset = 0;    ///< ns, capture time ahead of the pipeline's clock as it came
