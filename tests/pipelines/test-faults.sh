@@ -110,5 +110,5 @@ test_of_two_hosts_with_one_view_one_stays_left_out () {
   wait_for_sets_after "$begun" '0 2 .*0 1 2 ' 10 40
   end_job
   others_went_on "$began" 0 2
-  report "two hosts with one view-id" "told; $(stream-report all.rcnc | awk '/^view 1/ { print $9 }') change of encoder in view 1"
+  report "two hosts with one view-id" "told; $(stream-report all.rcnc | awk '/^view 1/ { print $10 }') change of encoder in view 1"
 }
