@@ -73,7 +73,7 @@ wait_for_sets_after () { # ms views count seconds
       END { exit !ok }' || return 0
     sleep 0.5
   done
-  fail "never $3 frame sets of $2 in $4 s: $(list | cut -d' ' -f2- | uniq -c | tail -n 12) $(cat parent.log)"
+  fail "never $3 frame sets of $2 in $4 s: $(list | cut -d' ' -f2- | uniq -c | tail -n 12) $(tail -n 20 parent.log)"
 }
 
 # Ms from a time on to the first frame set with a view.
