@@ -37,6 +37,7 @@
 #include "keyunitrequests.hpp"
 #include "neighbourcoderate.hpp"
 #include "recycledbuffers.hpp"
+#include "statsreporter.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -61,7 +62,8 @@ enum {
   PROP_N_THREADS,
   PROP_MAX_DEPTH_ERROR,
   PROP_ESTIMATED_BITRATE,
-  PROP_STATS
+  PROP_STATS,
+  PROP_STATS_INTERVAL
 };
 
 static constexpr EncoderSettings kDefaults;
@@ -85,6 +87,7 @@ struct GstNeighbourCodeEncPrivate {
   double bits_per_s = 0;
 
   KeyUnitRequests key_requests;
+  StatsReporter reporter; /* has locks of its own */
 
   /* streaming thread only */
   gstrange::RangeInfo info;
@@ -182,6 +185,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   const GstStructure *structure = gst_caps_get_structure (out, 0);
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
+  priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders begin anew with new caps */
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   forget_input (priv);
@@ -349,6 +353,7 @@ encode_input (GstNeighbourCodeEnc *self)
     return gst_range_flow_return (GST_ELEMENT (self), status);
   note_key (self, input, result);
   count_frame (priv, result, priv->encoder.size ());
+  priv->reporter.passed (GST_ELEMENT (self), input);
   return GST_FLOW_OK;
 }
 
@@ -474,6 +479,8 @@ gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->encoder.request_key ();
     priv->key_requests.forget ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
+    priv->reporter.finish ();
   }
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->sink_event (base, event);
 }
@@ -491,6 +498,15 @@ gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {
+               .frames = priv->frames, .points = priv->totals.points, .bytes = priv->coded_bytes}}};
+}
+
 static gboolean
 gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
@@ -499,6 +515,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.forget ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frame_number = 0;
   priv->bits_per_s = 0;
@@ -511,6 +528,7 @@ static gboolean
 gst_neighbour_code_enc_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->reporter.stop ();
   priv->is_configured = false;
   forget_input (priv);
   priv->buffers.drop ();
@@ -565,6 +583,9 @@ gst_neighbour_code_enc_set_property (
       break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
+      break;
+    case PROP_STATS_INTERVAL:
+      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -643,6 +664,9 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -751,6 +775,7 @@ install_properties (GObjectClass *object_class)
           "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
           "receiver-loss, receiver-queue",
           GST_TYPE_STRUCTURE, readable));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 }
 
 static void
