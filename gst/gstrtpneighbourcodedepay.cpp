@@ -59,11 +59,12 @@ struct GstRtpNeighbourCodeDepayPrivate {
   unsigned used_generation = 0;
   bool have_caps = false;
   std::size_t rig_views = 0;
-  std::vector<guint8> access_unit; /* slices that arrived so far */
-  rangecast::KeyCheck key_check;   /* of them */
-  bool has_gap = false;            /* packets were lost before or between them */
-  guint32 timestamp = 0;           /* RTP time of them */
-  std::optional<guint16> sequence; /* of the last packet */
+  std::vector<guint8> access_unit;    /* slices that arrived so far */
+  rangecast::KeyCheck key_check;      /* of them */
+  bool has_gap = false;               /* packets were lost before or between them */
+  guint32 timestamp = 0;              /* RTP time of them */
+  std::optional<guint16> sequence;    /* of the last packet */
+  std::optional<guint8> payload_type; /* of the last packet that was sound */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
@@ -218,6 +219,23 @@ take_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
   return status.ok ();
 }
 
+/* Packets of FEC, which rtpulpfecdec lets pass under a payload type of their own. */
+static bool
+is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
+{
+  const guint8 type = gst_rtp_buffer_get_payload_type (rtp);
+  if (priv->payload_type == type)
+    return false;
+  UnitReader reader ({static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+      gst_rtp_buffer_get_payload_len (rtp)});
+  UnitHeader header;
+  while (reader.next (header)) {
+  }
+  if (reader.status ().ok ())
+    priv->payload_type = type;
+  return priv->payload_type && priv->payload_type != type;
+}
+
 static void
 take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
 {
@@ -282,6 +300,10 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
   const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
   const bool after_gap = count_lost (priv, sequence);
+  if (is_of_other_payload (priv, rtp)) {
+    priv->has_gap = priv->has_gap || after_gap;
+    return nullptr;
+  }
   if (timestamp != priv->timestamp)
     push_unmarked (self);
   priv->has_gap = priv->has_gap || after_gap;
@@ -296,6 +318,13 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
     set_source_caps (base, priv->collector.info ());
   }
   return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self, true) : nullptr;
+}
+
+/* A packet that is lost is no gap in time: what came of its frame set goes out all the same. */
+static gboolean
+gst_rtp_neighbour_code_depay_packet_lost (GstRTPBaseDepayload *, GstEvent *)
+{
+  return TRUE;
 }
 
 static gboolean
@@ -341,6 +370,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
     priv->sequence.reset ();
+    priv->payload_type.reset ();
     std::lock_guard guard (priv->lock);
     priv->counters = {};
   }
@@ -420,6 +450,7 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   element_class->change_state = gst_rtp_neighbour_code_depay_change_state;
   depayload_class->set_caps = gst_rtp_neighbour_code_depay_set_caps;
   depayload_class->process_rtp_packet = gst_rtp_neighbour_code_depay_process;
+  depayload_class->packet_lost = gst_rtp_neighbour_code_depay_packet_lost;
   depayload_class->handle_event = gst_rtp_neighbour_code_depay_handle_event;
 
   GST_DEBUG_CATEGORY_INIT (gst_rtp_neighbour_code_depay_debug, "rtpneighbourcodedepay", 0,

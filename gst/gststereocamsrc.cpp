@@ -253,7 +253,10 @@ check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames 
     std::lock_guard guard (self->priv->lock);
     settings = self->priv->settings;
   }
-  return gst_range_flow_return (GST_ELEMENT (self), settings.find_names (names)) == GST_FLOW_OK;
+  rangecast::Status status = settings.check ();
+  if (status.ok ())
+    status = settings.find_names (names);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* NULL to READY: names and texts, no network. */
@@ -270,10 +273,9 @@ open_clock (GstStereoCamSrc *self)
     return false;
   GST_OBJECT_LOCK (element);
   if (self->priv->clock.clock ())
-    GST_OBJECT_FLAG_SET (element, GST_ELEMENT_FLAG_PROVIDE_CLOCK | GST_ELEMENT_FLAG_REQUIRE_CLOCK);
+    GST_OBJECT_FLAG_SET (element, GST_ELEMENT_FLAG_REQUIRE_CLOCK);
   else
-    GST_OBJECT_FLAG_UNSET (
-        element, GST_ELEMENT_FLAG_PROVIDE_CLOCK | GST_ELEMENT_FLAG_REQUIRE_CLOCK);
+    GST_OBJECT_FLAG_UNSET (element, GST_ELEMENT_FLAG_REQUIRE_CLOCK);
   GST_OBJECT_UNLOCK (element);
   if (self->priv->clock.clock ()) /* the pipeline may have asked before there was one */
     gst_element_post_message (element,
@@ -427,6 +429,7 @@ gst_stereo_cam_src_init (GstStereoCamSrc *self)
 {
   self->priv = new GstStereoCamSrcPrivate;
   GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
+  GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_PROVIDE_CLOCK); /* with clock-server; else no clock */
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template}) {
     add_pad (self, pad_template);
     gst_element_add_pad (GST_ELEMENT (self), self->priv->pads.back ()->pad ());

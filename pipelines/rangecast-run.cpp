@@ -11,15 +11,19 @@
 #include <gst/video/video.h>
 #include <gstrange/gstrange.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "latency-trace.hpp"
+#include "srtp-key.hpp"
 #include "stats-sender.hpp"
 
 struct Options {
@@ -32,6 +36,9 @@ struct Options {
   gchar *stats = nullptr, *trace = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
+  gchar *frame_log = nullptr;
+  gchar *threads_left = nullptr;
+  gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
 
@@ -50,7 +57,9 @@ struct Runner {
   GstClockTime first_frame = GST_CLOCK_TIME_NONE, last_frame = GST_CLOCK_TIME_NONE;
   bool seen_points = false;
   guint64 decoded = 0, whole = 0; /* frame sets; those in which all views have points */
-  gint64 first_points_us = 0;     /* monotonic; 0: none yet */
+  gint views_now = 0;             /* that have points in the last one decoded */
+  FILE *frame_log = nullptr;
+  gint64 first_points_us = 0; /* monotonic; 0: none yet */
 };
 
 struct StreamStats {
@@ -169,6 +178,7 @@ count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
     runner->decoded++;
     runner->whole += whole;
   }
+  runner->views_now = seen;
   return runner->seen_points ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
 }
 
@@ -203,6 +213,9 @@ count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
     runner->last_frame = now;
     runner->latencies_ms.push_back (
         GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
+    if (runner->frame_log)
+      std::fprintf (runner->frame_log, "%.6f,%.3f,%d\n", double (now) * 1e-9,
+          runner->latencies_ms.back (), runner->views_now);
   }
   if (runner->options.frames > 0 && frames + 1 == runner->options.frames)
     g_idle_add (send_eos, runner);
@@ -321,6 +334,52 @@ write_snapshot (Runner &runner)
         error ? error->message : "cannot be written");
   g_clear_error (&error);
   return written;
+}
+
+static FILE *
+open_frame_log (const char *path)
+{
+  FILE *file = std::fopen (path, "w");
+  if (!file) {
+    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
+    return nullptr;
+  }
+  std::setvbuf (file, nullptr, _IOLBF, 0); /* whoever watches reads it as it grows */
+  std::fprintf (file, "clock_s,latency_ms,views\n");
+  return file;
+}
+
+static std::vector<std::string>
+other_threads ()
+{
+  std::vector<std::string> names;
+  std::error_code error;
+  const std::string own = std::to_string (getpid ());
+  for (const auto &task : std::filesystem::directory_iterator ("/proc/self/task", error)) {
+    std::string name;
+    std::ifstream (task.path () / "comm") >> name;
+    if (task.path ().filename () != own)
+      names.push_back (name);
+  }
+  return names;
+}
+
+/* Those that end by themselves get a moment for it. */
+static bool
+write_threads_left (const char *path)
+{
+  g_thread_pool_set_max_unused_threads (0); /* else some stay for later use */
+  std::vector<std::string> left = other_threads ();
+  for (int i = 0; !left.empty () && i < 20; i++) {
+    g_usleep (50000);
+    left = other_threads ();
+  }
+  std::ofstream file (path);
+  for (const std::string &name : left)
+    file << name << '\n';
+  if (!file.flush ())
+    g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return bool (file);
 }
 
 /* ---- the run ---- */
@@ -442,6 +501,12 @@ parse_arguments (int *argc, char ***argv, Options &options)
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &options.report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &options.snapshot,
           "Write the last picture of the sink named snapshot", "PNG"},
+      {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &options.frame_log,
+          "Write a line for each frame: its time, latency and views with points", "CSV"},
+      {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &options.threads_left,
+          "Write the names of threads that still run when the pipeline is gone", "FILE"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
@@ -494,12 +559,25 @@ main (int argc, char **argv)
     runner.pipeline = gst_pipeline_new (nullptr);
     gst_bin_add (GST_BIN (runner.pipeline), parsed);
   }
-  play (runner);
+  if ((runner.options.frame_log &&
+          !(runner.frame_log = open_frame_log (runner.options.frame_log))) ||
+      (runner.options.srtp_key && !give_srtp_key (runner.pipeline, runner.options.srtp_key)))
+    runner.failed = true;
+  else
+    play (runner);
   gst_object_unref (runner.pipeline);
+  if (runner.frame_log)
+    std::fclose (runner.frame_log);
+  if (runner.options.threads_left && !write_threads_left (runner.options.threads_left))
+    runner.failed = true;
   g_free (runner.options.report);
   g_free (runner.options.stats);
   g_free (runner.options.trace);
   g_free (runner.options.snapshot);
+  g_free (runner.options.frame_log);
+  g_free (runner.options.threads_left);
+  g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
+  gst_deinit (); /* tracers write now what they found */
   return runner.failed ? 1 : 0;
 }
