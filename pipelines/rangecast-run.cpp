@@ -17,9 +17,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
+
+#include "latency-trace.hpp"
+#include "srtp-key.hpp"
+#include "stats-sender.hpp"
 
 struct Options {
   gint64 base_time = -1;
@@ -28,10 +33,12 @@ struct Options {
   gboolean turn = FALSE;
   gint timeout_s = 0;
   gboolean progress = FALSE;
+  gchar *stats = nullptr, *trace = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
   gchar *frame_log = nullptr;
   gchar *threads_left = nullptr;
+  gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
 
@@ -40,6 +47,8 @@ struct Runner {
   GstElement *pipeline = nullptr;
   GMainLoop *loop = nullptr;
   GstElement *turned = nullptr; /* a striprender */
+  std::unique_ptr<StatsSender> stats;
+  std::unique_ptr<LatencyTrace> trace;
   bool failed = false;
   bool ending = false;
 
@@ -399,6 +408,14 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
     case GST_MESSAGE_LATENCY:
       gst_bin_recalculate_latency (GST_BIN (runner->pipeline));
       break;
+    case GST_MESSAGE_CLOCK_LOST:
+      gst_element_set_state (runner->pipeline, GST_STATE_PAUSED);
+      gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
+      break;
+    case GST_MESSAGE_ELEMENT:
+      if (runner->stats)
+        runner->stats->take (message);
+      break;
     case GST_MESSAGE_EOS:
       g_main_loop_quit (runner->loop);
       break;
@@ -438,6 +455,8 @@ play (Runner &runner)
     runner.turned = gst_bin_get_by_name (GST_BIN (runner.pipeline), "view");
   add_probe (runner, "decoder", count_views);
   add_probe (runner, "rendered", count_rendered);
+  if (runner.options.trace)
+    runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     runner.failed = true; /* the reason is on the bus; on_message() prints it and quits */
@@ -448,6 +467,10 @@ play (Runner &runner)
   if (!runner.failed && runner.options.snapshot)
     runner.failed = !write_snapshot (runner);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
+  if (runner.trace && !runner.trace->write (runner.options.trace)) {
+    g_printerr ("rangecast-run: %s: cannot be written\n", runner.options.trace);
+    runner.failed = true;
+  }
   gst_bus_remove_watch (bus);
   gst_clear_object (&runner.turned);
   gst_object_unref (bus);
@@ -469,6 +492,12 @@ parse_arguments (int *argc, char ***argv, Options &options)
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
           "Fail if it has not ended by then (default 0: never)", "SECONDS"},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &options.progress, "Print a line every 2 s", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_STRING, &options.stats,
+          "Send the elements' statistics there, for top.sh: udp://HOST:PORT or a file (default: "
+          "environment RANGECAST_STATS, else nowhere)",
+          "ADDRESS"},
+      {"trace-latency", 0, 0, G_OPTION_ARG_FILENAME, &options.trace,
+          "Write when each buffer passed each pad", "FILE"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &options.report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &options.snapshot,
           "Write the last picture of the sink named snapshot", "PNG"},
@@ -476,6 +505,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
           "Write a line for each frame: its time, latency and views with points", "CSV"},
       {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &options.threads_left,
           "Write the names of threads that still run when the pipeline is gone", "FILE"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
@@ -492,11 +523,26 @@ parse_arguments (int *argc, char ***argv, Options &options)
   return parsed && options.launch;
 }
 
+/* @return false if there is something wrong with the address */
+static bool
+open_stats (Runner &runner)
+{
+  const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
+  if (!address || !*address)
+    return true;
+  const char *host = g_getenv ("RANGECAST_HOST");
+  std::string error;
+  runner.stats = StatsSender::open (address, host && *host ? host : g_get_host_name (), error);
+  if (!runner.stats)
+    g_printerr ("rangecast-run: statistics: %s\n", error.c_str ());
+  return runner.stats != nullptr;
+}
+
 int
 main (int argc, char **argv)
 {
   Runner runner;
-  if (!parse_arguments (&argc, &argv, runner.options))
+  if (!parse_arguments (&argc, &argv, runner.options) || !open_stats (runner))
     return 2;
   GError *error = nullptr;
   GstElement *parsed =
@@ -513,7 +559,9 @@ main (int argc, char **argv)
     runner.pipeline = gst_pipeline_new (nullptr);
     gst_bin_add (GST_BIN (runner.pipeline), parsed);
   }
-  if (runner.options.frame_log && !(runner.frame_log = open_frame_log (runner.options.frame_log)))
+  if ((runner.options.frame_log &&
+          !(runner.frame_log = open_frame_log (runner.options.frame_log))) ||
+      (runner.options.srtp_key && !give_srtp_key (runner.pipeline, runner.options.srtp_key)))
     runner.failed = true;
   else
     play (runner);
@@ -523,9 +571,12 @@ main (int argc, char **argv)
   if (runner.options.threads_left && !write_threads_left (runner.options.threads_left))
     runner.failed = true;
   g_free (runner.options.report);
+  g_free (runner.options.stats);
+  g_free (runner.options.trace);
   g_free (runner.options.snapshot);
   g_free (runner.options.frame_log);
   g_free (runner.options.threads_left);
+  g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
   gst_deinit (); /* tracers write now what they found */
   return runner.failed ? 1 : 0;
