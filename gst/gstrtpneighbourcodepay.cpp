@@ -78,7 +78,8 @@ GST_ELEMENT_REGISTER_DEFINE (
 
 /* ---- caps ---- */
 
-/* What goes into SDP as fmtp parameters; all values are strings there. */
+/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes the
+ * requests for key frame sets (PLI, FIR) that an encoder before us answers. */
 static gboolean
 set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
 {
@@ -90,7 +91,8 @@ set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
       "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
       std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
       std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",
-      G_TYPE_STRING, rig, nullptr);
+      G_TYPE_STRING, rig, "rtcp-fb-nack-pli", G_TYPE_BOOLEAN, TRUE, "rtcp-fb-ccm-fir",
+      G_TYPE_BOOLEAN, TRUE, nullptr);
   g_free (rig);
   return set;
 }
