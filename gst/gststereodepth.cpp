@@ -28,6 +28,7 @@
 
 #include "picturereader.hpp"
 #include "recycledbuffers.hpp"
+#include "statsreporter.hpp"
 #include "stereosettings.hpp"
 
 #include <gst/video/video.h>
@@ -73,6 +74,7 @@ struct GstStereoDepthPrivate {
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is older comes too late */
   double proportion = 1;                       /* of the last QOS event */
 
+  StatsReporter reporter;                   /* has locks of its own */
   std::atomic<bool> third_released = false; /* by any thread; the streaming thread clears it */
 
   /* streaming thread only */
@@ -194,6 +196,7 @@ negotiate (GstStereoDepth *self, bool third_is_there)
     gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   priv->negotiate = !pooled.ok ();
+  priv->reporter.set_views (info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), pooled);
 }
 
@@ -404,6 +407,7 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   priv->discont = false;
   priv->gaps.note_buffer (pair.running, duration);
+  priv->reporter.passed (GST_ELEMENT (self), output);
   return gst_aggregator_finish_buffer (aggregator, output);
 }
 
@@ -436,36 +440,14 @@ take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, Gst
   GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
   if (!pad)
     return GST_FLOW_OK;
-  const auto sink = GST_AGGREGATOR_PAD (pad);
-  const GstClockTime left = priv->pair.running;
-  const GstClockTime tolerance = gstrange::pairing_tolerance (frame_duration);
-  GstFlowReturn flow = GST_FLOW_OK;
-  while (true) {
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (sink);
-    if (!buffer) {
-      flow =
-          gst_aggregator_pad_is_eos (sink) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
-      break;
-    }
-    const GstClockTime time = gstrange::running_time_of (sink, buffer);
-    const bool gap = gstrange::is_gap (buffer);
-    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (left);
-    const GstClockTime last =
-        timed && gap ? gstrange::gap_end (time, buffer, tolerance) : time + tolerance;
-    gst_buffer_unref (buffer);
-    if (timed && (time > left + tolerance || (gap && last >= left)))
-      break;
-    if (!gap && (!timed || last >= left)) {
-      *third = gst_aggregator_pad_pop_buffer (sink);
-      break;
-    }
-    gst_aggregator_pad_drop_buffer (sink);
-    std::lock_guard guard (priv->lock);
-    priv->dropped_third += !gap;
-  }
+  guint64 dropped = 0;
+  const GstFlowReturn flow = gstrange::take_companion (GST_AGGREGATOR_PAD (pad), priv->pair.running,
+      gstrange::pairing_tolerance (frame_duration), timeout, dropped, third);
   gst_object_unref (pad);
   if (*third && !priv->have_info[2]) /* of a pad that was released just now */
     gst_clear_buffer (third);
+  std::lock_guard guard (priv->lock);
+  priv->dropped_third += dropped;
   return flow;
 }
 
@@ -573,8 +555,11 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   if (priv->have_info[0] && priv->info[0].fps_n > 0)
     duration = gst_util_uint64_scale_int (GST_SECOND, priv->info[0].fps_d, priv->info[0].fps_n);
   if (!priv->pair.buffers.first)
-    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK)
+    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK) {
+      if (flow == GST_FLOW_EOS)
+        priv->reporter.finish ();
       return flow;
+    }
   if (drop_if_late (self))
     return GST_FLOW_OK;
   GstBuffer *third = nullptr;
@@ -661,6 +646,17 @@ gst_stereo_depth_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const guint64 lost = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
+  return {{.counters = {.frames = priv->frames,
+               .lost = lost + priv->dropped_third,
+               .late = priv->dropped_late}}};
+}
+
 static gboolean
 gst_stereo_depth_start (GstAggregator *aggregator)
 {
@@ -673,6 +669,7 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   priv->dropped_before = priv->head_start = 0;
   priv->gaps.reset ();
   priv->matcher->reset ();
+  priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
   priv->dropped_late = priv->match_time = 0;
@@ -685,6 +682,7 @@ static gboolean
 gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  priv->reporter.stop ();
   drop_pool (priv->pool);
   forget_pair (priv);
   for (PictureReader &reader : priv->readers)
@@ -696,6 +694,10 @@ static void
 gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
+  if (id == prop_stats + 1) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
   std::lock_guard guard (priv->lock);
   if (!set_stereo_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -722,6 +724,8 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
   std::lock_guard guard (priv->lock);
   if (id == prop_stats)
     g_value_take_boxed (value, make_stats (priv));
+  else if (id == prop_stats + 1)
+    g_value_set_uint (value, priv->reporter.interval ());
   else if (!get_stereo_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -761,6 +765,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
           "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
           "dropped-right, dropped-third, dropped-late, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, prop_stats + 1);
 
   for (GstStaticPadTemplate *pad_template :
       {&left_template, &right_template, &third_template, &src_template})

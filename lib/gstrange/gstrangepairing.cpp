@@ -7,6 +7,29 @@
 
 namespace gstrange {
 
+GstFlowReturn
+take_companion (GstAggregatorPad *pad, GstClockTime running_time, GstClockTime tolerance,
+    bool timeout, guint64 &dropped, GstBuffer **result)
+{
+  *result = nullptr;
+  while (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
+    const GstClockTime time = running_time_of (pad, buffer);
+    const bool gap = is_gap (buffer);
+    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (running_time);
+    const GstClockTime last = timed && gap ? gap_end (time, buffer, tolerance) : time + tolerance;
+    gst_buffer_unref (buffer);
+    if (timed && (time > running_time + tolerance || (gap && last >= running_time)))
+      return GST_FLOW_OK;
+    if (!gap && (!timed || last >= running_time)) {
+      *result = gst_aggregator_pad_pop_buffer (pad);
+      return GST_FLOW_OK;
+    }
+    gst_aggregator_pad_drop_buffer (pad);
+    dropped += !gap;
+  }
+  return gst_aggregator_pad_is_eos (pad) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
 GstAggregatorPad *
 add_sink_pad (GstElement *aggregator, const char *name)
 {

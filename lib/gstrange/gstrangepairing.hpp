@@ -54,6 +54,17 @@ private:
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
 
+/** Takes from a further pad the buffer that belongs to a pair; older ones are dropped. A buffer
+ *  without PTS is taken as it comes.
+ *  @param running_time  of the pair, ns, or GST_CLOCK_TIME_NONE
+ *  @param tolerance     pairing_tolerance()
+ *  @param timeout       what is not there yet is not waited for
+ *  @param dropped       gets the number of dropped buffers added, not counting GAPs
+ *  @param[out] buffer   transfer full; null if it is lost, or the pad has ended
+ *  @return GST_FLOW_OK, or GST_AGGREGATOR_FLOW_NEED_DATA while it may still come */
+GST_RANGE_API GstFlowReturn take_companion (GstAggregatorPad *pad, GstClockTime running_time,
+    GstClockTime tolerance, bool timeout, guint64 &dropped, GstBuffer **buffer);
+
 /** Adds the always pad of that template and name to an aggregator; for instance_init.
  *  @return transfer none: the element owns it */
 GST_RANGE_API GstAggregatorPad *add_sink_pad (GstElement *aggregator, const char *name);

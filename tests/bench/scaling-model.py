@@ -22,7 +22,9 @@ MAX_VIEWS, MAX_RIG_PIXELS, MAX_ACCESS_UNIT = 64, 1 << 27, 32 << 20  # docs/limit
 
 # Bytes of one view of a frame set: the built-in figure, four views, background cut off (docs/scaling.md).
 BYTES = {
-    ("320x240", "plain"): 30000, ("320x240", "packed"): 9000, ("320x240", "entropy"): 6500, ("320x240", "temporal"): 4000,
+    ("320x240", "plain"): 34100, ("320x240", "packed"): 8700, ("320x240", "entropy"): 6900, ("320x240", "temporal"): 2400,
+    ("640x480", "plain"): 93200, ("640x480", "packed"): 23100, ("640x480", "entropy"): 15900, ("640x480", "temporal"): 5700,
+    ("1280x720", "plain"): 231000, ("1280x720", "packed"): 53600, ("1280x720", "entropy"): 29500, ("1280x720", "temporal"): 11200,
 }
 
 
@@ -201,7 +203,7 @@ def relay_tree(stream: Stream, viewers: int, c: Constants, link_bits: float, fan
 
 
 def what_breaks(stream: Stream, c: Constants, link_bits: float) -> list[str]:
-    """Limits that this stream is beyond, the parent's and a viewer's; nothing if it goes."""
+    """Limits that this stream is beyond, but for a viewer's cores; nothing if it goes."""
     broken = []
     if stream.views > MAX_VIEWS:
         broken.append(f"more than {MAX_VIEWS} views")
@@ -216,13 +218,14 @@ def what_breaks(stream: Stream, c: Constants, link_bits: float) -> list[str]:
         broken.append("the parent's output thread")
     if cpu_s > c.cores:
         broken.append("the parent's cores")
-    burst = stream.wire_bits / 8
-    if burst > c.buffer_bytes:
-        broken.append("a receiver's socket buffer, in one burst")
-    scale = stream.pixels / stream.views / (320 * 240)
-    if 1e-3 * c.viewer_ms * stream.views * scale * stream.fps > c.cores:
-        broken.append("a viewer's cores")
+    if stream.wire_bits / 8 > c.buffer_bytes:
+        broken.append("a viewer's socket buffer, in one burst")
     return broken
+
+
+def viewer_cores(stream: Stream, c: Constants) -> float:
+    """What decoding, cylinderfilter and striprender take of a viewer, by its pixels."""
+    return 1e-3 * c.viewer_ms * stream.pixels / (320 * 240) * stream.fps
 
 
 def views_until(stream: Stream, c: Constants, link_bits: float) -> tuple[int, list[str]]:
@@ -238,8 +241,8 @@ def print_tables(args: argparse.Namespace, c: Constants) -> None:
     stream = Stream(args.views, args.fps, args.size, args.profile)
     link = args.link_gbit * 1e9
     print(f"constants: {c}\n")
-    print("| views | size | profile | packets/set | Mbit/s on the wire | parent CPU, cores | parent ms/set | MiB | goes |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| views | size | profile | packets/set | Mbit/s on the wire | parent CPU, cores | parent ms/set | MiB | viewer CPU, cores | what breaks |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for size, profile in sorted(BYTES, key=lambda k: (int(k[0].split("x")[0]), -BYTES[k])):
         for views in (4, 16, 64):
             s = Stream(views, args.fps, size, profile)
@@ -247,11 +250,12 @@ def print_tables(args: argparse.Namespace, c: Constants) -> None:
             broken = what_breaks(s, c, link)
             print(f"| {views} | {size} | {profile} | {s.packets} | {s.bit_rate / 1e6:.0f} | "
                   f"{1e-6 * c.parent_us * s.packets * s.fps:.2f} | {hop.last_ms:.1f} | "
-                  f"{c.parent_mib + views * c.view_mib:.0f} | {'; '.join(broken) or 'yes'} |")
-    print("\n| size | profile | most views | what stops the next |\n|---|---|---|---|")
+                  f"{c.parent_mib + views * c.view_mib:.0f} | {viewer_cores(s, c):.1f} | {'; '.join(broken) or 'nothing'} |")
+    print(f"\n| size | profile | most views | what stops the next | views that {c.cores} cores of a viewer draw |\n|---|---|---|---|---|")
     for size, profile in sorted(BYTES, key=lambda k: (int(k[0].split("x")[0]), -BYTES[k])):
         views, broken = views_until(Stream(1, args.fps, size, profile), c, link)
-        print(f"| {size} | {profile} | {views} | {'; '.join(broken)} |")
+        drawn = math.floor(c.cores / max(viewer_cores(Stream(1, args.fps, size, profile), c), 1e-9))
+        print(f"| {size} | {profile} | {views} | {'; '.join(broken)} | {min(drawn, MAX_VIEWS)} |")
     print(f"\n{stream.views} views of {stream.size}, {stream.profile}, {stream.bit_rate / 1e6:.0f} Mbit/s, "
           f"links of {args.link_gbit:g} Gbit/s:\n")
     print("| viewers | fanout | levels | relays | latency ms | hop ms | held kB | Mbit/s out of a relay | goes |")
