@@ -28,11 +28,11 @@
 #include <string>
 #include <vector>
 
+#include "codedunits.hpp"
 #include "statsreporter.hpp"
 
 using rangecast::Status;
 using rangecast::UnitHeader;
-using rangecast::UnitReader;
 using rangecast::UnitType;
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
@@ -136,25 +136,23 @@ struct Packer {
   /* @return the first unit that is too long for a packet, if there is one */
   std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
-    GstMapInfo map;
-    if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
-      return {};
-    UnitReader reader ({map.data, map.size});
-    UnitHeader header;
     gsize begin = 0, end = 0;
     std::optional<UnitHeader> too_long;
-    while (const auto unit = reader.next (header)) {
-      if (unit->size () > room) {
+    Status damage; /* what is behind it is left out */
+    const auto take = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+      if (unit.size () > room) {
         too_long = header;
-        break;
+        return false;
       }
-      if (end - begin + unit->size () > room) {
+      if (end - begin + unit.size () > room) {
         add (buffer, begin, end - begin);
         begin = end;
       }
-      end += unit->size ();
-    }
-    gst_buffer_unmap (buffer, &map);
+      end = offset + unit.size ();
+      return true;
+    };
+    if (!for_each_unit (buffer, take, damage))
+      return {};
     if (!too_long && end > begin)
       add (buffer, begin, end - begin);
     return too_long;
