@@ -98,4 +98,9 @@ others_went_on () { # from-ms views...
   [ "${gap:-999999}" -le 1500 ] || fail "the others paused for $gap ms: $(stream-report all.rcnc)"
 }
 
+# What stream-report says of a view under that name.
+field () { # view name
+  stream-report all.rcnc | awk -v view="$1" -v name="$2" '$2 == view { for (i = 3; i < NF; i++) if ($i == name) print $(i + 1) }'
+}
+
 report () { echo "$1: $2"; }
