@@ -21,6 +21,7 @@
 #include "gstrangemux.h"
 
 #include <algorithm>
+#include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
@@ -60,13 +61,15 @@ struct GstRangeMuxPrivate {
   ClockPublisher clock;   /* has locks of its own */
   StatsReporter reporter; /* as well */
 
+  std::atomic<bool> caps_dirty = true; /* the streams have to be chosen again */
+
   /* streaming thread only */
-  bool caps_dirty = true, live = false;
+  bool live = false;
   rangecast::Rig rig; /* of rig_file; empty: any */
   MuxSteps steps;
   std::vector<MuxSteps::Stream> votes; /* kept for their memory */
   std::vector<MuxPad *> voters;
-  GstClockTime newest = GST_CLOCK_TIME_NONE; /* running time of what came last */
+  GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstClockTime last_capture = GST_CLOCK_TIME_NONE; /* of the last frame set */
   GstClockTime last_running = GST_CLOCK_TIME_NONE;
@@ -172,8 +175,7 @@ negotiate (GstRangeMux *self, const MuxPads &pads)
   for (const auto &entry : pads)
     if (entry->alive && (!entry->other_rig.ok () || !entry->clash.ok ()))
       set_state (
-          self, *entry, entry->clash.ok () ? MuxState::kOtherRig : MuxState::kClash, priv->newest);
-  priv->caps_dirty = false;
+          self, *entry, entry->clash.ok () ? MuxState::kOtherRig : MuxState::kClash, priv->now);
   if (format.info.views () == 0)
     return GST_FLOW_OK; /* nobody is left */
   GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
@@ -248,29 +250,36 @@ tolerance_of (GstRangeMuxPrivate *priv)
                                                         : kDefaultTolerance;
 }
 
-/* Notes who is there. Who was left out for a clash may have its turn when somebody has gone. */
+/* Notes who is there. Who has a buffer is; who has none is silent once the oldest one of the others
+ * is much later than its last one: so a stream whose times jump silences nobody. Who was left out
+ * for a clash may have its turn when somebody has gone. */
 static void
 note_arrivals (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
 {
   GstRangeMuxPrivate *priv = self->priv;
+  GstClockTime now = GST_CLOCK_TIME_NONE;
+  for (const auto &entry : pads)
+    entry->waits = false;
   for (const auto *buffers : {&waiting.list, &waiting.gaps})
-    for (const Waiting &w : *buffers)
-      if (GST_CLOCK_TIME_IS_VALID (w.running)) {
-        w.entry->seen = w.running;
-        if (!GST_CLOCK_TIME_IS_VALID (priv->newest) || w.running > priv->newest)
-          priv->newest = w.running;
-      }
-  if (!GST_CLOCK_TIME_IS_VALID (priv->newest))
+    for (const Waiting &w : *buffers) {
+      w.entry->waits = true;
+      if (!GST_CLOCK_TIME_IS_VALID (w.running))
+        continue;
+      w.entry->seen = w.running;
+      now = std::min (now, w.running); /* NONE is the greatest number there is */
+    }
+  priv->now = now;
+  if (!GST_CLOCK_TIME_IS_VALID (now))
     return;
   for (const auto &entry : pads) {
     if (!GST_CLOCK_TIME_IS_VALID (entry->seen))
-      entry->seen = priv->newest; /* it did not come so far */
-    const bool alive = priv->newest <= entry->seen + kSilent;
+      entry->seen = now; /* it did not come so far */
+    const bool alive = entry->waits || now <= entry->seen || now - entry->seen <= kSilent;
     if (alive != entry->alive)
       priv->caps_dirty = true;
     entry->alive = alive;
     if (!alive && priv->live && !gst_aggregator_pad_is_eos (entry->pad))
-      set_state (self, *entry, MuxState::kSilent, priv->newest);
+      set_state (self, *entry, MuxState::kSilent, now);
   }
 }
 
@@ -449,7 +458,7 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
     return GST_FLOW_EOS;
   }
   note_arrivals (self, pads, waiting);
-  if (priv->caps_dirty) {
+  if (priv->caps_dirty.exchange (false)) {
     const GstFlowReturn flow = negotiate (self, pads);
     if (flow != GST_FLOW_OK)
       return flow;
@@ -490,7 +499,7 @@ static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->last_capture = priv->last_running = priv->newest = GST_CLOCK_TIME_NONE;
+  priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
   priv->steps.reset ();
   for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
     entry->offset_known = false;
@@ -524,6 +533,7 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
     std::erase_if (
         self->priv->pads, [&] (const auto &entry) { return GST_PAD (entry->pad) == pad; });
   }
+  self->priv->caps_dirty = true; /* one less; one that clashed with it may have its place */
   GST_ELEMENT_CLASS (gst_range_mux_parent_class)->release_pad (element, pad);
 }
 
@@ -607,8 +617,7 @@ gst_range_mux_start (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->caps_dirty = true;
-  priv->frame_duration = priv->last_capture = priv->last_running = priv->newest =
-      GST_CLOCK_TIME_NONE;
+  priv->frame_duration = priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
   priv->steps.reset ();
   if (!load_rig_file (GST_RANGE_MUX (aggregator)) || !publish_clock (GST_RANGE_MUX (aggregator)))
     return FALSE;

@@ -109,7 +109,7 @@ version_of_units (std::span<const guint8> payload)
   if (version == kBitstreamVersion)
     return 0;
   while (payload.size () >= kUnitHeaderSize) {
-    const gsize size = GST_READ_UINT16_LE (&payload[2]);
+    const gsize size = payload[2] | payload[3] << 8;
     if (payload[0] >> 4 != version || size < kUnitHeaderSize || size > payload.size ())
       return 0;
     payload = payload.subspan (size);

@@ -44,6 +44,7 @@ struct MuxPad {
   rangecast::Status clash;                  ///< why it is not chosen
   bool chosen = false;                      ///< by choose_streams()
   bool alive = false;                       ///< something came lately
+  bool waits = false;                       ///< a buffer of it waits
   bool clash_reported = false;              ///< of buffers
   bool offset_known = false;                ///< `offset` is of its last buffer
   bool in_step = true;                      ///< its capture times are of the clock that most have
