@@ -5,8 +5,8 @@
  *
  * Lets the packets of one sender of coded frame sets through, and nothing else that arrives at its
  * port: no other bytes, no other codec, no second sender. A sender that comes back with another
- * SSRC takes over when the one before has been silent. It belongs between udpsrc and
- * rtpjitterbuffer, which one packet of a foreign stream brings out of step.
+ * SSRC, or from another address, takes over when the one before has been silent. It belongs between
+ * udpsrc and rtpjitterbuffer, which one packet of a foreign stream brings out of step.
  *
  * ## Example launch line
  * |[
@@ -20,6 +20,7 @@
  */
 #include "gstrtpneighbourcodeguard.h"
 
+#include <gst/net/gstnetaddressmeta.h>
 #include <gst/rtp/rtp.h>
 
 #include <mutex>
@@ -44,8 +45,9 @@ struct GstRtpNeighbourCodeGuardPrivate {
   std::mutex lock; /* guards what follows; never held while pushing or posting */
   GstClockTime timeout = kDefaultTimeout;
   GuardCounters counters;
-  std::optional<guint32> ssrc; /* of the sender whose packets pass */
-  guint8 payload_type = 0;     /* of its packets of slices */
+  std::optional<guint32> ssrc;       /* of the sender whose packets pass */
+  guint8 payload_type = 0;           /* of its packets of slices */
+  GSocketAddress *address = nullptr; /* and where it sends from, if udpsrc says it */
 
   /* streaming thread only */
   GstClockTime last_time = 0;      /* of its last packet */
@@ -98,7 +100,21 @@ struct Packet {
   guint32 ssrc = 0;
   guint8 payload_type = 0;
   bool units = false, repeated_units = false;
+  GSocketAddress *address = nullptr; /* of the buffer */
 };
+
+static bool
+is_from (GSocketAddress *a, GSocketAddress *b)
+{
+  if (!a || !b)
+    return true;               /* not known */
+  gchar first[64], second[64]; /* as the system has them: addresses and ports of IPv4 and IPv6 */
+  const gssize size = g_socket_address_get_native_size (a);
+  return size == g_socket_address_get_native_size (b) && size <= gssize (sizeof first) &&
+         g_socket_address_to_native (a, first, sizeof first, nullptr) &&
+         g_socket_address_to_native (b, second, sizeof second, nullptr) &&
+         memcmp (first, second, gsize (size)) == 0;
+}
 
 static bool
 read_packet (GstBuffer *buffer, Packet &packet)
@@ -109,6 +125,8 @@ read_packet (GstBuffer *buffer, Packet &packet)
   const std::span<const guint8> payload (
       static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
       gst_rtp_buffer_get_payload_len (&rtp));
+  if (GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer))
+    packet.address = meta->addr;
   packet.ssrc = gst_rtp_buffer_get_ssrc (&rtp);
   packet.payload_type = gst_rtp_buffer_get_payload_type (&rtp);
   packet.units = are_units (payload);
@@ -147,14 +165,15 @@ enum class Verdict { kPasses, kPassesAsFirst, kForeign, kRival };
 static Verdict
 judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now)
 {
-  if (priv->ssrc && packet.ssrc == *priv->ssrc) {
+  const bool same_place = is_from (priv->address, packet.address);
+  if (priv->ssrc && packet.ssrc == *priv->ssrc && same_place) {
     priv->last_time = now;
     priv->rival_packets = 0;
     if (packet.units)
       priv->payload_type = packet.payload_type;
     return Verdict::kPasses; /* or FEC */
   }
-  if (priv->ssrc && packet.payload_type != priv->payload_type &&
+  if (priv->ssrc && same_place && packet.payload_type != priv->payload_type &&
       (packet.repeated_units || packet.ssrc == priv->rtx_ssrc)) {
     priv->rtx_ssrc = packet.ssrc;
     return Verdict::kPasses;
@@ -164,6 +183,7 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
   if (priv->ssrc && now < priv->last_time + priv->timeout)
     return ++priv->rival_packets == kRivalPackets ? Verdict::kRival : Verdict::kForeign;
   priv->ssrc = packet.ssrc;
+  g_set_object (&priv->address, packet.address);
   priv->payload_type = packet.payload_type;
   priv->last_time = now;
   priv->rtx_ssrc.reset ();
@@ -218,6 +238,7 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may begin anew */
     std::lock_guard guard (self->priv->lock);
     self->priv->ssrc.reset ();
+    g_clear_object (&self->priv->address);
   }
   if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
     return gst_pad_event_default (pad, parent, event);
@@ -230,15 +251,15 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
 }
 
 /* A request for a key frame set says which stream it is about, as rtpbin's demultiplexers do it:
- * rtpsession makes a PLI of such a one. */
+ * rtpsession makes a PLI of such a one. One that a viewer sent to a parent names the parent's own
+ * stream, so whatever it names is replaced. */
 static gboolean
 gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   const GstStructure *structure = gst_event_get_structure (event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && structure &&
-      gst_structure_has_name (structure, "GstForceKeyUnit") &&
-      !gst_structure_has_field (structure, "ssrc")) {
+      gst_structure_has_name (structure, "GstForceKeyUnit")) {
     std::lock_guard guard (self->priv->lock);
     if (self->priv->ssrc) {
       event = gst_event_make_writable (event);
@@ -263,6 +284,7 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
     self->priv->rival_packets = 0;
     std::lock_guard guard (self->priv->lock);
     self->priv->ssrc.reset ();
+    g_clear_object (&self->priv->address);
     self->priv->counters = {};
   }
   return result;
@@ -307,6 +329,7 @@ gst_rtp_neighbour_code_guard_finalize (GObject *object)
 {
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
   gst_caps_replace (&priv->caps, nullptr);
+  g_clear_object (&priv->address);
   delete priv;
   G_OBJECT_CLASS (gst_rtp_neighbour_code_guard_parent_class)->finalize (object);
 }

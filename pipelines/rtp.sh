@@ -101,7 +101,8 @@ receive_rtp () {
   fi
   [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
   [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
-  rtp+=(! rtpjitterbuffer "latency=$3")
+  # A sender that was restarted counts its packets from anywhere: no more than so many of them are waited for.
+  rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)
   [ -z "$rtp_rtx" ] || rtp+=(do-retransmission=true)
   [ -z "$rtp_fec" ] || rtp+=(do-lost=true ! rtpulpfecdec pt=122)
   rtp+=(! rtpneighbourcodedepay)
