@@ -75,8 +75,9 @@ CamSourceSession::run ()
       ;
   previous_.reset ();
   while (!quits () && one_guarded_life () == End::kFault) {
+    const bool goes_on = stands_fault ();
     stop_cameras ();
-    if (!stands_fault ())
+    if (!goes_on)
       break;
     rest_before_retry ();
   }
@@ -122,6 +123,8 @@ CamSourceSession::one_life ()
       say ("stereocamsrc-back", "left", cameras_[0]->label ());
     }
     end = serve ();
+    if (end == End::kFault)
+      (void)stands_fault (); /* what follows may wait for a camera that does not answer */
     ticker_.stop ();
     look_.stop ();
     triggers_.stop ();
@@ -164,6 +167,25 @@ CamSourceSession::fail (CameraStatus status)
   if (fault_.ok ()) /* the first is the cause of the others */
     fault_ = std::move (status);
   changed_.notify_all ();
+}
+
+void
+CamSourceSession::lose (Camera &camera)
+{
+  camera.give_up ();
+  fail ({CameraFault::kLost, lost_text (camera.label ())});
+}
+
+/* @param status  of a call that was made while the camera ran */
+bool
+CamSourceSession::fail_if_gone (Camera &camera, const CameraStatus &status)
+{
+  const CameraFault fault = status.fault ();
+  const bool gone = fault == CameraFault::kTimedOut || fault == CameraFault::kLost ||
+                    fault == CameraFault::kBusy; /* others have control now */
+  if (gone)
+    lose (camera);
+  return gone;
 }
 
 struct ErrorDomain {
@@ -219,9 +241,17 @@ CamSourceSession::say (const char *name, const char *field, const std::string &v
   gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), structure));
 }
 
-/* @return false: it is the end */
+/* Tells a life's fault, once. @return false: it is the end */
 bool
 CamSourceSession::stands_fault ()
+{
+  if (!stands_)
+    stands_ = tell_fault ();
+  return *stands_;
+}
+
+bool
+CamSourceSession::tell_fault ()
 {
   bool may = false;
   GstFlowReturn flow = GST_FLOW_OK;
@@ -263,6 +293,7 @@ CamSourceSession::rest_before_retry ()
     {
       std::unique_lock guard (lock_);
       fault_ = {};
+      stands_.reset ();
       if (changed_.wait_for (guard, kGapTime, [this] { return quit_; }))
         return;
     }

@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "clockpublisher.hpp"
+#include "statsreporter.hpp"
 
 using gstrange::RangeInfo;
 using rangecast::Status;
@@ -38,7 +39,7 @@ using rangecast::StatusCode;
 GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
-enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_STATS };
+enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_STATS, PROP_STATS_INTERVAL };
 
 /* Capture times further than this from most others' are those of a clock that is not in step. */
 static constexpr GstClockTime kOutOfStep = 2 * GST_SECOND;
@@ -49,6 +50,7 @@ struct MuxPad {
   bool has_caps = false, coded = false;
   RangeInfo info;
   bool clash_reported = false;
+  guint64 views = 0; /* bits by view-id, for statistics */
   guint64 received = 0, late = 0, out_of_step = 0, matched = 0;
   GstClockTimeDiff last_skew = 0;
 
@@ -64,7 +66,8 @@ struct GstRangeMuxPrivate {
   GstClockTime max_skew = 0;
   guint64 frames = 0, complete = 0;
 
-  ClockPublisher clock; /* has locks of its own */
+  ClockPublisher clock;   /* has locks of its own */
+  StatsReporter reporter; /* as well */
 
   /* streaming thread only */
   bool caps_dirty = true;
@@ -149,6 +152,7 @@ negotiate (GstRangeMux *self, const MuxPads &pads)
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   priv->frame_duration = united.frame_duration ();
+  priv->reporter.set_views (united.rig);
   priv->caps_dirty = false;
   return GST_FLOW_OK;
 }
@@ -174,6 +178,8 @@ take_caps (GstRangeMux *self, MuxPad &entry, GstCaps *caps)
   entry.info = std::move (info);
   entry.has_caps = true;
   self->priv->caps_dirty = true;
+  std::lock_guard guard (self->priv->lock);
+  entry.views = view_bits (entry.info.rig);
   return TRUE;
 }
 
@@ -355,6 +361,7 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
     priv->frames++;
     priv->complete += matched == streams;
   }
+  priv->reporter.passed (GST_ELEMENT (self), frame_set);
   return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
 }
 
@@ -366,8 +373,12 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   const MuxPads pads = current_pads (self);
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const WaitingBuffers waiting (pads, live);
-  if (waiting.list.empty () && waiting.gaps.empty ())
-    return waiting.missing == 0 && waiting.ended > 0 ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (waiting.list.empty () && waiting.gaps.empty ()) {
+    if (waiting.missing > 0 || waiting.ended == 0)
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    priv->reporter.finish ();
+    return GST_FLOW_EOS;
+  }
   if (priv->caps_dirty) {
     const GstFlowReturn flow = negotiate (self, pads);
     if (flow != GST_FLOW_OK)
@@ -471,9 +482,30 @@ gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 
 /* ---- life ---- */
 
+/* A stream's frame sets that went without it count from the element's start. */
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRangeMuxPrivate *priv = GST_RANGE_MUX (element)->priv;
+  std::lock_guard guard (priv->lock);
+  std::vector<StatsRow> rows (1);
+  guint64 late = 0;
+  for (const auto &entry : priv->pads) {
+    late += entry->late + entry->out_of_step;
+    rows.push_back ({.pad = GST_PAD_NAME (entry->pad),
+        .counters = {.frames = entry->received,
+            .lost = priv->frames - std::min (priv->frames, entry->matched),
+            .late = entry->late + entry->out_of_step},
+        .views = entry->views});
+  }
+  rows[0].counters = {.frames = priv->frames, .lost = priv->frames - priv->complete, .late = late};
+  return rows;
+}
+
 static gboolean
 gst_range_mux_stop (GstAggregator *aggregator)
 {
+  GST_RANGE_MUX (aggregator)->priv->reporter.stop ();
   GST_RANGE_MUX (aggregator)->priv->clock.stop ();
   return TRUE;
 }
@@ -486,6 +518,7 @@ gst_range_mux_start (GstAggregator *aggregator)
   priv->frame_duration = priv->last_capture = priv->last_running = GST_CLOCK_TIME_NONE;
   if (!publish_clock (GST_RANGE_MUX (aggregator)))
     return FALSE;
+  priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->complete = 0;
   for (const auto &entry : priv->pads) {
@@ -506,6 +539,9 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
       break;
     case PROP_CLOCK_PORT:
       priv->clock.set_port (g_value_get_int (value));
+      break;
+    case PROP_STATS_INTERVAL:
+      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -549,6 +585,9 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -596,6 +635,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
           "Counters since start: frames, complete, incomplete, dropped-late, out-of-step; and a "
           "structure for each pad",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_AGGREGATOR_PAD);

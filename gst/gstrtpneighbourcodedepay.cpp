@@ -30,6 +30,8 @@
 #include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
+#include "statsreporter.hpp"
+
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::UnitHeader;
@@ -39,15 +41,17 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_depay_debug
 
-enum { PROP_0, PROP_UNIT_STATS };
+enum { PROP_0, PROP_UNIT_STATS, PROP_STATS_INTERVAL };
 
 struct DepayCounters {
-  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0;
+  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
+          lost_packets = 0, bytes = 0;
 };
 
 struct GstRtpNeighbourCodeDepayPrivate {
   std::mutex lock; /* guards counters */
   DepayCounters counters;
+  StatsReporter reporter; /* has locks of its own */
 
   /* streaming thread only */
   rangecast::RigCollector collector;
@@ -102,6 +106,7 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
   gst_caps_unref (caps);
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.set_views (stream.rig);
 }
 
 static Status
@@ -175,12 +180,15 @@ take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
       if (!is_key_unit (priv, has_end))
         GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
       priv->counters.access_units++;
+      priv->counters.bytes += priv->access_unit.size ();
     } else {
       priv->counters.without_rig++;
     }
   }
   if (buffer && GST_CLOCK_TIME_IS_VALID (priv->capture_time))
     gst_range_buffer_set_capture_time (buffer, priv->capture_time);
+  if (buffer)
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
   forget_access_unit (priv);
   return buffer;
 }
@@ -256,6 +264,19 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   priv->counters.bad_units += bad;
 }
 
+/* @return whether packets before this one are missing */
+static bool
+count_lost (GstRtpNeighbourCodeDepayPrivate *priv, guint16 sequence)
+{
+  const std::optional<guint16> last = std::exchange (priv->sequence, sequence);
+  const guint16 missing = last ? guint16 (sequence - *last - 1) : 0;
+  if (missing > 0 && missing < 0x8000) { /* else it goes back: another sender, or too late */
+    std::lock_guard guard (priv->lock);
+    priv->counters.lost_packets += missing;
+  }
+  return missing > 0;
+}
+
 /* The packet with the marker was lost: what came of the frame set goes out. */
 static void
 push_unmarked (GstRtpNeighbourCodeDepay *self)
@@ -278,8 +299,7 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
   const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
-  const bool after_gap = priv->sequence && sequence != static_cast<guint16> (*priv->sequence + 1);
-  priv->sequence = sequence;
+  const bool after_gap = count_lost (priv, sequence);
   if (is_of_other_payload (priv, rtp)) {
     priv->has_gap = priv->has_gap || after_gap;
     return nullptr;
@@ -313,21 +333,38 @@ gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
     GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->sequence.reset ();
-  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
     push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.finish ();
+  }
   return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
       ->handle_event (base, event);
 }
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const DepayCounters &c = priv->counters;
+  return {{.counters = {.frames = c.access_units,
+               .bytes = c.bytes,
+               .packets = c.packets,
+               .lost = c.lost_packets}}};
+}
+
 static GstStateChangeReturn
 gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange transition)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    priv->reporter.start (element, collect_stats);
   const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_depay_parent_class)
                                           ->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv->reporter.stop ();
     forget_access_unit (priv);
     priv->collector.reset ();
     priv->used_generation = 0;
@@ -341,10 +378,24 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
 }
 
 static void
+gst_rtp_neighbour_code_depay_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_STATS_INTERVAL)
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
 gst_rtp_neighbour_code_depay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  if (id == PROP_STATS_INTERVAL) {
+    g_value_set_uint (value, priv->reporter.interval ());
+    return;
+  }
   if (id != PROP_UNIT_STATS) {
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     return;
@@ -355,7 +406,8 @@ gst_rtp_neighbour_code_depay_get_property (
       gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
           c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
           "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
-          "without-rig", G_TYPE_UINT64, c.without_rig, nullptr));
+          "without-rig", G_TYPE_UINT64, c.without_rig, "lost-packets", G_TYPE_UINT64,
+          c.lost_packets, "bytes", G_TYPE_UINT64, c.bytes, nullptr));
 }
 
 static void
@@ -378,13 +430,16 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS (klass);
 
+  object_class->set_property = gst_rtp_neighbour_code_depay_set_property;
   object_class->get_property = gst_rtp_neighbour_code_depay_get_property;
   object_class->finalize = gst_rtp_neighbour_code_depay_finalize;
 
   g_object_class_install_property (object_class, PROP_UNIT_STATS,
       g_param_spec_boxed ("unit-stats", "Unit statistics",
-          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig",
+          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig, "
+          "lost-packets, bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

@@ -28,6 +28,8 @@
 #include <string>
 #include <vector>
 
+#include "statsreporter.hpp"
+
 using rangecast::Status;
 using rangecast::UnitHeader;
 using rangecast::UnitReader;
@@ -36,7 +38,7 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
 
-enum { PROP_0, PROP_CONFIG_INTERVAL };
+enum { PROP_0, PROP_CONFIG_INTERVAL, PROP_STATS_INTERVAL };
 
 static constexpr int kDefaultConfigInterval = 1;
 /* The least max-slice-size of neighbourcodeenc. */
@@ -44,6 +46,8 @@ static constexpr gsize kSmallestSliceLimit = 256;
 
 struct GstRtpNeighbourCodePayPrivate {
   std::atomic<int> config_interval{kDefaultConfigInterval};
+  std::atomic<guint64> frame_sets{0}, packets{0}, bytes{0}; /* since start */
+  StatsReporter reporter;
 
   /* streaming thread only */
   std::vector<guint8> rig_units;
@@ -95,6 +99,7 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv;
   gstrange::RangeInfo info;
   const Status status = gstrange::parse_caps (caps, info);
+  priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
   priv->rig_units.clear ();
@@ -230,7 +235,9 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   const bool is_last =
       !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
   std::optional<UnitHeader> too_long;
-  if (begins_frame_set (self->priv, buffer, is_last) && config_is_due (self, running)) {
+  const bool begins = begins_frame_set (self->priv, buffer, is_last);
+  self->priv->frame_sets += begins;
+  if (begins && config_is_due (self, running)) {
     GstBuffer *rig =
         gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
     too_long = packer.pack (rig);
@@ -238,6 +245,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   }
   if (!too_long)
     too_long = packer.pack (buffer);
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   gst_buffer_unref (buffer);
   if (too_long) {
     gst_buffer_list_unref (packer.packets);
@@ -249,6 +257,8 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   }
   if (is_last)
     set_marker (packer.packets);
+  self->priv->packets += gst_buffer_list_length (packer.packets);
+  self->priv->bytes += gst_buffer_list_calculate_size (packer.packets);
   return gst_rtp_base_payload_push_list (base, packer.packets);
 }
 
@@ -264,18 +274,46 @@ gst_rtp_neighbour_code_pay_sink_event (GstRTPBasePayload *base, GstEvent *event)
           event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
       all_headers)
     GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->last_config = GST_CLOCK_TIME_NONE;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->reporter.finish ();
   return GST_RTP_BASE_PAYLOAD_CLASS (gst_rtp_neighbour_code_pay_parent_class)
       ->sink_event (base, event);
 }
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  return {
+      {.counters = {.frames = priv->frame_sets, .bytes = priv->bytes, .packets = priv->packets}}};
+}
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_pay_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    priv->frame_sets = priv->packets = priv->bytes = 0;
+    priv->reporter.start (element, collect_stats);
+  }
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_pay_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    priv->reporter.stop ();
+  return result;
+}
+
 static void
 gst_rtp_neighbour_code_pay_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   if (id == PROP_CONFIG_INTERVAL)
-    GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval = g_value_get_int (value);
+    priv->config_interval = g_value_get_int (value);
+  else if (id == PROP_STATS_INTERVAL)
+    priv->reporter.set_interval (g_value_get_uint (value));
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -284,8 +322,11 @@ static void
 gst_rtp_neighbour_code_pay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   if (id == PROP_CONFIG_INTERVAL)
-    g_value_set_int (value, GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval);
+    g_value_set_int (value, priv->config_interval);
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -320,6 +361,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
           "-1 to 3600, default 1)",
           -1, 3600, kDefaultConfigInterval,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
@@ -327,6 +369,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       "Codec/Payloader/Network/RTP", "Puts coded range frame sets into RTP packets",
       "gst-rangecast");
 
+  element_class->change_state = gst_rtp_neighbour_code_pay_change_state;
   payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
   payload_class->sink_event = gst_rtp_neighbour_code_pay_sink_event;
   payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;

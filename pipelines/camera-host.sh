@@ -14,6 +14,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --input WHAT    avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
                   DIR: recorded pairs DIR/viewN-left.* and DIR/viewN-right.* (video files, or image
                   sequences viewN-left-%05d.png from 0), which begin with the empty scene;
+                  range: range images of the built-in figure, as perfect cameras would see it: no
+                  cameras and no stereo, to try what comes after them;
                   cameras: those that the rig names; cameras=LEFT,RIGHT[,THIRD]: these, by name,
                   serial number or address
   --views N       number of views in the rig, for avatar (default 4)
@@ -127,7 +129,12 @@ read_cameras () {
   done
 }
 
+depth=(stereodepth name=depth "rig=$rig" "view-id=$view" !)
 case "$input" in
+  range)
+    depth=()
+    cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))"
+      ! "video/x-range,width=${size%x*},height=${size#*x},framerate=$fps/1" ! queue max-size-buffers=2 !) ;;
   cameras=*,*,*) read_cameras left right third ;;
   cameras | cameras=*) read_cameras left right ;;
   avatar | avatar=*)
@@ -146,7 +153,7 @@ esac
 
 read -ra encoder <<<"$encoder"
 launch "${cameras[@]}" \
-  stereodepth name=depth "rig=$rig" "view-id=$view" \
-  ! roiextract "background-frames=$learn" \
+  "${depth[@]}" \
+  roiextract "background-frames=$learn" \
   ! queue max-size-buffers=2 leaky=downstream \
   ! neighbourcodeenc "${encoder[@]}" ! "${rtp[@]}"

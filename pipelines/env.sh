@@ -20,6 +20,8 @@ launch () {
     eval "runner=($RANGECAST_LAUNCH)" # a command line, quoted where it must be
     exec "${runner[@]}" "$@"
   fi
+  # It sends the elements' statistics there, for top.sh; gst-launch-1.0 does not.
+  [ -z "${RANGECAST_STATS:-}" ] || exec rangecast-run "$@"
   LANGUAGE=en exec gst-launch-1.0 -e --no-position "$@" > >(
     trap '' INT TERM # it ends with what it reads
     exec grep --line-buffered '^WARNING: ' >&2

@@ -33,10 +33,7 @@ struct LossWatch {
       return;
     std::lock_guard guard (lock);
     if (report)
-      report ({CameraFault::kLost,
-          label +
-              ": lost; it does not answer any more (unplugged, switched off), or another program "
-              "took control"});
+      report ({CameraFault::kLost, lost_text (label)});
   }
 };
 
@@ -113,11 +110,13 @@ Camera::Impl::describe ()
 }
 
 CameraStatus
-Camera::open (const std::string &name, std::unique_ptr<Camera> &camera)
+Camera::open (const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen)
 {
   auto impl = std::make_unique<Impl> ();
   ArvDevice *device = nullptr;
   CameraStatus status = open_camera_device (name, device, impl->info);
+  if (seen)
+    *seen = impl->info;
   if (!status.ok ())
     return status;
   GError *error = nullptr;
@@ -375,6 +374,12 @@ Camera::stop ()
   }
   run->store->close ();
   impl_->end (run);
+}
+
+void
+Camera::give_up ()
+{
+  impl_->watch->lost = true;
 }
 
 bool

@@ -1,0 +1,354 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rtsp-media.hpp"
+
+#include <gst/video/video.h>
+
+static const char kCodedType[] = "application/x-neighbour-code";
+
+/* ---- the launch string ---- */
+
+/* test-launch of gst-rtsp-server wants parentheses, so people write them. */
+static std::string
+without_parentheses (const std::string &launch)
+{
+  if (launch.size () < 2 || launch.front () != '(' || launch.back () != ')')
+    return launch;
+  return launch.substr (1, launch.size () - 2);
+}
+
+static bool
+may_give (GstPad *pad, const char *media_type)
+{
+  GstCaps *caps = gst_pad_query_caps (pad, nullptr);
+  bool may = false;
+  for (guint i = 0; i < gst_caps_get_size (caps) && !may; i++)
+    may = gst_structure_has_name (gst_caps_get_structure (caps, i), media_type);
+  gst_caps_unref (caps);
+  return may;
+}
+
+static void
+set_error (GError **error, const std::string &text)
+{
+  g_set_error_literal (error, GST_PARSE_ERROR, GST_PARSE_ERROR_LINK, text.c_str ());
+}
+
+static bool
+add_payloader (GstBin *bin, GError **error)
+{
+  GstPad *end = gst_bin_find_unlinked_pad (bin, GST_PAD_SRC);
+  if (!end) {
+    set_error (error, "expected a payloader named pay0, or coded frame sets that lead nowhere yet");
+    return false;
+  }
+  bool added = false;
+  GstElement *payloader = nullptr;
+  if (!may_give (end, kCodedType)) {
+    gchar *name = gst_pad_get_name (end);
+    GstElement *owner = gst_pad_get_parent_element (end);
+    set_error (error, std::string ("expected coded frame sets at the end (neighbourcodeenc), or a "
+                                   "payloader named pay0; the end is pad ") +
+                          name + " of " + GST_OBJECT_NAME (owner));
+    gst_object_unref (owner);
+    g_free (name);
+  } else if (!(payloader = gst_element_factory_make ("rtpneighbourcodepay", "pay0"))) {
+    set_error (error, "there is no element rtpneighbourcodepay: expected GST_PLUGIN_PATH to lead "
+                      "to the plugins of gst-rangecast, as pipelines/env.sh does");
+  } else {
+    gst_bin_add (bin, payloader);
+    GstPad *sink = gst_element_get_static_pad (payloader, "sink");
+    added = gst_pad_link (end, sink) == GST_PAD_LINK_OK;
+    gst_object_unref (sink);
+    if (!added)
+      set_error (error, "the end of the launch string cannot be linked to rtpneighbourcodepay");
+  }
+  gst_object_unref (end);
+  return added;
+}
+
+GstElement *
+make_stream_bin (const std::string &launch, GError **error)
+{
+  GstElement *bin = gst_parse_bin_from_description_full (
+      without_parentheses (launch).c_str (), FALSE, nullptr, GST_PARSE_FLAG_FATAL_ERRORS, error);
+  if (!bin)
+    return nullptr;
+  if (GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0")) {
+    gst_object_unref (payloader);
+    return bin;
+  }
+  if (add_payloader (GST_BIN (bin), error))
+    return bin;
+  gst_object_unref (gst_object_ref_sink (bin));
+  return nullptr;
+}
+
+/* ---- the media ---- */
+
+struct Stage {
+  StreamCounts *counts;
+  std::function<void (const std::string &)> on_end;
+};
+
+static void
+delete_stage (gpointer stage, GClosure *)
+{
+  delete static_cast<Stage *> (stage);
+}
+
+static void
+on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
+{
+  const auto &on_end = static_cast<Stage *> (user_data)->on_end;
+  GError *error = nullptr;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
+    if (GST_IS_PIPELINE (message->src))
+      on_end ("");
+    return;
+  }
+  const bool is_error = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR;
+  if (is_error)
+    gst_message_parse_error (message, &error, nullptr);
+  else
+    gst_message_parse_warning (message, &error, nullptr);
+  const std::string text = std::string (GST_OBJECT_NAME (message->src)) + ": " + error->message;
+  if (is_error)
+    on_end (text);
+  else
+    g_printerr ("rtsp-server: warning: %s\n", text.c_str ());
+  g_error_free (error);
+}
+
+static void
+note_packet (StreamCounts &counts, GstBuffer *packet)
+{
+  counts.bytes += gst_buffer_get_size (packet);
+  if (GST_BUFFER_FLAG_IS_SET (packet, GST_BUFFER_FLAG_MARKER))
+    counts.frame_sets++;
+}
+
+static GstPadProbeReturn
+on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+{
+  StreamCounts &counts = *static_cast<StreamCounts *> (user_data);
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) {
+    GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+    for (guint i = 0; i < gst_buffer_list_length (list); i++)
+      note_packet (counts, gst_buffer_list_get (list, i));
+  } else if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER) {
+    note_packet (counts, GST_PAD_PROBE_INFO_BUFFER (info));
+  } else if (gst_video_event_is_force_key_unit (GST_PAD_PROBE_INFO_EVENT (info))) {
+    counts.key_requests++;
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+/* The one pay0, or the first of several. */
+static GstPad *
+payload_pad (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
+  GstPad *pad = payloader ? gst_element_get_static_pad (payloader, "src") : nullptr;
+  gst_clear_object (&payloader);
+  gst_object_unref (bin);
+  return pad;
+}
+
+/* Live frame sets go out as soon as they are there: they carry their times, and the viewer's jitter
+ * buffer goes by them. Others (files) must be held back to their times. */
+static void
+on_prepared (GstRTSPMedia *media, gpointer)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
+  GstQuery *query = gst_query_new_latency ();
+  gboolean is_live = FALSE;
+  if (GstPad *pad = payload_pad (media)) {
+    if (gst_pad_query (pad, query))
+      gst_query_parse_latency (query, &is_live, nullptr, nullptr);
+    gst_object_unref (pad);
+  }
+  gst_rtsp_media_set_rate_control (media, !is_live);
+  gst_query_unref (query);
+  gst_clear_object (&pipeline);
+  gst_object_unref (bin);
+}
+
+static void
+on_media_configure (GstRTSPMediaFactory *, GstRTSPMedia *media, gpointer user_data)
+{
+  auto stage = static_cast<Stage *> (user_data);
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+    gst_bus_enable_sync_message_emission (bus);
+    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
+      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message), new Stage (*stage),
+          delete_stage, GConnectFlags (0));
+    gst_object_unref (bus);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+  if (GstPad *pad = payload_pad (media)) {
+    gst_pad_add_probe (pad,
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
+                         GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
+        on_payload, stage->counts, nullptr);
+    gst_object_unref (pad);
+  }
+  g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
+}
+
+void
+request_key_frame_set (GstRTSPMedia *media)
+{
+  if (GstPad *pad = payload_pad (media)) {
+    gst_pad_send_event (
+        pad, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
+    gst_object_unref (pad);
+  }
+}
+
+/* ---- the factory ---- */
+
+G_BEGIN_DECLS
+struct LaunchFactory {
+  GstRTSPMediaFactory parent;
+};
+struct LaunchFactoryClass {
+  GstRTSPMediaFactoryClass parent_class;
+};
+G_END_DECLS
+G_DEFINE_TYPE (LaunchFactory, launch_factory, GST_TYPE_RTSP_MEDIA_FACTORY)
+
+static GstElement *
+launch_factory_create_element (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
+{
+  gchar *launch = gst_rtsp_media_factory_get_launch (factory);
+  GError *error = nullptr;
+  GstElement *bin = make_stream_bin (launch, &error);
+  if (!bin)
+    g_printerr ("rtsp-server: launch string: %s\n", error->message);
+  g_clear_error (&error);
+  g_free (launch);
+  return bin;
+}
+
+static void
+launch_factory_init (LaunchFactory *)
+{
+}
+
+static void
+launch_factory_class_init (LaunchFactoryClass *klass)
+{
+  GST_RTSP_MEDIA_FACTORY_CLASS (klass)->create_element = launch_factory_create_element;
+}
+
+static void
+set_multicast (GstRTSPMediaFactory *factory, const MulticastRange &range)
+{
+  GstRTSPAddressPool *pool = gst_rtsp_address_pool_new ();
+  gst_rtsp_address_pool_add_range (pool, range.first.c_str (), range.last.c_str (),
+      guint16 (range.first_port), guint16 (range.last_port), guint8 (range.ttl));
+  gst_rtsp_media_factory_set_address_pool (factory, pool);
+  gst_rtsp_media_factory_set_max_mcast_ttl (factory, guint (range.ttl));
+  g_object_unref (pool);
+}
+
+GstRTSPMediaFactory *
+make_factory (const RtspOptions &options, StreamCounts &counts,
+    std::function<void (const std::string &)> on_end)
+{
+  auto factory = GST_RTSP_MEDIA_FACTORY (g_object_new (launch_factory_get_type (), nullptr));
+  gst_rtsp_media_factory_set_launch (factory, options.launch.c_str ());
+  gst_rtsp_media_factory_set_shared (factory, TRUE);
+  gst_rtsp_media_factory_set_suspend_mode (factory, GST_RTSP_SUSPEND_MODE_NONE);
+  gst_rtsp_media_factory_set_profiles (
+      factory, GstRTSPProfile (GST_RTSP_PROFILE_AVP | GST_RTSP_PROFILE_AVPF));
+  int protocols = 0;
+  if (options.udp)
+    protocols |= GST_RTSP_LOWER_TRANS_UDP;
+  if (options.tcp)
+    protocols |= GST_RTSP_LOWER_TRANS_TCP;
+  if (!options.multicast.first.empty ()) {
+    protocols |= GST_RTSP_LOWER_TRANS_UDP_MCAST;
+    set_multicast (factory, options.multicast);
+  }
+  gst_rtsp_media_factory_set_protocols (factory, GstRTSPLowerTrans (protocols));
+  if (options.retransmission_ms > 0) {
+    gst_rtsp_media_factory_set_do_retransmission (factory, TRUE);
+    gst_rtsp_media_factory_set_retransmission_time (
+        factory, guint64 (options.retransmission_ms) * GST_MSECOND);
+  }
+  for (const RtspUser &user : options.users)
+    gst_rtsp_media_factory_add_role (factory, user.name.c_str (), "media.factory.access",
+        G_TYPE_BOOLEAN, TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
+  g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
+      new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
+  return factory;
+}
+
+/* ---- the holder ---- */
+
+/* A transport that sends nothing to nobody. */
+static GstRTSPStreamTransport *
+make_dry_transport (GstRTSPStream *stream)
+{
+  GstRTSPTransport *transport = nullptr;
+  gst_rtsp_transport_new (&transport);
+  transport->trans = GST_RTSP_TRANS_RTP;
+  transport->profile = GST_RTSP_PROFILE_AVPF;
+  transport->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
+  transport->interleaved = {0, 1};
+  GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
+  const auto swallow = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
+  const auto swallow_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
+  gst_rtsp_stream_transport_set_callbacks (dry, swallow, swallow, nullptr, nullptr);
+  gst_rtsp_stream_transport_set_list_callbacks (dry, swallow_list, swallow_list, nullptr, nullptr);
+  return dry;
+}
+
+bool
+MediaHolder::hold (GstRTSPMedia *media)
+{
+  std::lock_guard guard (lock_);
+  if (media_)
+    return media_ == media;
+  if (!gst_rtsp_media_prepare (media, nullptr))
+    return false;
+  transports_ = g_ptr_array_new_with_free_func (g_object_unref);
+  for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
+    g_ptr_array_add (transports_, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
+  media_ = GST_RTSP_MEDIA (g_object_ref (media));
+  gst_rtsp_media_complete_pipeline (media, transports_);
+  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
+  return true;
+}
+
+void
+MediaHolder::release ()
+{
+  std::unique_lock guard (lock_);
+  GstRTSPMedia *media = media_;
+  GPtrArray *transports = transports_;
+  media_ = nullptr;
+  transports_ = nullptr;
+  guard.unlock ();
+  if (!media)
+    return;
+  for (guint i = 0; i < transports->len; i++)
+    gst_rtsp_stream_transport_set_active (
+        GST_RTSP_STREAM_TRANSPORT (g_ptr_array_index (transports, i)), FALSE);
+  gst_rtsp_media_unprepare (media);
+  g_ptr_array_unref (transports);
+  g_object_unref (media);
+}
+
+bool
+MediaHolder::holds_any ()
+{
+  std::lock_guard guard (lock_);
+  return media_ != nullptr;
+}

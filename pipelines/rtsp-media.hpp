@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What rtsp-server serves: a launch string as a media of gst-rtsp-server that all viewers share. */
+#pragma once
+
+#include <gst/rtsp-server/rtsp-server.h>
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "rtsp-options.hpp"
+
+/** Counted since the start; any thread. */
+struct StreamCounts {
+  std::atomic<guint64> frame_sets = 0;   /* that the launch string gave */
+  std::atomic<guint64> bytes = 0;        /* of their RTP packets */
+  std::atomic<guint64> key_requests = 0; /* GstForceKeyUnit that came to the payloader */
+  std::atomic<guint64> left_out = 0;     /* frame sets not sent to viewers that were too slow */
+};
+
+/** The element that a launch string makes: a bin with a payloader pay0. One is added behind coded
+ *  frame sets if it is missing.
+ *  @return nullptr, with error set, if it cannot be made */
+GstElement *make_stream_bin (const std::string &launch, GError **error);
+
+/** The factory of the one media; by it clients of the server get theirs.
+ *  @param counts  must live as long as the factory
+ *  @param on_end  called by any thread when the stream ended; its text is empty at EOS, otherwise
+ *                 what went wrong */
+GstRTSPMediaFactory *make_factory (const RtspOptions &options, StreamCounts &counts,
+    std::function<void (const std::string &)> on_end);
+
+/** Lets every payloader of the media ask its encoder for a key frame set, with the rig. */
+void request_key_frame_set (GstRTSPMedia *media);
+
+/** Keeps a media running, as a viewer would that throws away what comes. So it goes on while
+ * viewers come and go, and packets flow where the only viewer is slow. Any thread. */
+class MediaHolder {
+public:
+  ~MediaHolder () { release (); }
+  /** Starts it if it is not running. Another one that was held is left alone until release().
+   *  @return whether it is held */
+  bool hold (GstRTSPMedia *media);
+  void release ();
+  bool holds_any ();
+
+private:
+  std::mutex lock_;
+  GstRTSPMedia *media_ = nullptr;
+  GPtrArray *transports_ = nullptr;
+};

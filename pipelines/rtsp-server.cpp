@@ -1,0 +1,441 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Serves the coded frame sets of a launch string over RTSP: one encoder, any number of viewers, by
+ * UDP, multicast or inside the RTSP connection, with digest authentication and TLS where asked for.
+ *
+ * Threads: the main loop has the timer and the signals; connections are served by a few threads of
+ * gst-rtsp-server, which call on_play() and the like; the launch string runs in its own. The end of
+ * the stream is told by any thread, and the main loop acts. */
+#include <glib-unix.h>
+#include <gst/gst.h>
+#include <gst/rtsp-server/rtsp-server.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "rtsp-media.hpp"
+#include "rtsp-options.hpp"
+#include "rtsp-tcp-viewer.hpp"
+
+static constexpr guint kThreads = 4; /* that serve connections */
+/* Requests of RTSP have bodies of a few lines at most. */
+static constexpr guint kMostContent = 16384; /* bytes */
+/* Connections that are no viewers: those that ask only, or have not got so far. */
+static constexpr int kSpareConnections = 32;
+
+struct Server {
+  RtspOptions options;
+  StreamCounts counts;
+  MediaHolder holder;
+  GMainLoop *loop = nullptr;
+  GstRTSPServer *server = nullptr;
+  GstRTSPMediaFactory *factory = nullptr;
+  GstRTSPSessionPool *sessions = nullptr;
+  bool failed = false;
+  gint64 idle_since_us = 0; /* monotonic; since when there has been no viewer; 0: there is one */
+  gint64 start_at_us = 0;   /* of --always: not before */
+  gint64 stats_at_us = 0;
+  std::thread starter; /* of --always: waits until the launch string runs */
+  std::atomic<bool> starting = false;
+  std::atomic<bool> stopping = false;
+
+  std::mutex lock;                               /* guards what follows */
+  std::map<GstRTSPClient *, gint64> connections; /* connected when; monotonic, us */
+};
+
+/* ---- connections ---- */
+
+/* What the kernel takes beyond what it can send soon only makes the viewer late. */
+static void
+limit_send_buffer (GstRTSPClient *client, int bytes)
+{
+  GstRTSPConnection *connection = gst_rtsp_client_get_connection (client);
+  GSocket *socket = connection ? gst_rtsp_connection_get_write_socket (connection) : nullptr;
+  if (!socket)
+    return;
+  g_socket_set_option (socket, IPPROTO_TCP, TCP_NODELAY, TRUE, nullptr);
+#ifdef TCP_NOTSENT_LOWAT
+  g_socket_set_option (socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, bytes, nullptr);
+#endif
+}
+
+static void
+on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  queue_tcp_transports (context->session, context->sessmedia, server.counts.left_out);
+  request_key_frame_set (gst_rtsp_session_media_get_media (context->sessmedia));
+}
+
+static GstRTSPStatusCode
+before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  server.holder.hold (gst_rtsp_session_media_get_media (context->sessmedia));
+  return GST_RTSP_STS_OK;
+}
+
+static void
+on_pause_or_teardown (GstRTSPClient *, GstRTSPContext *context, gpointer)
+{
+  drop_tcp_transports (context->session);
+}
+
+static void
+on_closed (GstRTSPClient *client, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  std::lock_guard guard (server.lock);
+  server.connections.erase (client);
+}
+
+static void
+on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  limit_send_buffer (client, server.options.send_buffer_kb * 1024);
+  g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
+  g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);
+  g_signal_connect (client, "pause-request", G_CALLBACK (on_pause_or_teardown), &server);
+  g_signal_connect (client, "teardown-request", G_CALLBACK (on_pause_or_teardown), &server);
+  g_signal_connect (client, "closed", G_CALLBACK (on_closed), &server);
+  std::lock_guard guard (server.lock);
+  server.connections[client] = g_get_monotonic_time ();
+}
+
+/* It comes before the library's own handler, which takes the connection away. */
+static void
+on_session_removed (GstRTSPSessionPool *, GstRTSPSession *session, gpointer)
+{
+  drop_tcp_transports (session);
+}
+
+static bool
+has_session (GstRTSPClient *client)
+{
+  GList *sessions = gst_rtsp_client_session_filter (client, nullptr, nullptr);
+  const bool has = sessions != nullptr;
+  g_list_free_full (sessions, g_object_unref);
+  return has;
+}
+
+/* Those that connected and then asked for nothing, and those beyond the limit. */
+static void
+close_useless_connections (Server &server)
+{
+  const gint64 now = g_get_monotonic_time ();
+  const gint64 patience = server.options.timeout_s * G_USEC_PER_SEC;
+  int many = -server.options.max_viewers - kSpareConnections;
+  GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
+  for (GList *item = clients; item; item = item->next) {
+    auto client = GST_RTSP_CLIENT (item->data);
+    many++;
+    if (has_session (client))
+      continue;
+    std::unique_lock guard (server.lock);
+    const auto found = server.connections.find (client);
+    const bool is_late = found != server.connections.end () && now - found->second > patience;
+    guard.unlock ();
+    if (is_late || many > 0)
+      gst_rtsp_client_close (client);
+  }
+  g_list_free_full (clients, g_object_unref);
+}
+
+static GstRTSPFilterResult
+close_connection (GstRTSPServer *, GstRTSPClient *, gpointer)
+{
+  return GST_RTSP_FILTER_REMOVE;
+}
+
+/* ---- the stream ---- */
+
+static void
+close_all (Server &server)
+{
+  g_list_free_full (
+      gst_rtsp_server_client_filter (server.server, close_connection, nullptr), g_object_unref);
+  server.holder.release ();
+}
+
+static gboolean
+end_stream (gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  close_all (server);
+  server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
+  return G_SOURCE_REMOVE;
+}
+
+/* Whoever comes next gets a new run of the launch string. */
+static void
+on_stream_end (Server &server, const std::string &why)
+{
+  if (server.stopping)
+    return;
+  if (!why.empty ())
+    g_printerr ("rtsp-server: %s\n", why.c_str ());
+  g_timeout_add (why.empty () ? 500 : 0, end_stream, &server); /* EOS goes to the viewers before */
+}
+
+/* Runs the launch string before anybody asks for it. It takes as long as it waits for its first
+ * frame set, so this is a thread of its own. */
+static void
+start_media (Server &server)
+{
+  GstRTSPUrl *url = nullptr;
+  const std::string text = "rtsp://localhost" + server.options.mount;
+  gst_rtsp_url_parse (text.c_str (), &url);
+  GstRTSPMedia *media = gst_rtsp_media_factory_construct (server.factory, url);
+  gst_rtsp_url_free (url);
+  if (media) {
+    GstRTSPThreadPool *pool = gst_rtsp_server_get_thread_pool (server.server);
+    GstRTSPContext context = {};
+    GstRTSPThread *thread =
+        gst_rtsp_thread_pool_get_thread (pool, GST_RTSP_THREAD_TYPE_MEDIA, &context);
+    if (gst_rtsp_media_prepare (media, thread)) {
+      server.holder.hold (media);
+      gst_rtsp_media_unprepare (media); /* the holder has its own share of it */
+    }
+    g_object_unref (pool);
+    g_object_unref (media);
+  }
+  server.starting = false;
+}
+
+static void
+keep_running (Server &server)
+{
+  const gint64 now = g_get_monotonic_time ();
+  if (server.starting || server.holder.holds_any () || now < server.start_at_us)
+    return;
+  if (server.starter.joinable ())
+    server.starter.join ();
+  server.start_at_us = now + G_USEC_PER_SEC;
+  server.starting = true;
+  server.starter = std::thread (start_media, std::ref (server));
+}
+
+/* ---- the timer ---- */
+
+static void
+print_stats (Server &server)
+{
+  const gint64 now = g_get_monotonic_time ();
+  if (server.options.stats_s == 0 || now < server.stats_at_us)
+    return;
+  server.stats_at_us = now + server.options.stats_s * G_USEC_PER_SEC;
+  const StreamCounts &counts = server.counts;
+  std::printf ("viewers=%u frame-sets=%" G_GUINT64_FORMAT " bytes=%" G_GUINT64_FORMAT
+               " left-out=%" G_GUINT64_FORMAT " key-requests=%" G_GUINT64_FORMAT "\n",
+      gst_rtsp_session_pool_get_n_sessions (server.sessions), counts.frame_sets.load (),
+      counts.bytes.load (), counts.left_out.load (), counts.key_requests.load ());
+  std::fflush (stdout);
+}
+
+static gboolean
+on_second (gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  gst_rtsp_session_pool_cleanup (server.sessions);
+  close_useless_connections (server);
+  const gint64 now = g_get_monotonic_time ();
+  if (gst_rtsp_session_pool_get_n_sessions (server.sessions) > 0)
+    server.idle_since_us = 0;
+  else if (server.idle_since_us == 0)
+    server.idle_since_us = now;
+  if (server.options.always)
+    keep_running (server);
+  else if (server.idle_since_us > 0 &&
+           now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
+    server.holder.release ();
+  print_stats (server);
+  return G_SOURCE_CONTINUE;
+}
+
+/* ---- who may watch ---- */
+
+static GTlsCertificate *
+load_certificate (const RtspOptions &options)
+{
+  GError *error = nullptr;
+  GTlsCertificate *certificate = g_tls_certificate_new_from_files (
+      options.certificate_file.c_str (), options.key_file.c_str (), &error);
+  if (!certificate)
+    g_printerr ("rtsp-server: --cert %s, --key %s: %s\n", options.certificate_file.c_str (),
+        options.key_file.c_str (), error->message);
+  g_clear_error (&error);
+  return certificate;
+}
+
+static const char kEverybody[] = "everybody";
+
+/* An RTSP server of the library has certificates and passwords in one object. */
+static bool
+set_auth (Server &server)
+{
+  const RtspOptions &options = server.options;
+  if (options.users.empty () && options.certificate_file.empty ())
+    return true;
+  GstRTSPAuth *auth = gst_rtsp_auth_new ();
+  gst_rtsp_auth_set_supported_methods (auth, GST_RTSP_AUTH_DIGEST);
+  gst_rtsp_auth_set_realm (auth, options.realm.c_str ());
+  bool good = true;
+  if (!options.certificate_file.empty ()) {
+    GTlsCertificate *certificate = load_certificate (options);
+    good = certificate != nullptr;
+    if (good)
+      gst_rtsp_auth_set_tls_certificate (auth, certificate);
+    g_clear_object (&certificate);
+  }
+  for (const RtspUser &user : options.users) {
+    GstRTSPToken *token = gst_rtsp_token_new (
+        GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, user.name.c_str (), nullptr);
+    gst_rtsp_auth_add_digest (auth, user.name.c_str (), user.password.c_str (), token);
+    gst_rtsp_token_unref (token);
+  }
+  if (options.users.empty ()) {
+    gst_rtsp_media_factory_add_role (server.factory, kEverybody, "media.factory.access",
+        G_TYPE_BOOLEAN, TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
+    GstRTSPToken *token =
+        gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kEverybody, nullptr);
+    gst_rtsp_auth_set_default_token (auth, token);
+    gst_rtsp_token_unref (token);
+  }
+  gst_rtsp_server_set_auth (server.server, auth);
+  g_object_unref (auth);
+  return good;
+}
+
+/* ---- the run ---- */
+
+static bool
+check_launch (const RtspOptions &options)
+{
+  GError *error = nullptr;
+  GstElement *bin = make_stream_bin (options.launch, &error);
+  if (bin)
+    gst_object_unref (gst_object_ref_sink (bin));
+  else
+    g_printerr ("rtsp-server: launch string: %s\n", error->message);
+  g_clear_error (&error);
+  return bin != nullptr;
+}
+
+static void
+set_up (Server &server)
+{
+  const RtspOptions &options = server.options;
+  server.server = gst_rtsp_server_new ();
+  gst_rtsp_server_set_address (server.server, options.address.c_str ());
+  gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
+  gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
+  GstRTSPThreadPool *threads = gst_rtsp_server_get_thread_pool (server.server);
+  gst_rtsp_thread_pool_set_max_threads (threads, kThreads);
+  g_object_unref (threads);
+  server.sessions = gst_rtsp_server_get_session_pool (server.server);
+  gst_rtsp_session_pool_set_max_sessions (server.sessions, guint (options.max_viewers));
+  g_signal_connect (server.sessions, "session-removed", G_CALLBACK (on_session_removed), nullptr);
+  server.factory = make_factory (
+      options, server.counts, [&server] (const std::string &why) { on_stream_end (server, why); });
+  GstRTSPMountPoints *mounts = gst_rtsp_server_get_mount_points (server.server);
+  gst_rtsp_mount_points_add_factory (
+      mounts, options.mount.c_str (), GST_RTSP_MEDIA_FACTORY (g_object_ref (server.factory)));
+  g_object_unref (mounts);
+  g_signal_connect (server.server, "client-connected", G_CALLBACK (on_connected), &server);
+}
+
+static int
+port_of (GSocket *socket)
+{
+  GSocketAddress *address = g_socket_get_local_address (socket, nullptr);
+  const int port = address ? g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (address)) : 0;
+  g_clear_object (&address);
+  return port;
+}
+
+/* @return the source that takes connections, nullptr after saying why there is none */
+static GSource *
+listen (Server &server)
+{
+  const RtspOptions &options = server.options;
+  GError *error = nullptr;
+  GSocket *socket = gst_rtsp_server_create_socket (server.server, nullptr, &error);
+  if (!socket) {
+    g_printerr (
+        "rtsp-server: %s, port %d: %s\n", options.address.c_str (), options.port, error->message);
+    g_error_free (error);
+    return nullptr;
+  }
+  GSource *source =
+      g_socket_create_source (socket, GIOCondition (G_IO_IN | G_IO_ERR | G_IO_HUP), nullptr);
+  g_source_set_callback (source, G_SOURCE_FUNC (gst_rtsp_server_io_func),
+      g_object_ref (server.server), g_object_unref);
+  g_source_attach (source, nullptr);
+  std::printf ("serving %s://%s:%d%s\n", options.certificate_file.empty () ? "rtsp" : "rtsps",
+      options.address.c_str (), port_of (socket), options.mount.c_str ());
+  std::fflush (stdout);
+  g_object_unref (socket);
+  return source;
+}
+
+static gboolean
+on_signal (gpointer user_data)
+{
+  g_main_loop_quit (static_cast<Server *> (user_data)->loop);
+  return G_SOURCE_CONTINUE;
+}
+
+static void
+serve (Server &server, GSource *source)
+{
+  server.loop = g_main_loop_new (nullptr, FALSE);
+  const guint interrupt = g_unix_signal_add (SIGINT, on_signal, &server);
+  const guint terminate = g_unix_signal_add (SIGTERM, on_signal, &server);
+  const guint timer = g_timeout_add_seconds (1, on_second, &server);
+  if (server.options.always)
+    keep_running (server);
+  g_main_loop_run (server.loop);
+  server.stopping = true;
+  g_source_remove (timer);
+  g_source_remove (interrupt);
+  g_source_remove (terminate);
+  g_source_destroy (source);
+  close_all (server);
+  if (server.starter.joinable ())
+    server.starter.join ();
+  close_all (server); /* what the starter may have started meanwhile */
+  g_main_loop_unref (server.loop);
+}
+
+int
+main (int argc, char **argv)
+{
+  int result = 1;
+  {
+    Server server;
+    if (!parse_arguments (argc, argv, server.options))
+      return 2;
+    if (check_launch (server.options)) {
+      set_up (server);
+      GSource *source = set_auth (server) ? listen (server) : nullptr;
+      if (source) {
+        serve (server, source);
+        g_source_unref (source);
+        result = 0;
+      }
+      g_object_unref (server.factory);
+      g_object_unref (server.sessions);
+      g_object_unref (server.server);
+      gst_rtsp_thread_pool_cleanup ();
+    }
+  }
+  gst_deinit ();
+  return result;
+}

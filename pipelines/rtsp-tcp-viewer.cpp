@@ -1,0 +1,386 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rtsp-tcp-viewer.hpp"
+
+#include <gst/rtp/rtp.h>
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+static constexpr std::size_t kMostFrameSets = 4;
+/* Frame sets of many slices may come as one packet each; reports are few. */
+static constexpr std::size_t kMostMessages = 65536;
+
+struct Message {
+  GstBuffer *buffer;   /* or */
+  GstBufferList *list; /* packets */
+  bool is_rtp;
+  guint32 timestamp; /* of RTP */
+};
+
+/* Locks: `sending`, then `lock`. `lock` is not held while anything is called. */
+class TcpQueue {
+public:
+  TcpQueue (
+      GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out);
+  ~TcpQueue ();
+  void take (const Message &message);
+  void send_waiting ();
+  void note_sent ();
+  void close ();
+
+  /* The one behind a transport's callbacks; shared, since they may run while it is closed. */
+  std::shared_ptr<TcpQueue> self;
+
+private:
+  void leave_out_all ();
+  bool pop (Message &message);
+  bool hand_over (const Message &message);
+  void wake ();
+
+  GWeakRef transport_; /* of the library */
+  GstRTSPStreamTransport *ours_ = nullptr;
+  GstRTSPStream *stream_;
+  GMainContext *context_;
+  std::atomic<guint64> &left_out_;
+  std::mutex sending_; /* held while a message is handed over */
+
+  std::mutex lock_; /* guards all below */
+  std::deque<Message> waiting_;
+  std::size_t frame_sets_ = 0; /* among them */
+  bool busy_ = false;          /* a message is on its way */
+  bool draining_ = false;      /* in send_waiting() */
+  bool woken_ = false;
+  bool closed_ = false;
+};
+
+using Handle = std::shared_ptr<TcpQueue>;
+
+static void
+delete_handle (gpointer handle)
+{
+  delete static_cast<Handle *> (handle);
+}
+
+static TcpQueue &
+queue_of (gpointer handle)
+{
+  return **static_cast<Handle *> (handle);
+}
+
+static void
+forget (const Message &message)
+{
+  if (message.buffer)
+    gst_buffer_unref (message.buffer);
+  if (message.list)
+    gst_buffer_list_unref (message.list);
+}
+
+static guint32
+timestamp_of (GstBuffer *packet)
+{
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  guint32 timestamp = 0;
+  if (packet && gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp)) {
+    timestamp = gst_rtp_buffer_get_timestamp (&rtp);
+    gst_rtp_buffer_unmap (&rtp);
+  }
+  return timestamp;
+}
+
+/* ---- what the stream gives, in its own thread ---- */
+
+static gboolean
+take_rtp (GstBuffer *packet, guint8, gpointer handle)
+{
+  queue_of (handle).take ({gst_buffer_ref (packet), nullptr, true, timestamp_of (packet)});
+  return TRUE;
+}
+
+static gboolean
+take_rtcp (GstBuffer *packet, guint8, gpointer handle)
+{
+  queue_of (handle).take ({gst_buffer_ref (packet), nullptr, false, 0});
+  return TRUE;
+}
+
+static gboolean
+take_rtp_list (GstBufferList *list, guint8, gpointer handle)
+{
+  if (gst_buffer_list_length (list) > 0)
+    queue_of (handle).take (
+        {nullptr, gst_buffer_list_ref (list), true, timestamp_of (gst_buffer_list_get (list, 0))});
+  return TRUE;
+}
+
+static gboolean
+take_rtcp_list (GstBufferList *list, guint8, gpointer handle)
+{
+  if (gst_buffer_list_length (list) > 0)
+    queue_of (handle).take ({nullptr, gst_buffer_list_ref (list), false, 0});
+  return TRUE;
+}
+
+/* ---- the queue ---- */
+
+TcpQueue::TcpQueue (
+    GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out)
+    : stream_ (GST_RTSP_STREAM (g_object_ref (gst_rtsp_stream_transport_get_stream (transport)))),
+      context_ (g_main_context_ref (context)), left_out_ (left_out)
+{
+  g_weak_ref_init (&transport_, transport);
+}
+
+TcpQueue::~TcpQueue ()
+{
+  for (const Message &message : waiting_)
+    forget (message);
+  g_weak_ref_clear (&transport_);
+  g_main_context_unref (context_);
+  g_object_unref (stream_);
+}
+
+/* With the lock. */
+void
+TcpQueue::leave_out_all ()
+{
+  std::deque<Message> reports;
+  for (const Message &message : waiting_)
+    if (message.is_rtp)
+      forget (message);
+    else
+      reports.push_back (message);
+  waiting_.swap (reports);
+  left_out_ += frame_sets_;
+  frame_sets_ = 0;
+}
+
+void
+TcpQueue::take (const Message &message)
+{
+  std::unique_lock guard (lock_);
+  if (closed_ || waiting_.size () >= kMostMessages) {
+    guard.unlock ();
+    forget (message);
+    return;
+  }
+  if (message.is_rtp) {
+    const Message *last = nullptr;
+    for (auto it = waiting_.rbegin (); it != waiting_.rend () && !last; ++it)
+      if (it->is_rtp)
+        last = &*it;
+    if (!last || last->timestamp != message.timestamp) {
+      if (frame_sets_ >= kMostFrameSets)
+        leave_out_all ();
+      frame_sets_++;
+    }
+  }
+  waiting_.push_back (message);
+  guard.unlock ();
+  wake ();
+}
+
+/* Sends in the thread of the connection, so that it does not end meanwhile. */
+void
+TcpQueue::wake ()
+{
+  {
+    std::lock_guard guard (lock_);
+    if (woken_ || draining_ || busy_ || closed_ || waiting_.empty ())
+      return;
+    woken_ = true;
+  }
+  GSource *source = g_idle_source_new ();
+  g_source_set_priority (source, G_PRIORITY_DEFAULT);
+  const auto send = [] (gpointer handle) -> gboolean {
+    queue_of (handle).send_waiting ();
+    return G_SOURCE_REMOVE;
+  };
+  g_source_set_callback (source, send, new Handle (self), delete_handle);
+  g_source_attach (source, context_);
+  g_source_unref (source);
+}
+
+/* The next message, if one may be sent now. */
+bool
+TcpQueue::pop (Message &message)
+{
+  std::lock_guard guard (lock_);
+  woken_ = false;
+  draining_ = !busy_ && !closed_ && !waiting_.empty ();
+  if (!draining_)
+    return false;
+  message = waiting_.front ();
+  waiting_.pop_front ();
+  if (message.is_rtp) {
+    const auto is_next = [&] (const Message &other) {
+      return other.is_rtp && other.timestamp == message.timestamp;
+    };
+    const bool has_more = std::any_of (waiting_.begin (), waiting_.end (), is_next);
+    frame_sets_ -= !has_more && frame_sets_ > 0;
+  }
+  busy_ = true; /* until note_sent(), which may come from within */
+  return true;
+}
+
+bool
+TcpQueue::hand_over (const Message &message)
+{
+  auto transport = static_cast<GstRTSPStreamTransport *> (g_weak_ref_get (&transport_));
+  if (!transport)
+    return false;
+  gboolean sent = FALSE;
+  if (message.is_rtp)
+    sent = message.list ? gst_rtsp_stream_transport_send_rtp_list (transport, message.list)
+                        : gst_rtsp_stream_transport_send_rtp (transport, message.buffer);
+  else
+    sent = message.list ? gst_rtsp_stream_transport_send_rtcp_list (transport, message.list)
+                        : gst_rtsp_stream_transport_send_rtcp (transport, message.buffer);
+  g_object_unref (transport);
+  return sent;
+}
+
+void
+TcpQueue::send_waiting ()
+{
+  Message message;
+  std::lock_guard sending (sending_);
+  while (pop (message)) {
+    if (!hand_over (message))
+      note_sent (); /* it never will be: the connection is closing */
+    forget (message);
+  }
+}
+
+void
+TcpQueue::note_sent ()
+{
+  {
+    std::lock_guard guard (lock_);
+    busy_ = false;
+  }
+  wake ();
+}
+
+void
+TcpQueue::close ()
+{
+  std::lock_guard sending (sending_); /* what is being sent ends before */
+  std::lock_guard guard (lock_);
+  closed_ = true;
+}
+
+/* ---- transports ---- */
+
+/* What a transport of the library has of ours. */
+struct Tap {
+  Handle queue;
+  GstRTSPStream *stream;
+  GstRTSPStreamTransport *ours;
+};
+
+static const char kTapKey[] = "rangecast-tcp-queue";
+
+static void
+delete_tap (gpointer user_data)
+{
+  auto tap = static_cast<Tap *> (user_data);
+  gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
+  tap->queue->self.reset ();
+  g_object_unref (tap->ours);
+  g_object_unref (tap->stream);
+  delete tap;
+}
+
+/* A transport of ours in its place; the other one of the same channels. */
+static GstRTSPStreamTransport *
+make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
+{
+  GstRTSPTransport *copy = nullptr;
+  gchar *text = gst_rtsp_transport_as_text (
+      const_cast<GstRTSPTransport *> (gst_rtsp_stream_transport_get_transport (transport)));
+  gst_rtsp_transport_new (&copy);
+  const bool parsed = text && gst_rtsp_transport_parse (text, copy) == GST_RTSP_OK;
+  g_free (text);
+  if (!parsed) {
+    gst_rtsp_transport_free (copy);
+    return nullptr;
+  }
+  GstRTSPStreamTransport *ours =
+      gst_rtsp_stream_transport_new (gst_rtsp_stream_transport_get_stream (transport), copy);
+  gst_rtsp_stream_transport_set_callbacks (
+      ours, take_rtp, take_rtcp, new Handle (queue), delete_handle);
+  gst_rtsp_stream_transport_set_list_callbacks (
+      ours, take_rtp_list, take_rtcp_list, new Handle (queue), delete_handle);
+  return ours;
+}
+
+static void
+tap_transport (
+    GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out)
+{
+  GstRTSPStream *stream = gst_rtsp_stream_transport_get_stream (transport);
+  auto queue = std::make_shared<TcpQueue> (transport, context, left_out);
+  GstRTSPStreamTransport *ours = make_transport (transport, queue);
+  if (!ours)
+    return; /* the library's own way, then */
+  queue->self = queue;
+  gst_rtsp_stream_transport_set_message_sent (
+      transport, [] (gpointer handle) { queue_of (handle).note_sent (); }, new Handle (queue),
+      delete_handle);
+  gst_rtsp_stream_remove_transport (stream, transport);
+  gst_rtsp_stream_add_transport (stream, ours);
+  g_object_set_data_full (G_OBJECT (transport), kTapKey,
+      new Tap{queue, GST_RTSP_STREAM (g_object_ref (stream)), ours}, delete_tap);
+}
+
+/* The TCP transports of one media. */
+static std::vector<GstRTSPStreamTransport *>
+tcp_transports (GstRTSPSessionMedia *media)
+{
+  std::vector<GstRTSPStreamTransport *> found;
+  GPtrArray *transports = gst_rtsp_session_media_get_transports (media);
+  for (guint i = 0; i < transports->len; i++) {
+    auto transport = static_cast<GstRTSPStreamTransport *> (g_ptr_array_index (transports, i));
+    const GstRTSPTransport *to =
+        transport ? gst_rtsp_stream_transport_get_transport (transport) : nullptr;
+    if (to && to->lower_transport == GST_RTSP_LOWER_TRANS_TCP)
+      found.push_back (GST_RTSP_STREAM_TRANSPORT (g_object_ref (transport)));
+  }
+  g_ptr_array_unref (transports);
+  return found;
+}
+
+void
+queue_tcp_transports (GstRTSPSession *, GstRTSPSessionMedia *media, std::atomic<guint64> &left_out)
+{
+  GSource *source = g_main_current_source ();
+  if (!source)
+    return;
+  for (GstRTSPStreamTransport *transport : tcp_transports (media)) {
+    if (!g_object_get_data (G_OBJECT (transport), kTapKey))
+      tap_transport (transport, g_source_get_context (source), left_out);
+    g_object_unref (transport);
+  }
+}
+
+static GstRTSPFilterResult
+drop_media (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer)
+{
+  for (GstRTSPStreamTransport *transport : tcp_transports (media)) {
+    if (auto tap = static_cast<Tap *> (g_object_get_data (G_OBJECT (transport), kTapKey)))
+      tap->queue->close ();
+    g_object_set_data (G_OBJECT (transport), kTapKey, nullptr);
+    g_object_unref (transport);
+  }
+  return GST_RTSP_FILTER_KEEP;
+}
+
+void
+drop_tcp_transports (GstRTSPSession *session)
+{
+  g_list_free_full (gst_rtsp_session_filter (session, drop_media, nullptr), g_object_unref);
+}
