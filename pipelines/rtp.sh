@@ -97,9 +97,10 @@ receive_rtp () {
     rtp+=(! capssetter "caps=application/x-rtp,payload=96" ! "session$1.recv_rtp_sink"
       rtpsession "name=session$1" rtp-profile=avpf "session$1.send_rtcp_src")
     [ -z "$rtp_key" ] || rtp+=(! "encrypt$1.rtcp_sink_0" srtpenc "name=encrypt$1" "encrypt$1.rtcp_src_0")
-    rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src" ! rtpneighbourcodeguard)
+    rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src")
+    [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
+    rtp+=(! rtpneighbourcodeguard) # names the stream in requests
   fi
-  [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
   [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
   # A sender that was restarted counts its packets from anywhere: no more than so many of them are waited for.
   rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)
