@@ -95,7 +95,7 @@ receive_rtp () {
   if [ -n "$rtp_feedback" ]; then
     split_address "$rtp_feedback" --feedback
     rtp+=(! capssetter "caps=application/x-rtp,payload=96" ! "session$1.recv_rtp_sink"
-      rtpsession "name=session$1" rtp-profile=avpf "session$1.send_rtcp_src")
+      rtpsession "name=session$1" rtp-profile=avpf rtcp-min-interval=20000000 "session$1.send_rtcp_src")
     [ -z "$rtp_key" ] || rtp+=(! "encrypt$1.rtcp_sink_0" srtpenc "name=encrypt$1" "encrypt$1.rtcp_src_0")
     rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src")
     [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")

@@ -226,7 +226,7 @@ receiver_launch (const NetworkCase &c)
       kRtpCaps + "\" ! rtpneighbourcodeguard";
   if (c.feedback || c.rtx)
     s += " ! capssetter caps=application/x-rtp,payload=96 ! session.recv_rtp_sink rtpsession "
-         "name=session rtp-profile=avpf session.send_rtcp_src ! appsink name=rtcp sync=false "
+         "name=session rtp-profile=avpf rtcp-min-interval=20000000 session.send_rtcp_src ! appsink name=rtcp sync=false "
          "async=false session.recv_rtp_src";
   if (c.rtx)
     s += std::string (" ! rtprtxreceive payload-type-map=") + kRtxMap;
