@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "camsourceconflict.hpp"
+
 GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
@@ -15,16 +17,33 @@ static constexpr std::int64_t kNotRead = INT64_MIN;
 
 static constexpr gint64 kPtpPatience = 30 * G_USEC_PER_SEC;
 
+/* Cameras of one element under two names: it is this element itself that has control. */
+CameraStatus
+CamSourceSession::busy_or_twice (
+    const CameraInfo &seen, std::size_t camera, CameraStatus busy) const
+{
+  for (std::size_t other = 0; other < cameras_.size (); other++)
+    if (cameras_[other]->info ().is_same (seen))
+      return {CameraFault::kBadSetting, "'" + names_[camera] + "' is the same camera as '" +
+                                            names_[other] + "' of pad " + pads_[other]->name () +
+                                            "; expected different cameras"};
+  return busy;
+}
+
 bool
 CamSourceSession::open_cameras ()
 {
   cameras_.clear ();
+  set_has_cameras (false);
   abilities_.clear ();
   for (std::size_t i = 0; i < pads_.size (); i++) {
     if (quits ())
       return false;
     std::unique_ptr<Camera> camera;
-    CameraStatus status = Camera::open (names_[i], camera);
+    CameraInfo seen;
+    CameraStatus status = Camera::open (names_[i], camera, &seen);
+    if (status.fault () == CameraFault::kBusy)
+      status = busy_or_twice (seen, i, std::move (status));
     CameraAbilities abilities;
     if (status.ok ())
       status = camera->abilities (abilities);
@@ -34,6 +53,7 @@ CamSourceSession::open_cameras ()
     }
     GST_INFO_OBJECT (element_, "%s is %s", pads_[i]->name (), camera->label ().c_str ());
     cameras_.push_back (std::move (camera));
+    set_has_cameras (true);
     abilities_.push_back (std::move (abilities));
   }
   return !quits ();
@@ -54,18 +74,19 @@ bool
 CamSourceSession::choose_format ()
 {
   std::string why;
-  GstCaps *offered = camera_source_caps (abilities_, settings_.format, settings_.single_shot, why);
+  std::vector<std::string> labels;
+  for (const auto &camera : cameras_)
+    labels.push_back (camera->label ());
+  GstCaps *offered =
+      camera_source_caps (abilities_, labels, settings_.format, settings_.single_shot, why);
   const std::vector<GstPad *> pads = gst_pads ();
   for (GstPad *pad : pads)
     gst_pad_check_reconfigure (pad);
   bool chosen = false;
   if (!gst_caps_is_empty (offered)) {
     chosen = choose_camera_format (offered, pads, abilities_, format_);
-    if (!chosen) {
-      gchar *text = gst_caps_to_string (offered);
-      why = std::string ("downstream takes none of the cameras' formats: ") + text;
-      g_free (text);
-    }
+    if (!chosen)
+      why = caps_conflict (offered, pads);
   }
   gst_caps_unref (offered);
   if (!chosen)
@@ -106,13 +127,15 @@ CamSourceSession::configure_cameras ()
       exposure_us = std::max (exposure_us, *look.exposure_us);
   }
   const auto exposure = static_cast<GstClockTime> (exposure_us * 1000);
+  exposure_ = exposure;
   /* the others are for what is on its way, and for downstream */
   const int waiting = settings_.n_buffers / 2 - 1;
-  pairing_.start (
-      static_cast<int> (cameras_.size ()), fires (), format_.period (), exposure, waiting);
-  const GstClockTime period = format_.period () > 0 ? format_.period () : 100 * GST_MSECOND;
-  /* exposed, and on its way no longer than until the next one */
-  const GstClockTime latency = MIN (exposure, period) + period;
+  using Fired = CamSourcePairing::Fired;
+  const Fired fired = fires ()                                     ? Fired::kHere
+                      : settings_.trigger == TriggerMode::kFreeRun ? Fired::kAlone
+                                                                   : Fired::kElsewhere;
+  pairing_.start (static_cast<int> (cameras_.size ()), fired, format_.period (), exposure, waiting);
+  const GstClockTime latency = latency_of (exposure, format_.period ());
   if (latency_.exchange (latency) != latency)
     gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
   return !quits ();
@@ -130,6 +153,7 @@ CamSourceSession::start_cameras ()
     counted_ = cameras_;
   }
   pairing_.forget ();
+  underruns_ = {};
   shortest_trip_us_ = {};
   was_playing_ = false;
   for (std::size_t i = 0; i < cameras_.size (); i++) {
@@ -144,6 +168,9 @@ CamSourceSession::start_cameras ()
       return false;
     }
   }
+  for (std::size_t i = 0; i < cameras_.size (); i++)
+    pulses_[i].start (cameras_[i]->is_gige () ? cameras_[i]->info ().address : "",
+        g_get_monotonic_time () * 1000);
   for (const auto &pad : pads_)
     pad->set_caps (stream_, format_.caps);
   read_clocks ();
@@ -192,7 +219,8 @@ CamSourceSession::start_ticker ()
     return;
   if (settings_.trigger == TriggerMode::kSoftware)
     triggers_.start (static_cast<int> (cameras_.size ()), [this] (int camera) {
-      if (CameraStatus status = cameras_[camera]->trigger_software (); !status.ok ())
+      CameraStatus status = cameras_[camera]->trigger_software ();
+      if (!status.ok () && !fail_if_gone (*cameras_[camera], status))
         fail (std::move (status));
     });
   if (settings_.trigger == TriggerMode::kAction) {
@@ -236,8 +264,9 @@ CamSourceSession::fire (GstClockTime tick)
 }
 
 /* The middle of the round trip is only as good as the trip is short: of several, the shortest;
- * later ones only if they are no longer than twice that. @return false: the camera does not tell */
-static bool
+ * later ones only if they are no longer than twice that. @return not ok: the camera does not tell
+ */
+static CameraStatus
 read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
 {
   const bool first = shortest_us == 0;
@@ -245,8 +274,8 @@ read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
     std::uint64_t camera_ns = 0;
     std::int64_t read_at_us = 0;
     const gint64 begin = g_get_monotonic_time ();
-    if (!camera.read_clock (camera_ns, read_at_us).ok () || camera_ns == 0)
-      return false;
+    if (CameraStatus status = camera.read_clock (camera_ns, read_at_us); !status.ok ())
+      return status;
     const gint64 trip = MAX (g_get_monotonic_time () - begin, 1);
     if (shortest_us == 0 || trip < shortest_us || (!first && trip <= 2 * shortest_us)) {
       shortest_us = shortest_us == 0 ? trip : MIN (shortest_us, trip);
@@ -255,7 +284,7 @@ read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
       shortest_us += shortest_us / 2 + 10; /* a clock drifts: what is old gets worse */
     }
   }
-  return true;
+  return {};
 }
 
 /* Cameras that follow one IEEE 1588 clock get one offset, so that their stamps compare exactly. */
@@ -270,8 +299,11 @@ CamSourceSession::read_clocks ()
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     if (i == 0 || !ptp)
       offset = kNotRead;
-    if (offset == kNotRead && !read_offset (*cameras_[i], shortest_trip_us_[i], offset) && !ptp)
-      return;
+    if (offset == kNotRead) {
+      const CameraStatus status = read_offset (*cameras_[i], shortest_trip_us_[i], offset);
+      if (fail_if_gone (*cameras_[i], status) || (!status.ok () && !ptp))
+        return;
+    }
     if (offset != kNotRead)
       pairing_.set_clock_offset (static_cast<int> (i), offset);
   }
@@ -289,6 +321,7 @@ CamSourceSession::stop_cameras ()
   pairing_.drop_waiting ();
   bank_statistics ();
   cameras_.clear ();
+  set_has_cameras (false);
 }
 
 /* Cameras that stand still count from 0 when they begin again. */

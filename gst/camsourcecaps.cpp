@@ -74,24 +74,35 @@ caps_of_format (const std::string &name)
 }
 
 static std::string
-list_of (std::span<const CameraAbilities> cameras)
+formats_of (const CameraAbilities &camera)
 {
   std::string text;
-  for (const CameraAbilities &camera : cameras) {
-    text += text.empty () ? "" : "; ";
-    for (const std::string &name : camera.pixel_formats)
-      text += name + " ";
-    for (const std::string &name : camera.other_formats)
-      text += name + " (not carried) ";
-    if (!text.empty () && text.back () == ' ')
-      text.pop_back ();
+  for (const std::string &name : camera.pixel_formats)
+    text += (text.empty () ? "" : ", ") + name;
+  for (const std::string &name : camera.other_formats)
+    text += (text.empty () ? "" : ", ") + name + " (not carried)";
+  return text.empty () ? "none" : text;
+}
+
+/* Cameras with one list are named together. */
+static std::string
+list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> labels)
+{
+  std::string text, who;
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    who += (who.empty () ? "" : " and ") + labels[i];
+    const std::string formats = formats_of (cameras[i]);
+    if (i + 1 < cameras.size () && formats == formats_of (cameras[i + 1]))
+      continue;
+    text += (text.empty () ? "" : "; ") + who + ": " + formats;
+    who.clear ();
   }
   return text;
 }
 
 GstCaps *
-camera_source_caps (std::span<const CameraAbilities> cameras, const std::string &pixel_format,
-    bool single_shot, std::string &why)
+camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const std::string> labels,
+    const std::string &pixel_format, bool single_shot, std::string &why)
 {
   const SizeRange widths = common_range (cameras, true), heights = common_range (cameras, false);
   GstCaps *caps = gst_caps_new_empty ();
@@ -104,7 +115,8 @@ camera_source_caps (std::span<const CameraAbilities> cameras, const std::string 
       gst_caps_append (caps, caps_of_format (name));
   if (gst_caps_is_empty (caps))
     why = "the cameras have no pixel format in common that is " +
-          (pixel_format.empty () ? "carried" : pixel_format) + "; they have: " + list_of (cameras);
+          (pixel_format.empty () ? "carried" : pixel_format) +
+          "; they have: " + list_of (cameras, labels);
   for (guint i = 0; i < gst_caps_get_size (caps); i++) {
     GstStructure *structure = gst_caps_get_structure (caps, i);
     set_range (structure, "width", widths);

@@ -34,7 +34,8 @@ struct CamSourceFormat {
  *  @param[out] why      if the result is empty: what they lack in common
  *  @return transfer full */
 GstCaps *camera_source_caps (std::span<const CameraAbilities> cameras,
-    const std::string &pixel_format, bool single_shot, std::string &why);
+    std::span<const std::string> labels, const std::string &pixel_format, bool single_shot,
+    std::string &why);
 
 /** The format that the peers of all pads take: the largest pictures, the rate nearest to 30 a
  *  second. Pads without a peer take all.

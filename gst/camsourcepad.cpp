@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "camsourcepad.hpp"
 
+#include <chrono>
 #include <utility>
 
 CamSourcePad::CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed)
     : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))), flowed_ (std::move (flowed))
 {
+  flush_probe_ = gst_pad_add_probe (pad_, GST_PAD_PROBE_TYPE_EVENT_FLUSH, see_flush, this, nullptr);
 }
 
 CamSourcePad::~CamSourcePad ()
 {
+  gst_pad_remove_probe (pad_, flush_probe_);
   clear ();
   gst_clear_caps (&caps_);
   gst_object_unref (pad_);
@@ -135,6 +138,35 @@ CamSourcePad::next_item ()
   return item;
 }
 
+/* ---- flushes that are not ours ---- */
+
+GstPadProbeReturn
+CamSourcePad::see_flush (GstPad *, GstPadProbeInfo *info, gpointer self)
+{
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
+    static_cast<CamSourcePad *> (self)->flushed_by_others ();
+  return GST_PAD_PROBE_OK;
+}
+
+/* The pad has forgotten its segment. The task may have ended because the branch had. */
+void
+CamSourcePad::flushed_by_others ()
+{
+  std::lock_guard guard (lock_);
+  if (flushing_)
+    return; /* it is ours, or the pad is not active */
+  flushed_ = discont_ = true;
+  gst_pad_start_task (pad_, loop, this, nullptr);
+}
+
+/* What is pushed meanwhile is refused. */
+void
+CamSourcePad::wait_while_flushing ()
+{
+  std::unique_lock guard (lock_);
+  changed_.wait_for (guard, std::chrono::milliseconds (20), [this] { return flushing_; });
+}
+
 /* ---- the task ---- */
 
 void
@@ -189,11 +221,17 @@ CamSourcePad::one_item ()
     return;
   }
   const bool picture = GST_IS_BUFFER (item);
+  {
+    std::lock_guard guard (lock_);
+    needs_segment_ |= std::exchange (flushed_, false);
+  }
   const GstFlowReturn flow = push (item);
   const bool tells = picture || flow == GST_FLOW_NOT_NEGOTIATED; /* of the peer's wishes */
   if (tells && flow != GST_FLOW_FLUSHING && std::exchange (last_flow_, flow) != flow)
     flowed_ (*this, flow);
-  if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* it may be linked again */
+  if (flow == GST_FLOW_FLUSHING)
+    wait_while_flushing ();
+  else if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* it may be linked again */
     gst_pad_pause_task (pad_);
 }
 

@@ -54,7 +54,10 @@ private:
   static constexpr guint kMostPictures = 3; ///< beyond the one that is being pushed
   static constexpr guint kMostItems = 16;   ///< with events
 
+  static GstPadProbeReturn see_flush (GstPad *pad, GstPadProbeInfo *info, gpointer self);
   static void loop (gpointer self);
+  void flushed_by_others ();
+  void wait_while_flushing ();
   void one_item ();
   GstMiniObject *next_item ();
   void put (GstMiniObject *item);
@@ -68,6 +71,7 @@ private:
   GstElement *element_;
   GstPad *pad_;
   Flowed flowed_;
+  gulong flush_probe_ = 0;
   std::atomic<guint64> overrun_ = 0;
 
   std::mutex lock_; /* guards down to the blank line */
@@ -75,6 +79,7 @@ private:
   std::array<GstMiniObject *, kMostItems> ring_{};
   guint first_ = 0, count_ = 0, pictures_ = 0;
   bool flushing_ = true, ended_ = false, discont_ = true;
+  bool flushed_ = false;    ///< by an event that the application pushed on the pad
   GstCaps *caps_ = nullptr; ///< the last that were put
   guint group_id_ = 0;
 

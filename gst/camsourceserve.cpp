@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <gstrange/gstrange.h>
+#include <span>
 
 GST_DEBUG_CATEGORY_EXTERN (gst_stereo_cam_src_debug);
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
@@ -14,6 +15,7 @@ static constexpr std::int64_t kClockRead = 5 * kSecond; ///< cameras' clocks dri
 static constexpr std::int64_t kStatsMessage = 5 * kSecond;
 static constexpr std::int64_t kSilence = kSecond;      ///< of all cameras, before GAPs say so
 static constexpr std::int64_t kPatience = 3 * kSecond; ///< for a frame of a camera that runs
+static constexpr int kPeriods = 3;                     ///< ... or so many, if they are longer
 
 CamSourceSession::End
 CamSourceSession::serve ()
@@ -183,41 +185,75 @@ CamSourceSession::send_gaps (GstClockTime until_ago)
 
 /* ---- ten times a second ---- */
 
+/* However cameras are fired, and also while they have nothing to send. */
+void
+CamSourceSession::feel_pulses (std::int64_t now_ns)
+{
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    pulses_[i].feel (pairing_.last_arrival (static_cast<int> (i)), now_ns);
+    if (pulses_[i].is_gone (now_ns))
+      lose (*cameras_[i]);
+  }
+}
+
+void
+CamSourceSession::watch_clock (std::int64_t now_ns, std::int64_t most_ns)
+{
+  if (!fires () || now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) <= most_ns)
+    return;
+  fail ({CameraFault::kTimedOut,
+      "the pipeline's clock does not go on: no tick for " + std::to_string (most_ns / kSecond) +
+          " s" +
+          (settings_.clock_server.empty () ? ""
+                                           : "; is clock-server " + settings_.clock_server +
+                                                 " still the one that it was?")});
+}
+
+/* Cameras that must send pictures, and answer, but send none. */
 void
 CamSourceSession::watch_cameras (std::int64_t now_ns)
 {
   const bool comes_by_itself =
-      settings_.trigger == TriggerMode::kFreeRun || (fires () && !settings_.single_shot);
+      settings_.trigger == TriggerMode::kFreeRun || (fires () && !settings_.single_shot) ||
+      (settings_.trigger == TriggerMode::kHardware && !settings_.output_line.empty ());
   if (!comes_by_itself || !was_playing_)
     return;
-  const std::int64_t most = std::max (kPatience, 10 * static_cast<std::int64_t> (latency_.load ()));
+  const std::int64_t most =
+      std::max (kPatience, kPeriods * static_cast<std::int64_t> (format_.period () + exposure_));
   if (GST_CLOCK_TIME_IS_VALID (sent_until_) && last_sent_ns_ > 0 &&
       now_ns - last_sent_ns_ > std::max (kSilence, most / 2))
     send_gaps (latency_); /* what is under way may still come */
-  if (fires () && now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) > most) {
-    fail ({CameraFault::kTimedOut,
-        "the pipeline's clock does not go on: no tick for " + std::to_string (most / kSecond) +
-            " s" +
-            (settings_.clock_server.empty () ? ""
-                                             : "; is clock-server " + settings_.clock_server +
-                                                   " still the one that it was?")});
-    return;
-  }
+  watch_clock (now_ns, most);
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     const std::int64_t last =
         std::max (pairing_.last_arrival (static_cast<int> (i)), playing_since_ns_);
-    if (now_ns - last > most)
+    if (now_ns - last > most && !pulses_[i].is_doubtful ())
       fail ({CameraFault::kTimedOut, cameras_[i]->label () + ": no picture for " +
                                          std::to_string ((now_ns - last) / kSecond) +
-                                         " s; expected one each frame period (is the way for its "
-                                         "packets open, is its trigger connected?)"});
+                                         " s, although it answers; expected one each frame period "
+                                         "(is the way for its packets open, is its trigger "
+                                         "connected?)"});
   }
+}
+
+/* Pictures are lost for want of buffers, and it is not just that a camera sent many at once. */
+bool
+CamSourceSession::keeps_buffers ()
+{
+  bool keeps = false;
+  for (std::size_t i = 0; i < cameras_.size (); i++) {
+    const CameraStatistics now = cameras_[i]->statistics ();
+    const bool lost = now.underruns > underruns_[i];
+    keeps |= lost && now.buffers_out >= settings_.n_buffers - 1;
+    underruns_[i] = now.underruns;
+  }
+  return keeps;
 }
 
 void
 CamSourceSession::warn_once (const CameraStatistics &all)
 {
-  if (all.underruns > 0 && !std::exchange (said_underruns_, true))
+  if (keeps_buffers () && !std::exchange (said_underruns_, true))
     GST_ELEMENT_WARNING (element_, RESOURCE, NO_SPACE_LEFT,
         ("Pictures are lost because downstream keeps all buffers of a camera: raise property "
          "buffers above %d, or make downstream faster",
@@ -248,14 +284,17 @@ void
 CamSourceSession::look_around ()
 {
   const std::int64_t now = g_get_monotonic_time () * 1000;
+  feel_pulses (now);
   watch_cameras (now);
   warn_once (camera_statistics ());
   if (pairing_.clocks_are_off ()) {
     shortest_trip_us_ = {};
-    read_clocks ();
-  } else if (now - last_clock_read_ns_ > kClockRead) {
-    read_clocks ();
+    last_clock_read_ns_ = 0;
   }
+  const bool all_answer = std::ranges::all_of (
+      std::span (pulses_).first (cameras_.size ()), [] (const auto &p) { return p.is_sure (); });
+  if (all_answer && now - last_clock_read_ns_ > kClockRead) /* else it would wait */
+    read_clocks ();
   if (now - last_stats_ns_ > kStatsMessage && was_playing_) {
     last_stats_ns_ = now;
     raise_latency ();

@@ -16,6 +16,25 @@ using Milliseconds = std::chrono::milliseconds;
 static constexpr Milliseconds kRetry{1000}, kGapTime{100};
 static constexpr GstClockTime kClockPatience = 10 * GST_SECOND;
 
+/* Exposed, and on its way no longer than until the next one: else pictures would pile up. */
+GstClockTime
+CamSourceSession::latency_of (GstClockTime exposure, GstClockTime period)
+{
+  const GstClockTime longest = period > 0 ? period : 100 * GST_MSECOND; /* of single shots */
+  return MIN (exposure, longest) + longest;
+}
+
+/* What is asked before the cameras have answered is what it will mostly be: the rate where
+ * downstream leaves a choice, and the exposure that is wanted. */
+static GstClockTime
+first_latency (const CamSourceSettings &settings, const CamSourceSession *previous)
+{
+  if (previous && previous->latency () > 0)
+    return previous->latency ();
+  const auto exposure = static_cast<GstClockTime> (settings.exposure_us * 1000);
+  return CamSourceSession::latency_of (exposure, settings.single_shot ? 0 : GST_SECOND / 30);
+}
+
 CamSourceSession::CamSourceSession (Setup setup)
     : element_ (GST_ELEMENT (gst_object_ref (setup.element))),
       settings_ (std::move (setup.settings)), names_ (std::move (setup.names)),
@@ -23,6 +42,7 @@ CamSourceSession::CamSourceSession (Setup setup)
       clock_ (setup.clock ? GST_CLOCK (gst_object_ref (setup.clock)) : nullptr),
       previous_ (std::move (setup.previous)), ticker_ (setup.element)
 {
+  latency_ = first_latency (settings_, previous_.get ());
   for (const auto &pad : pads_)
     gst_flow_combiner_add_pad (flows_, pad->pad ());
 }
@@ -75,8 +95,9 @@ CamSourceSession::run ()
       ;
   previous_.reset ();
   while (!quits () && one_guarded_life () == End::kFault) {
+    const bool goes_on = stands_fault ();
     stop_cameras ();
-    if (!stands_fault ())
+    if (!goes_on)
       break;
     rest_before_retry ();
   }
@@ -122,6 +143,8 @@ CamSourceSession::one_life ()
       say ("stereocamsrc-back", "left", cameras_[0]->label ());
     }
     end = serve ();
+    if (end == End::kFault)
+      (void)stands_fault (); /* what follows may wait for a camera that does not answer */
     ticker_.stop ();
     look_.stop ();
     triggers_.stop ();
@@ -164,6 +187,25 @@ CamSourceSession::fail (CameraStatus status)
   if (fault_.ok ()) /* the first is the cause of the others */
     fault_ = std::move (status);
   changed_.notify_all ();
+}
+
+void
+CamSourceSession::lose (Camera &camera)
+{
+  camera.give_up ();
+  fail ({CameraFault::kLost, lost_text (camera.label ())});
+}
+
+/* @param status  of a call that was made while the camera ran */
+bool
+CamSourceSession::fail_if_gone (Camera &camera, const CameraStatus &status)
+{
+  const CameraFault fault = status.fault ();
+  const bool gone = fault == CameraFault::kTimedOut || fault == CameraFault::kLost ||
+                    fault == CameraFault::kBusy; /* others have control now */
+  if (gone)
+    lose (camera);
+  return gone;
 }
 
 struct ErrorDomain {
@@ -219,9 +261,17 @@ CamSourceSession::say (const char *name, const char *field, const std::string &v
   gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), structure));
 }
 
-/* @return false: it is the end */
+/* Tells a life's fault, once. @return false: it is the end */
 bool
 CamSourceSession::stands_fault ()
+{
+  if (!stands_)
+    stands_ = tell_fault ();
+  return *stands_;
+}
+
+bool
+CamSourceSession::tell_fault ()
 {
   bool may = false;
   GstFlowReturn flow = GST_FLOW_OK;
@@ -263,6 +313,7 @@ CamSourceSession::rest_before_retry ()
     {
       std::unique_lock guard (lock_);
       fault_ = {};
+      stands_.reset ();
       if (changed_.wait_for (guard, kGapTime, [this] { return quit_; }))
         return;
     }
@@ -306,6 +357,21 @@ CamSourceSession::ask_to_stop ()
     changed_.notify_all ();
   }
   ticker_.set_playing (false);
+}
+
+bool
+CamSourceSession::wait_for_cameras (Milliseconds most)
+{
+  std::unique_lock guard (lock_);
+  return changed_.wait_for (guard, most, [this] { return ended_ || !has_cameras_; });
+}
+
+void
+CamSourceSession::set_has_cameras (bool has)
+{
+  std::lock_guard guard (lock_);
+  has_cameras_ = has;
+  changed_.notify_all ();
 }
 
 bool

@@ -7,10 +7,12 @@
 #include <action_command.hpp>
 #include <atomic>
 #include <camera.hpp>
+#include <camera_pulse.hpp>
 #include <condition_variable>
 #include <look_follower.hpp>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "camsourcecaps.hpp"
@@ -52,6 +54,9 @@ public:
   void ask_to_stop ();
   /** @return false if it still runs after that time */
   bool wait_for_end (std::chrono::milliseconds most);
+  /** Until other programs may have the cameras. While none is open, as when it is still looked for,
+   *  that is at once. @return false if it still has some after that time */
+  bool wait_for_cameras (std::chrono::milliseconds most);
   /** An EOS event of the application's. */
   void end (guint32 seqnum);
   /** What waits between frames is forgotten. */
@@ -62,6 +67,8 @@ public:
 
   /** From a picture's time to when it is handed out, ns; what is known of it. */
   [[nodiscard]] GstClockTime latency () const { return latency_; }
+  /** What it is by what was set. @param period  0: single shots */
+  static GstClockTime latency_of (GstClockTime exposure, GstClockTime period);
   /** Transfer full. */
   GstStructure *stats ();
 
@@ -77,10 +84,13 @@ private:
   End one_life ();
   bool open_with_gaps ();
   bool stands_fault ();
+  bool tell_fault ();
   void rest_before_retry ();
   void post_fault (bool warning);
   void say (const char *name, const char *field, const std::string &value);
   void fail (CameraStatus status);
+  void lose (Camera &camera);
+  bool fail_if_gone (Camera &camera, const CameraStatus &status);
   void finish (guint32 seqnum);
   [[nodiscard]] bool quits ();
   bool wait_for_clock ();
@@ -95,11 +105,13 @@ private:
 
   /* camsourcecameras.cpp: the cameras */
   bool open_cameras ();
+  CameraStatus busy_or_twice (const CameraInfo &seen, std::size_t camera, CameraStatus busy) const;
   bool choose_format ();
   bool configure_cameras ();
   bool start_cameras ();
   bool wait_for_ptp ();
   void bank_statistics ();
+  void set_has_cameras (bool has);
   void stop_cameras ();
   void start_ticker ();
   void fire (GstClockTime tick);
@@ -117,7 +129,10 @@ private:
   void raise_latency ();
   void look_around ();
   void send_gaps (GstClockTime until_ago = 0);
+  void feel_pulses (std::int64_t now_ns);
+  void watch_clock (std::int64_t now_ns, std::int64_t most_ns);
   void watch_cameras (std::int64_t now_ns);
+  bool keeps_buffers ();
   void warn_once (const CameraStatistics &all);
   CameraStatistics camera_statistics ();
 
@@ -135,7 +150,8 @@ private:
 
   std::mutex lock_; /* guards down to the blank line */
   std::condition_variable changed_;
-  bool quit_ = false, ended_ = false, playing_ = false, eos_ = false, flushed_ = false;
+  bool quit_ = false, ended_ = false, has_cameras_ = false, playing_ = false, eos_ = false,
+       flushed_ = false;
   struct Arrival {
     int camera;
     CameraFrame frame;
@@ -150,6 +166,7 @@ private:
   /* This thread's. */
   std::vector<std::shared_ptr<Camera>> cameras_;
   std::vector<CameraAbilities> abilities_;
+  std::array<CameraPulse, kMaxCameras> pulses_;
   LookFollower look_;
   SimultaneousCalls triggers_;
   ActionSender action_;
@@ -160,6 +177,9 @@ private:
   std::int64_t playing_since_ns_ = 0, last_look_ns_ = 0, last_clock_read_ns_ = 0,
                last_stats_ns_ = 0, last_sent_ns_ = 0;
   guint64 sent_ = 0;
+  GstClockTime exposure_ = 0; ///< of the one that exposes longest, ns; 0: not known
+  std::array<std::uint64_t, kMaxCameras> underruns_{}; ///< when it was last looked
+  std::optional<bool> stands_;                         ///< the fault of this life, once it was told
   std::array<std::int64_t, kMaxCameras> shortest_trip_us_{}; ///< to a camera's clock and back
   GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE, gap_until_ = 0;
 };

@@ -90,8 +90,9 @@ static const IntegerRow kIntegers[] = {
     {"buffers", "Buffers",
         "Pictures of each camera that may be under way, downstream and in it (default 8)", 2, 256,
         FIELD (int, n_buffers)},
-    {"num-buffers", "num-buffers", "Pairs to put out before EOS (default -1: no end)", -1, G_MAXINT,
-        FIELD (int, num_buffers)},
+    {"num-buffers", "num-buffers",
+        "Sets, one picture of each camera, to put out before EOS (default -1: no end)", -1,
+        G_MAXINT, FIELD (int, num_buffers)},
 };
 
 static const UnsignedRow kUnsigneds[] = {
@@ -281,6 +282,11 @@ CamSourceSettings::find_names (CameraNames &found) const
       return s;
     found = {of_rig[0], of_rig[1], names[2].empty () ? of_rig[2] : names[2]};
   }
+  if (found[0].empty () != found[1].empty () && !rig.empty ())
+    return {StatusCode::kNotFound,
+        std::string ("no ") + (found[0].empty () ? "left" : "right") + " camera: property " +
+            (found[0].empty () ? "right" : "left") +
+            " names one, so rig is not asked; expected both left and right, or neither and rig"};
   if (found[0].empty () || found[1].empty ())
     return {StatusCode::kNotFound, std::string ("no ") + (found[0].empty () ? "left" : "right") +
                                        " camera: expected property " +
@@ -291,6 +297,18 @@ CamSourceSettings::find_names (CameraNames &found) const
       if (found[i] == found[j])
         return {StatusCode::kBadValue,
             "camera " + found[i] + " is named twice; expected different cameras"};
+  return {};
+}
+
+Status
+CamSourceSettings::check () const
+{
+  const bool by_element = trigger == TriggerMode::kSoftware || trigger == TriggerMode::kAction;
+  if (single_shot && !by_element)
+    return {StatusCode::kBadValue,
+        std::string ("single-shot with trigger=") +
+            (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware") +
+            ": the cameras are not fired by this element; expected trigger=software or action"};
   return {};
 }
 

@@ -43,6 +43,8 @@ struct CamSourceSettings {
   /** The names, from the rig file where there is none.
    *  @return kNotFound, kBadValue: the text says which property, or the file */
   rangecast::Status find_names (CameraNames &found) const;
+  /** Whether the properties go together. @return kBadValue: the text says which do not */
+  [[nodiscard]] rangecast::Status check () const;
   /** For one camera. Size and frame rate are still to be set. @param camera  0 is the left one */
   [[nodiscard]] CameraSettings for_camera (int camera) const;
   /** Whether the left camera's regulators steer the others, too. */

@@ -27,6 +27,7 @@
 #include <rangecast/guarded.hpp>
 
 #include "controlledvalues.hpp"
+#include "statsreporter.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
@@ -49,6 +50,7 @@ enum {
   PROP_BODIES,
   PROP_N_THREADS,
   PROP_STATS,
+  PROP_STATS_INTERVAL,
 };
 
 enum GstCylinderFilterMode {
@@ -66,7 +68,7 @@ static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
 struct CylinderCounts {
   guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0, units_held = 0,
-          units_changed = 0;
+          units_changed = 0, untouched = 0; /* frame sets while the mode is off */
   int bodies = 0;
   rangecast::Axis axis;
 };
@@ -79,6 +81,7 @@ struct GstCylinderFilterPrivate {
   double blend_width = kDefaultBlendWidth;
   rangecast::ColourMatch colours; /* streaming thread only */
   CylinderCounts counts;
+  StatsReporter reporter; /* has locks of its own */
 
   /* Streaming thread only. */
   rangecast::CylinderFilter core;
@@ -171,6 +174,7 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     gstrange::RangeInfo info;
     rangecast::Status result = gstrange::parse_caps (in, info);
+    priv->reporter.set_views (info.rig);
     if (result.ok ())
       result = priv->core.set_rig (info.rig);
     return result.ok () ? priv->colours.set_rig (info.rig) : result;
@@ -212,7 +216,10 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   sync_controlled_values (base, buffer);
   std::unique_lock guard (priv->lock);
   const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  priv->counts.untouched += off;
   guard.unlock ();
+  if (off)
+    priv->reporter.passed (GST_ELEMENT (base), buffer);
   if (off && !priv->was_off) /* nobody looks at what the scene does meanwhile */
     gst_cylinder_filter_forget_scene (priv);
   priv->was_off = off;
@@ -263,6 +270,7 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
     gst_cylinder_filter_count (priv, result);
   GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
       result.points_out, result.points_in);
+  priv->reporter.passed (GST_ELEMENT (self), buffer);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
@@ -274,7 +282,18 @@ gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP ||
       GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
     gst_cylinder_filter_forget (GST_CYLINDER_FILTER (base)->priv);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    GST_CYLINDER_FILTER (base)->priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
+}
+
+static std::vector<StatsRow>
+gst_cylinder_filter_collect (GstElement *element)
+{
+  auto priv = GST_CYLINDER_FILTER (element)->priv;
+  const std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->counts.frames + priv->counts.untouched,
+               .points = priv->counts.points_out}}};
 }
 
 static gboolean
@@ -283,6 +302,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   gst_cylinder_filter_forget (priv);
   priv->was_off = false;
+  priv->reporter.start (GST_ELEMENT (base), gst_cylinder_filter_collect);
   const std::lock_guard guard (priv->lock);
   priv->counts = {};
   return TRUE;
@@ -291,6 +311,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
 static gboolean
 gst_cylinder_filter_stop (GstBaseTransform *base)
 {
+  GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
   /* With the stream its memory goes too. */
   GST_CYLINDER_FILTER (base)->priv->core = {};
   GST_CYLINDER_FILTER (base)->priv->colours = {};
@@ -393,6 +414,9 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
       break;
+    case PROP_STATS_INTERVAL:
+      self->priv->reporter.set_interval (g_value_get_uint (value));
+      break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
@@ -472,6 +496,9 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
       break;
     case PROP_STATS:
       g_value_take_boxed (value, gst_cylinder_filter_stats (priv->counts));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -620,6 +647,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
           "READY; bodies, axis-position, axis-direction of the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

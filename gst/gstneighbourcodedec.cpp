@@ -38,6 +38,7 @@
 
 #include "concealment.hpp"
 #include "recycledbuffers.hpp"
+#include "statsreporter.hpp"
 
 using rangecast::DecoderResult;
 using rangecast::Status;
@@ -45,7 +46,14 @@ using rangecast::Status;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
 
-enum { PROP_0, PROP_CONCEAL, PROP_REQUEST_KEY_UNITS, PROP_N_THREADS, PROP_STATS };
+enum {
+  PROP_0,
+  PROP_CONCEAL,
+  PROP_REQUEST_KEY_UNITS,
+  PROP_N_THREADS,
+  PROP_STATS,
+  PROP_STATS_INTERVAL
+};
 
 /* Upstream is asked for a key frame set no more often. */
 static constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
@@ -59,6 +67,8 @@ struct GstNeighbourCodeDecPrivate {
   int n_threads = 0;
   guint64 frames = 0, coded_bytes = 0;
   DecoderResult totals;
+
+  StatsReporter reporter; /* has locks of its own */
 
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
@@ -144,6 +154,7 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
     priv->shown.change_rig (priv->decoder.rig (), info.rig);
   if (status.ok ())
     status = priv->decoder.set_rig (info.rig);
+  priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   forget_slices (priv);
@@ -295,6 +306,7 @@ decode_frame_set (
     gst_range_buffer_set_capture_time (*output, capture);
   GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
   keep_for_concealment (priv, *output);
+  priv->reporter.passed (GST_ELEMENT (self), *output);
   return GST_FLOW_OK;
 }
 
@@ -409,15 +421,30 @@ gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
     default:
       break;
   }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    self->priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event);
 }
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const DecoderResult &totals = priv->totals;
+  return {{.counters = {.frames = priv->frames,
+               .points = totals.points,
+               .bytes = priv->coded_bytes,
+               .lost = totals.missing_pixels + totals.unknown_pixels}}};
+}
+
 static gboolean
 gst_neighbour_code_dec_start (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};
@@ -428,6 +455,7 @@ static gboolean
 gst_neighbour_code_dec_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
+  priv->reporter.stop ();
   forget_stream (priv);
   drop_pool (priv->pool);
   return TRUE;
@@ -448,6 +476,9 @@ gst_neighbour_code_dec_set_property (
       break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
+      break;
+    case PROP_STATS_INTERVAL:
+      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -483,6 +514,9 @@ gst_neighbour_code_dec_get_property (GObject *object, guint id, GValue *value, G
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -539,6 +573,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
           "unknown-pixels, raw-bytes, "
           "coded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

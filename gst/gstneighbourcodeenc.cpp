@@ -35,8 +35,10 @@
 
 #include "controlledvalues.hpp"
 #include "keyunitrequests.hpp"
+#include "neighbourcodeenums.hpp"
 #include "neighbourcoderate.hpp"
 #include "recycledbuffers.hpp"
+#include "statsreporter.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -60,7 +62,9 @@ enum {
   PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
   PROP_N_THREADS,
   PROP_MAX_DEPTH_ERROR,
-  PROP_STATS
+  PROP_ESTIMATED_BITRATE,
+  PROP_STATS,
+  PROP_STATS_INTERVAL
 };
 
 static constexpr EncoderSettings kDefaults;
@@ -78,19 +82,20 @@ struct GstNeighbourCodeEncPrivate {
   int n_threads = 0;
   KeySettings key_settings;
   double max_depth_error_m = 0;
-  guint64 frames = 0, coded_bytes = 0;
+  guint64 frames = 0, coded_bytes = 0, left_out = 0;
   EncoderResult totals;
   EncoderSettings latest; /* of the latest frame set */
   double bits_per_s = 0;
 
   KeyUnitRequests key_requests;
+  StatsReporter reporter; /* has locks of its own */
 
   /* streaming thread only */
   gstrange::RangeInfo info;
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured;
   bool is_configured = false;
-  NeighbourCodeRate rate;
+  NeighbourCodeRate rate; /* what its receivers say: any thread */
   std::uint32_t frame_number = 0;
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
@@ -116,49 +121,6 @@ G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSF
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
 
-#define GST_TYPE_NEIGHBOUR_CODE_PROFILE (gst_neighbour_code_profile_get_type ())
-static GType
-gst_neighbour_code_profile_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
-        {int (rangecast::Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
-        {int (rangecast::Profile::kEntropy), "Adaptive probabilities and a range coder", "entropy"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeProfile", values);
-  }();
-  return type;
-}
-
-#define GST_TYPE_NEIGHBOUR_CODE_CHOICE (gst_neighbour_code_choice_get_type ())
-static GType
-gst_neighbour_code_choice_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::NeighbourChoice::kFirst), "Left, upper-left, upper, upper-right", "first"},
-        {int (rangecast::NeighbourChoice::kBest), "What costs least in error and bits, slower",
-            "best"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeChoice", values);
-  }();
-  return type;
-}
-
-#define GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE (gst_neighbour_code_depth_scale_get_type ())
-static GType
-gst_neighbour_code_depth_scale_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::DepthScale::kLinear), "Codes are linear in depth", "linear"},
-        {int (rangecast::DepthScale::kInverse), "Codes are linear in 1/depth", "inverse"}, {}};
-    return g_enum_register_static ("GstNeighbourCodeDepthScale", values);
-  }();
-  return type;
-}
-
 /* ---- caps ---- */
 
 static GstCaps *
@@ -181,6 +143,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   const GstStructure *structure = gst_caps_get_structure (out, 0);
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
+  priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders begin anew with new caps */
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   forget_input (priv);
@@ -233,13 +196,10 @@ encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSet
   guint64 pixels = 0;
   for (const rangecast::RangeImage &image : frame.views ())
     pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
-  const GstClockTime interval = frame_interval (priv->info);
   /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
   if (settings.encoder.temporal && !(priv->is_configured && priv->configured.temporal))
     priv->frame_number = g_random_int ();
-  if (Status s = configure (
-          priv, priv->rate.next (settings.encoder, settings.rate, input, pixels, interval));
-      !s.ok ())
+  if (Status s = configure (priv, priv->rate.next (settings.encoder, pixels)); !s.ok ())
     return s;
   const Status status =
       priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
@@ -301,10 +261,36 @@ note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &resu
     gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
 }
 
+/* Downstream learns that nothing comes for this time. */
+static void
+leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->left_out++;
+  }
+  const GstClockTime pts = GST_BUFFER_PTS (input), duration = GST_BUFFER_DURATION (input);
+  forget_input (self->priv);
+  if (GST_CLOCK_TIME_IS_VALID (pts))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (pts, duration));
+}
+
+static void
+tell_news (GstNeighbourCodeEnc *self)
+{
+  GstMessage *news = self->priv->rate.take_news (GST_OBJECT (self));
+  if (!news)
+    return;
+  gst_element_post_message (GST_ELEMENT (self), news);
+  g_object_notify (G_OBJECT (self), "estimated-bitrate");
+}
+
+/* The frame set in `input`; forgets it if it is left out. */
 static GstFlowReturn
-encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
+encode_input (GstNeighbourCodeEnc *self)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *input = priv->input;
   sync_controlled_values (GST_BASE_TRANSFORM (self), input);
   FrameSettings settings;
   {
@@ -312,6 +298,12 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
     settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_settings};
   }
   settings.encoder.frame_interval_ns = frame_interval (priv->info);
+  const bool keeps = priv->rate.begin (settings.rate, input, settings.encoder.frame_interval_ns);
+  tell_news (self);
+  if (!keeps) {
+    leave_out (self, input);
+    return GST_FLOW_OK;
+  }
   prepare_key (self, input, settings.key);
   EncoderResult result;
   const Status status = encode_frame (priv, input, settings, result);
@@ -319,6 +311,7 @@ encode_buffer (GstNeighbourCodeEnc *self, GstBuffer *input)
     return gst_range_flow_return (GST_ELEMENT (self), status);
   note_key (self, input, result);
   count_frame (priv, result, priv->encoder.size ());
+  priv->reporter.passed (GST_ELEMENT (self), input);
   return GST_FLOW_OK;
 }
 
@@ -403,7 +396,7 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
   if (base->queued_buf) {
     forget_input (priv);
     priv->input = g_steal_pointer (&base->queued_buf);
-    const GstFlowReturn flow = encode_buffer (self, priv->input);
+    const GstFlowReturn flow = encode_input (self);
     if (flow != GST_FLOW_OK) {
       forget_input (priv);
       return flow;
@@ -444,6 +437,8 @@ gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->encoder.request_key ();
     priv->key_requests.forget ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
+    priv->reporter.finish ();
   }
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->sink_event (base, event);
 }
@@ -451,7 +446,8 @@ gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
 static gboolean
 gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
 {
-  if (GST_NEIGHBOUR_CODE_ENC (base)->priv->key_requests.note (event)) {
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event) || priv->rate.receivers.note (event)) {
     gst_event_unref (event);
     return TRUE;
   }
@@ -459,6 +455,15 @@ gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
 }
 
 /* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {
+               .frames = priv->frames, .points = priv->totals.points, .bytes = priv->coded_bytes}}};
+}
 
 static gboolean
 gst_neighbour_code_enc_start (GstBaseTransform *base)
@@ -468,10 +473,11 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.forget ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frame_number = 0;
   priv->bits_per_s = 0;
-  priv->frames = priv->coded_bytes = 0;
+  priv->frames = priv->coded_bytes = priv->left_out = 0;
   priv->totals = {};
   return TRUE;
 }
@@ -480,6 +486,7 @@ static gboolean
 gst_neighbour_code_enc_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->reporter.stop ();
   priv->is_configured = false;
   forget_input (priv);
   priv->buffers.drop ();
@@ -535,6 +542,9 @@ gst_neighbour_code_enc_set_property (
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
       break;
+    case PROP_STATS_INTERVAL:
+      priv->reporter.set_interval (g_value_get_uint (value));
+      break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
@@ -543,15 +553,17 @@ gst_neighbour_code_enc_set_property (
 static GstStructure *
 make_stats (const GstNeighbourCodeEncPrivate *priv)
 {
-  return gst_structure_new ("application/x-neighbourcodeenc-stats", "frames", G_TYPE_UINT64,
-      priv->frames, "points", G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels",
-      G_TYPE_UINT64, guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64,
-      guint64{priv->totals.slices}, "delta-slices", G_TYPE_UINT64,
-      guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
+  GstStructure *stats = gst_structure_new ("application/x-neighbourcodeenc-stats", "frames",
+      G_TYPE_UINT64, priv->frames, "left-out", G_TYPE_UINT64, priv->left_out, "points",
+      G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels", G_TYPE_UINT64,
+      guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64, guint64{priv->totals.slices},
+      "delta-slices", G_TYPE_UINT64, guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
       guint64{priv->totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes,
       "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
       priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
       nullptr);
+  priv->rate.receivers.describe (stats);
+  return stats;
 }
 
 static void
@@ -605,8 +617,14 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
     case PROP_MAX_DEPTH_ERROR:
       g_value_set_double (value, priv->max_depth_error_m);
       break;
+    case PROP_ESTIMATED_BITRATE:
+      g_value_set_uint64 (value, guint64 (priv->rate.receivers.bits_per_s () + 0.5));
+      break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -703,12 +721,19 @@ install_properties (GObjectClass *object_class)
           "Metres by which a decoded depth differs from the one that came in at most, of any view, "
           "with the settings of the latest frame set; 0 before the first",
           0, G_MAXDOUBLE, 0, readable));
+  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
+      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
+          "Bits per second that receivers let the encoder have with adaptive-bitrate; 0: not known "
+          "(0 to 18446744073709551615, default 0)",
+          0, G_MAXUINT64, 0, readable));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points, full-pixels, slices, delta-slices, raw-bytes, "
-          "coded-bytes; "
-          "bitrate over the last 2 s; depth-threshold, colour-threshold of the latest frame set",
+          "Counters since start: frames, left-out, points, full-pixels, slices, delta-slices, "
+          "raw-bytes, coded-bytes; bitrate over the last 2 s; depth-threshold, colour-threshold of "
+          "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
+          "receiver-loss, receiver-queue",
           GST_TYPE_STRUCTURE, readable));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 }
 
 static void

@@ -74,6 +74,7 @@ struct Stream {               /* streaming thread only */
   bool src_caps_set = false;
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
+  bool ending = false;  /* pushed: EOS has come */
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector;
   std::string too_large; /* why a rig was refused */
@@ -549,6 +550,21 @@ finish_access_unit (
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
 
+/* Whose recorder was killed hears of it: what is left of the last access unit may be shown. */
+static void
+warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
+{
+  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const gsize expected = kStreamPrefixSize + part.header.size;
+  const bool at_end = NeighbourCodeSeek::reads_file (base) || stream.ending;
+  if (!at_end || !GST_BASE_PARSE_DRAINING (base) || part.length >= expected)
+    return;
+  GST_ELEMENT_WARNING (base, STREAM, DECODE,
+      ("The stream ends within an access unit: it lacks %" G_GSIZE_FORMAT " bytes",
+          expected - part.length),
+      ("expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT, expected, part.length));
+}
+
 static GstFlowReturn
 handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
 {
@@ -578,8 +594,10 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
   gst_buffer_unmap (frame->buffer, &map);
   if (part.rubbish)
     return drop_rubbish (base, frame, part.rubbish);
-  if (part.length)
+  if (part.length) {
+    warn_if_cut_off (base, part);
     return handle_access_unit_of_stream (base, frame, part);
+  }
   gst_base_parse_set_min_frame_size (base, guint (part.wanted));
   return GST_FLOW_OK;
 }
@@ -620,8 +638,10 @@ static void
 finish_stream (GstBaseParse *base)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  priv->stream.ending = true;
   if (base->segment.rate > 0)
     gst_base_parse_drain (base);
+  priv->stream.ending = false;
   if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
     post_what_is_missing (base);
 }

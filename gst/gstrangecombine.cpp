@@ -86,6 +86,7 @@ struct GstRangeCombinePrivate {
   /* streaming thread only */
   GstAggregatorPad *colour_pad = nullptr, *depth_pad = nullptr; /* owned by the element */
   gstrange::PairMatcher *matcher = nullptr;
+  gstrange::GapSender gaps;
   GstVideoInfo colour, depth;
   bool have_colour = false, have_depth = false;
   bool negotiate = true;
@@ -432,8 +433,9 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
   const GstClockTime duration = GST_CLOCK_TIME_IS_VALID (priv->frame_duration)
                                     ? priv->frame_duration
                                     : GST_BUFFER_DURATION (pair.first);
-  gstrange::stamp (aggregator, output, gstrange::running_time_of (priv->colour_pad, pair.first),
-      duration, capture);
+  const GstClockTime running = gstrange::running_time_of (priv->colour_pad, pair.first);
+  gstrange::stamp (aggregator, output, running, duration, capture);
+  priv->gaps.note_buffer (running, duration);
   if (GST_BUFFER_IS_DISCONT (pair.first))
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   {
@@ -441,6 +443,25 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
     priv->frames++;
   }
   return gst_aggregator_finish_buffer (aggregator, output);
+}
+
+/* Tells downstream of a time of which there will be nothing, up to the pair that waits. */
+static GstFlowReturn
+push_gap (GstRangeCombine *self, GstBuffer *waiting)
+{
+  GstRangeCombinePrivate *priv = self->priv;
+  GstClockTime begin, end;
+  if (!priv->matcher->take_gap (begin, end))
+    return GST_FLOW_OK;
+  if (waiting) /* NONE is the greatest number */
+    end = std::min (end, gstrange::running_time_of (priv->colour_pad, waiting));
+  if (!priv->gaps.cut (begin, end) || !priv->have_colour || !priv->have_depth)
+    return GST_FLOW_OK;
+  if (priv->negotiate)
+    if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
+      return flow;
+  priv->gaps.push (GST_AGGREGATOR (self), priv->colour_pad, begin, end);
+  return GST_FLOW_OK;
 }
 
 static GstFlowReturn
@@ -455,16 +476,27 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
     duration = std::min (duration, frame_duration_of (priv->depth));
 
   gstrange::PairMatcher::Pair pair;
-  GstFlowReturn flow = priv->matcher->take (duration, pair);
-  if (flow != GST_FLOW_OK)
-    return flow;
-  if (priv->negotiate)
+  const GstFlowReturn taken = priv->matcher->take (duration, pair);
+  GstFlowReturn flow = push_gap (self, pair.first);
+  if (taken != GST_FLOW_OK)
+    return flow == GST_FLOW_OK ? taken : flow;
+  if (flow == GST_FLOW_OK && priv->negotiate)
     flow = negotiate (self);
   if (flow == GST_FLOW_OK)
     flow = push_pair (self, pair);
   gst_buffer_unref (pair.first);
   gst_buffer_unref (pair.second);
   return flow;
+}
+
+static GstFlowReturn
+gst_range_combine_flush (GstAggregator *aggregator)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  GstClockTime begin, end;
+  priv->matcher->take_gap (begin, end);
+  priv->gaps.reset ();
+  return GST_FLOW_OK;
 }
 
 /* ---- life ---- */
@@ -476,6 +508,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   priv->have_colour = priv->have_depth = false;
   priv->negotiate = true;
   priv->matcher->reset ();
+  priv->gaps.reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;
   return TRUE;
@@ -681,6 +714,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
 
   aggregator_class->start = gst_range_combine_start;
   aggregator_class->stop = gst_range_combine_stop;
+  aggregator_class->flush = gst_range_combine_flush;
   aggregator_class->sink_event = gst_range_combine_sink_event;
   aggregator_class->update_src_caps = gst_range_combine_update_src_caps;
   aggregator_class->clip = gstrange::clip_to_segment;

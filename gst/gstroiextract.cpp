@@ -35,6 +35,8 @@
 #include <string>
 
 #include "controlledvalues.hpp"
+#include "roisettings.hpp"
+#include "statsreporter.hpp"
 
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
@@ -46,50 +48,15 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
 #define GST_CAT_DEFAULT gst_roi_extract_debug
 
-enum {
-  PROP_0,
-  PROP_BACKGROUND_FRAMES,
-  PROP_SETTLE_FRAMES,
-  PROP_BACKGROUND_FILE,
-  PROP_SAVE_BACKGROUND,
-  PROP_CUE,
-  PROP_NOISE_FACTOR,
-  PROP_DEPTH_THRESHOLD,
-  PROP_COLOUR_THRESHOLD,
-  PROP_SHADOW,
-  PROP_HIGHLIGHT,
-  PROP_MIN_AREA,
-  PROP_MAX_HOLE,
-  PROP_MAX_PEOPLE,
-  PROP_FILL,
-  PROP_FRINGE,
-  PROP_FOLLOW_LIGHT,
-  PROP_ADAPT_TIME,
-  PROP_MARGIN,
-  PROP_N_THREADS,
-  PROP_STATS
-};
 enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
 static guint signals[N_SIGNALS];
+static guint prop_stats; /* number of that property, after the settings */
 
-static constexpr int kDefaultBackgroundFrames = 30;
-static constexpr double kDefaultAdaptTime = 30; /* seconds */
 /* It is taught no more often than this, which nobody sees and saves time, seconds. */
 static constexpr double kShortestStep = 0.2;
-static constexpr rangecast::SegmentationSettings kDefaults;
 /* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
  * fits it no more. */
 static constexpr int kAnnouncedMargin = 16;
-
-struct RoiSettings {
-  int background_frames = kDefaultBackgroundFrames;
-  int settle_frames = 0;
-  std::string background_file, save_background;
-  rangecast::SegmentationSettings segmentation;
-  int margin = 0;
-  int n_threads = 0;
-  double adapt_time_s = kDefaultAdaptTime;
-};
 
 /* What is kept of one view. */
 struct ViewState {
@@ -112,6 +79,7 @@ struct GstRoiExtractPrivate {
   guint64 frames = 0, points_in = 0, points_out = 0;
   Roi last_roi;
 
+  StatsReporter reporter; /* has locks of its own */
   std::atomic<bool> relearn{false};
 
   /* streaming thread only */
@@ -133,20 +101,6 @@ static GstStaticPadTemplate src_template =
 
 G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
-
-#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())
-static GType
-gst_roi_extract_cue_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::Cue::kBoth), "Nearer than the background or of another colour", "both"},
-        {int (rangecast::Cue::kColour), "Of another colour", "colour"},
-        {int (rangecast::Cue::kDepth), "Nearer than the background", "depth"}, {}};
-    return g_enum_register_static ("GstRoiExtractCue", values);
-  }();
-  return type;
-}
 
 /* ---- the background ---- */
 
@@ -268,6 +222,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   const RoiSettings settings = copy_settings (priv);
   Status status = gstrange::parse_caps (caps, priv->info);
   if (status.ok ()) {
+    priv->reporter.set_views (priv->info.rig);
     prepare_views (priv, settings.background_frames);
     if (!settings.background_file.empty () && !all_learnt (priv))
       status = load_background_file (priv, settings.background_file);
@@ -457,6 +412,7 @@ gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const Status status = process_frame (self, frame, settings);
   if (status.ok ())
     after_frame (self, frame, settings);
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
@@ -471,10 +427,20 @@ gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
     if (settings.adapt_time_s > 0)
       save_when_all_learnt (self, settings.save_background);
   }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    self->priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_roi_extract_parent_class)->sink_event (base, event);
 }
 
 /* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->frames, .points = priv->points_out}}};
+}
 
 static gboolean
 gst_roi_extract_start (GstBaseTransform *base)
@@ -485,6 +451,7 @@ gst_roi_extract_start (GstBaseTransform *base)
     return FALSE;
   priv->refused.clear ();
   priv->unsaved.clear ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->points_in = priv->points_out = 0;
   priv->last_roi = {};
@@ -495,6 +462,7 @@ static gboolean
 gst_roi_extract_stop (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  priv->reporter.stop ();
   priv->info = {};
   priv->relearn = false;
   for (auto &state : priv->views)
@@ -508,87 +476,17 @@ gst_roi_extract_capture_background (GstRoiExtract *self)
   self->priv->relearn = true;
 }
 
-static bool
-set_segmentation (rangecast::SegmentationSettings &settings, guint id, const GValue *value)
-{
-  switch (id) {
-    case PROP_CUE:
-      settings.cue = rangecast::Cue (g_value_get_enum (value));
-      return true;
-    case PROP_NOISE_FACTOR:
-      settings.noise_factor = g_value_get_double (value);
-      return true;
-    case PROP_DEPTH_THRESHOLD:
-      settings.depth_threshold_m = g_value_get_double (value);
-      return true;
-    case PROP_COLOUR_THRESHOLD:
-      settings.colour_threshold = g_value_get_double (value);
-      return true;
-    case PROP_SHADOW:
-      settings.shadow = g_value_get_double (value);
-      return true;
-    case PROP_HIGHLIGHT:
-      settings.highlight = g_value_get_double (value);
-      return true;
-    case PROP_MIN_AREA:
-      settings.min_area = g_value_get_int (value);
-      return true;
-    case PROP_MAX_HOLE:
-      settings.max_hole = g_value_get_int (value);
-      return true;
-    case PROP_MAX_PEOPLE:
-      settings.max_people = g_value_get_int (value);
-      return true;
-    case PROP_FILL:
-      settings.fill = g_value_get_int (value);
-      return true;
-    case PROP_FRINGE:
-      settings.fringe = g_value_get_int (value);
-      return true;
-    case PROP_FOLLOW_LIGHT:
-      settings.follow_light = g_value_get_boolean (value);
-      return true;
-    default:
-      return false;
-  }
-}
-
 static void
 gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
-  std::lock_guard guard (priv->lock);
-  RoiSettings &settings = priv->settings;
-  const auto text = [value] {
-    const gchar *string = g_value_get_string (value);
-    return std::string (string ? string : "");
-  };
-  switch (id) {
-    case PROP_BACKGROUND_FRAMES:
-      settings.background_frames = g_value_get_int (value);
-      break;
-    case PROP_SETTLE_FRAMES:
-      settings.settle_frames = g_value_get_int (value);
-      break;
-    case PROP_BACKGROUND_FILE:
-      settings.background_file = text ();
-      break;
-    case PROP_SAVE_BACKGROUND:
-      settings.save_background = text ();
-      break;
-    case PROP_ADAPT_TIME:
-      settings.adapt_time_s = g_value_get_double (value);
-      break;
-    case PROP_MARGIN:
-      settings.margin = g_value_get_int (value);
-      break;
-    case PROP_N_THREADS:
-      settings.n_threads = g_value_get_int (value);
-      break;
-    default:
-      if (!set_segmentation (settings.segmentation, id, value))
-        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  if (id == prop_stats + 1) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
   }
+  std::lock_guard guard (priv->lock);
+  if (!set_roi_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
@@ -601,89 +499,17 @@ make_stats (const GstRoiExtractPrivate *priv)
       "roi-height", G_TYPE_INT, roi.height, nullptr);
 }
 
-static bool
-get_segmentation (const rangecast::SegmentationSettings &settings, guint id, GValue *value)
-{
-  switch (id) {
-    case PROP_CUE:
-      g_value_set_enum (value, int (settings.cue));
-      return true;
-    case PROP_NOISE_FACTOR:
-      g_value_set_double (value, settings.noise_factor);
-      return true;
-    case PROP_DEPTH_THRESHOLD:
-      g_value_set_double (value, settings.depth_threshold_m);
-      return true;
-    case PROP_COLOUR_THRESHOLD:
-      g_value_set_double (value, settings.colour_threshold);
-      return true;
-    case PROP_SHADOW:
-      g_value_set_double (value, settings.shadow);
-      return true;
-    case PROP_HIGHLIGHT:
-      g_value_set_double (value, settings.highlight);
-      return true;
-    case PROP_MIN_AREA:
-      g_value_set_int (value, settings.min_area);
-      return true;
-    case PROP_MAX_HOLE:
-      g_value_set_int (value, settings.max_hole);
-      return true;
-    case PROP_MAX_PEOPLE:
-      g_value_set_int (value, settings.max_people);
-      return true;
-    case PROP_FILL:
-      g_value_set_int (value, settings.fill);
-      return true;
-    case PROP_FRINGE:
-      g_value_set_int (value, settings.fringe);
-      return true;
-    case PROP_FOLLOW_LIGHT:
-      g_value_set_boolean (value, settings.follow_light);
-      return true;
-    default:
-      return false;
-  }
-}
-
 static void
 gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
   std::lock_guard guard (priv->lock);
-  const RoiSettings &settings = priv->settings;
-  const auto set_text = [value] (const std::string &text) {
-    g_value_set_string (value, text.empty () ? nullptr : text.c_str ());
-  };
-  switch (id) {
-    case PROP_BACKGROUND_FRAMES:
-      g_value_set_int (value, settings.background_frames);
-      break;
-    case PROP_SETTLE_FRAMES:
-      g_value_set_int (value, settings.settle_frames);
-      break;
-    case PROP_BACKGROUND_FILE:
-      set_text (settings.background_file);
-      break;
-    case PROP_SAVE_BACKGROUND:
-      set_text (settings.save_background);
-      break;
-    case PROP_ADAPT_TIME:
-      g_value_set_double (value, settings.adapt_time_s);
-      break;
-    case PROP_MARGIN:
-      g_value_set_int (value, settings.margin);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_int (value, settings.n_threads);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
-      break;
-    default:
-      if (!get_segmentation (settings.segmentation, id, value))
-        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == prop_stats)
+    g_value_take_boxed (value, make_stats (priv));
+  else if (id == prop_stats + 1)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else if (!get_roi_setting (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -701,109 +527,6 @@ gst_roi_extract_init (GstRoiExtract *self)
 }
 
 static void
-install_background_properties (GObjectClass *object_class)
-{
-  const auto ready =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-  const auto playing =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-  g_object_class_install_property (object_class, PROP_BACKGROUND_FRAMES,
-      g_param_spec_int ("background-frames", "Background frames",
-          "Frames of the empty scene from which a background is learnt (1 to 10000, default 30)", 1,
-          10000, kDefaultBackgroundFrames, playing));
-  g_object_class_install_property (object_class, PROP_SETTLE_FRAMES,
-      g_param_spec_int ("settle-frames", "Settle frames",
-          "Frames at the start from which nothing is learnt, while exposure settles (0 to 100000, "
-          "default 0)",
-          0, 100000, 0, ready));
-  g_object_class_install_property (object_class, PROP_BACKGROUND_FILE,
-      g_param_spec_string ("background-file", "Background file",
-          "Take the background from this file instead of learning it (default: none)", nullptr,
-          ready));
-  g_object_class_install_property (object_class, PROP_SAVE_BACKGROUND,
-      g_param_spec_string ("save-background", "Save background",
-          "Write the background to this file (.yml, .yaml, .json or .xml, with .gz if wanted) "
-          "whenever one is learnt, and as it has become at EOS (default: none)",
-          nullptr, playing));
-}
-
-static void
-install_segmentation_properties (GObjectClass *object_class)
-{
-  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
-  const auto install_double = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                                  double minimum, double maximum, double fallback) {
-    g_object_class_install_property (object_class, id,
-        g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, live));
-  };
-  g_object_class_install_property (object_class, PROP_CUE,
-      g_param_spec_enum ("cue", "Cue", "What speaks for a pixel (default: both)",
-          GST_TYPE_ROI_EXTRACT_CUE, int (rangecast::Cue::kBoth), live));
-  install_double (PROP_NOISE_FACTOR, "noise-factor", "Noise factor",
-      "A difference counts from so many standard deviations of the background (0 to 100, default "
-      "4)",
-      0, 100, kDefaults.noise_factor);
-  install_double (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
-      "Depth speaks for a pixel from so many metres nearer than the background (0 to 10, default "
-      "0.02)",
-      0, 10, kDefaults.depth_threshold_m);
-  install_double (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "Colour speaks for a pixel from so many grey levels of chromatic distortion (0 to 255, "
-      "default 18)",
-      0, 255, kDefaults.colour_threshold);
-  install_double (PROP_SHADOW, "shadow", "Shadow",
-      "A pixel darker than this share of the background is no shadow (0 to 1, default 0.5)", 0, 1,
-      kDefaults.shadow);
-  install_double (PROP_HIGHLIGHT, "highlight", "Highlight",
-      "A pixel brighter than this share of the background is no change of light (1 to 10, default "
-      "1.35)",
-      1, 10, kDefaults.highlight);
-  g_object_class_install_property (object_class, PROP_FOLLOW_LIGHT,
-      g_param_spec_boolean ("follow-light", "Follow light",
-          "Undo what exposure, white balance and lamps do to the whole picture (default: true)",
-          kDefaults.follow_light, live));
-  install_double (PROP_ADAPT_TIME, "adapt-time", "Adaptation time",
-      "Time constant with which the background follows slow change where nobody is, seconds (0 to "
-      "100000, default 30; 0: never)",
-      0, 100000, kDefaultAdaptTime);
-}
-
-static void
-install_region_properties (GObjectClass *object_class)
-{
-  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
-  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                               int maximum, int fallback) {
-    g_object_class_install_property (
-        object_class, id, g_param_spec_int (name, nick, blurb, 0, maximum, fallback, live));
-  };
-  install_int (PROP_MIN_AREA, "min-area", "Minimum area",
-      "Smaller islands are cleared, pixels (0 to 1000000, default 150)", 1000000,
-      kDefaults.min_area);
-  install_int (PROP_MAX_HOLE, "max-hole", "Maximum hole",
-      "Smaller holes are closed, pixels (0 to 1000000, default 100)", 1000000, kDefaults.max_hole);
-  install_int (PROP_MAX_PEOPLE, "max-people", "Maximum people",
-      "Only so many of the largest islands stay (0 to 1000, default 0: all)", 1000,
-      kDefaults.max_people);
-  install_int (PROP_FILL, "fill", "Fill",
-      "Depth is extended so many pixels to what has none, where colour says that it is no "
-      "background "
-      "(0 to 1000, default 4; 0: no depth is made)",
-      1000, kDefaults.fill);
-  install_int (PROP_FRINGE, "fringe", "Fringe",
-      "What is nearer but looks like the background beside it must be so wide, pixels (0 to 99, "
-      "default 9; 0: depth is taken at its word, for cameras whose depth ends at the silhouette)",
-      99, kDefaults.fringe);
-  install_int (PROP_MARGIN, "margin", "Margin",
-      "The ROI is this much larger than what is left, pixels each side (0 to 1000, default 0)",
-      1000, 0);
-  install_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Views worked on at the same time (0 to 64, default 0: as many as there are cores)", 64, 0);
-}
-
-static void
 gst_roi_extract_class_init (GstRoiExtractClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -813,13 +536,12 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   object_class->set_property = gst_roi_extract_set_property;
   object_class->get_property = gst_roi_extract_get_property;
   object_class->finalize = gst_roi_extract_finalize;
-  install_background_properties (object_class);
-  install_segmentation_properties (object_class);
-  install_region_properties (object_class);
-  g_object_class_install_property (object_class, PROP_STATS,
+  prop_stats = install_roi_settings (object_class) + 1;
+  g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames, points-in, points-out; and the last ROI of the first view",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, prop_stats + 1);
 
   /**
    * GstRoiExtract::capture-background:

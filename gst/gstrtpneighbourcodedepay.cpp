@@ -30,6 +30,9 @@
 #include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
+#include "statsreporter.hpp"
+#include "unitgatherer.hpp"
+
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::UnitHeader;
@@ -39,15 +42,17 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_depay_debug
 
-enum { PROP_0, PROP_UNIT_STATS };
+enum { PROP_0, PROP_UNIT_STATS, PROP_STATS_INTERVAL };
 
 struct DepayCounters {
-  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0;
+  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
+          lost_packets = 0, bytes = 0;
 };
 
 struct GstRtpNeighbourCodeDepayPrivate {
   std::mutex lock; /* guards counters */
   DepayCounters counters;
+  StatsReporter reporter; /* has locks of its own */
 
   /* streaming thread only */
   rangecast::RigCollector collector;
@@ -55,11 +60,12 @@ struct GstRtpNeighbourCodeDepayPrivate {
   unsigned used_generation = 0;
   bool have_caps = false;
   std::size_t rig_views = 0;
-  std::vector<guint8> access_unit; /* slices that arrived so far */
-  rangecast::KeyCheck key_check;   /* of them */
-  bool has_gap = false;            /* packets were lost before or between them */
-  guint32 timestamp = 0;           /* RTP time of them */
-  std::optional<guint16> sequence; /* of the last packet */
+  UnitGatherer access_unit;           /* slices that arrived so far */
+  rangecast::KeyCheck key_check;      /* of them */
+  bool has_gap = false;               /* packets were lost before or between them */
+  guint32 timestamp = 0;              /* RTP time of them */
+  std::optional<guint16> sequence;    /* of the last packet */
+  std::optional<guint8> payload_type; /* of the last packet that was sound */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
@@ -101,6 +107,7 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
   gst_caps_unref (caps);
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.set_views (stream.rig);
 }
 
 static Status
@@ -169,17 +176,20 @@ take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
   if (!priv->access_unit.empty ()) {
     std::lock_guard guard (priv->lock);
     if (priv->have_caps) {
-      buffer = gst_buffer_new_memdup (priv->access_unit.data (), priv->access_unit.size ());
+      buffer = priv->access_unit.take ();
       GST_BUFFER_PTS (buffer) = priv->pts;
       if (!is_key_unit (priv, has_end))
         GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
       priv->counters.access_units++;
+      priv->counters.bytes += gst_buffer_get_size (buffer);
     } else {
       priv->counters.without_rig++;
     }
   }
   if (buffer && GST_CLOCK_TIME_IS_VALID (priv->capture_time))
     gst_range_buffer_set_capture_time (buffer, priv->capture_time);
+  if (buffer)
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
   forget_access_unit (priv);
   return buffer;
 }
@@ -210,6 +220,23 @@ take_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
   return status.ok ();
 }
 
+/* Packets of FEC, which rtpulpfecdec lets pass under a payload type of their own. */
+static bool
+is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
+{
+  const guint8 type = gst_rtp_buffer_get_payload_type (rtp);
+  if (priv->payload_type == type)
+    return false;
+  UnitReader reader ({static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+      gst_rtp_buffer_get_payload_len (rtp)});
+  UnitHeader header;
+  while (reader.next (header)) {
+  }
+  if (reader.status ().ok ())
+    priv->payload_type = type;
+  return priv->payload_type && priv->payload_type != type;
+}
+
 static void
 take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
 {
@@ -220,13 +247,12 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView)) {
       bad += !take_rig_view (self, *unit);
-    } else if (priv->access_unit.size () + unit->size () > rangecast::kMaxAccessUnitSize) {
+    } else if (!priv->access_unit.add (*unit)) {
       bad++; /* it is hostile */
     } else {
       good++;
       if (header.type == static_cast<guint8> (UnitType::kSlice))
         note_slice (priv, *unit);
-      priv->access_unit.insert (priv->access_unit.end (), unit->begin (), unit->end ());
     }
   }
   bad += !reader.status ().ok ();
@@ -236,6 +262,19 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   priv->counters.packets++;
   priv->counters.units += good;
   priv->counters.bad_units += bad;
+}
+
+/* @return whether packets before this one are missing */
+static bool
+count_lost (GstRtpNeighbourCodeDepayPrivate *priv, guint16 sequence)
+{
+  const std::optional<guint16> last = std::exchange (priv->sequence, sequence);
+  const guint16 missing = last ? guint16 (sequence - *last - 1) : 0;
+  if (missing > 0 && missing < 0x8000) { /* else it goes back: another sender, or too late */
+    std::lock_guard guard (priv->lock);
+    priv->counters.lost_packets += missing;
+  }
+  return missing > 0;
 }
 
 /* The packet with the marker was lost: what came of the frame set goes out. */
@@ -260,8 +299,11 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
   const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
-  const bool after_gap = priv->sequence && sequence != static_cast<guint16> (*priv->sequence + 1);
-  priv->sequence = sequence;
+  const bool after_gap = count_lost (priv, sequence);
+  if (is_of_other_payload (priv, rtp)) {
+    priv->has_gap = priv->has_gap || after_gap;
+    return nullptr;
+  }
   if (timestamp != priv->timestamp)
     push_unmarked (self);
   priv->has_gap = priv->has_gap || after_gap;
@@ -278,32 +320,57 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self, true) : nullptr;
 }
 
+/* A packet that is lost is no gap in time: what came of its frame set goes out all the same. */
+static gboolean
+gst_rtp_neighbour_code_depay_packet_lost (GstRTPBaseDepayload *, GstEvent *)
+{
+  return TRUE;
+}
+
 static gboolean
 gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
     GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->sequence.reset ();
-  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
     push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.finish ();
+  }
   return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
       ->handle_event (base, event);
 }
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const DepayCounters &c = priv->counters;
+  return {{.counters = {.frames = c.access_units,
+               .bytes = c.bytes,
+               .packets = c.packets,
+               .lost = c.lost_packets}}};
+}
+
 static GstStateChangeReturn
 gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange transition)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    priv->reporter.start (element, collect_stats);
   const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_depay_parent_class)
                                           ->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv->reporter.stop ();
     forget_access_unit (priv);
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
     priv->sequence.reset ();
+    priv->payload_type.reset ();
     std::lock_guard guard (priv->lock);
     priv->counters = {};
   }
@@ -311,10 +378,24 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
 }
 
 static void
+gst_rtp_neighbour_code_depay_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_STATS_INTERVAL)
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
 gst_rtp_neighbour_code_depay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  if (id == PROP_STATS_INTERVAL) {
+    g_value_set_uint (value, priv->reporter.interval ());
+    return;
+  }
   if (id != PROP_UNIT_STATS) {
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     return;
@@ -325,7 +406,8 @@ gst_rtp_neighbour_code_depay_get_property (
       gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
           c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
           "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
-          "without-rig", G_TYPE_UINT64, c.without_rig, nullptr));
+          "without-rig", G_TYPE_UINT64, c.without_rig, "lost-packets", G_TYPE_UINT64,
+          c.lost_packets, "bytes", G_TYPE_UINT64, c.bytes, nullptr));
 }
 
 static void
@@ -348,13 +430,16 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS (klass);
 
+  object_class->set_property = gst_rtp_neighbour_code_depay_set_property;
   object_class->get_property = gst_rtp_neighbour_code_depay_get_property;
   object_class->finalize = gst_rtp_neighbour_code_depay_finalize;
 
   g_object_class_install_property (object_class, PROP_UNIT_STATS,
       g_param_spec_boxed ("unit-stats", "Unit statistics",
-          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig",
+          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig, "
+          "lost-packets, bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
@@ -365,6 +450,7 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   element_class->change_state = gst_rtp_neighbour_code_depay_change_state;
   depayload_class->set_caps = gst_rtp_neighbour_code_depay_set_caps;
   depayload_class->process_rtp_packet = gst_rtp_neighbour_code_depay_process;
+  depayload_class->packet_lost = gst_rtp_neighbour_code_depay_packet_lost;
   depayload_class->handle_event = gst_rtp_neighbour_code_depay_handle_event;
 
   GST_DEBUG_CATEGORY_INIT (gst_rtp_neighbour_code_depay_debug, "rtpneighbourcodedepay", 0,

@@ -28,15 +28,17 @@
 #include <string>
 #include <vector>
 
+#include "codedunits.hpp"
+#include "statsreporter.hpp"
+
 using rangecast::Status;
 using rangecast::UnitHeader;
-using rangecast::UnitReader;
 using rangecast::UnitType;
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
 
-enum { PROP_0, PROP_CONFIG_INTERVAL };
+enum { PROP_0, PROP_CONFIG_INTERVAL, PROP_STATS_INTERVAL };
 
 static constexpr int kDefaultConfigInterval = 1;
 /* The least max-slice-size of neighbourcodeenc. */
@@ -44,6 +46,8 @@ static constexpr gsize kSmallestSliceLimit = 256;
 
 struct GstRtpNeighbourCodePayPrivate {
   std::atomic<int> config_interval{kDefaultConfigInterval};
+  std::atomic<guint64> frame_sets{0}, packets{0}, bytes{0}; /* since start */
+  StatsReporter reporter;
 
   /* streaming thread only */
   std::vector<guint8> rig_units;
@@ -51,6 +55,8 @@ struct GstRtpNeighbourCodePayPrivate {
   bool by_slices = false;                         /* alignment of the input */
   bool within_frame_set = false;                  /* slices of this one came before */
   GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
+  gsize header_size = 0;                          /* of a packet, bytes */
+  GstCaps *header_caps = nullptr;                 /* for which that holds */
 };
 
 struct _GstRtpNeighbourCodePay {
@@ -97,6 +103,7 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv;
   gstrange::RangeInfo info;
   const Status status = gstrange::parse_caps (caps, info);
+  priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
   priv->rig_units.clear ();
@@ -129,30 +136,68 @@ struct Packer {
   /* @return the first unit that is too long for a packet, if there is one */
   std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
-    GstMapInfo map;
-    if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
-      return {};
-    UnitReader reader ({map.data, map.size});
-    UnitHeader header;
     gsize begin = 0, end = 0;
     std::optional<UnitHeader> too_long;
-    while (const auto unit = reader.next (header)) {
-      if (unit->size () > room) {
+    Status damage; /* what is behind it is left out */
+    const auto take = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+      if (unit.size () > room) {
         too_long = header;
-        break;
+        return false;
       }
-      if (end - begin + unit->size () > room) {
+      if (end - begin + unit.size () > room) {
         add (buffer, begin, end - begin);
         begin = end;
       }
-      end += unit->size ();
-    }
-    gst_buffer_unmap (buffer, &map);
+      end = offset + unit.size ();
+      return true;
+    };
+    if (!for_each_unit (buffer, take, damage))
+      return {};
     if (!too_long && end > begin)
       add (buffer, begin, end - begin);
     return too_long;
   }
 };
+
+/* Bytes that an extension takes in the header at most; 0: the base class does not make it either.
+ */
+static gsize
+extension_size (const char *uri, const GstBuffer *buffer)
+{
+  GstRTPHeaderExtension *extension = gst_rtp_header_extension_create_from_uri (uri);
+  if (!extension)
+    return 0;
+  const gsize size = 2 + gst_rtp_header_extension_get_max_size (extension, buffer);
+  gst_object_unref (extension);
+  return size;
+}
+
+/* The fixed header, and the extensions that were agreed on: the base class writes them into packets
+ * that are made already. */
+static gsize
+find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
+{
+  GstRtpNeighbourCodePayPrivate *priv = self->priv;
+  GstCaps *caps = gst_pad_get_current_caps (GST_RTP_BASE_PAYLOAD_SRCPAD (self));
+  if (caps && caps == priv->header_caps) {
+    gst_caps_unref (caps);
+    return priv->header_size;
+  }
+  const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
+  gsize extensions = 0;
+  for (int i = 0; structure && i < gst_structure_n_fields (structure); i++) {
+    const char *name = gst_structure_nth_field_name (structure, guint (i));
+    const GValue *value = gst_structure_get_value (structure, name);
+    if (!g_str_has_prefix (name, "extmap-"))
+      continue;
+    if (GST_VALUE_HOLDS_ARRAY (value) && gst_value_array_get_size (value) > 1)
+      value = gst_value_array_get_value (value, 1); /* direction, URI, attributes */
+    if (G_VALUE_HOLDS_STRING (value))
+      extensions += extension_size (g_value_get_string (value), buffer);
+  }
+  gst_caps_take (&priv->header_caps, caps);
+  return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + (extensions + 3) / 4 * 4 : 0);
+}
 
 /* Notes where frame sets begin and end. The end of one without MARKER is known only afterwards; its
  * packets have no marker, and receivers go by the next timestamp. */
@@ -211,7 +256,7 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
   const char *name = unit.type == guint8 (UnitType::kSlice)     ? "slice"
                      : unit.type == guint8 (UnitType::kRigView) ? "rig view"
                                                                 : "unit";
-  const gsize mtu_needed = unit.size + gst_rtp_buffer_calc_header_len (0);
+  const gsize mtu_needed = unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size;
   GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
       ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
           int (unit.size), mtu, advice (unit, room, mtu_needed).c_str ()),
@@ -224,7 +269,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_PAY (base);
   const guint mtu = GST_RTP_BASE_PAYLOAD_MTU (base);
-  const gsize header = gst_rtp_buffer_calc_header_len (0);
+  const gsize header = self->priv->header_size = find_header_size (self, buffer);
   Packer packer = {base, gst_buffer_list_new (), mtu > header ? mtu - header : 0,
       GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
   const GstClockTime running =
@@ -232,7 +277,9 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   const bool is_last =
       !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
   std::optional<UnitHeader> too_long;
-  if (begins_frame_set (self->priv, buffer, is_last) && config_is_due (self, running)) {
+  const bool begins = begins_frame_set (self->priv, buffer, is_last);
+  self->priv->frame_sets += begins;
+  if (begins && config_is_due (self, running)) {
     GstBuffer *rig =
         gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
     too_long = packer.pack (rig);
@@ -240,6 +287,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   }
   if (!too_long)
     too_long = packer.pack (buffer);
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   gst_buffer_unref (buffer);
   if (too_long) {
     gst_buffer_list_unref (packer.packets);
@@ -251,6 +299,8 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   }
   if (is_last)
     set_marker (packer.packets);
+  self->priv->packets += gst_buffer_list_length (packer.packets);
+  self->priv->bytes += gst_buffer_list_calculate_size (packer.packets);
   return gst_rtp_base_payload_push_list (base, packer.packets);
 }
 
@@ -266,18 +316,46 @@ gst_rtp_neighbour_code_pay_sink_event (GstRTPBasePayload *base, GstEvent *event)
           event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
       all_headers)
     GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->last_config = GST_CLOCK_TIME_NONE;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->reporter.finish ();
   return GST_RTP_BASE_PAYLOAD_CLASS (gst_rtp_neighbour_code_pay_parent_class)
       ->sink_event (base, event);
 }
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  return {
+      {.counters = {.frames = priv->frame_sets, .bytes = priv->bytes, .packets = priv->packets}}};
+}
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_pay_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    priv->frame_sets = priv->packets = priv->bytes = 0;
+    priv->reporter.start (element, collect_stats);
+  }
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_pay_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    priv->reporter.stop ();
+  return result;
+}
+
 static void
 gst_rtp_neighbour_code_pay_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   if (id == PROP_CONFIG_INTERVAL)
-    GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval = g_value_get_int (value);
+    priv->config_interval = g_value_get_int (value);
+  else if (id == PROP_STATS_INTERVAL)
+    priv->reporter.set_interval (g_value_get_uint (value));
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -286,8 +364,11 @@ static void
 gst_rtp_neighbour_code_pay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   if (id == PROP_CONFIG_INTERVAL)
-    g_value_set_int (value, GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->config_interval);
+    g_value_set_int (value, priv->config_interval);
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -295,6 +376,7 @@ gst_rtp_neighbour_code_pay_get_property (
 static void
 gst_rtp_neighbour_code_pay_finalize (GObject *object)
 {
+  gst_clear_caps (&GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->header_caps);
   delete GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   G_OBJECT_CLASS (gst_rtp_neighbour_code_pay_parent_class)->finalize (object);
 }
@@ -322,6 +404,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
           "-1 to 3600, default 1)",
           -1, 3600, kDefaultConfigInterval,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
@@ -329,6 +412,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       "Codec/Payloader/Network/RTP", "Puts coded range frame sets into RTP packets",
       "gst-rangecast");
 
+  element_class->change_state = gst_rtp_neighbour_code_pay_change_state;
   payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
   payload_class->sink_event = gst_rtp_neighbour_code_pay_sink_event;
   payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;

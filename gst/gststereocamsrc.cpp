@@ -36,11 +36,12 @@
 
 #include "camsourceclock.hpp"
 #include "camsourcesession.hpp"
+#include "statsreporter.hpp"
 
 GST_DEBUG_CATEGORY (gst_stereo_cam_src_debug); /* the other camsource files log to it too */
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
-static const guint kStats = CamSourceSettings::kFirstFreeId;
+static const guint kStats = CamSourceSettings::kFirstFreeId, kStatsInterval = kStats + 1;
 
 enum { SIGNAL_CAPTURE, N_SIGNALS };
 static guint signals[N_SIGNALS];
@@ -56,6 +57,7 @@ struct GstStereoCamSrcPrivate {
   /* State changes; constant between them. */
   CamSourcePads pads; ///< left, right, and third while it is there
   CamSourceClock clock;
+  StatsReporter reporter; /* has locks of its own */
 
   std::shared_ptr<CamSourceSession> current ()
   {
@@ -210,6 +212,40 @@ remove_third_pad (GstStereoCamSrc *self)
 
 /* ---- life ---- */
 
+/* What the session counts, in the words that all elements have. Latency is the delay of pictures.
+ */
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstStereoCamSrcPrivate *priv = GST_STEREO_CAM_SRC (element)->priv;
+  std::vector<StatsRow> rows (1);
+  {
+    std::lock_guard guard (priv->lock);
+    rows[0].views = guint64{1} << (priv->settings.view_id & 63);
+  }
+  const auto session = priv->current ();
+  if (!session)
+    return rows;
+  GstStructure *stats = session->stats ();
+  const auto count = [stats] (const std::string &field) {
+    guint64 value = 0;
+    gst_structure_get_uint64 (stats, field.c_str (), &value);
+    return value;
+  };
+  guint64 lost = 0;
+  for (const char *side : {"left", "right", "third"})
+    lost += count (std::string ("dropped-") + side) + count (std::string ("incomplete-") + side);
+  rows[0].counters = {.frames = count ("sets"), .lost = lost, .late = count ("missed-ticks")};
+  gint64 p50, p99;
+  if (gst_structure_get_int64 (stats, "delay-p50", &p50) &&
+      gst_structure_get_int64 (stats, "delay-p99", &p99)) {
+    rows[0].latency_p50 = p50;
+    rows[0].latency_p99 = p99;
+  }
+  gst_structure_free (stats);
+  return rows;
+}
+
 static bool
 check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames &names)
 {
@@ -217,7 +253,10 @@ check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames 
     std::lock_guard guard (self->priv->lock);
     settings = self->priv->settings;
   }
-  return gst_range_flow_return (GST_ELEMENT (self), settings.find_names (names)) == GST_FLOW_OK;
+  rangecast::Status status = settings.check ();
+  if (status.ok ())
+    status = settings.find_names (names);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* NULL to READY: names and texts, no network. */
@@ -234,10 +273,9 @@ open_clock (GstStereoCamSrc *self)
     return false;
   GST_OBJECT_LOCK (element);
   if (self->priv->clock.clock ())
-    GST_OBJECT_FLAG_SET (element, GST_ELEMENT_FLAG_PROVIDE_CLOCK | GST_ELEMENT_FLAG_REQUIRE_CLOCK);
+    GST_OBJECT_FLAG_SET (element, GST_ELEMENT_FLAG_REQUIRE_CLOCK);
   else
-    GST_OBJECT_FLAG_UNSET (
-        element, GST_ELEMENT_FLAG_PROVIDE_CLOCK | GST_ELEMENT_FLAG_REQUIRE_CLOCK);
+    GST_OBJECT_FLAG_UNSET (element, GST_ELEMENT_FLAG_REQUIRE_CLOCK);
   GST_OBJECT_UNLOCK (element);
   if (self->priv->clock.clock ()) /* the pipeline may have asked before there was one */
     gst_element_post_message (element,
@@ -289,7 +327,7 @@ static void
 close (GstStereoCamSrc *self)
 {
   const auto session = self->priv->current ();
-  if (session && !session->wait_for_end (kGiveBack))
+  if (session && !session->wait_for_cameras (kGiveBack))
     GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
 }
 
@@ -304,8 +342,10 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     self->priv->current ()->set_playing (false);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    self->priv->reporter.stop ();
     stop (self);
+  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->change_state (element, transition);
   const bool began = transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
@@ -324,6 +364,8 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     return result;
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
     self->priv->current ()->set_playing (true);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    self->priv->reporter.start (element, collect_stats);
   const bool to_paused = transition == GST_STATE_CHANGE_READY_TO_PAUSED ||
                          transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED;
   return to_paused ? GST_STATE_CHANGE_NO_PREROLL : result;
@@ -347,6 +389,10 @@ static void
 gst_stereo_cam_src_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   auto priv = GST_STEREO_CAM_SRC (object)->priv;
+  if (id == kStatsInterval) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
   std::lock_guard guard (priv->lock);
   if (!priv->settings.set (id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -360,6 +406,10 @@ gst_stereo_cam_src_get_property (GObject *object, guint id, GValue *value, GPara
     const auto session = priv->current ();
     g_value_take_boxed (
         value, session ? session->stats () : gst_structure_new_empty ("stereocamsrc-stats"));
+    return;
+  }
+  if (id == kStatsInterval) {
+    g_value_set_uint (value, priv->reporter.interval ());
     return;
   }
   std::lock_guard guard (priv->lock);
@@ -379,6 +429,7 @@ gst_stereo_cam_src_init (GstStereoCamSrc *self)
 {
   self->priv = new GstStereoCamSrcPrivate;
   GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
+  GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_PROVIDE_CLOCK); /* with clock-server; else no clock */
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template}) {
     add_pad (self, pad_template);
     gst_element_add_pad (GST_ELEMENT (self), self->priv->pads.back ()->pad ());
@@ -414,6 +465,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   g_object_class_install_property (object_class, kStats,
       g_param_spec_boxed ("stats", "Statistics", "Counters since the element was last started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, kStatsInterval);
   install_capture (klass);
 
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template, &third_template})

@@ -28,6 +28,7 @@
 
 #include "picturereader.hpp"
 #include "recycledbuffers.hpp"
+#include "statsreporter.hpp"
 #include "stereosettings.hpp"
 
 #include <gst/video/video.h>
@@ -73,6 +74,7 @@ struct GstStereoDepthPrivate {
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is older comes too late */
   double proportion = 1;                       /* of the last QOS event */
 
+  StatsReporter reporter;                   /* has locks of its own */
   std::atomic<bool> third_released = false; /* by any thread; the streaming thread clears it */
 
   /* streaming thread only */
@@ -86,9 +88,9 @@ struct GstStereoDepthPrivate {
   bool negotiate = true;      /* left or right have changed */
   bool third_changed = false; /* matters with its next picture */
   bool said_mirrored = false, said_unpaired = false;
-  bool segment_sent = false, discont = false;
-  guint64 dropped_before = 0;  /* by the matcher, up to the last pair */
-  GstClockTime position = 0;   /* running time at which the output so far ends */
+  bool discont = false;
+  guint64 dropped_before = 0; /* by the matcher, up to the last pair */
+  gstrange::GapSender gaps;
   GstClockTime head_start = 0; /* live: of the element's own latency, what matching takes */
   PictureReader readers[3];
   rangecast::StereoDepth core;
@@ -194,6 +196,7 @@ negotiate (GstStereoDepth *self, bool third_is_there)
     gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   priv->negotiate = !pooled.ok ();
+  priv->reporter.set_views (info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), pooled);
 }
 
@@ -403,24 +406,9 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   priv->discont = false;
-  priv->segment_sent = true;
-  if (GST_CLOCK_TIME_IS_VALID (pair.running))
-    priv->position = pair.running + (GST_CLOCK_TIME_IS_VALID (duration) ? duration : 0);
+  priv->gaps.note_buffer (pair.running, duration);
+  priv->reporter.passed (GST_ELEMENT (self), output);
   return gst_aggregator_finish_buffer (aggregator, output);
-}
-
-/* GstAggregator sends it with buffers only. It comes again with the first one, which changes
- * nothing. */
-static void
-push_segment (GstStereoDepth *self, const GstSegment &segment)
-{
-  GstEvent *event = gst_event_new_segment (&segment);
-  GstEvent *cause = gst_pad_get_sticky_event (GST_PAD (self->priv->pads[0]), GST_EVENT_SEGMENT, 0);
-  if (cause)
-    gst_event_set_seqnum (event, gst_event_get_seqnum (cause));
-  gst_clear_event (&cause);
-  gst_pad_push_event (GST_AGGREGATOR (self)->srcpad, event);
-  self->priv->segment_sent = true;
 }
 
 /* Tells downstream of a time of which there will be nothing, so that it does not wait for it. */
@@ -428,25 +416,17 @@ static GstFlowReturn
 push_gap (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  auto aggregator = GST_AGGREGATOR (self);
   GstClockTime begin, end;
   if (!priv->matcher->take_gap (begin, end))
     return GST_FLOW_OK;
-  begin = std::max (begin, priv->position);
   end = std::min (end, priv->pair.running); /* NONE is the greatest number */
   const bool begun = priv->pool != nullptr;
-  if (end <= begin || (!begun && (!priv->have_info[0] || !priv->have_info[1])))
+  if (!priv->gaps.cut (begin, end) || (!begun && (!priv->have_info[0] || !priv->have_info[1])))
     return GST_FLOW_OK;
   if (!begun)
     if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
       return flow;
-  GST_OBJECT_LOCK (self);
-  const GstSegment segment = GST_AGGREGATOR_PAD (aggregator->srcpad)->segment;
-  GST_OBJECT_UNLOCK (self);
-  if (!priv->segment_sent)
-    push_segment (self, segment);
-  priv->position = end;
-  gst_pad_push_event (aggregator->srcpad, gst_event_new_gap (segment.start + begin, end - begin));
+  priv->gaps.push (GST_AGGREGATOR (self), priv->pads[0], begin, end);
   return GST_FLOW_OK;
 }
 
@@ -460,36 +440,14 @@ take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, Gst
   GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
   if (!pad)
     return GST_FLOW_OK;
-  const auto sink = GST_AGGREGATOR_PAD (pad);
-  const GstClockTime left = priv->pair.running;
-  const GstClockTime tolerance = gstrange::pairing_tolerance (frame_duration);
-  GstFlowReturn flow = GST_FLOW_OK;
-  while (true) {
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (sink);
-    if (!buffer) {
-      flow =
-          gst_aggregator_pad_is_eos (sink) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
-      break;
-    }
-    const GstClockTime time = gstrange::running_time_of (sink, buffer);
-    const bool gap = gstrange::is_gap (buffer);
-    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (left);
-    const GstClockTime last =
-        timed && gap ? gstrange::gap_end (time, buffer, tolerance) : time + tolerance;
-    gst_buffer_unref (buffer);
-    if (timed && (time > left + tolerance || (gap && last >= left)))
-      break;
-    if (!gap && (!timed || last >= left)) {
-      *third = gst_aggregator_pad_pop_buffer (sink);
-      break;
-    }
-    gst_aggregator_pad_drop_buffer (sink);
-    std::lock_guard guard (priv->lock);
-    priv->dropped_third += !gap;
-  }
+  guint64 dropped = 0;
+  const GstFlowReturn flow = gstrange::take_companion (GST_AGGREGATOR_PAD (pad), priv->pair.running,
+      gstrange::pairing_tolerance (frame_duration), timeout, dropped, third);
   gst_object_unref (pad);
   if (*third && !priv->have_info[2]) /* of a pad that was released just now */
     gst_clear_buffer (third);
+  std::lock_guard guard (priv->lock);
+  priv->dropped_third += dropped;
   return flow;
 }
 
@@ -597,8 +555,11 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   if (priv->have_info[0] && priv->info[0].fps_n > 0)
     duration = gst_util_uint64_scale_int (GST_SECOND, priv->info[0].fps_d, priv->info[0].fps_n);
   if (!priv->pair.buffers.first)
-    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK)
+    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK) {
+      if (flow == GST_FLOW_EOS)
+        priv->reporter.finish ();
       return flow;
+    }
   if (drop_if_late (self))
     return GST_FLOW_OK;
   GstBuffer *third = nullptr;
@@ -654,8 +615,8 @@ gst_stereo_depth_flush (GstAggregator *aggregator)
   priv->since_refresh = 0;
   priv->core.forget ();
   forget_pair (priv);
-  priv->position = 0;
-  priv->segment_sent = priv->discont = false;
+  priv->gaps.reset ();
+  priv->discont = false;
   GstClockTime begin, end;
   priv->matcher->take_gap (begin, end);
   std::lock_guard guard (priv->lock);
@@ -685,6 +646,17 @@ gst_stereo_depth_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const guint64 lost = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
+  return {{.counters = {.frames = priv->frames,
+               .lost = lost + priv->dropped_third,
+               .late = priv->dropped_late}}};
+}
+
 static gboolean
 gst_stereo_depth_start (GstAggregator *aggregator)
 {
@@ -693,9 +665,11 @@ gst_stereo_depth_start (GstAggregator *aggregator)
     have = false;
   priv->negotiate = true;
   priv->third_changed = priv->third_released = false;
-  priv->said_unpaired = priv->segment_sent = priv->discont = false;
-  priv->dropped_before = priv->position = priv->head_start = 0;
+  priv->said_unpaired = priv->discont = false;
+  priv->dropped_before = priv->head_start = 0;
+  priv->gaps.reset ();
   priv->matcher->reset ();
+  priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
   priv->dropped_late = priv->match_time = 0;
@@ -708,6 +682,7 @@ static gboolean
 gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  priv->reporter.stop ();
   drop_pool (priv->pool);
   forget_pair (priv);
   for (PictureReader &reader : priv->readers)
@@ -719,6 +694,10 @@ static void
 gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
+  if (id == prop_stats + 1) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
   std::lock_guard guard (priv->lock);
   if (!set_stereo_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
@@ -745,6 +724,8 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
   std::lock_guard guard (priv->lock);
   if (id == prop_stats)
     g_value_take_boxed (value, make_stats (priv));
+  else if (id == prop_stats + 1)
+    g_value_set_uint (value, priv->reporter.interval ());
   else if (!get_stereo_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -784,6 +765,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
           "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
           "dropped-right, dropped-third, dropped-late, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, prop_stats + 1);
 
   for (GstStaticPadTemplate *pad_template :
       {&left_template, &right_template, &third_template, &src_template})

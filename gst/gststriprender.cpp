@@ -81,6 +81,7 @@ take_input_caps (GstStripRender *self, GstCaps *in)
     return GST_FLOW_ERROR;
   if (status.ok ())
     priv->scene.set_rig (priv->info.rig);
+  priv->reporter.set_views (priv->info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
@@ -345,6 +346,8 @@ gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
     case GST_EVENT_STREAM_START:
     case GST_EVENT_EOS:
       strip_drain_and_reset (self);
+      if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+        self->priv->reporter.finish ();
       break;
     case GST_EVENT_GAP:
       if (strip_take_gap (self, event)) {
@@ -406,6 +409,18 @@ gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const RenderStats &stats = priv->stats;
+  return {{.counters = {.frames = stats.frames,
+               .points = stats.points_total,
+               .bytes = stats.uploaded_total,
+               .late = stats.dropped}}};
+}
+
 static gboolean
 gst_strip_render_start (GstBaseTransform *base)
 {
@@ -416,6 +431,7 @@ gst_strip_render_start (GstBaseTransform *base)
   priv->live = false;
   priv->stats_text = {};
   strip_reset_rate (self);
+  priv->reporter.start (GST_ELEMENT (self), collect_stats);
   {
     std::lock_guard guard (priv->lock);
     priv->stats = {};
@@ -428,6 +444,7 @@ static gboolean
 gst_strip_render_stop (GstBaseTransform *base)
 {
   auto self = GST_STRIP_RENDER (base);
+  self->priv->reporter.stop ();
   self->priv->thread.stop ();
   strip_reset_rate (self);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->stop (base);
@@ -450,6 +467,10 @@ static void
 gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
+  if (id == prop_stats + 1) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
   bool hold_changed, keep_changed;
   {
     std::lock_guard guard (priv->lock);
@@ -471,6 +492,8 @@ gst_strip_render_get_property (GObject *object, guint id, GValue *value, GParamS
   std::lock_guard guard (priv->lock);
   if (id == prop_stats)
     g_value_take_boxed (value, priv->stats.to_structure ());
+  else if (id == prop_stats + 1)
+    g_value_set_uint (value, priv->reporter.interval ());
   else if (!get_strip_setting (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -520,6 +543,7 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
           "frame: points, "
           "vertices, triangles, strips, isolated, uploaded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, prop_stats + 1);
 
   describe_element (element_class);
   element_class->change_state = gst_strip_render_change_state;

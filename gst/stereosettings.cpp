@@ -4,6 +4,8 @@
 #include <iterator>
 #include <rangecast/geometry/range_image.hpp>
 
+#include "propertyrows.hpp"
+
 using rangecast::MatchAlgorithm;
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -17,13 +19,7 @@ static constexpr double kDefaultNear = 0.3, kDefaultFar = 3.0;
 
 /* ---- properties ---- */
 
-/* The properties that are plain numbers. */
-template <typename T> struct NumberRow {
-  const char *name, *nick, *blurb;
-  T minimum, maximum, fallback;
-  T &(*field) (Settings &);
-};
-static const NumberRow<double> kReals[] = {
+static const NumberRow<Settings, double> kReals[] = {
     {"focal-length", "Focal length",
         "Without a rig, for rectified pictures: pixels (default 0: not set)", 0, 1e6, 0,
         [] (Settings &s) -> double & { return s.focal_length; }},
@@ -69,7 +65,7 @@ static const NumberRow<double> kReals[] = {
         "default 0)",
         0, 1, kDefaults.steady, [] (Settings &s) -> double & { return s.core.steady; }},
 };
-static const NumberRow<int> kIntegers[] = {
+static const NumberRow<Settings, int> kIntegers[] = {
     {"view-id", "View id", "View of the rig, and view-id of the output (0 to 63, default 0)", 0,
         rangecast::kMaxViews - 1, 0, [] (Settings &s) -> int & { return s.view_id; }},
     {"block-size", "Block size",
@@ -125,14 +121,6 @@ enum : guint {
   PROP_QOS
 };
 
-/* The row of a property, or null if it is none of these. */
-template <typename T, std::size_t N>
-static const NumberRow<T> *
-find_row (const NumberRow<T> (&rows)[N], guint id, guint first)
-{
-  return id >= first && id < first + N ? &rows[id - first] : nullptr;
-}
-
 GType
 gst_stereo_depth_algorithm_get_type (void)
 {
@@ -149,14 +137,8 @@ gst_stereo_depth_algorithm_get_type (void)
 guint
 install_stereo_settings (GObjectClass *object_class)
 {
-  for (guint i = 0; const NumberRow<double> &row : kReals)
-    g_object_class_install_property (object_class, PROP_REALS + i++,
-        g_param_spec_double (
-            row.name, row.nick, row.blurb, row.minimum, row.maximum, row.fallback, kFlags));
-  for (guint i = 0; const NumberRow<int> &row : kIntegers)
-    g_object_class_install_property (object_class, PROP_INTEGERS + i++,
-        g_param_spec_int (
-            row.name, row.nick, row.blurb, row.minimum, row.maximum, row.fallback, kFlags));
+  install_rows (object_class, kReals, PROP_REALS, kFlags);
+  install_rows (object_class, kIntegers, PROP_INTEGERS, kFlags);
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
           "Rig file with the stereo pair that view-id names (default: none, see focal-length)",

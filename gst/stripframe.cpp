@@ -101,11 +101,14 @@ draw_frame (
         ("OpenGL could not draw into the output: %s", result.reason), (nullptr));
     return GST_FLOW_ERROR;
   }
+  if (!again)
+    priv->reporter.passed (GST_ELEMENT (self), frame_set);
   std::lock_guard guard (priv->lock);
   priv->settings.camera.shown (result.matrices, priv->scene.frame (), result.width, result.height);
   priv->scene.count_into (priv->stats);
   priv->stats.uploaded_bytes = result.uploaded;
   priv->stats.uploaded_total += result.uploaded;
+  priv->stats.points_total += priv->stats.points;
   priv->stats.frames++;
   priv->stats.repeated += again;
   return GST_FLOW_OK;

@@ -23,6 +23,7 @@
 #include "gststriprender.h"
 #include "picturegrid.hpp"
 #include "picturethread.hpp"
+#include "statsreporter.hpp"
 #include "stripdrawing.hpp"
 #include "stripscene.hpp"
 #include "stripsettings.hpp"
@@ -67,6 +68,7 @@ struct GstStripRenderPrivate {
   StreamGap gap; /* to go downstream between pictures, as far as they do not fill it */
 
   PictureThread thread;
+  StatsReporter reporter; /* has locks of its own */
 };
 
 struct _GstStripRender {

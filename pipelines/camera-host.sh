@@ -3,6 +3,7 @@
 # One camera host: a stereo pair to a coded range image of the person, over RTP to the parent.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
+source "$(dirname "$0")/rtp.sh"
 
 usage () {
   cat <<'END'
@@ -13,6 +14,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --input WHAT    avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
                   DIR: recorded pairs DIR/viewN-left.* and DIR/viewN-right.* (video files, or image
                   sequences viewN-left-%05d.png from 0), which begin with the empty scene;
+                  range: range images of the built-in figure, as perfect cameras would see it: no
+                  cameras and no stereo, to try what comes after them;
                   cameras: those that the rig names; cameras=LEFT,RIGHT[,THIRD]: these, by name,
                   serial number or address
   --views N       number of views in the rig, for avatar (default 4)
@@ -26,13 +29,21 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
                   cameras of all hosts of the network: one does (default: the host of view 0)
   --reconnect     wait for cameras that are gone or not there yet, instead of ending
   --learn N       frames from which the background is learnt (default 20)
+  --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true"
 END
+  rtp_usage_sender
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= action_send= reconnect=false
+format=rgb trigger=software clock_server= action_send= reconnect=false encoder=
 while [ $# -gt 0 ]; do
+  rtp_option sender "$1" "${2:-}"
+  if [ $taken -gt 0 ]; then
+    shift $taken || die "the last option lacks its value"
+    continue
+  fi
   case "$1" in
+    --encoder) encoder=${2:-}; shift ;;
     --view) view=${2:-}; shift ;;
     --to) to=${2:-}; shift ;;
     --rig) rig=${2:-}; shift ;;
@@ -70,7 +81,8 @@ if [ -n "$clock_server" ]; then
   split_address "$clock_server" --clock-server
   [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs fire by this machine's clock"
 fi
-split_address "$to" --to
+rtp_check sender
+send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
 # Sets `side` to the elements that play one side of a recorded pair at its own speed.
@@ -117,7 +129,12 @@ read_cameras () {
   done
 }
 
+depth=(stereodepth name=depth "rig=$rig" "view-id=$view" !)
 case "$input" in
+  range)
+    depth=()
+    cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))"
+      ! "video/x-range,width=${size%x*},height=${size#*x},framerate=$fps/1" ! queue max-size-buffers=2 !) ;;
   cameras=*,*,*) read_cameras left right third ;;
   cameras | cameras=*) read_cameras left right ;;
   avatar | avatar=*)
@@ -134,8 +151,9 @@ case "$input" in
     cameras+=("${side[@]}" ! queue ! depth.right) ;;
 esac
 
+read -ra encoder <<<"$encoder"
 launch "${cameras[@]}" \
-  stereodepth name=depth "rig=$rig" "view-id=$view" \
-  ! roiextract "background-frames=$learn" \
+  "${depth[@]}" \
+  roiextract "background-frames=$learn" \
   ! queue max-size-buffers=2 leaky=downstream \
-  ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink "host=$host" "port=$port" sync=false async=false
+  ! neighbourcodeenc "${encoder[@]}" ! "${rtp[@]}"

@@ -50,7 +50,8 @@ def main():
     print(f"CPU seconds by host: {cpu}")
     if whole < 0.9 * report["frames"]:
         print("warning: this machine is too slow for that size and rate: views came late and were left out of frame sets")
-    print(f"{out}/avatar.png  {out}/avatar.webm  {out}/report.json")
+    names = (os.path.join(out, name) for name in ("avatar.png", "avatar.webm", "report.json"))
+    print("  ".join(name for name in names if os.path.exists(name)))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ absolute () { case "$1" in /*) echo "$1" ;; *) echo "$called_from/$1" ;; esac; }
 usage () {
   cat <<'END'
 usage: demo.sh [options]
-  --input WHAT  avatar (default), avatar=MODEL.glb, a folder of recorded pairs with its rig.yaml
+  --input WHAT  avatar (default), avatar=MODEL.glb, range, a folder of recorded pairs with its rig.yaml
                 (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
                 shows, made on this machine's loopback network by fake-cameras
   --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
@@ -22,10 +22,16 @@ usage: demo.sh [options]
   --out DIR     where avatar.png, avatar.webm and report.json go (default out)
   --port N      first of views + 1 UDP ports (default 18400)
   --window      also show it in a window
+  --no-film     no avatar.webm, whose coding takes CPU time that a viewer does not need
+  --trace       also write when each buffer passed each pad to DIR/log/HOST.trace, for
+                tests/bench/latency-budget.py
+  --jitter MS   jitter buffers of the parent and the viewer (default: theirs)
+  --latency MS  how long the parent waits for a late view (default: its own)
+With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts' statistics go there, for top.sh.
 END
 }
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency=
 while [ $# -gt 0 ]; do
   case "$1" in
     --input) input=${2:-}; shift ;;
@@ -36,6 +42,10 @@ while [ $# -gt 0 ]; do
     --out) out=${2:-}; shift ;;
     --port) port=${2:-}; shift ;;
     --window) window=--window ;;
+    --no-film) film= ;;
+    --trace) trace=yes ;;
+    --jitter) jitter=${2:-}; shift ;;
+    --latency) latency=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; echo "demo.sh: unknown option '$1'" >&2; exit 2 ;;
   esac
@@ -50,10 +60,12 @@ need_size "$size" --size
 need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
+[ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
+[ -z "$latency" ] || need_number "$latency" --latency 0 10000
 [ -n "$out" ] || die "--out: expected a folder"
 out=$(absolute "$out")
 case "$input" in
-  avatar | cameras) ;;
+  avatar | range | cameras) ;;
   avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
   *) input=$(absolute "$input") ;;
 esac
@@ -91,11 +103,11 @@ case "$input" in
     need_number "$views" --views 1 64
     command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras was not built; it needs Aravis (libaravis-dev)"
     start_fake_cameras ;;
-  avatar | avatar=*)
+  avatar | avatar=* | range)
     views=${views:-4}
     need_number "$views" --views 1 64
     model=()
-    [ "$input" = avatar ] || model=("location=${input#avatar=}")
+    [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")
     gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
       ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
   *)
@@ -106,10 +118,12 @@ case "$input" in
     need_number "$views" --views 1 "$recorded_views" ;;
 esac
 
+trace_option () { [ -z "$trace" ] || printf -- '--trace-latency %q' "$out/log/$1.trace"; }
+
 start () { # name command...
   local name=$1
   shift
-  RANGECAST_LAUNCH="rangecast-run $run_options --report $(printf %q "$out/log/$name.json")" \
+  RANGECAST_HOST=$name RANGECAST_LAUNCH="rangecast-run $run_options $(trace_option "$name") --report $(printf %q "$out/log/$name.json")" \
     "$@" >"$out/log/$name.log" 2>&1 &
   pids+=($!)
   names[$!]=$name
@@ -118,7 +132,7 @@ start () { # name command...
 # Recorded pictures must begin at the same clock time on all hosts.
 run_options=
 case "$input" in
-  avatar | avatar=* | cameras) ;;
+  avatar | avatar=* | range | cameras) ;;
   *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
@@ -129,11 +143,13 @@ for ((i = 0; i < views; i++)); do
     --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))"
 done
 run_options=
-start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port"
+start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port" \
+  ${jitter:+--jitter "$jitter"} ${latency:+--latency "$latency"}
 
-RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
+[ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
+RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
   --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
-  pipelines/viewer-host.sh --listen "$viewer_port" --out "$out" $window &
+  pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} $window &
 viewer=$!
 pids+=($viewer)
 

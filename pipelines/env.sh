@@ -20,6 +20,8 @@ launch () {
     eval "runner=($RANGECAST_LAUNCH)" # a command line, quoted where it must be
     exec "${runner[@]}" "$@"
   fi
+  # It sends the elements' statistics there, for top.sh; gst-launch-1.0 does not.
+  [ -z "${RANGECAST_STATS:-}" ] || exec rangecast-run "$@"
   LANGUAGE=en exec gst-launch-1.0 -e --no-position "$@" > >(
     trap '' INT TERM # it ends with what it reads
     exec grep --line-buffered '^WARNING: ' >&2
@@ -35,6 +37,15 @@ split_address () {
     die "$2: expected HOST:PORT, got '$1'"
 }
 
+# usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets $addresses for multiudpsink
+split_addresses () {
+  local list one
+  IFS=, read -ra list <<<"$1"
+  [ ${#list[@]} -ge 1 ] || die "$2: expected HOST:PORT, got '$1'"
+  for one in "${list[@]}"; do split_address "$one" "$2"; done
+  addresses=$1
+}
+
 # usage: need_number VALUE option minimum maximum
 need_number () {
   [[ "$1" =~ ^[0-9]+$ ]] && [ "$1" -ge "$3" ] && [ "$1" -le "$4" ] ||
@@ -45,4 +56,5 @@ need_size () {
   [[ "$1" =~ ^[1-9][0-9]*x[1-9][0-9]*$ ]] || die "$2: expected WIDTHxHEIGHT, e.g. 320x240, got '$1'"
 }
 
-rtp_caps='application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'
+rtp_fields='media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'
+rtp_caps="application/x-rtp,$rtp_fields"

@@ -3,28 +3,50 @@
 # The parent host: the coded views of all camera hosts, matched by capture time, on to the viewer.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
+source "$(dirname "$0")/rtp.sh"
 
 usage () {
   cat <<'END'
-usage: parent-host.sh --views N --listen PORT --to HOST:PORT [options]
+usage: parent-host.sh --views N --listen PORT --to HOST:PORT[,HOST:PORT...] [options]
   --views N       how many camera hosts there are
   --listen PORT   camera host of view i sends to UDP port PORT + i
-  --to HOST:PORT  where the viewer listens
+  --to ADDRESSES  where viewers listen; a multicast group (e.g. 239.255.7.1:7000) reaches any number
+  --interface IF  network interface to the multicast group (default: the system's choice)
+  --ttl N         how many routers the multicast may pass, plus one (default 1: this network)
   --jitter MS     jitter buffer of each camera stream (default 30)
   --latency MS    how long to wait for a late view (default 60)
   --clock-port N  publish the clock on UDP port N, for camera-host.sh --clock-server (default: no)
+  --rig FILE      leave out camera hosts whose cameras are not those of this rig (default: none is)
+To the viewers:
+END
+  rtp_usage_sender
+  cat <<'END'
+From the cameras:
+  --cameras HOST:PORT[,HOST:PORT...]  camera-host.sh --feedback of each, in the order of views
+  --camera-fec, --camera-rtx  the camera hosts have --fec, --rtx; --key is one for all
 END
 }
 
-views= listen= to= jitter=30 latency=60 clock_port=
+views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx=
 while [ $# -gt 0 ]; do
+  rtp_option sender "$1" "${2:-}"
+  if [ $taken -gt 0 ]; then
+    shift $taken || die "the last option lacks its value"
+    continue
+  fi
   case "$1" in
     --views) views=${2:-}; shift ;;
     --listen) listen=${2:-}; shift ;;
     --to) to=${2:-}; shift ;;
+    --interface) rtp_interface=${2:-}; shift ;;
+    --ttl) rtp_ttl=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
     --latency) latency=${2:-}; shift ;;
     --clock-port) clock_port=${2:-}; shift ;;
+    --rig) rig=${2:-}; shift ;;
+    --cameras) cameras_feedback=${2:-}; shift ;;
+    --camera-fec) camera_fec=yes ;;
+    --camera-rtx) camera_rtx=yes ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
@@ -32,15 +54,25 @@ while [ $# -gt 0 ]; do
 done
 need_number "$views" --views 1 64
 need_number "$listen" --listen 1 $((65535 - views))
+need_number "$rtp_ttl" --ttl 0 255
 need_number "$jitter" --jitter 0 10000
 need_number "$latency" --latency 0 10000
 [ -z "$clock_port" ] || need_number "$clock_port" --clock-port 1 65535
-split_address "$to" --to
+IFS=, read -ra feedbacks <<<"$cameras_feedback"
+[ ${#feedbacks[@]} = 0 ] || [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
+[ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: expected --cameras, too"
+[ -z "$rig" ] || [ -f "$rig" ] || die "--rig: no file '$rig'"
+rtp_check sender
+send_rtp "$to"
+viewers=("${rtp[@]}")
 
+rtp_fec=$camera_fec rtp_rtx=$camera_rtx rtp_interface=
 cameras=()
 for ((i = 0; i < views; i++)); do
-  cameras+=(udpsrc "port=$((listen + i))" reuse=false buffer-size=1048576 "caps=$rtp_caps"
-    ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay ! mux.)
+  rtp_feedback=${feedbacks[i]:-}
+  [ -z "$rtp_feedback" ] || split_address "$rtp_feedback" --cameras
+  receive_rtp "$i" $((listen + i)) "$jitter" 1048576
+  cameras+=("${rtp[@]}" ! mux.)
 done
-launch rangemux name=mux "latency=$((latency * 1000000))" ${clock_port:+"clock-port=$clock_port"} \
-  ! rtpneighbourcodepay ! udpsink "host=$host" "port=$port" sync=false async=false "${cameras[@]}"
+launch rangemux name=mux "latency=$((latency * 1000000))" ${clock_port:+"clock-port=$clock_port"} ${rig:+"rig=$rig"} \
+  ! "${viewers[@]}" "${cameras[@]}"

@@ -11,12 +11,20 @@
 #include <gst/video/video.h>
 #include <gstrange/gstrange.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
+
+#include "latency-trace.hpp"
+#include "srtp-key.hpp"
+#include "stats-sender.hpp"
 
 struct Options {
   gint64 base_time = -1;
@@ -25,8 +33,12 @@ struct Options {
   gboolean turn = FALSE;
   gint timeout_s = 0;
   gboolean progress = FALSE;
+  gchar *stats = nullptr, *trace = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
+  gchar *frame_log = nullptr;
+  gchar *threads_left = nullptr;
+  gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
 
@@ -35,6 +47,8 @@ struct Runner {
   GstElement *pipeline = nullptr;
   GMainLoop *loop = nullptr;
   GstElement *turned = nullptr; /* a striprender */
+  std::unique_ptr<StatsSender> stats;
+  std::unique_ptr<LatencyTrace> trace;
   bool failed = false;
   bool ending = false;
 
@@ -43,7 +57,9 @@ struct Runner {
   GstClockTime first_frame = GST_CLOCK_TIME_NONE, last_frame = GST_CLOCK_TIME_NONE;
   bool seen_points = false;
   guint64 decoded = 0, whole = 0; /* frame sets; those in which all views have points */
-  gint64 first_points_us = 0;     /* monotonic; 0: none yet */
+  gint views_now = 0;             /* that have points in the last one decoded */
+  FILE *frame_log = nullptr;
+  gint64 first_points_us = 0; /* monotonic; 0: none yet */
 };
 
 struct StreamStats {
@@ -162,6 +178,7 @@ count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
     runner->decoded++;
     runner->whole += whole;
   }
+  runner->views_now = seen;
   return runner->seen_points ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
 }
 
@@ -196,6 +213,9 @@ count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
     runner->last_frame = now;
     runner->latencies_ms.push_back (
         GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0);
+    if (runner->frame_log)
+      std::fprintf (runner->frame_log, "%.6f,%.3f,%d\n", double (now) * 1e-9,
+          runner->latencies_ms.back (), runner->views_now);
   }
   if (runner->options.frames > 0 && frames + 1 == runner->options.frames)
     g_idle_add (send_eos, runner);
@@ -316,6 +336,52 @@ write_snapshot (Runner &runner)
   return written;
 }
 
+static FILE *
+open_frame_log (const char *path)
+{
+  FILE *file = std::fopen (path, "w");
+  if (!file) {
+    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
+    return nullptr;
+  }
+  std::setvbuf (file, nullptr, _IOLBF, 0); /* whoever watches reads it as it grows */
+  std::fprintf (file, "clock_s,latency_ms,views\n");
+  return file;
+}
+
+static std::vector<std::string>
+other_threads ()
+{
+  std::vector<std::string> names;
+  std::error_code error;
+  const std::string own = std::to_string (getpid ());
+  for (const auto &task : std::filesystem::directory_iterator ("/proc/self/task", error)) {
+    std::string name;
+    std::ifstream (task.path () / "comm") >> name;
+    if (task.path ().filename () != own)
+      names.push_back (name);
+  }
+  return names;
+}
+
+/* Those that end by themselves get a moment for it. */
+static bool
+write_threads_left (const char *path)
+{
+  g_thread_pool_set_max_unused_threads (0); /* else some stay for later use */
+  std::vector<std::string> left = other_threads ();
+  for (int i = 0; !left.empty () && i < 20; i++) {
+    g_usleep (50000);
+    left = other_threads ();
+  }
+  std::ofstream file (path);
+  for (const std::string &name : left)
+    file << name << '\n';
+  if (!file.flush ())
+    g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return bool (file);
+}
+
 /* ---- the run ---- */
 
 static gboolean
@@ -341,6 +407,14 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       break;
     case GST_MESSAGE_LATENCY:
       gst_bin_recalculate_latency (GST_BIN (runner->pipeline));
+      break;
+    case GST_MESSAGE_CLOCK_LOST:
+      gst_element_set_state (runner->pipeline, GST_STATE_PAUSED);
+      gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
+      break;
+    case GST_MESSAGE_ELEMENT:
+      if (runner->stats)
+        runner->stats->take (message);
       break;
     case GST_MESSAGE_EOS:
       g_main_loop_quit (runner->loop);
@@ -381,6 +455,8 @@ play (Runner &runner)
     runner.turned = gst_bin_get_by_name (GST_BIN (runner.pipeline), "view");
   add_probe (runner, "decoder", count_views);
   add_probe (runner, "rendered", count_rendered);
+  if (runner.options.trace)
+    runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     runner.failed = true; /* the reason is on the bus; on_message() prints it and quits */
@@ -391,6 +467,10 @@ play (Runner &runner)
   if (!runner.failed && runner.options.snapshot)
     runner.failed = !write_snapshot (runner);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
+  if (runner.trace && !runner.trace->write (runner.options.trace)) {
+    g_printerr ("rangecast-run: %s: cannot be written\n", runner.options.trace);
+    runner.failed = true;
+  }
   gst_bus_remove_watch (bus);
   gst_clear_object (&runner.turned);
   gst_object_unref (bus);
@@ -412,9 +492,21 @@ parse_arguments (int *argc, char ***argv, Options &options)
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
           "Fail if it has not ended by then (default 0: never)", "SECONDS"},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &options.progress, "Print a line every 2 s", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_STRING, &options.stats,
+          "Send the elements' statistics there, for top.sh: udp://HOST:PORT or a file (default: "
+          "environment RANGECAST_STATS, else nowhere)",
+          "ADDRESS"},
+      {"trace-latency", 0, 0, G_OPTION_ARG_FILENAME, &options.trace,
+          "Write when each buffer passed each pad", "FILE"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &options.report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &options.snapshot,
           "Write the last picture of the sink named snapshot", "PNG"},
+      {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &options.frame_log,
+          "Write a line for each frame: its time, latency and views with points", "CSV"},
+      {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &options.threads_left,
+          "Write the names of threads that still run when the pipeline is gone", "FILE"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
@@ -431,11 +523,26 @@ parse_arguments (int *argc, char ***argv, Options &options)
   return parsed && options.launch;
 }
 
+/* @return false if there is something wrong with the address */
+static bool
+open_stats (Runner &runner)
+{
+  const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
+  if (!address || !*address)
+    return true;
+  const char *host = g_getenv ("RANGECAST_HOST");
+  std::string error;
+  runner.stats = StatsSender::open (address, host && *host ? host : g_get_host_name (), error);
+  if (!runner.stats)
+    g_printerr ("rangecast-run: statistics: %s\n", error.c_str ());
+  return runner.stats != nullptr;
+}
+
 int
 main (int argc, char **argv)
 {
   Runner runner;
-  if (!parse_arguments (&argc, &argv, runner.options))
+  if (!parse_arguments (&argc, &argv, runner.options) || !open_stats (runner))
     return 2;
   GError *error = nullptr;
   GstElement *parsed =
@@ -452,10 +559,25 @@ main (int argc, char **argv)
     runner.pipeline = gst_pipeline_new (nullptr);
     gst_bin_add (GST_BIN (runner.pipeline), parsed);
   }
-  play (runner);
+  if ((runner.options.frame_log &&
+          !(runner.frame_log = open_frame_log (runner.options.frame_log))) ||
+      (runner.options.srtp_key && !give_srtp_key (runner.pipeline, runner.options.srtp_key)))
+    runner.failed = true;
+  else
+    play (runner);
   gst_object_unref (runner.pipeline);
+  if (runner.frame_log)
+    std::fclose (runner.frame_log);
+  if (runner.options.threads_left && !write_threads_left (runner.options.threads_left))
+    runner.failed = true;
   g_free (runner.options.report);
+  g_free (runner.options.stats);
+  g_free (runner.options.trace);
   g_free (runner.options.snapshot);
+  g_free (runner.options.frame_log);
+  g_free (runner.options.threads_left);
+  g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
+  gst_deinit (); /* tracers write now what they found */
   return runner.failed ? 1 : 0;
 }

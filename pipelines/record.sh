@@ -3,6 +3,7 @@
 # Records coded frame sets to a file: what a parent sends, or the built-in figure.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
+source "$(dirname "$0")/rtp.sh"
 
 usage () {
   cat <<'END'
@@ -12,16 +13,27 @@ usage: record.sh FILE [options]
   --views N      views round the figure (default 4)
   --size WxH     picture size (default 320x240)
   --frames N     frame sets (default 60)
+With --listen:
+  --multicast GROUP  the parent sends to this multicast group
+  --interface IF  network interface to the group (default: the system's choice)
 END
+  rtp_usage_receiver
 }
 
-file= listen= views=4 size=320x240 frames=60
+file= listen= views=4 size=320x240 frames=60 group=
 while [ $# -gt 0 ]; do
+  rtp_option receiver "$1" "${2:-}"
+  if [ $taken -gt 0 ]; then
+    shift $taken || die "the last option lacks its value"
+    continue
+  fi
   case "$1" in
     --listen) listen=${2:-}; shift ;;
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --frames) frames=${2:-}; shift ;;
+    --multicast) group=${2:-}; shift ;;
+    --interface) rtp_interface=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; die "unknown option '$1'" ;;
     *) file=$1 ;;
@@ -35,7 +47,9 @@ need_size "$size" --size
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
-  source=(udpsrc "port=$listen" reuse=false "caps=$rtp_caps" ! rtpjitterbuffer latency=50 ! rtpneighbourcodedepay)
+  rtp_check receiver
+  receive_rtp 0 "$listen" 50 4194304 "$group"
+  source=("${rtp[@]}")
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)

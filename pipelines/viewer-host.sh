@@ -3,6 +3,7 @@
 # The viewer: frame sets of all views to a picture that turns round the person.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
+source "$(dirname "$0")/rtp.sh"
 
 usage () {
   cat <<'END'
@@ -13,11 +14,19 @@ usage: viewer-host.sh --listen PORT [options]
   --orbit DEG     degrees per second by which the view turns by itself (default 0)
   --size WxH      picture size (default 640x480)
   --jitter MS     jitter buffer (default 30)
+  --multicast GROUP  the parent sends to this multicast group, e.g. 239.255.7.1
+  --interface IF  network interface to the group (default: the system's choice)
 END
+  rtp_usage_receiver
 }
 
-listen= out= window= orbit=0 size=640x480 jitter=30
+listen= out= window= orbit=0 size=640x480 jitter=30 group=
 while [ $# -gt 0 ]; do
+  rtp_option receiver "$1" "${2:-}"
+  if [ $taken -gt 0 ]; then
+    shift $taken || die "the last option lacks its value"
+    continue
+  fi
   case "$1" in
     --listen) listen=${2:-}; shift ;;
     --out) out=${2:-}; shift ;;
@@ -25,6 +34,8 @@ while [ $# -gt 0 ]; do
     --orbit) orbit=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
+    --multicast) group=${2:-}; shift ;;
+    --interface) rtp_interface=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
@@ -33,20 +44,22 @@ done
 need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
 need_size "$size" --size
+[[ -z "$group" || "$group" =~ ^2(2[4-9]|3[0-9])(\.[0-9]{1,3}){3}$ ]] || die "--multicast: expected a group from 224.0.0.0 to 239.255.255.255, got '$group'"
+rtp_check receiver
+receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
-sinks=(picture. ! queue ! fakesink name=snapshot sync=false async=false)
+sinks=(picture. ! queue max-size-buffers=2 leaky=downstream ! fakesink name=snapshot sync=false async=false)
 if [ -n "$window" ]; then
-  sinks+=(picture. ! queue max-size-buffers=2 ! videoconvert ! autovideosink sync=false)
+  sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink sync=false)
 fi
 if [ -n "$out" ]; then
   mkdir -p "$out"
-  sinks+=(picture. ! queue ! videoconvert ! vp8enc deadline=1 cpu-used=8 target-bitrate=2000000
+  sinks+=(picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8 target-bitrate=2000000
     keyframe-max-dist=60 ! webmmux ! filesink "location=$out/avatar.webm")
 fi
 
-launch udpsrc "port=$listen" reuse=false buffer-size=4194304 "caps=$rtp_caps" \
-  ! rtpjitterbuffer "latency=$jitter" ! rtpneighbourcodedepay \
+launch "${rtp[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
-  ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
+  ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
   ! identity name=rendered ! tee name=picture "${sinks[@]}"

@@ -28,6 +28,16 @@ struct CameraInfo {
   std::string address;     ///< GigE: IP address; USB: USB vendor, product and serial
   std::string physical_id; ///< GigE: MAC address; USB: GUID
   std::string protocol;    ///< "GigEVision", "USB3Vision"
+
+  /** Whether both are known to be one camera, whatever names they were found by. */
+  [[nodiscard]] bool is_same (const CameraInfo &other) const
+  {
+    const auto same = [] (const std::string &a, const std::string &b) {
+      return !a.empty () && a == b;
+    };
+    return same (id, other.id) || same (address, other.address) ||
+           same (physical_id, other.physical_id);
+  }
 };
 
 /** All cameras that answer now. Takes about a second, looks at every network interface and USB. Any
@@ -104,8 +114,10 @@ public:
    *  @param[out] camera  set if ok
    *  @return kNotFound (the text says which cameras answered), kBusy (another program has control),
    * kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait
-   * for each other. */
-  static CameraStatus open (const std::string &name, std::unique_ptr<Camera> &camera);
+   * for each other.
+   *  @param[out] seen  what is known of the camera of that name, also if it is busy; may be null */
+  static CameraStatus open (
+      const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen = nullptr);
 
   Camera (const Camera &) = delete;
   Camera &operator= (const Camera &) = delete;
@@ -133,12 +145,14 @@ public:
   /** Begins to stream; numbers of frames begin at 0.
    *  @param arrived  a frame came, or was given up; in order of `number`
    *  @param lost     at most once: the camera does not answer any more, or another program took
-   * control. GigE tells so after its heartbeat, within about 6 s; who wants to know sooner watches
-   * for frames that do not come. */
+   * control. GigE tells so after its heartbeat, within about 6 s; who wants to know sooner has a
+   * CameraPulse. */
   CameraStatus start (Arrived arrived, Lost lost);
   /** No callback runs or comes after it. */
   void stop ();
   [[nodiscard]] bool is_lost () const; ///< any thread
+  /** Any thread: it is gone, as somebody else noticed: nothing waits for it any more. */
+  void give_up ();
 
   /** Any thread: takes one picture (TriggerMode::kSoftware). Returns when the camera has
    * acknowledged, mostly within a millisecond. */

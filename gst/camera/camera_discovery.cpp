@@ -256,6 +256,8 @@ open_by_other_name (
   if (name.find ('.') == std::string::npos || name.find (' ') != std::string::npos)
     return not_found (name, list);
   const CameraStatus status = open_by_id (name, name, device, protocol);
+  if (g_hostname_is_ip_address (name.c_str ()))
+    info.address = name;
   info.protocol = protocol;
   return status.fault () == CameraFault::kNotFound ? not_found (name, list) : status;
 }

@@ -27,6 +27,15 @@ enum class CameraFault {
   kFailed,       ///< anything else (RESOURCE/FAILED)
 };
 
+/** What is said of a camera that was open and is gone, however that was noticed.
+ *  @param label  how texts name it */
+inline std::string
+lost_text (const std::string &label)
+{
+  return label + ": does not answer any more; expected it plugged in and powered, and no other "
+                 "program to take control of it";
+}
+
 /** The result of a camera function: fine, or a fault and one sentence that names the camera and
  * what was expected. The words in brackets above are the GStreamer errors that fit. */
 class [[nodiscard]] CameraStatus {

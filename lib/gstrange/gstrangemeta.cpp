@@ -138,6 +138,70 @@ gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)
   return TRUE;
 }
 
+/* The bytes [begin, end) of the buffer that a plane covers; false if the layout is absurd. */
+static bool
+plane_extent (gsize offset, gsize stride, gsize row_bytes, gsize rows, gsize buffer_size,
+    gsize *begin, gsize *end)
+{
+  if (offset > buffer_size || stride < row_bytes || rows > G_MAXUINT32)
+    return false;
+  const gsize length = (rows - 1) * stride + row_bytes;
+  if (length > buffer_size - offset)
+    return false;
+  *begin = std::min (*begin, offset);
+  *end = std::max (*end, offset + length);
+  return true;
+}
+
+/* The bytes [begin, end) of the buffer that both planes of a view cover, which is not empty; false
+ * if the layout is absurd. */
+static bool
+view_extent (const GstRangeMeta *meta, gsize buffer_size, gsize *begin, gsize *end)
+{
+  if (meta->width > rangecast::kMaxImageSide || meta->height > rangecast::kMaxImageSide ||
+      meta->depth_offset % 2 || meta->depth_stride % 2 || meta->colour_stride % 4)
+    return false;
+  *begin = G_MAXSIZE;
+  *end = 0;
+  return plane_extent (meta->depth_offset, meta->depth_stride, gsize{meta->width} * 2, meta->height,
+             buffer_size, begin, end) &&
+         plane_extent (meta->colour_offset, meta->colour_stride, gsize{meta->width} * 4,
+             meta->height, buffer_size, begin, end);
+}
+
+/**
+ * gst_range_buffer_copy_view:
+ * @frame_set: a frame set
+ * @meta: one of its views
+ *
+ * The inverse of gst_range_buffer_append(): a buffer of one view, without copying pixels. The
+ * memory is shared, and @frame_set stays alive as long as the new buffer does. Flags, times and
+ * capture time are not set.
+ *
+ * Returns: (transfer full) (nullable): the view, or %NULL if its planes do not lie inside the
+ * buffer
+ */
+GstBuffer *
+gst_range_buffer_copy_view (GstBuffer *frame_set, const GstRangeMeta *meta)
+{
+  const bool empty = meta->width == 0 || meta->height == 0;
+  gsize begin = 0, end = 0;
+  if (!empty && !view_extent (meta, gst_buffer_get_size (frame_set), &begin, &end))
+    return nullptr;
+  begin -= begin % 4; /* planes stay aligned, counted from the buffer's start */
+  GstBuffer *view = gst_buffer_new ();
+  if (!empty) {
+    gst_buffer_copy_into (view, frame_set, GST_BUFFER_COPY_MEMORY, begin, end - begin);
+    gst_buffer_add_parent_buffer_meta (view, frame_set);
+  }
+  auto added =
+      reinterpret_cast<GstRangeMeta *> (gst_buffer_add_meta (view, GST_RANGE_META_INFO, nullptr));
+  gst_range_meta_copy_fields (added, meta);
+  added->depth_offset = empty ? 0 : meta->depth_offset - begin;
+  added->colour_offset = empty ? 0 : meta->colour_offset - begin;
+  return view;
+}
+
 static GstCaps *
 capture_time_reference ()
 {
@@ -183,21 +247,6 @@ gst_range_buffer_get_capture_time (GstBuffer *buffer)
   return view ? view->capture_time : GST_CLOCK_TIME_NONE;
 }
 
-/* The bytes [begin, end) of the buffer that a plane covers; false if the layout is absurd. */
-static bool
-plane_extent (gsize offset, gsize stride, gsize row_bytes, gsize rows, gsize buffer_size,
-    gsize *begin, gsize *end)
-{
-  if (offset > buffer_size || stride < row_bytes || rows > G_MAXUINT32)
-    return false;
-  const gsize length = (rows - 1) * stride + row_bytes;
-  if (length > buffer_size - offset)
-    return false;
-  *begin = std::min (*begin, offset);
-  *end = std::max (*end, offset + length);
-  return true;
-}
-
 /**
  * gst_range_view_map:
  * @view: (out caller-allocates): the mapped view
@@ -224,17 +273,9 @@ gst_range_view_map (
   view->colour_stride = meta->colour_stride;
   if (meta->width == 0 || meta->height == 0)
     return TRUE;
-  if (meta->width > rangecast::kMaxImageSide || meta->height > rangecast::kMaxImageSide ||
-      meta->depth_offset % 2 || meta->depth_stride % 2 || meta->colour_stride % 4)
-    return FALSE;
-
-  const gsize size = gst_buffer_get_size (buffer);
-  gsize begin = G_MAXSIZE, end = 0, skip = 0;
+  gsize begin = 0, end = 0, skip = 0;
   guint index = 0, length = 0;
-  if (!plane_extent (meta->depth_offset, meta->depth_stride, gsize{meta->width} * 2, meta->height,
-          size, &begin, &end) ||
-      !plane_extent (meta->colour_offset, meta->colour_stride, gsize{meta->width} * 4, meta->height,
-          size, &begin, &end) ||
+  if (!view_extent (meta, gst_buffer_get_size (buffer), &begin, &end) ||
       !gst_buffer_find_memory (buffer, begin, end - begin, &index, &length, &skip) ||
       !gst_buffer_map_range (buffer, index, length, &view->map, flags))
     return FALSE;

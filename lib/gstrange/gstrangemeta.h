@@ -45,6 +45,8 @@ GST_RANGE_API GstRangeMeta *gst_buffer_iterate_range_meta (GstBuffer *buffer, gp
 GST_RANGE_API guint gst_buffer_n_range_metas (GstBuffer *buffer);
 
 GST_RANGE_API gboolean gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views);
+GST_RANGE_API GstBuffer *gst_range_buffer_copy_view (
+    GstBuffer *frame_set, const GstRangeMeta *meta);
 
 GST_RANGE_API void gst_range_buffer_set_capture_time (GstBuffer *buffer, GstClockTime time);
 GST_RANGE_API GstClockTime gst_range_buffer_get_capture_time (GstBuffer *buffer);

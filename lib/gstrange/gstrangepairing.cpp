@@ -7,6 +7,29 @@
 
 namespace gstrange {
 
+GstFlowReturn
+take_companion (GstAggregatorPad *pad, GstClockTime running_time, GstClockTime tolerance,
+    bool timeout, guint64 &dropped, GstBuffer **result)
+{
+  *result = nullptr;
+  while (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
+    const GstClockTime time = running_time_of (pad, buffer);
+    const bool gap = is_gap (buffer);
+    const bool timed = GST_CLOCK_TIME_IS_VALID (time) && GST_CLOCK_TIME_IS_VALID (running_time);
+    const GstClockTime last = timed && gap ? gap_end (time, buffer, tolerance) : time + tolerance;
+    gst_buffer_unref (buffer);
+    if (timed && (time > running_time + tolerance || (gap && last >= running_time)))
+      return GST_FLOW_OK;
+    if (!gap && (!timed || last >= running_time)) {
+      *result = gst_aggregator_pad_pop_buffer (pad);
+      return GST_FLOW_OK;
+    }
+    gst_aggregator_pad_drop_buffer (pad);
+    dropped += !gap;
+  }
+  return gst_aggregator_pad_is_eos (pad) || timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
 GstAggregatorPad *
 add_sink_pad (GstElement *aggregator, const char *name)
 {
@@ -182,6 +205,48 @@ stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
   }
   GST_BUFFER_DURATION (buffer) = duration;
   gst_range_buffer_set_capture_time (buffer, capture_time);
+}
+
+void
+GapSender::note_buffer (GstClockTime running_time, GstClockTime duration)
+{
+  segment_sent_ = true; /* GstAggregator sends it with the first buffer */
+  if (GST_CLOCK_TIME_IS_VALID (running_time))
+    position_ = running_time + (GST_CLOCK_TIME_IS_VALID (duration) ? duration : 0);
+}
+
+bool
+GapSender::cut (GstClockTime &begin, GstClockTime end) const
+{
+  begin = std::max (begin, position_);
+  return begin < end;
+}
+
+/* GstAggregator sends it with buffers only. It comes again with the first one, which changes
+ * nothing. */
+static void
+push_segment (GstAggregator *aggregator, GstAggregatorPad *cause, const GstSegment &segment)
+{
+  GstEvent *event = gst_event_new_segment (&segment);
+  GstEvent *reason = gst_pad_get_sticky_event (GST_PAD (cause), GST_EVENT_SEGMENT, 0);
+  if (reason)
+    gst_event_set_seqnum (event, gst_event_get_seqnum (reason));
+  gst_clear_event (&reason);
+  gst_pad_push_event (aggregator->srcpad, event);
+}
+
+void
+GapSender::push (
+    GstAggregator *aggregator, GstAggregatorPad *cause, GstClockTime begin, GstClockTime end)
+{
+  GST_OBJECT_LOCK (aggregator);
+  const GstSegment segment = GST_AGGREGATOR_PAD (aggregator->srcpad)->segment;
+  GST_OBJECT_UNLOCK (aggregator);
+  if (!segment_sent_)
+    push_segment (aggregator, cause, segment);
+  segment_sent_ = true;
+  position_ = end;
+  gst_pad_push_event (aggregator->srcpad, gst_event_new_gap (segment.start + begin, end - begin));
 }
 
 } // namespace gstrange

@@ -54,6 +54,17 @@ private:
   std::atomic<guint64> dropped_[2] = {0, 0}; // also read by whoever asks for statistics
 };
 
+/** Takes from a further pad the buffer that belongs to a pair; older ones are dropped. A buffer
+ *  without PTS is taken as it comes.
+ *  @param running_time  of the pair, ns, or GST_CLOCK_TIME_NONE
+ *  @param tolerance     pairing_tolerance()
+ *  @param timeout       what is not there yet is not waited for
+ *  @param dropped       gets the number of dropped buffers added, not counting GAPs
+ *  @param[out] buffer   transfer full; null if it is lost, or the pad has ended
+ *  @return GST_FLOW_OK, or GST_AGGREGATOR_FLOW_NEED_DATA while it may still come */
+GST_RANGE_API GstFlowReturn take_companion (GstAggregatorPad *pad, GstClockTime running_time,
+    GstClockTime tolerance, bool timeout, guint64 &dropped, GstBuffer **buffer);
+
 /** Adds the always pad of that template and name to an aggregator; for instance_init.
  *  @return transfer none: the element owns it */
 GST_RANGE_API GstAggregatorPad *add_sink_pad (GstElement *aggregator, const char *name);
@@ -83,5 +94,25 @@ GST_RANGE_API GstClockTime capture_time_of (GstAggregatorPad *pad, GstBuffer *bu
  *  @param running_time  may be GST_CLOCK_TIME_NONE (no PTS) */
 GST_RANGE_API void stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
     GstClockTime duration, GstClockTime capture_time);
+
+/** Tells downstream of an aggregator of times of which nothing will come, so that it does not wait
+ *  for it. For the streaming thread. Running times, ns. */
+class GST_RANGE_API GapSender {
+public:
+  /** A buffer goes out. Both may be GST_CLOCK_TIME_NONE. */
+  void note_buffer (GstClockTime running_time, GstClockTime duration);
+  /** Cuts off what has come out already. @return whether anything is left */
+  bool cut (GstClockTime &begin, GstClockTime end) const;
+  /** Sends a GAP, in front of it the segment if that did not go out yet; caps must have.
+   *  @param cause  of that segment: its sequence number is that of this pad's */
+  void push (
+      GstAggregator *aggregator, GstAggregatorPad *cause, GstClockTime begin, GstClockTime end);
+  /** After a flush, or at a start. */
+  void reset () { *this = GapSender (); }
+
+private:
+  bool segment_sent_ = false;
+  GstClockTime position_ = 0; /* where the output so far ends */
+};
 
 } // namespace gstrange

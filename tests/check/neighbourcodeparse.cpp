@@ -53,6 +53,36 @@ GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_
 }
 GST_END_TEST;
 
+/* Warnings of a stream that lacks its last bytes. */
+static int
+warnings_of_stream (const Recording &recording, gsize missing)
+{
+  GstHarness *h = new_parser ();
+  int n = 0;
+  {
+    ErrorCounter errors (h);
+    push_bytes (h, std::span (recording.bytes).first (recording.bytes.size () - missing), 5000);
+    gst_harness_push_event (h, gst_event_new_eos ());
+    while (GstMessage *message = gst_bus_pop_filtered (errors.bus, GST_MESSAGE_WARNING)) {
+      gst_message_unref (message);
+      n++;
+    }
+  }
+  auto parsed = pull_all (h);
+  unref_all (parsed);
+  gst_harness_teardown (h);
+  return n;
+}
+
+GST_START_TEST (test_stream_that_ends_within_an_access_unit_is_one_warning)
+{
+  const Recording recording;
+  fail_unless_equals_int (warnings_of_stream (recording, 0), 0);
+  fail_unless_equals_int (warnings_of_stream (recording, 1), 1);
+  fail_unless_equals_int (warnings_of_stream (recording, 500), 1);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_trailing_bytes_cost_nothing)
 {
   const Recording recording;
@@ -717,6 +747,7 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_what_is_written_reads_the_same_in_pieces_of_any_size);
   tcase_add_test (tc, test_rubbish_before_and_between_costs_nothing_else);
   tcase_add_test (tc, test_every_truncated_prefix_keeps_the_whole_access_units_before_it);
+  tcase_add_test (tc, test_stream_that_ends_within_an_access_unit_is_one_warning);
   tcase_add_test (tc, test_trailing_bytes_cost_nothing);
   tcase_add_test (tc, test_size_field_that_lies_costs_no_later_access_unit);
   tcase_add_test (tc, test_every_flipped_bit_costs_its_own_access_unit_only);

@@ -134,20 +134,60 @@ GST_START_TEST (test_left_cameras_present_format_is_taken_where_any_will_do)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_formats_that_nobody_has_are_one_error_that_lists_the_cameras)
+static std::string
+error_with_caps (const std::string &left, const std::string &right)
+{
+  CameraPipeline p ("trigger=software", 2, "ANY");
+  const std::string caps[] = {left, right};
+  for (int side = 0; side < 2; side++) {
+    GstPad *pad = gst_element_get_static_pad (p.source (), kSides[side]);
+    GstPad *peer = gst_pad_get_peer (pad);
+    GstElement *filter = gst_pad_get_parent_element (peer);
+    gst_util_set_object_arg (G_OBJECT (filter), "caps", caps[side].c_str ());
+    gst_object_unref (filter);
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+  }
+  p.play ();
+  return p.next_text (GST_MESSAGE_ERROR);
+}
+
+GST_START_TEST (test_caps_that_nobody_has_are_one_error_that_names_pad_field_and_values)
 {
   TestCameras cameras;
-  {
-    CameraPipeline p ("trigger=software", 2, "video/x-raw,width=31");
-    p.play ();
-    const std::string text = p.next_text (GST_MESSAGE_ERROR);
-    fail_unless (text.find ("GRAY8") != std::string::npos, "%s", text.c_str ());
+  const struct {
+    std::string left, right, expected;
+  } rows[] = {
+      {"ANY", "video/x-raw,width=1920,height=1080",
+          "pad right: downstream asks for width 1920; the cameras have [ 4, 64, 4 ]"},
+      {"video/x-raw,height=4000", "ANY",
+          "pad left: downstream asks for height 4000; the cameras have [ 1, 48 ]"},
+      {"video/x-raw,framerate=0/1", "ANY", "pad left: downstream asks for framerate 0/1; the"},
+      {"video/x-raw,format=NV12", "ANY", "pad left: downstream asks for format video/x-raw NV12;"},
+      {"video/x-raw,format=RGB", "video/x-raw,format=GRAY8",
+          "pad right: downstream asks for format video/x-raw GRAY8; with pad left there is "
+          "video/x-raw RGB"},
+      {"video/x-raw,width=32", "video/x-raw,width=64",
+          "pad right: downstream asks for width 64; with pad left there is 32"},
+  };
+  for (const auto &row : rows) {
+    const std::string text = error_with_caps (row.left, row.right);
+    fail_unless (text.find (row.expected) != std::string::npos, "%s", text.c_str ());
   }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_format_that_is_not_there_is_one_error_that_lists_the_cameras)
+{
+  TestCameras cameras;
   CameraPipeline p ("trigger=software format=Mono12Packed", 2, "ANY");
   p.play ();
   const std::string text = p.next_text (GST_MESSAGE_ERROR);
-  fail_unless (text.find ("Mono12Packed") != std::string::npos, "%s", text.c_str ());
-  fail_unless (text.find ("Mono8") != std::string::npos, "%s", text.c_str ());
+  for (const char *part : {"Mono12Packed", "Mono8"})
+    fail_unless (text.find (part) != std::string::npos, "%s", text.c_str ());
+  for (int camera = 0; camera < 2; camera++)
+    fail_unless (text.find (camera_address (camera)) != std::string::npos, "%s", text.c_str ());
+  fail_unless (text.find ("Mono8") == text.rfind ("Mono8"), "the same twice: %s", text.c_str ());
 }
 GST_END_TEST;
 
@@ -200,6 +240,9 @@ GST_START_TEST (test_cameras_that_are_not_named_are_one_error)
       {"", "property left"},
       {"left=a", "property right"},
       {"left=a right=a", "named twice"},
+      {"left=a rig=" + path, "no right camera: property left names one, so rig is not asked"},
+      {"left=a right=b single-shot=true", "single-shot with trigger=free-run"},
+      {"left=a right=b single-shot=true trigger=hardware", "single-shot with trigger=hardware"},
       {"rig=/nowhere.yaml", "/nowhere.yaml: no such file"},
       {"rig=" + path, "does not name its left camera"},
       {"view-id=7 rig=" + path, "view-id 7"},
@@ -322,6 +365,37 @@ GST_START_TEST (test_it_is_live_and_says_its_latency)
 }
 GST_END_TEST;
 
+static GstClockTime
+latency_now (CameraPipeline &p)
+{
+  GstQuery *query = gst_query_new_latency ();
+  GstPad *pad = gst_element_get_static_pad (p.source (), "left");
+  GstClockTime least = 0;
+  fail_unless (gst_pad_query (pad, query));
+  gst_query_parse_latency (query, nullptr, &least, nullptr);
+  gst_query_unref (query);
+  gst_object_unref (pad);
+  return least;
+}
+
+/* Sinks ask when the pipeline goes to PLAYING, which is before cameras have answered. */
+GST_START_TEST (test_latency_before_the_cameras_answer_has_exposure_and_a_period)
+{
+  {
+    CameraPipeline p ("trigger=software exposure=5000"); /* of cameras that are not there */
+    gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+    fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + GST_SECOND / 30);
+  }
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software exposure=5000");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+  gst_element_set_state (p.pipeline (), GST_STATE_READY);
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + kPeriod); /* as it was */
+}
+GST_END_TEST;
+
 GST_START_TEST (test_no_picture_is_taken_while_paused)
 {
   TestCameras cameras;
@@ -372,6 +446,30 @@ GST_START_TEST (test_flush_goes_out_on_all_pads_and_pictures_go_on)
   fail_unless (gst_element_send_event (p.source (), gst_event_new_flush_stop (FALSE)));
   fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
   fail_unless (p.seen (0)[0].discont);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pictures_go_on_after_a_flush_that_the_application_pushes_on_one_pad)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 5));
+  GstPad *left = gst_element_get_static_pad (p.source (), "left");
+  for (const bool with_time_between : {true, false}) {
+    gst_pad_push_event (left, gst_event_new_flush_start ());
+    if (with_time_between)
+      g_usleep (200000);
+    gst_pad_push_event (left, gst_event_new_flush_stop (FALSE));
+    p.forget ();
+    fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
+    GstEvent *segment = gst_pad_get_sticky_event (left, GST_EVENT_SEGMENT, 0);
+    fail_unless (segment != nullptr);
+    gst_event_unref (segment);
+  }
+  p.stop ();
+  expect_pairs (p, 2, kPeriod / 2);
+  gst_object_unref (left);
 }
 GST_END_TEST;
 
@@ -438,7 +536,8 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_pixels_are_not_copied);
   tcase_add_test (tc, test_downstream_chooses_format_size_and_rate);
   tcase_add_test (tc, test_left_cameras_present_format_is_taken_where_any_will_do);
-  tcase_add_test (tc, test_formats_that_nobody_has_are_one_error_that_lists_the_cameras);
+  tcase_add_test (tc, test_caps_that_nobody_has_are_one_error_that_names_pad_field_and_values);
+  tcase_add_test (tc, test_format_that_is_not_there_is_one_error_that_lists_the_cameras);
   tcase_add_test (tc, test_rig_file_names_the_cameras);
   tcase_add_test (tc, test_cameras_that_are_not_named_are_one_error);
   tcase_add_test (tc, test_blocked_branch_does_not_hold_up_the_other);
@@ -447,10 +546,12 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_runs_again_after_null_and_after_ready);
   tcase_add_test (tc, test_states_may_change_at_once);
   tcase_add_test (tc, test_it_is_live_and_says_its_latency);
+  tcase_add_test (tc, test_latency_before_the_cameras_answer_has_exposure_and_a_period);
   tcase_add_test (tc, test_no_picture_is_taken_while_paused);
   tcase_add_test (tc, test_eos_event_ends_all_pads);
   tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);
   tcase_add_test (tc, test_flush_goes_out_on_all_pads_and_pictures_go_on);
+  tcase_add_test (tc, test_pictures_go_on_after_a_flush_that_the_application_pushes_on_one_pad);
   tcase_add_test (tc, test_running_time_begins_anew_after_a_flush_that_resets_it);
   tcase_add_test (tc, test_downstream_may_want_another_size_mid_stream);
   return suite;

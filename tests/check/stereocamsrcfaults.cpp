@@ -95,6 +95,38 @@ GST_START_TEST (test_lost_camera_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_unplugged_camera_is_said_with_one_text_whatever_fires_it)
+{
+  for (const char *trigger : {"free-run", "software", "hardware", "action",
+           "hardware output-line=Line2", "software single-shot=true"}) {
+    TestCameras cameras;
+    CameraPipeline p (std::string ("trigger=") + trigger, 2, "video/x-raw,format=GRAY8");
+    p.play ();
+    for (int i = 0; i < 2000 && read_register (0, ARV_FAKE_CAMERA_REGISTER_ACQUISITION) == 0; i++)
+      g_usleep (10000);
+    g_usleep (1000000); /* the right one is started, too */
+    cameras.unplug (1);
+    const std::string text = p.next_text (GST_MESSAGE_ERROR);
+    expect_text (text, camera_address (1));
+    expect_text (text, "does not answer any more; expected it plugged in and powered");
+    fail_unless (text.find ("timeout") == std::string::npos, "%s", text.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_one_camera_under_two_names_is_said_to_be_one)
+{
+  TestCameras cameras;
+  const std::string names[][2] = {{camera_address (0), "stereo0"}, {"stereo0", camera_address (0)}};
+  for (const auto &name : names) {
+    CameraPipeline p ("left=" + name[0] + " right=" + name[1], 2, "ANY", false);
+    p.play ();
+    const std::string text = p.next_text (GST_MESSAGE_ERROR);
+    expect_text (text, "'" + name[1] + "' is the same camera as '" + name[0] + "' of pad left");
+  }
+}
+GST_END_TEST;
+
 static GstPadProbeReturn
 count_gaps (GstPad *, GstPadProbeInfo *info, gpointer count)
 {
@@ -233,6 +265,8 @@ stereocamsrcfaults_suite ()
   tcase_add_test (tc, test_feature_that_is_not_there_is_one_error_that_names_it);
   tcase_add_test (tc, test_features_reach_the_cameras);
   tcase_add_test (tc, test_lost_camera_is_one_error);
+  tcase_add_test (tc, test_unplugged_camera_is_said_with_one_text_whatever_fires_it);
+  tcase_add_test (tc, test_one_camera_under_two_names_is_said_to_be_one);
   tcase_add_test (tc, test_camera_that_is_killed_comes_back_and_pairs_stay_exact);
   tcase_add_test (tc, test_free_running_camera_that_is_killed_comes_back);
   tcase_add_test (tc, test_camera_that_comes_late_is_waited_for);

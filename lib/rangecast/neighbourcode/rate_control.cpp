@@ -22,6 +22,10 @@ constexpr double kMemoryOfModel = 0.3, kMemoryOfInterval = 0.5;
  * nothing was saved while nothing was there. */
 constexpr double kLongestPause = 2, kMostIntervals = 4;
 
+/* A target that differs by more is another one; by less it is the old one that follows a network.
+ */
+constexpr double kOtherTarget = 0.125;
+
 /* What a share of the target a frame set is planned for at least and at most. */
 constexpr double kLeastShare = 0.7, kGreatestShare = 1.3;
 
@@ -100,7 +104,8 @@ RateControl::configure (const RateSettings &wanted)
   if (configured_ && settings == settings_)
     return;
   const bool first = !configured_;
-  if (first || settings.bits_per_s != settings_.bits_per_s)
+  if (first ||
+      std::abs (settings.bits_per_s - settings_.bits_per_s) > kOtherTarget * settings_.bits_per_s)
     account_ = entering_ = spread_ = 0;
   const Thresholds before = thresholds_;
   const bool same_limits = settings.best == settings_.best && settings.worst == settings_.worst;
@@ -217,12 +222,19 @@ RateControl::limit_account ()
   account_ = std::clamp (account_, -credit * second, debt * second);
 }
 
+double
+RateControl::least_bits () const
+{
+  return frames_ > 0 ? points_ * std::exp (a_ - b_ * most_x_) : 0;
+}
+
 void
 RateControl::coded (const CodedFrame &frame)
 {
   const auto bytes = static_cast<double> (frame.bytes);
   const auto points = static_cast<double> (frame.points);
   const bool refresh = frame.refresh && frames_ > 0;
+  points_ = points;
   const double usual = points * std::exp (a_ - b_ * coarseness_of (thresholds_)) / 8;
   const double more = refresh ? std::max (0.0, bytes - usual) : 0;
   entering_ = std::min (entering_ + more, kMostSpread * bytes_per_s ());

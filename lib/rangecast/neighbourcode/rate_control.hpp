@@ -49,8 +49,8 @@ public:
   /** Forgets everything. */
   void reset () { *this = RateControl (); }
 
-  /** May be called before every frame set. A new target begins a new account; thresholds go on from
-   *  what they are, within the new limits. */
+  /** May be called before every frame set. A target that differs by more than an eighth
+   *  begins a new account; thresholds go on from what they are, within the new limits. */
   void configure (const RateSettings &settings);
 
   /** The thresholds for the next frame set, once for each.
@@ -64,6 +64,9 @@ public:
 
   [[nodiscard]] Thresholds thresholds () const { return thresholds_; }
   [[nodiscard]] double coarseness () const { return x_; }
+
+  /** What the latest frame set would come to at the worst thresholds, bits; 0 before the first. */
+  [[nodiscard]] double least_bits () const;
 
 private:
   [[nodiscard]] double threshold_at (int best, int worst, double x) const;
@@ -84,7 +87,8 @@ private:
   int frames_ = 0;                        /* learnt from, up to a few */
   int outliers_ = 0;                      /* in a row */
   double a_ = 0, b_ = 0;
-  double fill_ = 0; /* points of a pixel */
+  double fill_ = 0;   /* points of a pixel */
+  double points_ = 0; /* of the latest frame set */
   bool has_time_ = false;
   std::uint64_t time_ns_ = 0;
   double interval_s_ = 0, elapsed_s_ = 0;

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "frame_thinning.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangecast {
+namespace {
+
+/* Seconds for which a rate must be wrong. */
+constexpr double kShort = 0.25, kEnough = 2;
+/* What a frame set may cost more than there is before that counts, and what there must be more than
+ * it costs before there are more of them. */
+constexpr double kTooMuch = 1.03, kReserve = 1.2;
+constexpr int kMost = 1000;
+
+} // namespace
+
+void
+FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
+{
+  const double fps = 1e9 / static_cast<double> (in.interval_ns);
+  const int most = in.least_fps > 0
+                       ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMost)))
+                       : kMost;
+  const double share = in.bits_per_s > 0 ? in.least_bits * fps / in.bits_per_s : 0;
+  const auto one_of = [&] (double x) {
+    return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (most))));
+  };
+  short_s_ = share > kTooMuch * one_of_ ? short_s_ + elapsed_s : 0;
+  enough_s_ = one_of (kReserve * share) < one_of_ ? enough_s_ + elapsed_s : 0;
+  if (short_s_ > kShort || one_of_ > most)
+    one_of_ = one_of (share);
+  else if (enough_s_ > kEnough)
+    one_of_ = one_of (kReserve * share);
+  else
+    return;
+  short_s_ = enough_s_ = 0;
+}
+
+bool
+FrameThinning::keep (const ThinningInput &in)
+{
+  if (in.interval_ns == 0)
+    return true;
+  const double elapsed =
+      has_time_ ? 1e-9 * static_cast<double> (static_cast<std::int64_t> (in.time_ns - time_ns_))
+                : 0;
+  has_time_ = true;
+  time_ns_ = in.time_ns;
+  const int before = one_of_;
+  adjust (in, std::clamp (elapsed, 0.0, 1.0));
+  const std::uint64_t number = (in.time_ns + in.interval_ns / 2) / in.interval_ns;
+  const std::uint64_t slot = number / static_cast<std::uint64_t> (one_of_);
+  const bool keeps = one_of_ == 1 || one_of_ != before || slot != kept_;
+  kept_ = slot;
+  return keeps;
+}
+
+} // namespace rangecast

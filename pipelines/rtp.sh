@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Sourced by the scripts of hosts: the part of a launch string between coded frame sets and UDP, on
+# either side, with what the options in rtp_usage_* ask for. docs/streaming.md explains it.
+
+rtp_fec= rtp_rtx= rtp_key= rtp_interface= rtp_ttl=1 rtp_feedback=
+
+rtp_usage_sender () {
+  cat <<'END_OF_USAGE'
+  --fec PERCENT   send so many more packets, from which receivers with --fec make lost ones again
+                  (1 to 100; default none)
+  --feedback PORT receivers' RTCP arrives at this UDP port: requests for key frame sets, for lost packets
+  --rtx           send lost packets again to receivers with --rtx; needs --feedback
+  --key FILE      encrypt (SRTP) with the key in FILE: 60 hexadecimal digits
+END_OF_USAGE
+}
+rtp_usage_receiver () {
+  cat <<'END_OF_USAGE'
+  --fec           the sender has --fec
+  --feedback HOST:PORT  the sender's --feedback
+  --rtx           ask the sender (--rtx) for lost packets again; needs --feedback
+  --key FILE      the sender's --key
+END_OF_USAGE
+}
+
+# usage: rtp_option sender|receiver NAME VALUE -> sets `taken` to how many arguments it took, 0: none.
+rtp_option () {
+  taken=2
+  case "$2" in
+    --fec)
+      if [ "$1" = sender ]; then
+        need_number "$3" --fec 1 100
+        rtp_fec=$3
+      else
+        rtp_fec=yes taken=1
+      fi ;;
+    --rtx) rtp_rtx=yes taken=1 ;;
+    --key) rtp_key=$3 ;;
+    --feedback) rtp_feedback=$3 ;;
+    *) taken=0 ;;
+  esac
+}
+
+# After all options: whether they go together.
+rtp_check () { # sender|receiver
+  if [ -n "$rtp_feedback" ]; then
+    if [ "$1" = sender ]; then need_number "$rtp_feedback" --feedback 1 65535; else split_address "$rtp_feedback" --feedback; fi
+  fi
+  [ -z "$rtp_rtx" ] || [ -n "$rtp_feedback" ] || die "--rtx: expected --feedback, too"
+  [ -n "$rtp_key" ] || return 0
+  # gst-launch-1.0 takes a key on its command line only, where everybody on the machine reads it.
+  [[ "$(cat "$rtp_key" 2>/dev/null)" =~ ^[0-9a-fA-F]{60}$ ]] || die "--key: expected a file of 60 hexadecimal digits, got '$rtp_key'"
+  command -v rangecast-run >/dev/null || die "--key: rangecast-run was not found"
+  local key
+  printf -v key %q "$(realpath "$rtp_key")"
+  RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --srtp-key $key"
+}
+
+rtp_fb='rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true'
+# Transport-wide feedback, from which neighbourcodeenc adaptive-bitrate=true learns of queues.
+rtp_twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
+rtx_map='application/x-rtp-pt-map,96=(uint)97,122=(uint)123'
+
+# usage: send_rtp HOST:PORT[,HOST:PORT...] -> sets `rtp` to what takes coded frame sets to all of them.
+send_rtp () {
+  local target twcc=
+  split_addresses "$1" --to
+  rtp=(rtpneighbourcodepay)
+  # Of several receivers rtpsession would mix the transport-wide feedback.
+  [[ "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
+  [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc" ! rtcpreports name=reports)
+  [ -z "$rtp_fec" ] || rtp+=(! rtpulpfecenc "percentage=$rtp_fec" pt=122)
+  [ -z "$rtp_rtx" ] || rtp+=(! rtprtxsend max-size-time=500 "payload-type-map=$rtx_map")
+  [ -z "$rtp_feedback" ] || rtp+=(! session.send_rtp_sink session.send_rtp_src)
+  [ -z "$rtp_key" ] || rtp+=(! encrypt.rtp_sink_0 srtpenc name=encrypt encrypt.rtp_src_0)
+  rtp+=(! multiudpsink "clients=$addresses" sync=false async=false "ttl-mc=$rtp_ttl")
+  [ -z "$rtp_interface" ] || rtp+=("multicast-iface=$rtp_interface")
+  [ -n "$rtp_feedback" ] || return 0
+  rtp+=(rtpsession name=session rtp-profile=avpf)
+  if [ -n "$rtp_key" ]; then
+    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-srtcp ! decrypt.rtcp_sink
+      srtpdec name=decrypt decrypt.rtcp_src ! reports.rtcp_sink)
+  else
+    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-rtcp ! reports.rtcp_sink)
+  fi
+  rtp+=(reports.rtcp_src ! session.recv_rtcp_sink)
+}
+
+# usage: receive_rtp NUMBER PORT JITTER_MS BUFFER_BYTES [GROUP] -> sets `rtp` to what gives coded frame
+# sets from a port. NUMBER tells several of one pipeline apart.
+receive_rtp () {
+  local type=application/x-rtp feedback=
+  [ -z "$rtp_key" ] || type=application/x-srtp
+  rtp=(udpsrc "port=$2" reuse=false "buffer-size=$4" "caps=$type,$rtp_fields,payload=96,$rtp_fb,$rtp_twcc")
+  if [ -n "${5:-}" ]; then
+    rtp+=("address=$5" reuse=true) # several viewers on one host
+    [ -z "$rtp_interface" ] || rtp+=("multicast-iface=$rtp_interface")
+  fi
+  [ -z "$rtp_key" ] || rtp+=(! "decrypt$1.rtp_sink" srtpdec "name=decrypt$1" "decrypt$1.rtp_src")
+  rtp+=(! rtpneighbourcodeguard)
+  if [ -n "$rtp_feedback" ]; then
+    split_address "$rtp_feedback" --feedback
+    rtp+=(! capssetter "caps=application/x-rtp,payload=96" ! "session$1.recv_rtp_sink"
+      rtpsession "name=session$1" rtp-profile=avpf "session$1.send_rtcp_src")
+    [ -z "$rtp_key" ] || rtp+=(! "encrypt$1.rtcp_sink_0" srtpenc "name=encrypt$1" "encrypt$1.rtcp_src_0")
+    rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src" ! rtpneighbourcodeguard)
+  fi
+  [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
+  [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
+  # Of the number of a sender that begins again nothing follows: expect a second of loss at most.
+  rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)
+  [ -z "$rtp_rtx" ] || rtp+=(do-retransmission=true)
+  [ -z "$rtp_fec" ] || rtp+=(do-lost=true ! rtpulpfecdec pt=122)
+  rtp+=(! rtpneighbourcodedepay)
+}

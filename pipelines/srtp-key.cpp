@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "srtp-key.hpp"
+
+#include <atomic>
+#include <string>
+
+namespace {
+
+constexpr std::size_t kKeyBytes = 30; /* of AES-128 in counter mode, RFC 3711 */
+constexpr guint kClosedPackets = 20;  /* in a row, before somebody is told */
+
+/** What goes into a srtpdec and comes out of it; its streaming threads count. */
+struct Watched {
+  std::string name, path;
+  std::atomic<guint> closed = 0; /* packets in a row that did not open */
+  bool told = false;             /* one streaming thread per pad, and one pad counts in */
+};
+
+GstBuffer *
+read_key (const char *path)
+{
+  gchar *text = nullptr;
+  guint8 key[kKeyBytes];
+  bool good = g_file_get_contents (path, &text, nullptr, nullptr);
+  if (good) {
+    g_strstrip (text);
+    good = strlen (text) == 2 * kKeyBytes;
+  }
+  for (std::size_t i = 0; good && i < kKeyBytes; i++) {
+    const int high = g_ascii_xdigit_value (text[2 * i]),
+              low = g_ascii_xdigit_value (text[2 * i + 1]);
+    good = high >= 0 && low >= 0;
+    key[i] = guint8 (high * 16 + low);
+  }
+  g_free (text);
+  if (good)
+    return gst_buffer_new_memdup (key, kKeyBytes);
+  g_printerr ("rangecast-run: --srtp-key %s: expected a file of %zu hexadecimal digits\n", path,
+      2 * kKeyBytes);
+  return nullptr;
+}
+
+GstCaps *
+on_request_key (GstElement *, guint ssrc, gpointer user_data)
+{
+  return gst_caps_new_simple ("application/x-srtp", "ssrc", G_TYPE_UINT, ssrc, "srtp-key",
+      GST_TYPE_BUFFER, static_cast<GstBuffer *> (user_data), "srtp-cipher", G_TYPE_STRING,
+      "aes-128-icm", "srtp-auth", G_TYPE_STRING, "hmac-sha1-80", "srtcp-cipher", G_TYPE_STRING,
+      "aes-128-icm", "srtcp-auth", G_TYPE_STRING, "hmac-sha1-80", nullptr);
+}
+
+GstPadProbeReturn
+on_packet_in (GstPad *, GstPadProbeInfo *, gpointer user_data)
+{
+  auto watched = static_cast<Watched *> (user_data);
+  if (++watched->closed == kClosedPackets && !watched->told) {
+    watched->told = true;
+    g_printerr (
+        "WARNING: %s: packets do not open with the key in %s: the sender has another key, or "
+        "does not encrypt\n",
+        watched->name.c_str (), watched->path.c_str ());
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+GstPadProbeReturn
+on_packet_out (GstPad *, GstPadProbeInfo *, gpointer user_data)
+{
+  auto watched = static_cast<Watched *> (user_data);
+  watched->closed = 0;
+  watched->told = false;
+  return GST_PAD_PROBE_OK;
+}
+
+void
+watch (GstElement *decrypter, const char *path)
+{
+  const char *const ways[][2] = {{"rtp_sink", "rtp_src"}, {"rtcp_sink", "rtcp_src"}};
+  for (const auto &way : ways) {
+    auto watched = new Watched; /* lives as the pipeline */
+    watched->name = GST_OBJECT_NAME (decrypter);
+    watched->path = path;
+    GstPad *in = gst_element_get_static_pad (decrypter, way[0]);
+    GstPad *out = gst_element_get_static_pad (decrypter, way[1]);
+    const auto types = GST_PAD_PROBE_TYPE_BUFFER;
+    gst_pad_add_probe (in, types, on_packet_in, watched,
+        [] (gpointer data) { delete static_cast<Watched *> (data); });
+    gst_pad_add_probe (out, types, on_packet_out, watched, nullptr);
+    gst_object_unref (in);
+    gst_object_unref (out);
+  }
+}
+
+void
+release_key (gpointer key, GClosure *)
+{
+  gst_buffer_unref (static_cast<GstBuffer *> (key));
+}
+
+} // namespace
+
+bool
+give_srtp_key (GstElement *pipeline, const char *path)
+{
+  GstBuffer *key = read_key (path);
+  if (!key)
+    return false;
+  for (GList *item = GST_BIN_CHILDREN (pipeline); item; item = item->next) {
+    GstElement *element = GST_ELEMENT (item->data);
+    GstElementFactory *factory = gst_element_get_factory (element);
+    const gchar *name = factory ? GST_OBJECT_NAME (factory) : "";
+    if (g_str_equal (name, "srtpenc")) {
+      g_object_set (element, "key", key, nullptr);
+    } else if (g_str_equal (name, "srtpdec")) {
+      g_signal_connect_data (element, "request-key", G_CALLBACK (on_request_key),
+          gst_buffer_ref (key), release_key, GConnectFlags (0));
+      watch (element, path);
+    }
+  }
+  gst_buffer_unref (key);
+  return true;
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+#include <netdb.h>
+#include <sys/socket.h>
+
+#include <memory>
+#include <string>
+
+/** Sends the elements' `rangecast-stats` messages on, for pipelines/top.sh: a JSON object a line,
+ * or a datagram. Never waits: what the network does not take is lost. */
+class StatsSender {
+public:
+  /** @param address  udp://HOST:PORT, or a file, to which lines are appended
+   *  @param host     what these messages are called in the table
+   *  @param[out] error  what is wrong with the address
+   *  @return null after an error */
+  static std::unique_ptr<StatsSender> open (
+      const std::string &address, std::string host, std::string &error);
+  ~StatsSender ();
+  StatsSender (const StatsSender &) = delete;
+  StatsSender &operator= (const StatsSender &) = delete;
+
+  /** Sends it if it is a rangecast-stats message. */
+  void take (GstMessage *message);
+
+private:
+  StatsSender () = default;
+  bool open_socket (const std::string &host, const std::string &port, std::string &error);
+
+  int fd_ = -1;
+  bool is_socket_ = false;
+  sockaddr_storage to_{};
+  socklen_t to_size_ = 0;
+  std::string host_;
+};
