@@ -31,6 +31,7 @@
 #include <vector>
 
 #include "statsreporter.hpp"
+#include "unitgatherer.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -59,7 +60,7 @@ struct GstRtpNeighbourCodeDepayPrivate {
   unsigned used_generation = 0;
   bool have_caps = false;
   std::size_t rig_views = 0;
-  std::vector<guint8> access_unit;    /* slices that arrived so far */
+  UnitGatherer access_unit;           /* slices that arrived so far */
   rangecast::KeyCheck key_check;      /* of them */
   bool has_gap = false;               /* packets were lost before or between them */
   guint32 timestamp = 0;              /* RTP time of them */
@@ -175,12 +176,12 @@ take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
   if (!priv->access_unit.empty ()) {
     std::lock_guard guard (priv->lock);
     if (priv->have_caps) {
-      buffer = gst_buffer_new_memdup (priv->access_unit.data (), priv->access_unit.size ());
+      buffer = priv->access_unit.take ();
       GST_BUFFER_PTS (buffer) = priv->pts;
       if (!is_key_unit (priv, has_end))
         GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
       priv->counters.access_units++;
-      priv->counters.bytes += priv->access_unit.size ();
+      priv->counters.bytes += gst_buffer_get_size (buffer);
     } else {
       priv->counters.without_rig++;
     }
@@ -246,13 +247,12 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView)) {
       bad += !take_rig_view (self, *unit);
-    } else if (priv->access_unit.size () + unit->size () > rangecast::kMaxAccessUnitSize) {
+    } else if (!priv->access_unit.add (*unit)) {
       bad++; /* it is hostile */
     } else {
       good++;
       if (header.type == static_cast<guint8> (UnitType::kSlice))
         note_slice (priv, *unit);
-      priv->access_unit.insert (priv->access_unit.end (), unit->begin (), unit->end ());
     }
   }
   bad += !reader.status ().ok ();

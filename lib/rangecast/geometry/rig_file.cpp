@@ -228,6 +228,8 @@ load_rig (const std::string &path, Rig &rig)
   if (!std::filesystem::is_regular_file (there))
     return {StatusCode::kNotFound,
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
+  if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
+    return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
   Rig loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);
