@@ -48,16 +48,17 @@ def constants_from(path: str) -> Constants:
     with open(path, encoding="utf-8") as file:
         told = json.load(file)
     rows = told["rows"]
-    of = lambda what: [r for r in rows if r["what"] == what and r["packets_per_set"] > 0]
+    of = lambda what: [r for r in rows if r["what"] == what and r["packets_per_set"] > 0 and r["lost"] < 0.5]
+    passed_us = lambda r: 1e3 * r["cpu_ms"] / (r["packets_per_set"] * (1 - r["lost"]))  # what was lost cost nothing
     c = Constants()
     parents, relays, viewers = of("parent"), of("relay"), told["viewers"]
     if parents:
         largest = max(parents, key=lambda r: r["views"])
-        c = replace(c, parent_us=1e3 * largest["cpu_ms"] / largest["packets_per_set"])
+        c = replace(c, parent_us=passed_us(largest))
         base, slope = fit([(r["views"], r["rss_mib"]) for r in parents])
         c = replace(c, parent_mib=base, view_mib=max(slope, 0.0))
     if len(relays) >= 2:
-        base, slope = fit([(r["viewers"], 1e3 * r["cpu_ms"] / r["packets_per_set"]) for r in relays])
+        base, slope = fit([(r["viewers"], passed_us(r)) for r in relays])
         c = replace(c, relay_in_us=max(base, 0.0), relay_out_us=slope)
     if viewers:
         last = viewers[-1]
