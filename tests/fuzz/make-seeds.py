@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Makes first inputs for the fuzz targets of the golden streams in tests/data; README.md says what becomes of them.
+"""Makes first inputs for the fuzz targets, most of them of the golden streams in tests/data; README.md says what becomes of them.
 
 usage: make-seeds.py FOLDER
 """
 
 import struct
 import sys
+from base64 import b64encode
 from importlib import import_module
 from pathlib import Path
 
@@ -120,9 +121,122 @@ def rtp_seeds(access_units: list[list[bytes]]) -> list[bytes]:
     return seeds
 
 
+VIEW = {
+    "id": "0",
+    "name": "\"front\"",
+    "image_size": "[ 64, 48 ]",
+    "intrinsics": "[ 60., 60., 31.5, 23.5 ]",
+    "world_from_view": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ 0., 0., 0.8 ]"},
+    "depth_unit": "1.0e-04",
+    "near": "0.45",
+    "far": "1.3",
+}
+PARTNER = {
+    "camera": "\"1234\"",
+    "intrinsics": "[ 60., 60., 31.5, 23.5 ]",
+    "distortion": "[ 0.1, -0.2, 0., 0. ]",
+    "partner_from_left": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ -0.1, 0., 0. ]"},
+}
+PIXELS = {"rows": "1", "cols": "2", "dt": "\"8f\"", "data": "[ " + ", ".join(["10., 20., 30., 1., 8000., 5., 1., 7990."] * 2) + " ]"}
+# A kind of matrix, padded, and then the same numbers.
+BINARY = b64encode(b"8f".ljust(24) + struct.pack("<16f", *[10, 20, 30, 1, 8000, 5, 1, 7990] * 2)).decode()
+
+
+def yaml_of(node: dict, indent: int = 0) -> str:
+    lines = []
+    for key, value in node.items():
+        start = " " * indent + f"{key}:"
+        if isinstance(value, dict):
+            lines.append(start + (" !!opencv-matrix\n" if "dt" in value else "\n") + yaml_of(value, indent + 3))
+        elif isinstance(value, list):
+            items = [yaml_of(item, indent + 6) for item in value]
+            lines.append(start + "\n" + "".join(" " * (indent + 3) + "-\n" + item for item in items))
+        else:
+            lines.append(f"{start} {value}\n")
+    return "".join(lines)
+
+
+def json_of(node: dict) -> str:
+    parts = []
+    for key, value in node.items():
+        if isinstance(value, dict):
+            text = json_of({"type_id": "\"opencv-matrix\"", **value} if "dt" in value else value)
+        else:
+            text = "[ " + ", ".join(json_of(item) for item in value) + " ]" if isinstance(value, list) else value
+        parts.append(f'"{key}": {text}')
+    return "{ " + ",\n".join(parts) + " }"
+
+
+def xml_of(node: dict) -> str:
+    parts = []
+    for key, value in node.items():
+        if isinstance(value, dict):
+            text = xml_of(value)
+        else:
+            text = "".join(f"<_>{xml_of(item)}</_>" for item in value) if isinstance(value, list) else value.strip("[ ]").replace(",", "")
+        kind = ' type_id="opencv-matrix"' if "dt" in value else ""
+        parts.append(f"<{key}{kind}>{text}</{key}>\n")
+    return "".join(parts)
+
+
+def texts_of(node: dict) -> list[bytes]:
+    """The three that OpenCV reads."""
+    texts = ["%YAML:1.0\n---\n" + yaml_of(node), json_of(node), f'<?xml version="1.0"?>\n<opencv_storage>\n{xml_of(node)}</opencv_storage>\n']
+    return [text.encode() for text in texts]
+
+
+def rig_file_seeds() -> list[bytes]:
+    views = [[VIEW], [{**VIEW, "right": PARTNER, "third": PARTNER}], [VIEW, {**VIEW, "id": "7"}], []]
+    return [text for some in views for text in texts_of({"rangecast_rig": "1", "views": some})]
+
+
+def background_seeds() -> list[bytes]:
+    datas = [PIXELS, {**PIXELS, "data": f'"$base64${BINARY}"'}, {**PIXELS, "data": f"!!binary |\n            {BINARY}"}]
+    texts = [text for pixels in datas for text in texts_of({"rangecast_background": "2", "views": [{"id": "0", "frames": "3", "pixels": pixels}]})]
+    return [text.replace(b'<data>"$base64$', b'<data type_id="binary">').replace(b'"</data>', b"</data>") for text in texts]
+
+
+def range_meta_seeds() -> list[bytes]:
+    """Two memories of which each holds a view of 8 x 4 pixels; the views in another order, with padding, or empty."""
+
+    def view(number: int, offset: int, width: int = 8, more: int = 0) -> bytes:
+        strides = (width * 2 + more, width * 4 + more)
+        return struct.pack("<7I4x2Q", number, 5, 6, width, 4, *strides, offset, offset + 4 * strides[0])
+
+    sizes = struct.pack("<2H", 192, 256)
+    views = [[view(0, 0), view(1, 192)], [view(9, 192, 8, 8), view(63, 0)], [view(0, 0, 0), view(0, 192)], [view(0, 384)], [view(3, 96)]]
+    return [bytes((1 | len(some) << 2,)) + sizes + b"".join(some) for some in views]
+
+
+def caps_seeds(rigs: list[bytes]) -> list[bytes]:
+    fields = "width=(int)80, height=(int)60, views=(int)%d, framerate=(fraction)30/1, rig=(buffer)%s"
+    media = ("video/x-range, format=(string)Z16_RGBx, ", "application/x-neighbour-code, version=(int)1, alignment=(string)slice, ")
+    texts = [(media[i % 2] + fields % (1 + i // 2, rig.hex())).encode() for i, rig in enumerate(rigs)]
+    texts += [b"ANY", b"video/x-range, width=[ 1, 80 ], alignment={ access-unit, slice }; application/x-neighbour-code(memory:GLMemory)"]
+    numbers = struct.pack("<5i", 80, 60, 1, 30, 1)
+    return [b"\1" + text for text in texts] + [bytes((2 * (i % 2),)) + numbers + rig for i, rig in enumerate(rigs)]
+
+
+def rtp_caps_seeds(rigs: list[bytes]) -> list[bytes]:
+    return [b"\7" + b"1\0" + b"30/1\0" + b64encode(rig) for rig in rigs] + [b"\x0b" + b"1\0" + b"25/1\0" + rig for rig in rigs] + [b"\1" + b"2"]
+
+
+def camera_texts_seeds() -> list[bytes]:
+    texts = [b"Gamma=0.8 LineSelector='Line 1' UserSetLoad", b'A="x y",B=1;C', b"1A=2", b"A=\"x", b"A=1=2"]
+    return texts + [bytes.fromhex("0000008500180001000000e8") + name.ljust(16, b"\0") for name in (b"left", b"sixteen letters ")]
+
+
+def parse_seeds(access_units: list[list[bytes]], stream: bytes) -> list[bytes]:
+    """As a byte stream in pieces of 1025 and 17 bytes, and as single access units."""
+    own = [b"".join(moved(unit) for unit in units[1:]) for units in access_units]
+    return [bytes((kind,)) + stream[:LARGEST] for kind in (128, 2)] + [b"\xff" + units for units in own]
+
+
 def main() -> None:
     to = Path(sys.argv[1])
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
+    seeds |= {"rig_file": rig_file_seeds(), "background": background_seeds(), "range_meta": range_meta_seeds(), "parse": []}
+    seeds["camera_texts"] = camera_texts_seeds()
     for path in STREAMS:
         data = path.read_bytes()
         if path.stem == "damaged":  # its sizes are lies
@@ -135,6 +249,9 @@ def main() -> None:
             seeds["rig"] += [unit[14:] for unit in units if unit[0] == streams.RIG_VIEW]
         seeds["access_unit"] += access_unit_seeds(access_units)
         seeds["rtp_depay"] += rtp_seeds(access_units)
+        seeds["parse"] += parse_seeds(access_units, data)
+    rigs = sorted(set(seeds["rig"]))
+    seeds |= {"caps": caps_seeds(rigs), "rtp_caps": rtp_caps_seeds(rigs)}
     for target, inputs in seeds.items():
         (to / target).mkdir(parents=True, exist_ok=True)
         for number, seed in enumerate(sorted(set(inputs))):

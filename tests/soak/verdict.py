@@ -24,6 +24,8 @@ from statistics import median
 
 STEADY = ("camera0", "parent", "viewer")  # these run from beginning to end
 BLOCKS = 48  # medians that the line goes through
+PASSING = ("GstBuffer", "GstMemory", "GstEvent", "GstMessage", "GstQuery", "GstSample", "GstBufferList")
+PASSING_MORE = 150  # there may be at one time than at another
 # Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, Mesa's.
 LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
 
@@ -177,7 +179,7 @@ def objects_in(log: Path) -> list[Counter]:
     return lists
 
 
-def judge_objects(folder: Path, limits: Limits) -> list[Finding]:
+def judge_objects(folder: Path) -> list[Finding]:
     leaked: Counter = Counter()
     checked = 0
     for path in sorted(folder.glob("*.log")):
@@ -194,11 +196,13 @@ def judge_objects(folder: Path, limits: Limits) -> list[Finding]:
         if len(lists) < 2:
             findings.append(Finding(f"{name}: lists of objects", len(lists), "2", False))
             continue
-        more = lists[1] - lists[0]
-        first, last = lists[0].total(), lists[1].total()
-        what = f"{name}: objects at the end ({', '.join(f'{n} more {t}' for t, n in more.most_common(4)) or 'no type has more'})"
-        # Buffers and events are on their way, some more at one time than at another.
-        findings.append(Finding(what, last, f"{first} after the warm-up, and a tenth", last <= first * 1.1 + 10))
+        steady, passing = (  # those that stay as long as the pipeline does, and those on their way through it
+            tuple(sum(n for kind, n in found.items() if (kind in PASSING) == part) for found in lists[:2]) for part in (False, True)
+        )
+        more = ", ".join(f"{n} more {kind}" for kind, n in (lists[1] - lists[0]).most_common(4)) or "no type has more"
+        findings.append(Finding(f"{name}: objects that stay, at the end ({more})", steady[1], f"{steady[0]}", steady[1] <= steady[0]))
+        limit = passing[0] + PASSING_MORE
+        findings.append(Finding(f"{name}: buffers, events and their like at the end", passing[1], limit, passing[1] <= limit))
     return findings
 
 
@@ -221,7 +225,7 @@ def judge(out: Path, limits: Limits) -> list[Finding]:
         *judge_latency(frames, events, limits),
         *judge_returns(frames, events),
         *judge_ends(events),
-        *judge_objects(out / "log", limits),
+        *judge_objects(out / "log"),
         *judge_threads_left(out / "log"),
     ]
 

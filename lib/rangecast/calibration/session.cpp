@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <ranges>
 
 namespace rangecast {
 
@@ -44,7 +43,8 @@ Status
 CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
     std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns, std::uint64_t number)
 {
-  if (!std::ranges::equal (cameras_, cameras | std::views::take (cameras_.size ())))
+  if (cameras.size () < cameras_.size () ||
+      !std::equal (cameras_.begin (), cameras_.end (), cameras.begin ()))
     clear (); /* one went, or became another */
   cameras_ = cameras;
   while (eyes_.size () < cameras.size ()) {

@@ -25,8 +25,8 @@ constexpr float kMost = 0.5f, kMostOfAll = 1;
 
 /* Where bytes that follow each other in memory lie in a word. */
 constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
-constexpr int kByte[] = {
-    kFirst, std::abs (kFirst - 8), std::abs (kFirst - 16), std::abs (kFirst - 24)};
+constexpr int kNext = kFirst == 0 ? 8 : -8;
+constexpr int kByte[] = {kFirst, kFirst + kNext, kFirst + 2 * kNext, kFirst + 3 * kNext};
 
 /* Sums over windows of kSide columns, and kSide rows, one row of them after the other. */
 template <int kSide, typename T> class WindowSums {
