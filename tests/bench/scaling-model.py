@@ -34,8 +34,8 @@ class Constants:
     parent_us: float = 13.0    # CPU of the parent for a packet, in and out
     parent_serial: float = 0.4  # share of that in the one thread that puts frame sets out
     relay_in_us: float = 7.0   # CPU of a relay to take a packet
-    relay_out_us: float = 1.6  # and to send it to one receiver
-    viewer_ms: float = 5.0     # CPU of a viewer for a view of a frame set of 320x240: decode, cylinder, draw
+    relay_out_us: float = 2.2  # and to send it to one receiver
+    viewer_ms: float = 2.3     # CPU of a viewer for a view of a frame set of 320x240: decode, cylinder, draw
     parent_mib: float = 60.0   # resident memory, without views
     view_mib: float = 0.6      # and for each
     cores: int = 8
