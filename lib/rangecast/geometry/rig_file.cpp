@@ -7,6 +7,8 @@
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 
+#include "../storage_check.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -228,6 +230,8 @@ load_rig (const std::string &path, Rig &rig)
   if (!std::filesystem::is_regular_file (there))
     return {StatusCode::kNotFound,
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
+  if (Status s = check_storage (path); !s.ok ())
+    return {s.code (), s.message () + "; expected a rig file"};
   Rig loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);
