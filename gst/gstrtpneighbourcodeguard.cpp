@@ -378,16 +378,17 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   return TRUE;
 }
 
-/* A request for a key frame set says which stream it is about, as rtpbin's demultiplexers do it:
- * rtpsession makes a PLI of such a one. */
+/* Requests for a key frame set and for a lost packet say which stream they are about, as rtpbin's
+ * demultiplexers do it: rtpsession makes a PLI or a NACK of such ones. A request that a viewer sent
+ * to a parent names the parent's own stream, so whatever it names is replaced. */
 static gboolean
 gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   const GstStructure *structure = gst_event_get_structure (event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && structure &&
-      gst_structure_has_name (structure, "GstForceKeyUnit") &&
-      !gst_structure_has_field (structure, "ssrc")) {
+      (gst_structure_has_name (structure, "GstForceKeyUnit") ||
+          gst_structure_has_name (structure, "GstRTPRetransmissionRequest"))) {
     std::lock_guard guard (self->priv->lock);
     if (self->priv->ssrc) {
       event = gst_event_make_writable (event);
