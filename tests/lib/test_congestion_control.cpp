@@ -3,6 +3,8 @@
  * means over many seconds, from when the stream has found its rate. */
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "link-simulation.hpp"
 
 using namespace rangecast;
@@ -245,4 +247,38 @@ TEST (CongestionControl, jitter_that_rises_keeps_receiver_reports_from_raising_t
     else
       EXPECT_EQ (control.bits_per_s (), before);
   }
+}
+
+/* The table of docs/elements/neighbourcodeenc.md: --gtest_also_run_disabled_tests
+ * --gtest_filter=*table */
+TEST (CongestionControl, DISABLED_table)
+{
+  const auto row = [] (const char *name, LinkSimulation &sim) {
+    sim.run (8);
+    for (SimulatedStream &stream : sim.streams)
+      stream.second = {};
+    sim.run (60);
+    for (const SimulatedStream &stream : sim.streams) {
+      const StreamResult &r = stream.second;
+      std::printf ("| %s | %.2f | %.1f %% | %.0f, %.0f ms |\n", name, 1e-6 * rate_of (r, 60),
+          100 * r.loss (), 1e3 * r.queue_s (), 1e3 * r.queue_max_s);
+    }
+  };
+  for (const auto &[name, capacity] :
+      {std::pair{"1 Mbit/s", 1e6}, {"5 Mbit/s", 5e6}, {"20 Mbit/s", 20e6}}) {
+    LinkSimulation sim (1, 30e6);
+    sim.link.bits_per_s = capacity;
+    row (name, sim);
+  }
+  for (const auto &[name, loss] : {std::pair{"loss 1 %", 0.01}, {"3 %", 0.03}, {"5 %", 0.05}}) {
+    LinkSimulation sim;
+    sim.link.loss = loss;
+    row (name, sim);
+  }
+  LinkSimulation jitter, reports, four (4);
+  jitter.link.jitter_s = 0.05;
+  row ("jitter 50 ms", jitter);
+  row ("4 streams", four);
+  reports.streams[0].reports_only = true;
+  row ("reports", reports);
 }

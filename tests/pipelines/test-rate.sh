@@ -75,3 +75,17 @@ test_below_the_worst_thresholds_frame_sets_are_left_out_before_slices_are_lost (
   echo "lost: $lost %"
   [ "$lost" -le 15 ] || fail "$lost % lost"
 }
+
+test_camera_host_with_feedback_follows_the_link () {
+  timeout 60 gst-launch-1.0 -q avatartestsrc views=1 num-buffers=1 rig-export=rig.yaml ! fakesink
+  udp-relay --listen $((ports + 50)) --to "127.0.0.1:$((ports + 51))" --bandwidth 500 >relay.log 2>&1 &
+  timeout -k 5 28 "$pipelines/record.sh" out.rcnc --listen $((ports + 51)) --feedback "127.0.0.1:$((ports + 52))" >record.log 2>&1 &
+  RANGECAST_LAUNCH="timeout -k 5 24 gst-launch-1.0 -m" "$pipelines/camera-host.sh" --view 0 --views 1 --rig rig.yaml --input range --learn 5 \
+    --to "127.0.0.1:$((ports + 50))" --feedback $((ports + 52)) --encoder "profile=entropy adaptive-bitrate=true" >camera.log 2>&1 || true
+  wait_for_pairs
+  local bitrate
+  bitrate=$(grep 'neighbourcodeenc-adaptive-bitrate,' camera.log | tail -n 1 | grep -oE 'estimated-bitrate=\(guint64\)[0-9]+' | grep -oE '[0-9]+$' || true)
+  [ -n "$bitrate" ] || fail "the rate never changed: $(tail -n 3 camera.log record.log)"
+  [ "$bitrate" -lt 700000 ] || fail "$bitrate bits/s for a link of 500000"
+  expect_file out.rcnc 20000
+}
