@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The rangecast-stats messages of all elements: what they count, and when they come. */
+/* The rangecast-stats messages of all elements: what they count, and when they come. striprender's:
+ * striprenderflow. */
 #include "coded-check.hpp"
-#include "render-check.hpp"
 
 #include <gst/rtp/rtp.h>
 
@@ -339,28 +339,6 @@ GST_START_TEST (test_stereodepth_counts_pairs_and_pictures_without_partner)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_striprender_counts_pictures_and_points)
-{
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
-  const Rig rig = ring_rig (1, 64, 48);
-  GstHarness *h = render_harness (rig, kAtTheEnd);
-  Watched render (h);
-  guint64 points = 0;
-  for (int i = 0; i < 3; i++) {
-    GstBuffer *frame_set = make_frame_set (rig, i * kFrame);
-    points += points_of (frame_set);
-    gst_buffer_unref (gst_harness_push_and_pull (h, frame_set));
-  }
-  const auto all = render.end ();
-  fail_unless_equals_int (all.size (), 1);
-  fail_unless (all[0].text ("element") == "striprender");
-  fail_unless_equals_uint64 (all[0].count ("frames"), 3);
-  fail_unless_equals_uint64 (all[0].count ("points"), points);
-  fail_unless_equals_uint64 (all[0].count ("late"), 0);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_latency_is_from_capture_to_now_on_the_elements_clock)
 {
   const Rig rig = ring_rig (1, 64, 48);
@@ -543,7 +521,6 @@ statistics_suite ()
   tcase_add_test (tc, test_filters_count_the_points_that_they_leave);
   tcase_add_test (tc, test_mux_tells_of_each_stream_what_came_and_what_was_missed);
   tcase_add_test (tc, test_stereodepth_counts_pairs_and_pictures_without_partner);
-  tcase_add_test (tc, test_striprender_counts_pictures_and_points);
   tcase_add_test (tc, test_latency_is_from_capture_to_now_on_the_elements_clock);
   tcase_add_test (tc, test_clocks_that_have_nothing_to_do_with_each_other_give_no_latency);
   tcase_add_test (tc, test_stream_that_stalls_is_told_of_with_zero_fps);
