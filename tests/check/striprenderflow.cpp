@@ -606,12 +606,47 @@ GST_START_TEST (test_memory_that_ends_on_the_drawing_thread_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_statistics_count_pictures_and_points)
+{
+  const Rig rig = ring_rig (1, 64, 48);
+  GstHarness *h = render_harness (rig, "stats-interval=3600000");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (r, bus);
+  guint64 points = 0;
+  for (GstClockTime i = 0; i < 3; i++) {
+    gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, i * GST_SECOND / 30)));
+    points += stats_field (r, "points");
+  }
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ELEMENT);
+  fail_unless (message && gst_message_has_name (message, "rangecast-stats"));
+  const GstStructure *stats = gst_message_get_structure (message);
+  guint64 frames = 0, counted = 0, late = 1;
+  gst_structure_get_uint64 (stats, "frames", &frames);
+  gst_structure_get_uint64 (stats, "points", &counted);
+  gst_structure_get_uint64 (stats, "late", &late);
+  fail_unless_equals_uint64 (frames, 3);
+  fail_unless (points > 0);
+  fail_unless_equals_uint64 (counted, points);
+  fail_unless_equals_uint64 (late, 0);
+  gst_message_unref (message);
+  gst_element_set_bus (r, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (r);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 striprenderflow_suite ()
 {
   Suite *suite = suite_create ("striprenderflow");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_statistics_count_pictures_and_points);
   tcase_add_test (tc, test_gap_after_hold_time_goes_on);
   tcase_add_test (tc, test_rest_of_a_live_gap_follows_the_pictures_that_fill_it);
   tcase_add_test (tc, test_gap_comes_between_the_pictures_beside_it);
