@@ -235,7 +235,17 @@ hand_on (GstPad *, GstEvent **event, gpointer pad)
   return TRUE;
 }
 
-static gboolean gst_range_demux_src_event (GstPad *pad, GstObject *parent, GstEvent *event);
+static gboolean
+gst_range_demux_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK &&
+      GST_RANGE_DEMUX (parent)->priv->last_seek.exchange (gst_event_get_seqnum (event)) ==
+          gst_event_get_seqnum (event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return gst_pad_event_default (pad, parent, event);
+}
 
 static void
 add_pad (GstRangeDemux *self, const View &view, GstPad *sink)
@@ -353,18 +363,6 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       break;
   }
   return gst_pad_event_default (sink, parent, event);
-}
-
-static gboolean
-gst_range_demux_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
-{
-  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK &&
-      GST_RANGE_DEMUX (parent)->priv->last_seek.exchange (gst_event_get_seqnum (event)) ==
-          gst_event_get_seqnum (event)) {
-    gst_event_unref (event);
-    return TRUE;
-  }
-  return gst_pad_event_default (pad, parent, event);
 }
 
 /* ---- life ---- */
