@@ -32,7 +32,7 @@ stop_server () {
   kill -INT "$server"
   until_true 30 is_gone "$server"
   wait "$server" || fail "exit status $?: $(tail -n 5 server.log)"
-  ! grep -qE 'CRITICAL|ERROR:' server.log || fail "$(cat server.log)"
+  ! grep -qE 'CRITICAL|ERROR:|runtime error' server.log || fail "$(cat server.log)"
 }
 count () { timeout 100 python3 "$viewers" "$@"; }
 # A number of the last line of --stats.
