@@ -58,7 +58,7 @@ struct GstRtpNeighbourCodeGuardPrivate {
   /* streaming thread only */
   GstClockTime last_time = 0;        /* of its last packet */
   std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
-  guint rival_packets = 0;           /* of a second sender, since it began */
+  guint rival_packets = 0;           /* of others while it sends */
   GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
   SenderProbation probation;
   bool warned_of_version = false;
@@ -245,10 +245,8 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
 {
   const bool here = same_sender (packet.address, priv->address);
   if (is_senders (priv, packet, here)) {
-    if (packet.ssrc == *priv->ssrc) {
+    if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;
-      priv->rival_packets = 0;
-    }
     return Verdict::kPasses;
   }
   const bool silent = !priv->ssrc || now >= priv->last_time + priv->timeout;
@@ -380,16 +378,17 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   return TRUE;
 }
 
-/* A request for a key frame set says which stream it is about, as rtpbin's demultiplexers do it:
- * rtpsession makes a PLI of such a one. */
+/* Requests for a key frame set and for a lost packet say which stream they are about, as rtpbin's
+ * demultiplexers do it: rtpsession makes a PLI or a NACK of such ones. A request that a viewer sent
+ * to a parent names the parent's own stream, so whatever it names is replaced. */
 static gboolean
 gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   const GstStructure *structure = gst_event_get_structure (event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && structure &&
-      gst_structure_has_name (structure, "GstForceKeyUnit") &&
-      !gst_structure_has_field (structure, "ssrc")) {
+      (gst_structure_has_name (structure, "GstForceKeyUnit") ||
+          gst_structure_has_name (structure, "GstRTPRetransmissionRequest"))) {
     std::lock_guard guard (self->priv->lock);
     if (self->priv->ssrc) {
       event = gst_event_make_writable (event);
