@@ -28,6 +28,8 @@ static constexpr guint kThreads = 4; /* that serve connections */
 static constexpr guint kMostContent = 16384; /* bytes */
 /* Connections that are no viewers: those that ask only, or have not got so far. */
 static constexpr int kSpareConnections = 32;
+/* So long gst-rtsp-server waits for the first frame set before it answers. */
+static constexpr int kSlowestStart_s = 20;
 
 struct Server {
   RtspOptions options;
@@ -159,7 +161,7 @@ static void
 close_useless_connections (Server &server)
 {
   const gint64 now = g_get_monotonic_time ();
-  const gint64 patience = server.options.timeout_s * G_USEC_PER_SEC;
+  const gint64 patience = (server.options.timeout_s + kSlowestStart_s) * G_USEC_PER_SEC;
   int many = -server.options.max_viewers - kSpareConnections;
   GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
   for (GList *item = clients; item; item = item->next) {

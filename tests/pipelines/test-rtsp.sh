@@ -5,6 +5,8 @@
 source "$source_dir/tests/pipelines/test-viewer.sh"
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
 
+source "$source_dir/tests/pipelines/netns.sh"
+
 viewers=$source_dir/tests/pipelines/rtsp_viewers.py
 figure="avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc"
 
@@ -32,7 +34,7 @@ stop_server () {
   kill -INT "$server"
   until_true 30 is_gone "$server"
   wait "$server" || fail "exit status $?: $(tail -n 5 server.log)"
-  ! grep -qE 'CRITICAL|ERROR:' server.log || fail "$(cat server.log)"
+  ! grep -qE 'CRITICAL|ERROR:|runtime error' server.log || fail "$(cat server.log)"
 }
 count () { timeout 100 python3 "$viewers" "$@"; }
 # A number of the last line of --stats.
@@ -296,6 +298,27 @@ test_parent_of_two_cameras_is_served () {
   trap 'kill -KILL $server $player "${cameras[@]}" 2>/dev/null || true' EXIT
   until_true 60 grep -q 'depay0.GstPad:src: caps.*views=(int)2' player.log
   kill "$player" "${cameras[@]}"
+  stop_server
+}
+
+watch_by_multicast () { # host
+  net_on "$1" timeout -k 5 90 gst-launch-1.0 -e rtspsrc "location=rtsp://$(net_address parent):8554/live" protocols=udp-mcast latency=50 \
+    ! rtpneighbourcodedepay ! neighbourcodedec ! identity eos-after=20 ! fakesink sync=false >"$1.log" 2>&1
+}
+test_multicast_reaches_two_hosts () {
+  net_need
+  net_open
+  local host
+  for host in parent near far; do net_host "$host"; done
+  net_on parent rtsp-server --port 8554 --multicast 239.7.7.7:5000-5001 -- "$figure" >server.log 2>&1 &
+  server=$!
+  until_true 30 grep -q '^serving' server.log
+  watch_by_multicast near &
+  near=$!
+  watch_by_multicast far
+  wait "$near"
+  grep -q 'Got EOS' near.log || fail "$(tail -n 5 near.log)"
+  grep -q 'Got EOS' far.log || fail "$(tail -n 5 far.log)"
   stop_server
 }
 
