@@ -230,8 +230,8 @@ load_rig (const std::string &path, Rig &rig)
   if (!std::filesystem::is_regular_file (there))
     return {StatusCode::kNotFound,
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
-  if (Status s = check_storage (path); !s.ok ())
-    return {s.code (), s.message () + "; expected a rig file"};
+  if (Status s = check_storage (path, "", false); !s.ok ())
+    return {s.code (), s.message () + "; expected a rig file (YAML or JSON)"};
   Rig loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);
