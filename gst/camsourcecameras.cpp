@@ -34,6 +34,7 @@ bool
 CamSourceSession::open_cameras ()
 {
   cameras_.clear ();
+  set_has_cameras (false);
   abilities_.clear ();
   for (std::size_t i = 0; i < pads_.size (); i++) {
     if (quits ())
@@ -52,6 +53,7 @@ CamSourceSession::open_cameras ()
     }
     GST_INFO_OBJECT (element_, "%s is %s", pads_[i]->name (), camera->label ().c_str ());
     cameras_.push_back (std::move (camera));
+    set_has_cameras (true);
     abilities_.push_back (std::move (abilities));
   }
   return !quits ();
@@ -128,11 +130,12 @@ CamSourceSession::configure_cameras ()
   exposure_ = exposure;
   /* the others are for what is on its way, and for downstream */
   const int waiting = settings_.n_buffers / 2 - 1;
-  pairing_.start (
-      static_cast<int> (cameras_.size ()), fires (), format_.period (), exposure, waiting);
-  const GstClockTime period = format_.period () > 0 ? format_.period () : 100 * GST_MSECOND;
-  /* exposed, and on its way no longer than until the next one */
-  const GstClockTime latency = MIN (exposure, period) + period;
+  using Fired = CamSourcePairing::Fired;
+  const Fired fired = fires ()                                     ? Fired::kHere
+                      : settings_.trigger == TriggerMode::kFreeRun ? Fired::kAlone
+                                                                   : Fired::kElsewhere;
+  pairing_.start (static_cast<int> (cameras_.size ()), fired, format_.period (), exposure, waiting);
+  const GstClockTime latency = latency_of (exposure, format_.period ());
   if (latency_.exchange (latency) != latency)
     gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
   return !quits ();
@@ -318,6 +321,7 @@ CamSourceSession::stop_cameras ()
   pairing_.drop_waiting ();
   bank_statistics ();
   cameras_.clear ();
+  set_has_cameras (false);
 }
 
 /* Cameras that stand still count from 0 when they begin again. */

@@ -10,6 +10,7 @@ using rangecast::FrameSets;
 
 /* A camera that did not answer a shot within this time does not any more. */
 static constexpr std::int64_t kAnswerTime = 1'000'000'000;
+static constexpr std::int64_t kLeastAnswerTime = 60'000'000;
 
 /* How wrong the reading of a camera's clock may be. */
 static constexpr std::int64_t kClockError = 50'000'000;
@@ -27,13 +28,14 @@ CamSourcePairing::~CamSourcePairing ()
 
 void
 CamSourcePairing::start (
-    int cameras, bool triggered, GstClockTime period, GstClockTime exposure, int waiting)
+    int cameras, Fired fired, GstClockTime period, GstClockTime exposure, int waiting)
 {
   drop_waiting ();
   std::lock_guard guard (lock_);
   cameras_ = cameras;
   waiting_ = waiting;
-  triggered_ = triggered;
+  triggered_ = fired == Fired::kHere;
+  one_signal_ = fired == Fired::kElsewhere;
   period_ = period > 0 ? period : GST_SECOND;
   exposure_ = exposure;
 }
@@ -57,6 +59,7 @@ CamSourcePairing::forget ()
   clocks_are_off_ = false;
   for (int c = 0; c < kMaxCameras; c++) {
     finders_[c].start (static_cast<std::int64_t> (period_));
+    partners_[c].start (static_cast<std::int64_t> (period_));
     clocks_[c].forget ();
     offsets_[c].reset ();
     answered_[c] = last_arrival_ns_[c] = last_taken_ns_[c] = 0;
@@ -65,6 +68,8 @@ CamSourcePairing::forget ()
   ticks_ = {};
   shots_ = 0;
   lone_shots_ = 0;
+  spacing_ = 0;
+  owing_ = false;
 }
 
 /* ---- frames that are kept ---- */
@@ -111,6 +116,18 @@ CamSourcePairing::drop_waiting ()
 
 /* ---- shots ---- */
 
+/* How long a shot that teaches waits for its answers: where pictures get lost, the next one should
+ * come soon; a camera that is slow to begin gets longer each time. */
+std::int64_t
+CamSourcePairing::answer_time () const
+{
+  std::int64_t time =
+      std::max<std::int64_t> (3 * static_cast<std::int64_t> (period_), kLeastAnswerTime);
+  for (int i = 1; i < lone_shots_ && time < kAnswerTime; i++)
+    time *= 2;
+  return std::min (time, kAnswerTime) + 2 * static_cast<std::int64_t> (exposure_);
+}
+
 bool
 CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
 {
@@ -129,8 +146,14 @@ CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
     lone_shots_ = 0;
   }
   const Tick &last = ticks_[(shots_ + kTicks - 1) % kTicks];
-  if (shots_ == 0 ||
-      now_ns - last.fired_ns > kAnswerTime + 2 * static_cast<std::int64_t> (exposure_))
+  /* An answer that is late would be taken for that of a later shot, by the time between the two.
+   * Where each of these times is more than all before it, two such mistakes do not agree. */
+  if (owing_ && now_ns - last.fired_ns <
+                    std::min (2 * spacing_ + static_cast<std::int64_t> (period_), kAnswerTime))
+    return false;
+  const std::int64_t patience =
+      alone ? kAnswerTime + 2 * static_cast<std::int64_t> (exposure_) : answer_time ();
+  if (shots_ == 0 || now_ns - last.fired_ns > patience)
     return true;
   for (int c = 0; c < cameras_; c++)
     if (answered_[c] < shots_)
@@ -142,16 +165,19 @@ void
 CamSourcePairing::fired (GstClockTime tick, std::int64_t fired_ns)
 {
   std::lock_guard guard (lock_);
-  bool alone = true;
   const Tick &last = ticks_[(shots_ + kTicks - 1) % kTicks];
+  bool answered = true;
   for (int c = 0; c < cameras_; c++)
-    alone &= answered_[c] >= shots_ || fired_ns - last.fired_ns > kAnswerTime;
+    answered &= answered_[c] >= shots_;
+  const bool alone = answered || fired_ns - last.fired_ns > answer_time ();
   bool settled = true;
   for (int c = 0; c < cameras_; c++) {
     finders_[c].fired (shots_, fired_ns, alone);
     settled &= finders_[c].settled ();
   }
   lone_shots_ = settled ? 0 : lone_shots_ + 1;
+  owing_ = !settled && (owing_ || !answered);
+  spacing_ = shots_ > 0 ? std::min (fired_ns - last.fired_ns, kAnswerTime) : 0;
   ticks_[shots_ % kTicks] = {shots_, tick, fired_ns};
   shots_++;
 }
@@ -196,7 +222,7 @@ CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
       finders_[camera].find (frame.number + 1, stamp_of (frame), frame.arrived_us * 1000);
   if (shots_ > 0)
     answered_[camera] = std::max (answered_[camera], found.known ? found.shot + 1 : 0);
-  if (!found.known) {
+  if (!found.known || owing_) {
     counts_.dropped[camera] += frame.buffer != nullptr;
     counts_.unknown += frame.buffer != nullptr;
     return;
@@ -224,20 +250,36 @@ CamSourcePairing::learn_interval (int camera, std::int64_t taken)
   sets_.set_tolerance (tolerance_);
 }
 
-void
-CamSourcePairing::place_by_time (int camera, CameraFrame frame)
+/* Comparable between cameras. */
+std::optional<std::int64_t>
+CamSourcePairing::time_of (int camera, const CameraFrame &frame)
 {
   const std::int64_t arrived =
       clocks_[camera].host_time (stamp_of (frame), frame.arrived_us * 1000);
   const auto exposed = exposed_at (camera, frame);
-  const std::int64_t taken = exposed ? *exposed : arrived - static_cast<std::int64_t> (exposure_);
+  std::optional<std::int64_t> taken;
+  if (frame.buffer || frame.camera_time_ns > 0) /* else it came too late to say when */
+    taken = exposed ? *exposed : arrived - static_cast<std::int64_t> (exposure_);
+  if (!one_signal_)
+    return taken;
+  if (camera > 0)
+    return partners_[camera].place (frame.number, taken, exposed.has_value ());
+  for (int c = 1; taken && c < cameras_; c++)
+    partners_[c].leader (frame.number, *taken);
+  return taken;
+}
+
+void
+CamSourcePairing::place_by_time (int camera, CameraFrame frame)
+{
+  const auto taken = time_of (camera, frame);
+  if (!taken)
+    return;
   if (frame.buffer)
-    delay_.add (frame.arrived_us * 1000 - taken);
-  else if (frame.camera_time_ns == 0)
-    return;                 /* came too late to say when it was taken */
+    delay_.add (frame.arrived_us * 1000 - *taken);
   if (stamp_of (frame) > 0) /* arrivals come in bursts */
-    learn_interval (camera, taken);
-  put (camera, taken, std::move (frame), taken);
+    learn_interval (camera, *taken);
+  put (camera, *taken, std::move (frame), *taken);
 }
 
 void

@@ -10,6 +10,7 @@
 #include <optional>
 #include <rangecast/sync/camera_clock.hpp>
 #include <rangecast/sync/frame_sets.hpp>
+#include <rangecast/sync/partner_finder.hpp>
 #include <rangecast/sync/shot_finder.hpp>
 
 using rangecast::kMaxCameras;
@@ -43,11 +44,17 @@ public:
   CamSourcePairing (const CamSourcePairing &) = delete;
   CamSourcePairing &operator= (const CamSourcePairing &) = delete;
 
-  /** @param triggered  shots are told with fired()
-   *  @param period     ns; 0 for single shots
+  /** Who fires the cameras. */
+  enum class Fired {
+    kHere,      ///< this element: shots are told with fired()
+    kElsewhere, ///< one signal, or command, that reaches all of them
+    kAlone,     ///< each by itself
+  };
+
+  /** @param period     ns; 0 for single shots
    *  @param exposure   ns, as far as it is known
    *  @param waiting    pictures of one camera that may wait for partners */
-  void start (int cameras, bool triggered, GstClockTime period, GstClockTime exposure, int waiting);
+  void start (int cameras, Fired fired, GstClockTime period, GstClockTime exposure, int waiting);
   /** Forgets frames, and what it learnt about the cameras' clocks, not what it counted. */
   void forget ();
   /** Lets waiting frames go. */
@@ -96,21 +103,26 @@ private:
   void place_by_time (int camera, CameraFrame frame);
   void put (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken);
   std::optional<std::int64_t> exposed_at (int camera, const CameraFrame &frame);
+  std::int64_t answer_time () const;
+  std::optional<std::int64_t> time_of (int camera, const CameraFrame &frame);
   void learn_interval (int camera, std::int64_t taken);
   void drop (rangecast::FrameSets::Set &set);
   bool hand_out (rangecast::FrameSets::Set &from, CamSourceSet &set);
 
   std::mutex lock_; /* guards all */
   int cameras_ = 2, waiting_ = 1;
-  bool triggered_ = false;
+  bool triggered_ = false, one_signal_ = false;
   GstClockTime period_ = 0, exposure_ = 0;
   rangecast::FrameSets sets_;
   std::array<rangecast::ShotFinder, kMaxCameras> finders_;
+  std::array<rangecast::PartnerFinder, kMaxCameras> partners_; ///< of those beside the left one
   std::array<rangecast::CameraClock, kMaxCameras> clocks_;
   std::array<std::optional<std::int64_t>, kMaxCameras> offsets_;
   std::array<Tick, kTicks> ticks_;
   std::int64_t shots_ = 0;
   int lone_shots_ = 0;
+  std::int64_t spacing_ = 0; ///< of the last two shots, ns
+  bool owing_ = false; ///< while delays are learnt, answers may come that older shots are owed
   std::array<std::int64_t, kMaxCameras> answered_{}; ///< shot
   std::array<std::int64_t, kMaxCameras> last_arrival_ns_{};
   std::array<std::uint64_t, kMaxCameras> last_number_{};

@@ -16,6 +16,25 @@ using Milliseconds = std::chrono::milliseconds;
 static constexpr Milliseconds kRetry{1000}, kGapTime{100};
 static constexpr GstClockTime kClockPatience = 10 * GST_SECOND;
 
+/* Exposed, and on its way no longer than until the next one: else pictures would pile up. */
+GstClockTime
+CamSourceSession::latency_of (GstClockTime exposure, GstClockTime period)
+{
+  const GstClockTime longest = period > 0 ? period : 100 * GST_MSECOND; /* of single shots */
+  return MIN (exposure, longest) + longest;
+}
+
+/* What is asked before the cameras have answered is what it will mostly be: the rate where
+ * downstream leaves a choice, and the exposure that is wanted. */
+static GstClockTime
+first_latency (const CamSourceSettings &settings, const CamSourceSession *previous)
+{
+  if (previous && previous->latency () > 0)
+    return previous->latency ();
+  const auto exposure = static_cast<GstClockTime> (settings.exposure_us * 1000);
+  return CamSourceSession::latency_of (exposure, settings.single_shot ? 0 : GST_SECOND / 30);
+}
+
 CamSourceSession::CamSourceSession (Setup setup)
     : element_ (GST_ELEMENT (gst_object_ref (setup.element))),
       settings_ (std::move (setup.settings)), names_ (std::move (setup.names)),
@@ -23,6 +42,7 @@ CamSourceSession::CamSourceSession (Setup setup)
       clock_ (setup.clock ? GST_CLOCK (gst_object_ref (setup.clock)) : nullptr),
       previous_ (std::move (setup.previous)), ticker_ (setup.element)
 {
+  latency_ = first_latency (settings_, previous_.get ());
   for (const auto &pad : pads_)
     gst_flow_combiner_add_pad (flows_, pad->pad ());
 }
@@ -337,6 +357,21 @@ CamSourceSession::ask_to_stop ()
     changed_.notify_all ();
   }
   ticker_.set_playing (false);
+}
+
+bool
+CamSourceSession::wait_for_cameras (Milliseconds most)
+{
+  std::unique_lock guard (lock_);
+  return changed_.wait_for (guard, most, [this] { return ended_ || !has_cameras_; });
+}
+
+void
+CamSourceSession::set_has_cameras (bool has)
+{
+  std::lock_guard guard (lock_);
+  has_cameras_ = has;
+  changed_.notify_all ();
 }
 
 bool

@@ -54,6 +54,9 @@ public:
   void ask_to_stop ();
   /** @return false if it still runs after that time */
   bool wait_for_end (std::chrono::milliseconds most);
+  /** Until other programs may have the cameras. While none is open, as when it is still looked for,
+   *  that is at once. @return false if it still has some after that time */
+  bool wait_for_cameras (std::chrono::milliseconds most);
   /** An EOS event of the application's. */
   void end (guint32 seqnum);
   /** What waits between frames is forgotten. */
@@ -64,6 +67,8 @@ public:
 
   /** From a picture's time to when it is handed out, ns; what is known of it. */
   [[nodiscard]] GstClockTime latency () const { return latency_; }
+  /** What it is by what was set. @param period  0: single shots */
+  static GstClockTime latency_of (GstClockTime exposure, GstClockTime period);
   /** Transfer full. */
   GstStructure *stats ();
 
@@ -106,6 +111,7 @@ private:
   bool start_cameras ();
   bool wait_for_ptp ();
   void bank_statistics ();
+  void set_has_cameras (bool has);
   void stop_cameras ();
   void start_ticker ();
   void fire (GstClockTime tick);
@@ -144,7 +150,8 @@ private:
 
   std::mutex lock_; /* guards down to the blank line */
   std::condition_variable changed_;
-  bool quit_ = false, ended_ = false, playing_ = false, eos_ = false, flushed_ = false;
+  bool quit_ = false, ended_ = false, has_cameras_ = false, playing_ = false, eos_ = false,
+       flushed_ = false;
   struct Arrival {
     int camera;
     CameraFrame frame;

@@ -26,6 +26,7 @@
 #include <utility>
 
 #include "camera/camera.hpp"
+#include "camera/user_name.hpp"
 #include "cameradevices.hpp"
 #include "usbcameras.hpp"
 
@@ -35,6 +36,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_camera_device_provider_debug);
 using rangecast::FoundCamera;
 using rangecast::FoundCameras;
 using rangecast::KnownPair;
+using rangecast::KnownRigs;
 using rangecast::UsbCameras;
 
 namespace {
@@ -72,6 +74,7 @@ struct Watch {
   std::vector<Announced<FoundCamera>> cameras;
   std::vector<Announced<KnownPair>> pairs;
   std::set<std::string> told; // problems, each said once
+  KnownRigs rigs;
 
   std::mutex lock; // guards what follows; never held while searching or announcing
   std::condition_variable changed;
@@ -95,10 +98,22 @@ GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdevicepr
 
 /*** What is there ***/
 
+/** A camera's user-defined name, which discovery does not tell: it is asked for once, while the
+ *  camera stays. */
+static std::string
+user_name_of (const CameraInfo &info, const FoundCameras &known)
+{
+  const auto is_same = [&] (const FoundCamera &camera) {
+    return camera.id == info.id && camera.address == info.address;
+  };
+  const auto at = std::ranges::find_if (known, is_same);
+  return at != known.end () ? at->user_name : read_user_name (info.address).value_or ("");
+}
+
 /** The GigE Vision cameras that answer. USB comes from libusb, which tells about hotplug and
- *  permissions. Takes about a second. */
+ *  permissions. Takes about a second. @param known  those that answered before */
 static FoundCameras
-find_gige_cameras ()
+find_gige_cameras (const FoundCameras &known)
 {
   FoundCameras found;
   for (auto &info : list_cameras ())
@@ -109,6 +124,8 @@ find_gige_cameras ()
           .model = info.model,
           .serial = info.serial,
           .address = info.address,
+          .physical_id = info.physical_id,
+          .user_name = user_name_of (info, known),
           .problem = {}});
   return found;
 }
@@ -132,10 +149,11 @@ tell (GstDeviceProvider *provider, std::set<std::string> &told, const std::strin
 }
 
 static Present
-present (GstDeviceProvider *provider, FoundCameras cameras, std::set<std::string> &told)
+present (
+    GstDeviceProvider *provider, KnownRigs &rigs, FoundCameras cameras, std::set<std::string> &told)
 {
   std::vector<std::string> problems;
-  auto pairs = rangecast::known_pairs (rangecast::known_rig_files (), cameras, problems);
+  auto pairs = rigs.pairs (rangecast::known_rig_files (), cameras, problems);
   for (const auto &camera : cameras)
     problems.push_back (camera.problem);
   for (const auto &problem : problems)
@@ -146,11 +164,12 @@ present (GstDeviceProvider *provider, FoundCameras cameras, std::set<std::string
 static GList *
 gst_camera_device_provider_probe (GstDeviceProvider *provider)
 {
-  auto cameras = find_gige_cameras ();
+  auto cameras = find_gige_cameras ({});
   if (auto usb = open_usb (provider))
     std::ranges::copy (usb->list (), std::back_inserter (cameras));
   std::set<std::string> told;
-  const auto now = present (provider, std::move (cameras), told);
+  KnownRigs rigs;
+  const auto now = present (provider, rigs, std::move (cameras), told);
 
   GList *devices = nullptr;
   for (const auto &camera : now.cameras)
@@ -187,7 +206,7 @@ announce (GstDeviceProvider *provider, std::vector<Announced<What>> &announced,
 static bool
 discover_gige (Watch &watch)
 {
-  auto answered = find_gige_cameras ();
+  auto answered = find_gige_cameras (watch.gige);
   std::vector<int> misses (answered.size (), 0);
   for (std::size_t i = 0; i < watch.gige.size (); ++i) {
     const auto is_same = [&] (const FoundCamera &camera) { return camera.id == watch.gige[i].id; };
@@ -208,7 +227,7 @@ update (Watch &watch)
 {
   auto cameras = watch.gige;
   std::ranges::copy (watch.usb_cameras, std::back_inserter (cameras));
-  const auto now = present (watch.provider, std::move (cameras), watch.told);
+  const auto now = present (watch.provider, watch.rigs, std::move (cameras), watch.told);
   announce (watch.provider, watch.cameras, now.cameras, rangecast::new_camera_device);
   announce (watch.provider, watch.pairs, now.pairs, rangecast::new_pair_device);
 }

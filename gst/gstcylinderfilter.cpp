@@ -216,7 +216,10 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   sync_controlled_values (base, buffer);
   std::unique_lock guard (priv->lock);
   const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  priv->counts.untouched += off;
   guard.unlock ();
+  if (off)
+    priv->reporter.passed (GST_ELEMENT (base), buffer);
   if (off && !priv->was_off) /* nobody looks at what the scene does meanwhile */
     gst_cylinder_filter_forget_scene (priv);
   priv->was_off = off;
@@ -249,12 +252,9 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const rangecast::CylinderSettings settings = priv->settings;
   const rangecast::ColourSettings colours = {priv->balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
       priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
-  priv->counts.untouched += off;
   guard.unlock ();
-  if (off) {
-    priv->reporter.passed (GST_ELEMENT (self), buffer);
+  if (off)
     return GST_FLOW_OK;
-  }
 
   rangecast::CylinderResult result;
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {

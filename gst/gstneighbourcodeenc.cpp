@@ -35,6 +35,7 @@
 
 #include "controlledvalues.hpp"
 #include "keyunitrequests.hpp"
+#include "neighbourcodeenums.hpp"
 #include "neighbourcoderate.hpp"
 #include "recycledbuffers.hpp"
 #include "statsreporter.hpp"
@@ -119,49 +120,6 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
-
-#define GST_TYPE_NEIGHBOUR_CODE_PROFILE (gst_neighbour_code_profile_get_type ())
-static GType
-gst_neighbour_code_profile_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
-        {int (rangecast::Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
-        {int (rangecast::Profile::kEntropy), "Adaptive probabilities and a range coder", "entropy"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeProfile", values);
-  }();
-  return type;
-}
-
-#define GST_TYPE_NEIGHBOUR_CODE_CHOICE (gst_neighbour_code_choice_get_type ())
-static GType
-gst_neighbour_code_choice_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::NeighbourChoice::kFirst), "Left, upper-left, upper, upper-right", "first"},
-        {int (rangecast::NeighbourChoice::kBest), "What costs least in error and bits, slower",
-            "best"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeChoice", values);
-  }();
-  return type;
-}
-
-#define GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE (gst_neighbour_code_depth_scale_get_type ())
-static GType
-gst_neighbour_code_depth_scale_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (rangecast::DepthScale::kLinear), "Codes are linear in depth", "linear"},
-        {int (rangecast::DepthScale::kInverse), "Codes are linear in 1/depth", "inverse"}, {}};
-    return g_enum_register_static ("GstNeighbourCodeDepthScale", values);
-  }();
-  return type;
-}
 
 /* ---- caps ---- */
 

@@ -25,52 +25,48 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <memory>
 #include <mutex>
 #include <vector>
 
 #include "clockpublisher.hpp"
+#include "muxsteps.hpp"
+#include "muxstreams.hpp"
+#include "muxwaiting.hpp"
 #include "statsreporter.hpp"
 
-using gstrange::RangeInfo;
 using rangecast::Status;
 using rangecast::StatusCode;
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
-enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_STATS, PROP_STATS_INTERVAL };
+enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
 
-/* Capture times further than this from most others' are those of a clock that is not in step. */
-static constexpr GstClockTime kOutOfStep = 2 * GST_SECOND;
+static constexpr GstClockTime kOutOfStep = MuxSteps::kOutOfStep;
+/* A stream of which nothing came for so long is silent: it has no say any more. */
+static constexpr GstClockTime kSilent = 2 * GST_SECOND;
+/* What lasts so long is told. Pictures that a host which stood still sends at once are not. */
+static constexpr GstClockTime kWorthTelling = GST_SECOND;
 static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
 
-struct MuxPad {
-  GstAggregatorPad *pad; /* owned by the element while this entry exists */
-  bool has_caps = false, coded = false;
-  RangeInfo info;
-  bool clash_reported = false;
-  guint64 views = 0; /* bits by view-id, for statistics */
-  guint64 received = 0, late = 0, out_of_step = 0, matched = 0;
-  GstClockTimeDiff last_skew = 0;
-
-  explicit MuxPad (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
-  ~MuxPad () { gst_object_unref (pad); }
-};
-using MuxPads = std::vector<std::shared_ptr<MuxPad>>;
-
 struct GstRangeMuxPrivate {
-  std::mutex lock; /* guards pads (the vector), counters and max_skew; never held across a push,
-                      message or call into the aggregator */
+  std::mutex lock; /* guards pads (the vector), counters, max_skew and rig_file; never held across a
+                      push, message or call into the aggregator */
   MuxPads pads;
   GstClockTime max_skew = 0;
+  std::string rig_file;
   guint64 frames = 0, complete = 0;
 
   ClockPublisher clock;   /* has locks of its own */
   StatsReporter reporter; /* as well */
 
   /* streaming thread only */
-  bool caps_dirty = true;
+  bool caps_dirty = true, live = false;
+  rangecast::Rig rig; /* of rig_file; empty: any */
+  MuxSteps steps;
+  std::vector<MuxSteps::Stream> votes; /* kept for their memory */
+  std::vector<MuxPad *> voters;
+  GstClockTime newest = GST_CLOCK_TIME_NONE; /* running time of what came last */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstClockTime last_capture = GST_CLOCK_TIME_NONE; /* of the last frame set */
   GstClockTime last_running = GST_CLOCK_TIME_NONE;
@@ -100,60 +96,92 @@ current_pads (GstRangeMux *self)
   return self->priv->pads;
 }
 
-/* ---- caps: the union of all rigs ---- */
+/* ---- what becomes of each stream ---- */
 
-static Status
-unite (const MuxPads &pads, RangeInfo &united, bool &coded)
+/* Why a stream is left out, for people. @param offset  ahead of the others, ns */
+static std::string
+explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset)
 {
-  const MuxPad *first = nullptr;
-  rangecast::Rig rig;
-  int fps_n = 0, fps_d = 1;
-  for (const auto &entry : pads) {
-    if (!entry->has_caps)
-      continue;
-    const std::string name = GST_PAD_NAME (entry->pad);
-    if (first && entry->coded != first->coded)
-      return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (first->pad)) + " and " +
-                                         name + ": expected all raw or all coded streams"};
-    for (const auto &other : pads)
-      if (other != entry && other->has_caps)
-        for (const auto &view : entry->info.rig.views)
-          if (other->info.rig.find (view.id))
-            return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (other->pad)) +
-                                               " and " + name + ": both have view-id " +
-                                               std::to_string (view.id) +
-                                               "; expected each view once"};
-    if (Status s = rangecast::merge (rig, entry->info.rig); !s.ok ())
-      return s;
-    if (!first) {
-      first = entry.get ();
-      fps_n = entry->info.fps_n;
-      fps_d = entry->info.fps_d;
-    }
+  const std::string seconds = std::to_string (double (ABS (offset)) / GST_SECOND) + " s";
+  switch (state) {
+    case MuxState::kSilent:
+      return ": nothing came for " + std::to_string (kSilent / GST_SECOND) +
+             " s; the others go on without it";
+    case MuxState::kLate:
+      return ": all that comes is too late, capture times are " + seconds +
+             " behind the others'; left out; expected a host and a network that keep up, a clock "
+             "in step, or a greater latency";
+    case MuxState::kOutOfStep:
+      return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
+             " the others': the host's clock is not in step; left out until it is";
+    case MuxState::kOtherRig:
+      return ": " + entry.other_rig.message () + "; left out";
+    case MuxState::kClash:
+      return ": " + entry.clash.message () + "; left out";
+    default:
+      return ": is back";
   }
-  if (first)
-    coded = first->coded;
-  united = gstrange::make_info (std::move (rig), fps_n, fps_d);
-  return {};
 }
+
+/* Tells a state to people, by a warning, and to applications. */
+static void
+tell_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTimeDiff offset)
+{
+  entry.said = state;
+  const std::string text = entry.title () + explain (entry, state, offset);
+  GST_INFO_OBJECT (self, "%s", text.c_str ());
+  if (state != MuxState::kIn)
+    gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadData, text});
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("rangemux-stream", "pad", G_TYPE_STRING, GST_PAD_NAME (entry.pad),
+              "view-id", G_TYPE_INT, entry.view_id (), "state", G_TYPE_STRING, name_of (state),
+              "offset", G_TYPE_INT64, gint64 (offset), nullptr)));
+}
+
+/* @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
+static void
+set_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTime running)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  if (state != entry.state) {
+    std::lock_guard guard (priv->lock);
+    entry.state = state;
+    entry.since = running;
+  }
+  if (state == entry.said)
+    return;
+  const bool lasts = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (entry.since) &&
+                     running >= entry.since + kWorthTelling;
+  if (lasts || (state != MuxState::kLate && state != MuxState::kOutOfStep))
+    tell_state (self, entry, state,
+        entry.offset_known && priv->live ? entry.offset - priv->steps.reference () : 0);
+}
+
+/* ---- caps: the union of the rigs of the streams that go together ---- */
 
 static GstFlowReturn
 negotiate (GstRangeMux *self, const MuxPads &pads)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  RangeInfo united;
-  bool coded = false;
-  const GstFlowReturn flow =
-      gst_range_flow_return (GST_ELEMENT (self), unite (pads, united, coded));
-  if (flow != GST_FLOW_OK)
+  MuxFormat format;
+  const Status status = choose_streams (pads, !priv->live, format);
+  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
+      flow != GST_FLOW_OK)
     return flow;
-  GstCaps *caps = coded ? gstrange::make_neighbour_code_caps (united, "access-unit")
-                        : gstrange::make_range_caps (united);
+  for (const auto &entry : pads)
+    if (entry->alive && (!entry->other_rig.ok () || !entry->clash.ok ()))
+      set_state (
+          self, *entry, entry->clash.ok () ? MuxState::kOtherRig : MuxState::kClash, priv->newest);
+  priv->caps_dirty = false;
+  if (format.info.views () == 0)
+    return GST_FLOW_OK; /* nobody is left */
+  GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
+                               : gstrange::make_range_caps (format.info);
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
-  priv->frame_duration = united.frame_duration ();
-  priv->reporter.set_views (united.rig);
-  priv->caps_dirty = false;
+  priv->frame_duration = format.info.frame_duration ();
+  priv->reporter.set_views (format.info.rig);
   return GST_FLOW_OK;
 }
 
@@ -166,13 +194,16 @@ gst_range_mux_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 static gboolean
 take_caps (GstRangeMux *self, MuxPad &entry, GstCaps *caps)
 {
-  RangeInfo info;
+  gstrange::RangeInfo info;
   Status status = gstrange::parse_caps (caps, info);
   if (!status.ok ())
     status = {
         status.code (), "pad " + std::string (GST_PAD_NAME (entry.pad)) + ": " + status.message ()};
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
+  const rangecast::Rig &expected = self->priv->rig;
+  entry.other_rig = expected.views.empty () ? Status{} : check_rig (info.rig, expected);
+  entry.clash = {};
   entry.coded =
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   entry.info = std::move (info);
@@ -201,42 +232,6 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
 
 /* ---- matching ---- */
 
-/* A pad with the buffer that waits on it. */
-struct Waiting {
-  MuxPad *entry;
-  GstBuffer *buffer; /* a reference of ours */
-  GstClockTime capture, running;
-};
-
-/* All buffers that wait; unrefs them when it goes. */
-class WaitingBuffers {
-public:
-  WaitingBuffers (const MuxPads &pads, bool live)
-  {
-    for (const auto &entry : pads) {
-      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
-      if (buffer)
-        (gstrange::is_gap (buffer) ? gaps : list)
-            .push_back ({entry.get (), buffer, gstrange::capture_time_of (entry->pad, buffer, live),
-                gstrange::running_time_of (entry->pad, buffer)});
-      else if (!gst_aggregator_pad_is_eos (entry->pad))
-        missing++;
-      else
-        ended++;
-    }
-  }
-  ~WaitingBuffers ()
-  {
-    for (const auto *waiting : {&list, &gaps})
-      for (const Waiting &w : *waiting)
-        gst_buffer_unref (w.buffer);
-  }
-  WaitingBuffers (const WaitingBuffers &) = delete;
-
-  std::vector<Waiting> list, gaps;
-  int missing = 0, ended = 0;
-};
-
 static GstClockTime
 distance (GstClockTime a, GstClockTime b)
 {
@@ -253,34 +248,108 @@ tolerance_of (GstRangeMuxPrivate *priv)
                                                         : kDefaultTolerance;
 }
 
-/* Drops what can be part of no frame set any more: what is older than the last one, and what is
- * far from most others, from a host whose clock is not in step. @return whether anything went */
+/* Notes who is there. Who was left out for a clash may have its turn when somebody has gone. */
+static void
+note_arrivals (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  for (const auto *buffers : {&waiting.list, &waiting.gaps})
+    for (const Waiting &w : *buffers)
+      if (GST_CLOCK_TIME_IS_VALID (w.running)) {
+        w.entry->seen = w.running;
+        if (!GST_CLOCK_TIME_IS_VALID (priv->newest) || w.running > priv->newest)
+          priv->newest = w.running;
+      }
+  if (!GST_CLOCK_TIME_IS_VALID (priv->newest))
+    return;
+  for (const auto &entry : pads) {
+    if (!GST_CLOCK_TIME_IS_VALID (entry->seen))
+      entry->seen = priv->newest; /* it did not come so far */
+    const bool alive = priv->newest <= entry->seen + kSilent;
+    if (alive != entry->alive)
+      priv->caps_dirty = true;
+    entry->alive = alive;
+    if (!alive && priv->live && !gst_aggregator_pad_is_eos (entry->pad))
+      set_state (self, *entry, MuxState::kSilent, priv->newest);
+  }
+}
+
+/* Live: compares how far capture times are from the pipeline's clock, so that nobody has to wait
+ * for the others. */
+static void
+judge_steps (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
+  for (const Waiting &w : waiting.list)
+    if (GST_CLOCK_TIME_IS_VALID (w.running)) {
+      std::lock_guard guard (priv->lock);
+      w.entry->offset = MuxSteps::offset_of (w.capture, base + w.running);
+      w.entry->offset_known = true;
+    }
+  priv->votes.clear ();
+  priv->voters.clear ();
+  for (const auto &entry : pads)
+    if (entry->chosen && entry->alive && entry->offset_known) {
+      priv->votes.push_back ({entry->offset});
+      priv->voters.push_back (entry.get ());
+    }
+  if (priv->steps.judge (priv->votes))
+    priv->last_capture = GST_CLOCK_TIME_NONE; /* times of another clock */
+  for (std::size_t i = 0; i < priv->voters.size (); i++)
+    priv->voters[i]->in_step = priv->votes[i].in_step;
+}
+
+/* Not live: PTS may begin anywhere, and every stream that has not ended has a buffer here. */
+static void
+judge_recordings (GstRangeMuxPrivate *priv, const WaitingBuffers &waiting)
+{
+  if (waiting.list.empty ())
+    return;
+  std::vector<GstClockTime> captures;
+  for (const Waiting &w : waiting.list)
+    captures.push_back (w.capture);
+  std::ranges::nth_element (captures, captures.begin () + captures.size () / 2);
+  const GstClockTime median = captures[captures.size () / 2];
+  for (const Waiting &w : waiting.list)
+    w.entry->in_step = distance (w.capture, median) <= kOutOfStep;
+  if (GST_CLOCK_TIME_IS_VALID (priv->last_capture) && median + kOutOfStep < priv->last_capture)
+    priv->last_capture = GST_CLOCK_TIME_NONE; /* all of them began again */
+}
+
+/* Whether a buffer can be part of a frame set to come, and why not. */
+static MuxState
+fate_of (const GstRangeMuxPrivate *priv, const Waiting &w, GstClockTime tolerance)
+{
+  if (!w.entry->chosen)
+    return w.entry->other_rig.ok () ? MuxState::kClash : MuxState::kOtherRig;
+  if (!w.entry->in_step)
+    return MuxState::kOutOfStep;
+  const bool late =
+      GST_CLOCK_TIME_IS_VALID (priv->last_capture) && w.capture <= priv->last_capture + tolerance;
+  return late ? MuxState::kLate : MuxState::kIn;
+}
+
+/* @return whether anything went */
 static bool
 drop_useless (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime tolerance)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  std::vector<GstClockTime> captures;
-  for (const Waiting &w : waiting.list)
-    captures.push_back (w.capture);
-  if (captures.empty ())
-    return false;
-  std::ranges::nth_element (captures, captures.begin () + captures.size () / 2);
-  const GstClockTime median = captures[captures.size () / 2];
-  if (GST_CLOCK_TIME_IS_VALID (priv->last_capture) && median + kOutOfStep < priv->last_capture)
-    priv->last_capture = GST_CLOCK_TIME_NONE; /* all of them began again */
-
   bool any = false;
   for (const Waiting &w : waiting.list) {
-    const bool late =
-        GST_CLOCK_TIME_IS_VALID (priv->last_capture) && w.capture <= priv->last_capture + tolerance;
-    const bool astray = distance (w.capture, median) > kOutOfStep;
-    if (!late && !astray)
+    const MuxState fate = fate_of (priv, w, tolerance);
+    if (fate == MuxState::kIn)
       continue;
-    gst_aggregator_pad_drop_buffer (w.entry->pad);
-    std::lock_guard guard (priv->lock);
-    w.entry->received++;
-    (astray ? w.entry->out_of_step : w.entry->late)++;
     any = true;
+    gst_aggregator_pad_drop_buffer (w.entry->pad);
+    {
+      std::lock_guard guard (priv->lock);
+      w.entry->received++;
+      (fate == MuxState::kLate           ? w.entry->late
+          : fate == MuxState::kOutOfStep ? w.entry->out_of_step
+                                         : w.entry->left_out)++;
+    }
+    set_state (self, *w.entry, fate, w.running);
   }
   return any;
 }
@@ -334,7 +403,7 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
 {
   GstRangeMuxPrivate *priv = self->priv;
   GstBuffer *frame_set = gst_buffer_new ();
-  GstClockTime running = GST_CLOCK_TIME_NONE, last = first;
+  GstClockTime running = GST_CLOCK_TIME_NONE;
   std::size_t matched = 0;
   for (const Waiting &w : waiting.list) {
     if (w.capture > first + tolerance)
@@ -344,8 +413,8 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
       report_clash (self, *w.entry);
     if (GST_CLOCK_TIME_IS_VALID (w.running))
       running = GST_CLOCK_TIME_IS_VALID (running) ? std::min (running, w.running) : w.running;
-    last = std::max (last, w.capture);
     matched++;
+    set_state (self, *w.entry, MuxState::kIn, w.running);
     std::lock_guard guard (priv->lock);
     w.entry->received++;
     w.entry->matched++;
@@ -371,19 +440,24 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   auto self = GST_RANGE_MUX (aggregator);
   GstRangeMuxPrivate *priv = self->priv;
   const MuxPads pads = current_pads (self);
-  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const WaitingBuffers waiting (pads, live);
+  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  const WaitingBuffers waiting (pads, priv->live);
   if (waiting.list.empty () && waiting.gaps.empty ()) {
     if (waiting.missing > 0 || waiting.ended == 0)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     priv->reporter.finish ();
     return GST_FLOW_EOS;
   }
+  note_arrivals (self, pads, waiting);
   if (priv->caps_dirty) {
     const GstFlowReturn flow = negotiate (self, pads);
     if (flow != GST_FLOW_OK)
       return flow;
   }
+  if (priv->live)
+    judge_steps (self, pads, waiting);
+  else
+    judge_recordings (priv, waiting);
   const GstClockTime tolerance = tolerance_of (priv);
   if (drop_past_gaps (waiting, tolerance, timeout) || drop_useless (self, waiting, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
@@ -416,7 +490,12 @@ static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->last_capture = priv->last_running = GST_CLOCK_TIME_NONE;
+  priv->last_capture = priv->last_running = priv->newest = GST_CLOCK_TIME_NONE;
+  priv->steps.reset ();
+  for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
+    entry->offset_known = false;
+    entry->seen = GST_CLOCK_TIME_NONE;
+  }
   return GST_FLOW_OK;
 }
 
@@ -510,21 +589,34 @@ gst_range_mux_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
+static bool
+load_rig_file (GstRangeMux *self)
+{
+  std::string file;
+  {
+    std::lock_guard guard (self->priv->lock);
+    file = self->priv->rig_file;
+  }
+  self->priv->rig = {};
+  const Status status = file.empty () ? Status{} : rangecast::load_rig (file, self->priv->rig);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
 static gboolean
 gst_range_mux_start (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->caps_dirty = true;
-  priv->frame_duration = priv->last_capture = priv->last_running = GST_CLOCK_TIME_NONE;
-  if (!publish_clock (GST_RANGE_MUX (aggregator)))
+  priv->frame_duration = priv->last_capture = priv->last_running = priv->newest =
+      GST_CLOCK_TIME_NONE;
+  priv->steps.reset ();
+  if (!load_rig_file (GST_RANGE_MUX (aggregator)) || !publish_clock (GST_RANGE_MUX (aggregator)))
     return FALSE;
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->complete = 0;
-  for (const auto &entry : priv->pads) {
-    entry->has_caps = entry->clash_reported = false;
-    entry->received = entry->matched = entry->late = entry->out_of_step = 0;
-  }
+  for (const auto &entry : priv->pads)
+    entry->reset ();
   return TRUE;
 }
 
@@ -540,6 +632,9 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
     case PROP_CLOCK_PORT:
       priv->clock.set_port (g_value_get_int (value));
       break;
+    case PROP_RIG:
+      priv->rig_file = g_value_get_string (value) ? g_value_get_string (value) : "";
+      break;
     case PROP_STATS_INTERVAL:
       priv->reporter.set_interval (g_value_get_uint (value));
       break;
@@ -551,20 +646,22 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
 static GstStructure *
 make_stats (const GstRangeMuxPrivate *priv)
 {
-  guint64 late = 0, out_of_step = 0;
+  guint64 late = 0, out_of_step = 0, left_out = 0;
   for (const auto &entry : priv->pads) {
     late += entry->late;
+    left_out += entry->left_out;
     out_of_step += entry->out_of_step;
   }
   GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
       priv->frames, "complete", G_TYPE_UINT64, priv->complete, "incomplete", G_TYPE_UINT64,
       priv->frames - priv->complete, "dropped-late", G_TYPE_UINT64, late, "out-of-step",
-      G_TYPE_UINT64, out_of_step, nullptr);
+      G_TYPE_UINT64, out_of_step, "left-out", G_TYPE_UINT64, left_out, nullptr);
   for (const auto &entry : priv->pads) {
     GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, entry->received,
         "matched", G_TYPE_UINT64, entry->matched, "late", G_TYPE_UINT64, entry->late, "out-of-step",
-        G_TYPE_UINT64, entry->out_of_step, "skew", G_TYPE_INT64, gint64 (entry->last_skew),
-        nullptr);
+        G_TYPE_UINT64, entry->out_of_step, "left-out", G_TYPE_UINT64, entry->left_out, "skew",
+        G_TYPE_INT64, gint64 (entry->last_skew), "state", G_TYPE_STRING, name_of (entry->state),
+        "offset", G_TYPE_INT64, gint64 (entry->offset), nullptr);
     gst_structure_set (stats, GST_PAD_NAME (entry->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
     gst_structure_free (of_pad);
   }
@@ -582,6 +679,9 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
       break;
     case PROP_CLOCK_PORT:
       g_value_set_int (value, priv->clock.port ());
+      break;
+    case PROP_RIG:
+      g_value_set_string (value, priv->rig_file.empty () ? nullptr : priv->rig_file.c_str ());
       break;
     case PROP_STATS:
       g_value_take_boxed (value, make_stats (priv));
@@ -630,10 +730,18 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
           "= no, 0 = any free port, which can be read while not in READY (default -1)",
           -1, 65535, ClockPublisher::kOff,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
+  g_object_class_install_property (object_class, PROP_RIG,
+      g_param_spec_string ("rig", "Rig",
+          "Rig file that streams have to agree with: one whose cameras are others, or elsewhere, "
+          "is "
+          "left out, and in a pipeline that is not live an error (default: none, any will do)",
+          nullptr,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, complete, incomplete, dropped-late, out-of-step; and a "
-          "structure for each pad",
+          "Counters since start: frames, complete, incomplete, dropped-late, out-of-step, "
+          "left-out; "
+          "and a structure for each pad",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 

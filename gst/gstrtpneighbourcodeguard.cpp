@@ -4,9 +4,11 @@
  * @title: rtpneighbourcodeguard
  *
  * Lets the packets of one sender of coded frame sets through, and nothing else that arrives at its
- * port: no other bytes, no other codec, no second sender. A sender that comes back with another
- * SSRC takes over when the one before has been silent. It belongs between udpsrc and
- * rtpjitterbuffer, which one packet of a foreign stream brings out of step.
+ * port: no other bytes, no other codec, no second sender, not its own packets from elsewhere. A
+ * sender is who sends some sound packets one after another; another one takes over when it has been
+ * silent, or at once from the same address and port. It belongs between udpsrc and rtpjitterbuffer,
+ * which one packet of a foreign stream brings out of step. Directly behind udpsrc it has the kernel
+ * drop what a flood of foreign packets brings, before it takes the good ones' room.
  *
  * ## Example launch line
  * |[
@@ -20,12 +22,18 @@
  */
 #include "gstrtpneighbourcodeguard.h"
 
+#include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
 
+#include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
 #include <rangecast/neighbourcode/unit.hpp>
 #include <span>
+#include <vector>
+
+#include "senderfilter.hpp"
+#include "senderprobation.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
@@ -48,10 +56,14 @@ struct GstRtpNeighbourCodeGuardPrivate {
   guint8 payload_type = 0;     /* of its packets of slices */
 
   /* streaming thread only */
-  GstClockTime last_time = 0;      /* of its last packet */
-  std::optional<guint32> rtx_ssrc; /* under which its packets come again */
-  guint rival_packets = 0;         /* of a second sender, since it began */
-  GstCaps *caps = nullptr;         /* as they came */
+  GstClockTime last_time = 0;        /* of its last packet */
+  std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
+  guint rival_packets = 0;           /* of others while it sends */
+  GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
+  SenderProbation probation;
+  bool warned_of_version = false;
+  GSocket *filtered = nullptr; /* udpsrc's, while the kernel filters for us */
+  GstCaps *caps = nullptr;     /* as they came */
 };
 
 struct _GstRtpNeighbourCodeGuard {
@@ -71,10 +83,11 @@ GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST
 
 /* ---- packets ---- */
 
-/* Whether the bytes are slices and views of a rig from the first to the last: what no other codec's
- * are, nor a FEC packet's. */
-static bool
-are_units (std::span<const guint8> payload)
+/* The version of the neighbour code if the bytes are its units from the first to the last, with a
+ * slice or a view of the rig among them: what no other codec's are, nor a FEC packet's. 0 if they
+ * are not. */
+static int
+version_of_units (std::span<const guint8> payload)
 {
   using namespace rangecast;
   UnitReader reader (payload);
@@ -82,22 +95,36 @@ are_units (std::span<const guint8> payload)
   SliceHeader slice;
   bool any = false;
   while (const auto unit = reader.next (header)) {
-    any = true;
     if (header.type == static_cast<guint8> (UnitType::kSlice)) {
       if (!read_slice_header (*unit, slice).ok ())
-        return false;
-    } else if (header.type != static_cast<guint8> (UnitType::kRigView)) {
-      return false;
+        return 0;
+      any = true;
     }
+    any |= header.type == static_cast<guint8> (UnitType::kRigView);
   }
-  return any && reader.status ().ok ();
+  if (reader.status ().ok ())
+    return any ? kBitstreamVersion : 0;
+  /* Of another version only the sizes are known: they lead to the end. */
+  const int version = payload.empty () ? 0 : payload[0] >> 4;
+  if (version == kBitstreamVersion)
+    return 0;
+  while (payload.size () >= kUnitHeaderSize) {
+    const gsize size = GST_READ_UINT16_LE (&payload[2]);
+    if (payload[0] >> 4 != version || size < kUnitHeaderSize || size > payload.size ())
+      return 0;
+    payload = payload.subspan (size);
+  }
+  return payload.empty () ? version : 0;
 }
 
 /* What of a packet the guard looks at. */
 struct Packet {
   guint32 ssrc = 0;
+  guint16 sequence = 0;
   guint8 payload_type = 0;
+  int version = 0; /* of its units; 0: it is none of the neighbour code */
   bool units = false, repeated_units = false;
+  GSocketAddress *address = nullptr; /* the buffer's */
 };
 
 static bool
@@ -110,12 +137,52 @@ read_packet (GstBuffer *buffer, Packet &packet)
       static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
       gst_rtp_buffer_get_payload_len (&rtp));
   packet.ssrc = gst_rtp_buffer_get_ssrc (&rtp);
+  packet.sequence = gst_rtp_buffer_get_seq (&rtp);
   packet.payload_type = gst_rtp_buffer_get_payload_type (&rtp);
-  packet.units = are_units (payload);
+  packet.version = version_of_units (payload);
+  packet.units = packet.version == rangecast::kBitstreamVersion;
   packet.repeated_units =
-      !packet.units && payload.size () > kRtxHeader && are_units (payload.subspan (kRtxHeader));
+      !packet.units && payload.size () > kRtxHeader &&
+      version_of_units (payload.subspan (kRtxHeader)) == rangecast::kBitstreamVersion;
   gst_rtp_buffer_unmap (&rtp);
+  if (const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer))
+    packet.address = meta->addr;
   return true;
+}
+
+/* ---- the kernel's help ---- */
+
+/* The socket of the udpsrc that is linked to the sink pad, or nullptr. */
+static GSocket *
+find_socket (GstRtpNeighbourCodeGuard *self)
+{
+  GSocket *socket = nullptr;
+  GstPad *peer = gst_pad_get_peer (self->sinkpad);
+  GstElement *source = peer ? gst_pad_get_parent_element (peer) : nullptr;
+  if (source && g_object_class_find_property (G_OBJECT_GET_CLASS (source), "used-socket"))
+    g_object_get (source, "used-socket", &socket, nullptr);
+  gst_clear_object (&source);
+  gst_clear_object (&peer);
+  return socket;
+}
+
+static void
+stop_filter (GstRtpNeighbourCodeGuardPrivate *priv)
+{
+  if (priv->filtered)
+    SenderFilter::detach (priv->filtered);
+  g_clear_object (&priv->filtered);
+}
+
+static void
+start_filter (GstRtpNeighbourCodeGuard *self)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  stop_filter (priv);
+  GSocket *socket = priv->address ? find_socket (self) : nullptr;
+  if (socket && SenderFilter::attach (socket, priv->address))
+    priv->filtered = G_SOCKET (g_object_ref (socket));
+  g_clear_object (&socket);
 }
 
 /* Downstream learns whose packets these are; a payload type, which would keep FEC packets from the
@@ -141,35 +208,108 @@ time_of (GstBuffer *buffer)
   return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
 }
 
-enum class Verdict { kPasses, kPassesAsFirst, kForeign, kRival };
+enum class Verdict { kPasses, kPassesAsFirst, kForeign, kRival, kOtherVersion };
+
+/* Under the lock: a packet of the sender, or one that was lost and comes again.
+ * @param here  it comes from the sender's address and port */
+static bool
+is_senders (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
+{
+  if (!priv->ssrc || !here)
+    return false;
+  if (packet.ssrc == *priv->ssrc) /* slices, or FEC */
+    return packet.units || packet.payload_type != priv->payload_type;
+  if (packet.payload_type == priv->payload_type ||
+      (!packet.repeated_units && packet.ssrc != priv->rtx_ssrc))
+    return false;
+  priv->rtx_ssrc = packet.ssrc;
+  return true;
+}
 
 /* Under the lock. */
-static Verdict
-judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now)
+static void
+take_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
 {
-  if (priv->ssrc && packet.ssrc == *priv->ssrc) {
-    priv->last_time = now;
-    priv->rival_packets = 0;
-    if (packet.units)
-      priv->payload_type = packet.payload_type;
-    return Verdict::kPasses; /* or FEC */
-  }
-  if (priv->ssrc && packet.payload_type != priv->payload_type &&
-      (packet.repeated_units || packet.ssrc == priv->rtx_ssrc)) {
-    priv->rtx_ssrc = packet.ssrc;
-    return Verdict::kPasses;
-  }
-  if (!packet.units)
-    return Verdict::kForeign;
-  if (priv->ssrc && now < priv->last_time + priv->timeout)
-    return ++priv->rival_packets == kRivalPackets ? Verdict::kRival : Verdict::kForeign;
   priv->ssrc = packet.ssrc;
   priv->payload_type = packet.payload_type;
-  priv->last_time = now;
+  g_set_object (&priv->address, packet.address);
   priv->rtx_ssrc.reset ();
-  priv->rival_packets = 0;
+  priv->probation.clear ();
   priv->counters.senders++;
+}
+
+/* Under the lock. @param[out] stream  the packets that pass with kPassesAsFirst */
+static Verdict
+judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
+    GstBuffer *buffer, std::vector<GstBuffer *> &stream)
+{
+  const bool here = same_sender (packet.address, priv->address);
+  if (is_senders (priv, packet, here)) {
+    if (packet.ssrc == *priv->ssrc)
+      priv->last_time = now;
+    return Verdict::kPasses;
+  }
+  const bool silent = !priv->ssrc || now >= priv->last_time + priv->timeout;
+  if (silent && priv->filtered)
+    stop_filter (priv); /* the next sender may be among those that it keeps out */
+  if (packet.version == 0)
+    return Verdict::kForeign;
+  if (packet.units && !silent && !here)
+    return ++priv->rival_packets == kRivalPackets ? Verdict::kRival : Verdict::kForeign;
+  if (!packet.units && priv->warned_of_version)
+    return Verdict::kForeign;
+  if (!priv->probation.add (
+          {packet.address, packet.ssrc, packet.sequence, packet.version}, buffer, stream))
+    return Verdict::kForeign;
+  if (!packet.units) {
+    priv->warned_of_version = true;
+    return Verdict::kOtherVersion;
+  }
+  take_sender (priv, packet);
+  priv->last_time = now;
+  priv->rival_packets = 0;
   return Verdict::kPassesAsFirst;
+}
+
+/* What came of the sender so far, in order; `stream` is empty afterwards. */
+static GstFlowReturn
+push_first (GstRtpNeighbourCodeGuard *self, std::vector<GstBuffer *> &stream)
+{
+  GST_INFO_OBJECT (self, "SSRC %08x passes", *self->priv->ssrc);
+  start_filter (self);
+  push_caps (self);
+  GstFlowReturn flow = GST_FLOW_OK;
+  bool first = true;
+  for (GstBuffer *buffer : stream) {
+    if (flow != GST_FLOW_OK) {
+      gst_buffer_unref (buffer);
+      continue;
+    }
+    if (first) {
+      buffer = gst_buffer_make_writable (buffer);
+      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+    }
+    first = false;
+    flow = gst_pad_push (self->srcpad, buffer);
+  }
+  stream.clear ();
+  return flow;
+}
+
+static void
+warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet)
+{
+  if (verdict == Verdict::kRival)
+    GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
+        ("Two senders at one port: packets of SSRC %08x are dropped, expected those of %08x",
+            packet.ssrc, *self->priv->ssrc),
+        (nullptr));
+  if (verdict == Verdict::kOtherVersion)
+    gst_range_post_warning (GST_ELEMENT (self),
+        {rangecast::StatusCode::kUnsupported,
+            "A sender's packets are of version " + std::to_string (packet.version) +
+                " of the neighbour code: dropped; expected version " +
+                std::to_string (rangecast::kBitstreamVersion)});
 }
 
 static GstFlowReturn
@@ -179,34 +319,43 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
   Packet packet;
   Verdict verdict = Verdict::kForeign;
+  std::vector<GstBuffer *> stream; /* empty, and so without memory, but when a sender begins */
   const bool is_rtp = read_packet (buffer, packet);
   {
     std::lock_guard guard (priv->lock);
     if (is_rtp)
-      verdict = judge (priv, packet, time_of (buffer));
-    const bool passes = verdict == Verdict::kPasses || verdict == Verdict::kPassesAsFirst;
-    (passes ? priv->counters.passed : priv->counters.foreign)++;
+      verdict = judge (priv, packet, time_of (buffer), buffer, stream);
+    priv->counters.passed += verdict == Verdict::kPasses          ? 1
+                             : verdict == Verdict::kPassesAsFirst ? stream.size ()
+                                                                  : 0;
+    if (verdict == Verdict::kPassesAsFirst)
+      priv->counters.foreign -= stream.size () - 1; /* they were, on probation */
+    else
+      priv->counters.foreign += verdict != Verdict::kPasses;
   }
-  switch (verdict) {
-    case Verdict::kPasses:
-      return gst_pad_push (self->srcpad, buffer);
-    case Verdict::kPassesAsFirst:
-      GST_INFO_OBJECT (self, "SSRC %08x passes", packet.ssrc);
-      push_caps (self);
-      buffer = gst_buffer_make_writable (buffer);
-      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-      return gst_pad_push (self->srcpad, buffer);
-    case Verdict::kRival:
-      GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-          ("Two senders at one port: packets of SSRC %08x are dropped, expected those of %08x",
-              packet.ssrc, *priv->ssrc),
-          (nullptr));
-      break;
-    case Verdict::kForeign:
-      break;
+  if (verdict == Verdict::kPasses)
+    return gst_pad_push (self->srcpad, buffer);
+  if (verdict == Verdict::kPassesAsFirst) {
+    gst_buffer_unref (buffer); /* the stream has it */
+    return push_first (self, stream);
   }
+  warn_of (self, verdict, packet);
+  for (GstBuffer *held : stream)
+    gst_buffer_unref (held);
   gst_buffer_unref (buffer);
   return GST_FLOW_OK;
+}
+
+/* Under the lock. */
+static void
+forget_sender (GstRtpNeighbourCodeGuardPrivate *priv)
+{
+  stop_filter (priv);
+  priv->ssrc.reset ();
+  priv->rtx_ssrc.reset ();
+  priv->probation.clear ();
+  priv->rival_packets = 0;
+  g_clear_object (&priv->address);
 }
 
 /* ---- events ---- */
@@ -217,7 +366,7 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may begin anew */
     std::lock_guard guard (self->priv->lock);
-    self->priv->ssrc.reset ();
+    forget_sender (self->priv);
   }
   if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
     return gst_pad_event_default (pad, parent, event);
@@ -229,16 +378,17 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   return TRUE;
 }
 
-/* A request for a key frame set says which stream it is about, as rtpbin's demultiplexers do it:
- * rtpsession makes a PLI of such a one. */
+/* Requests for a key frame set and for a lost packet say which stream they are about, as rtpbin's
+ * demultiplexers do it: rtpsession makes a PLI or a NACK of such ones. A request that a viewer sent
+ * to a parent names the parent's own stream, so whatever it names is replaced. */
 static gboolean
 gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   const GstStructure *structure = gst_event_get_structure (event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && structure &&
-      gst_structure_has_name (structure, "GstForceKeyUnit") &&
-      !gst_structure_has_field (structure, "ssrc")) {
+      (gst_structure_has_name (structure, "GstForceKeyUnit") ||
+          gst_structure_has_name (structure, "GstRTPRetransmissionRequest"))) {
     std::lock_guard guard (self->priv->lock);
     if (self->priv->ssrc) {
       event = gst_event_make_writable (event);
@@ -259,10 +409,9 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
                                           ->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     gst_caps_replace (&self->priv->caps, nullptr);
-    self->priv->rtx_ssrc.reset ();
-    self->priv->rival_packets = 0;
     std::lock_guard guard (self->priv->lock);
-    self->priv->ssrc.reset ();
+    forget_sender (self->priv);
+    self->priv->warned_of_version = false;
     self->priv->counters = {};
   }
   return result;
@@ -307,6 +456,7 @@ gst_rtp_neighbour_code_guard_finalize (GObject *object)
 {
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
   gst_caps_replace (&priv->caps, nullptr);
+  forget_sender (priv);
   delete priv;
   G_OBJECT_CLASS (gst_rtp_neighbour_code_guard_parent_class)->finalize (object);
 }

@@ -28,11 +28,11 @@
 #include <string>
 #include <vector>
 
+#include "codedunits.hpp"
 #include "statsreporter.hpp"
 
 using rangecast::Status;
 using rangecast::UnitHeader;
-using rangecast::UnitReader;
 using rangecast::UnitType;
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
@@ -55,6 +55,8 @@ struct GstRtpNeighbourCodePayPrivate {
   bool by_slices = false;                         /* alignment of the input */
   bool within_frame_set = false;                  /* slices of this one came before */
   GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
+  gsize header_size = 0;                          /* of a packet, bytes */
+  GstCaps *header_caps = nullptr;                 /* for which that holds */
 };
 
 struct _GstRtpNeighbourCodePay {
@@ -76,7 +78,8 @@ GST_ELEMENT_REGISTER_DEFINE (
 
 /* ---- caps ---- */
 
-/* What goes into SDP as fmtp parameters; all values are strings there. */
+/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes the
+ * requests for key frame sets (PLI, FIR) that an encoder before us answers. */
 static gboolean
 set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
 {
@@ -88,7 +91,8 @@ set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
       "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
       std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
       std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",
-      G_TYPE_STRING, rig, nullptr);
+      G_TYPE_STRING, rig, "rtcp-fb-nack-pli", G_TYPE_BOOLEAN, TRUE, "rtcp-fb-ccm-fir",
+      G_TYPE_BOOLEAN, TRUE, nullptr);
   g_free (rig);
   return set;
 }
@@ -132,30 +136,68 @@ struct Packer {
   /* @return the first unit that is too long for a packet, if there is one */
   std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
-    GstMapInfo map;
-    if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
-      return {};
-    UnitReader reader ({map.data, map.size});
-    UnitHeader header;
     gsize begin = 0, end = 0;
     std::optional<UnitHeader> too_long;
-    while (const auto unit = reader.next (header)) {
-      if (unit->size () > room) {
+    Status damage; /* what is behind it is left out */
+    const auto take = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+      if (unit.size () > room) {
         too_long = header;
-        break;
+        return false;
       }
-      if (end - begin + unit->size () > room) {
+      if (end - begin + unit.size () > room) {
         add (buffer, begin, end - begin);
         begin = end;
       }
-      end += unit->size ();
-    }
-    gst_buffer_unmap (buffer, &map);
+      end = offset + unit.size ();
+      return true;
+    };
+    if (!for_each_unit (buffer, take, damage))
+      return {};
     if (!too_long && end > begin)
       add (buffer, begin, end - begin);
     return too_long;
   }
 };
+
+/* Bytes that an extension takes in the header at most; 0: the base class does not make it either.
+ */
+static gsize
+extension_size (const char *uri, const GstBuffer *buffer)
+{
+  GstRTPHeaderExtension *extension = gst_rtp_header_extension_create_from_uri (uri);
+  if (!extension)
+    return 0;
+  const gsize size = 2 + gst_rtp_header_extension_get_max_size (extension, buffer);
+  gst_object_unref (extension);
+  return size;
+}
+
+/* The fixed header, and the extensions that were agreed on: the base class writes them into packets
+ * that are made already. */
+static gsize
+find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
+{
+  GstRtpNeighbourCodePayPrivate *priv = self->priv;
+  GstCaps *caps = gst_pad_get_current_caps (GST_RTP_BASE_PAYLOAD_SRCPAD (self));
+  if (caps && caps == priv->header_caps) {
+    gst_caps_unref (caps);
+    return priv->header_size;
+  }
+  const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
+  gsize extensions = 0;
+  for (int i = 0; structure && i < gst_structure_n_fields (structure); i++) {
+    const char *name = gst_structure_nth_field_name (structure, guint (i));
+    const GValue *value = gst_structure_get_value (structure, name);
+    if (!g_str_has_prefix (name, "extmap-"))
+      continue;
+    if (GST_VALUE_HOLDS_ARRAY (value) && gst_value_array_get_size (value) > 1)
+      value = gst_value_array_get_value (value, 1); /* direction, URI, attributes */
+    if (G_VALUE_HOLDS_STRING (value))
+      extensions += extension_size (g_value_get_string (value), buffer);
+  }
+  gst_caps_take (&priv->header_caps, caps);
+  return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + (extensions + 3) / 4 * 4 : 0);
+}
 
 /* Notes where frame sets begin and end. The end of one without MARKER is known only afterwards; its
  * packets have no marker, and receivers go by the next timestamp. */
@@ -214,7 +256,7 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
   const char *name = unit.type == guint8 (UnitType::kSlice)     ? "slice"
                      : unit.type == guint8 (UnitType::kRigView) ? "rig view"
                                                                 : "unit";
-  const gsize mtu_needed = unit.size + gst_rtp_buffer_calc_header_len (0);
+  const gsize mtu_needed = unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size;
   GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
       ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
           int (unit.size), mtu, advice (unit, room, mtu_needed).c_str ()),
@@ -227,7 +269,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_PAY (base);
   const guint mtu = GST_RTP_BASE_PAYLOAD_MTU (base);
-  const gsize header = gst_rtp_buffer_calc_header_len (0);
+  const gsize header = self->priv->header_size = find_header_size (self, buffer);
   Packer packer = {base, gst_buffer_list_new (), mtu > header ? mtu - header : 0,
       GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
   const GstClockTime running =
@@ -334,6 +376,7 @@ gst_rtp_neighbour_code_pay_get_property (
 static void
 gst_rtp_neighbour_code_pay_finalize (GObject *object)
 {
+  gst_clear_caps (&GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->header_caps);
   delete GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
   G_OBJECT_CLASS (gst_rtp_neighbour_code_pay_parent_class)->finalize (object);
 }

@@ -327,7 +327,7 @@ static void
 close (GstStereoCamSrc *self)
 {
   const auto session = self->priv->current ();
-  if (session && !session->wait_for_end (kGiveBack))
+  if (session && !session->wait_for_cameras (kGiveBack))
     GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
 }
 

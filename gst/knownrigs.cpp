@@ -81,23 +81,42 @@ known_rig_files ()
   return files;
 }
 
+const KnownRigs::RigFile &
+KnownRigs::read (const std::string &path)
+{
+  std::error_code error;
+  const auto written = fs::last_write_time (path, error);
+  const auto size = fs::file_size (path, error);
+  const auto at = files_.find (path);
+  if (!error && at != files_.end () && at->second.written == written && at->second.size == size)
+    return at->second;
+  RigFile &file = files_[path];
+  file = {.written = written, .size = size, .rig = {}, .problem = {}};
+  reads_++;
+  if (const auto status = load_rig (path, file.rig); !status.ok ())
+    file.problem = status.message ();
+  return file;
+}
+
 std::vector<KnownPair>
-known_pairs (const std::vector<std::string> &files, const FoundCameras &found,
+KnownRigs::pairs (const std::vector<std::string> &files, const FoundCameras &found,
     std::vector<std::string> &problems)
 {
+  std::erase_if (files_,
+      [&] (const auto &known) { return std::ranges::find (files, known.first) == files.end (); });
   std::vector<KnownPair> pairs;
-  for (const auto &file : files) {
-    Rig rig;
-    if (const auto status = load_rig (file, rig); !status.ok ()) {
-      problems.push_back (status.message ());
+  for (const auto &path : files) {
+    const RigFile &file = read (path);
+    if (!file.problem.empty ()) {
+      problems.push_back (file.problem);
       continue;
     }
-    for (const auto &view : rig.views)
+    for (const auto &view : file.rig.views)
       if (is_complete (view, found))
-        pairs.push_back ({.rig_path = file,
+        pairs.push_back ({.rig_path = path,
             .view_id = view.id,
             .cameras = cameras_of (view),
-            .display_name = display_name (view, file)});
+            .display_name = display_name (view, path)});
   }
   return pairs;
 }

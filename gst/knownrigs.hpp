@@ -2,6 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <rangecast/geometry/rig.hpp>
 #include <string>
 #include <vector>
 
@@ -24,9 +28,30 @@ struct KnownPair {
  *  (XDG). @return the files that end in .yaml, .yml or .json, each once */
 std::vector<std::string> known_rig_files ();
 
-/** The pairs, among the views of these rig files, whose cameras are among `found`. Files that
- * cannot be read are left out: `problems` then has one line for each, as load_rig() words it. */
-std::vector<KnownPair> known_pairs (const std::vector<std::string> &files,
-    const FoundCameras &found, std::vector<std::string> &problems);
+/** What is in rig files, which are read again only when they have changed. One thread. */
+class KnownRigs {
+public:
+  KnownRigs () = default;
+
+  /** The pairs, among the views of these rig files, whose cameras are among `found`. Files that
+   *  cannot be read are left out: `problems` then has one line for each, as load_rig() words it. */
+  std::vector<KnownPair> pairs (const std::vector<std::string> &files, const FoundCameras &found,
+      std::vector<std::string> &problems);
+
+  /** How often a file was read. */
+  [[nodiscard]] unsigned reads () const { return reads_; }
+
+private:
+  struct RigFile {
+    std::filesystem::file_time_type written;
+    std::uintmax_t size = 0;
+    Rig rig;
+    std::string problem; ///< empty if it could be read
+  };
+  const RigFile &read (const std::string &path);
+
+  std::map<std::string, RigFile> files_;
+  unsigned reads_ = 0;
+};
 
 } // namespace rangecast

@@ -46,7 +46,7 @@ NeighbourCodeRateSettings::install (GObjectClass *klass)
           "The rate follows what receivers report (RTPTWCCPackets and RangecastReceiverReport "
           "events from downstream), from min-bitrate to target-bitrate or, if that is 0, without "
           "limit (default false)",
-          defaults.adaptive, live));
+          defaults.adaptive, GParamFlags (live & ~GST_PARAM_CONTROLLABLE)));
   g_object_class_install_property (klass, PROP_MIN_BITRATE,
       g_param_spec_uint ("min-bitrate", "Minimum bit rate",
           "With adaptive-bitrate, bits per second of coded frame sets at least, or target-bitrate "

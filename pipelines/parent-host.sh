@@ -16,6 +16,7 @@ usage: parent-host.sh --views N --listen PORT --to HOST:PORT[,HOST:PORT...] [opt
   --jitter MS     jitter buffer of each camera stream (default 30)
   --latency MS    how long to wait for a late view (default 60)
   --clock-port N  publish the clock on UDP port N, for camera-host.sh --clock-server (default: no)
+  --rig FILE      leave out camera hosts whose cameras are not those of this rig (default: none is)
 To the viewers:
 END
   rtp_usage_sender
@@ -26,7 +27,7 @@ From the cameras:
 END
 }
 
-views= listen= to= jitter=30 latency=60 clock_port= cameras_feedback= camera_fec= camera_rtx=
+views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx=
 while [ $# -gt 0 ]; do
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
@@ -42,6 +43,7 @@ while [ $# -gt 0 ]; do
     --jitter) jitter=${2:-}; shift ;;
     --latency) latency=${2:-}; shift ;;
     --clock-port) clock_port=${2:-}; shift ;;
+    --rig) rig=${2:-}; shift ;;
     --cameras) cameras_feedback=${2:-}; shift ;;
     --camera-fec) camera_fec=yes ;;
     --camera-rtx) camera_rtx=yes ;;
@@ -59,6 +61,7 @@ need_number "$latency" --latency 0 10000
 IFS=, read -ra feedbacks <<<"$cameras_feedback"
 [ ${#feedbacks[@]} = 0 ] || [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
 [ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: expected --cameras, too"
+[ -z "$rig" ] || [ -f "$rig" ] || die "--rig: no file '$rig'"
 rtp_check sender
 send_rtp "$to"
 viewers=("${rtp[@]}")
@@ -71,5 +74,5 @@ for ((i = 0; i < views; i++)); do
   receive_rtp "$i" $((listen + i)) "$jitter" 1048576
   cameras+=("${rtp[@]}" ! mux.)
 done
-launch rangemux name=mux "latency=$((latency * 1000000))" ${clock_port:+"clock-port=$clock_port"} \
+launch rangemux name=mux "latency=$((latency * 1000000))" ${clock_port:+"clock-port=$clock_port"} ${rig:+"rig=$rig"} \
   ! "${viewers[@]}" "${cameras[@]}"

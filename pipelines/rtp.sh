@@ -56,14 +56,18 @@ rtp_check () { # sender|receiver
 }
 
 rtp_fb='rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true'
+# Transport-wide feedback, from which neighbourcodeenc adaptive-bitrate=true learns of queues.
+rtp_twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
 rtx_map='application/x-rtp-pt-map,96=(uint)97,122=(uint)123'
 
 # usage: send_rtp HOST:PORT[,HOST:PORT...] -> sets `rtp` to what takes coded frame sets to all of them.
 send_rtp () {
-  local target
+  local target twcc=
   split_addresses "$1" --to
   rtp=(rtpneighbourcodepay)
-  [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb")
+  # Of several receivers rtpsession would mix the transport-wide feedback.
+  [[ "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
+  [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc" ! rtcpreports name=reports)
   [ -z "$rtp_fec" ] || rtp+=(! rtpulpfecenc "percentage=$rtp_fec" pt=122)
   [ -z "$rtp_rtx" ] || rtp+=(! rtprtxsend max-size-time=500 "payload-type-map=$rtx_map")
   [ -z "$rtp_feedback" ] || rtp+=(! session.send_rtp_sink session.send_rtp_src)
@@ -74,10 +78,11 @@ send_rtp () {
   rtp+=(rtpsession name=session rtp-profile=avpf)
   if [ -n "$rtp_key" ]; then
     rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-srtcp ! decrypt.rtcp_sink
-      srtpdec name=decrypt decrypt.rtcp_src ! session.recv_rtcp_sink)
+      srtpdec name=decrypt decrypt.rtcp_src ! reports.rtcp_sink)
   else
-    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-rtcp ! session.recv_rtcp_sink)
+    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-rtcp ! reports.rtcp_sink)
   fi
+  rtp+=(reports.rtcp_src ! session.recv_rtcp_sink)
 }
 
 # usage: receive_rtp NUMBER PORT JITTER_MS BUFFER_BYTES [GROUP] -> sets `rtp` to what gives coded frame
@@ -85,7 +90,7 @@ send_rtp () {
 receive_rtp () {
   local type=application/x-rtp feedback=
   [ -z "$rtp_key" ] || type=application/x-srtp
-  rtp=(udpsrc "port=$2" reuse=false "buffer-size=$4" "caps=$type,$rtp_fields,payload=96,$rtp_fb")
+  rtp=(udpsrc "port=$2" reuse=false "buffer-size=$4" "caps=$type,$rtp_fields,payload=96,$rtp_fb,$rtp_twcc")
   if [ -n "${5:-}" ]; then
     rtp+=("address=$5" reuse=true) # several viewers on one host
     [ -z "$rtp_interface" ] || rtp+=("multicast-iface=$rtp_interface")
@@ -95,13 +100,15 @@ receive_rtp () {
   if [ -n "$rtp_feedback" ]; then
     split_address "$rtp_feedback" --feedback
     rtp+=(! capssetter "caps=application/x-rtp,payload=96" ! "session$1.recv_rtp_sink"
-      rtpsession "name=session$1" rtp-profile=avpf "session$1.send_rtcp_src")
+      rtpsession "name=session$1" rtp-profile=avpf rtcp-min-interval=20000000 "session$1.send_rtcp_src")
     [ -z "$rtp_key" ] || rtp+=(! "encrypt$1.rtcp_sink_0" srtpenc "name=encrypt$1" "encrypt$1.rtcp_src_0")
-    rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src" ! rtpneighbourcodeguard)
+    rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src")
+    [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
+    rtp+=(! rtpneighbourcodeguard) # names the stream in requests
   fi
-  [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
   [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
-  rtp+=(! rtpjitterbuffer "latency=$3")
+  # Of the number of a sender that begins again nothing follows: expect a second of loss at most.
+  rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)
   [ -z "$rtp_rtx" ] || rtp+=(do-retransmission=true)
   [ -z "$rtp_fec" ] || rtp+=(do-lost=true ! rtpulpfecdec pt=122)
   rtp+=(! rtpneighbourcodedepay)

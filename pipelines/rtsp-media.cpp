@@ -265,13 +265,15 @@ make_factory (const RtspOptions &options, StreamCounts &counts,
   gst_rtsp_media_factory_set_launch (factory, options.launch.c_str ());
   gst_rtsp_media_factory_set_shared (factory, TRUE);
   gst_rtsp_media_factory_set_suspend_mode (factory, GST_RTSP_SUSPEND_MODE_NONE);
-  gst_rtsp_media_factory_set_profiles (
-      factory, GstRTSPProfile (GST_RTSP_PROFILE_AVP | GST_RTSP_PROFILE_AVPF));
-  int protocols = 0;
+  /* AVPF: viewers ask for key frame sets and lost packets at once. With AVP beside it the SDP would
+   * have two streams, and players take both. */
+  const bool is_clear = options.tcp && !options.udp && options.multicast.first.empty ();
+  gst_rtsp_media_factory_set_profiles (factory, options.certificate_file.empty () || is_clear
+                                                    ? GST_RTSP_PROFILE_AVPF
+                                                    : GST_RTSP_PROFILE_SAVPF);
+  int protocols = GST_RTSP_LOWER_TRANS_TCP; /* for the holder in any case */
   if (options.udp)
     protocols |= GST_RTSP_LOWER_TRANS_UDP;
-  if (options.tcp)
-    protocols |= GST_RTSP_LOWER_TRANS_TCP;
   if (!options.multicast.first.empty ()) {
     protocols |= GST_RTSP_LOWER_TRANS_UDP_MCAST;
     set_multicast (factory, options.multicast);
@@ -302,6 +304,7 @@ make_dry_transport (GstRTSPStream *stream)
   transport->profile = GST_RTSP_PROFILE_AVPF;
   transport->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
   transport->interleaved = {0, 1};
+  transport->destination = g_strdup ("nobody"); /* reports are compared with it */
   GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
   const auto swallow = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
   const auto swallow_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
@@ -328,8 +331,15 @@ MediaHolder::hold (GstRTSPMedia *media)
 }
 
 void
+MediaHolder::wait_for_release ()
+{
+  std::lock_guard releasing (releasing_);
+}
+
+void
 MediaHolder::release ()
 {
+  std::lock_guard releasing (releasing_);
   std::unique_lock guard (lock_);
   GstRTSPMedia *media = media_;
   GPtrArray *transports = transports_;

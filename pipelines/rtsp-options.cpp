@@ -194,6 +194,8 @@ take_strings (const Strings &strings, RtspOptions &options)
     return false;
   if (strings.transports && !parse_transports (strings.transports, options))
     return false;
+  if (!strings.transports && !options.certificate_file.empty ())
+    options.udp = false; /* with TLS all that need not be SRTP */
   if (!strings.launch) {
     g_printerr ("rtsp-server: expected a launch string behind --, see --help\n");
     return false;

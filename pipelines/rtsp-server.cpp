@@ -74,6 +74,25 @@ on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 }
 
 static GstRTSPStatusCode
+before_describe (GstRTSPClient *, GstRTSPContext *, gpointer user_data)
+{
+  static_cast<Server *> (user_data)->holder.wait_for_release ();
+  return GST_RTSP_STS_OK;
+}
+
+/* The factory lets TCP pass, since the holder is such a viewer. */
+static GstRTSPStatusCode
+before_setup (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
+{
+  gchar *transport = nullptr;
+  gst_rtsp_message_get_header (context->request, GST_RTSP_HDR_TRANSPORT, &transport, 0);
+  const bool is_tcp = transport && std::strstr (transport, "/TCP");
+  return is_tcp && !static_cast<Server *> (user_data)->options.tcp
+             ? GST_RTSP_STS_UNSUPPORTED_TRANSPORT
+             : GST_RTSP_STS_OK;
+}
+
+static GstRTSPStatusCode
 before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
@@ -85,6 +104,13 @@ static void
 on_pause_or_teardown (GstRTSPClient *, GstRTSPContext *context, gpointer)
 {
   drop_tcp_transports (context->session);
+}
+
+static void
+on_new_session (GstRTSPClient *, GstRTSPSession *session, gpointer user_data)
+{
+  gst_rtsp_session_set_timeout (
+      session, guint (static_cast<Server *> (user_data)->options.timeout_s));
 }
 
 static void
@@ -100,10 +126,13 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   limit_send_buffer (client, server.options.send_buffer_kb * 1024);
+  g_signal_connect (client, "pre-describe-request", G_CALLBACK (before_describe), &server);
+  g_signal_connect (client, "pre-setup-request", G_CALLBACK (before_setup), &server);
   g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
   g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);
   g_signal_connect (client, "pause-request", G_CALLBACK (on_pause_or_teardown), &server);
   g_signal_connect (client, "teardown-request", G_CALLBACK (on_pause_or_teardown), &server);
+  g_signal_connect (client, "new-session", G_CALLBACK (on_new_session), &server);
   g_signal_connect (client, "closed", G_CALLBACK (on_closed), &server);
   std::lock_guard guard (server.lock);
   server.connections[client] = g_get_monotonic_time ();

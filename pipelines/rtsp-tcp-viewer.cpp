@@ -29,6 +29,7 @@ public:
   void take (const Message &message);
   void send_waiting ();
   void note_sent ();
+  void keep_alive ();
   void close ();
 
   /* The one behind a transport's callbacks; shared, since they may run while it is closed. */
@@ -41,8 +42,6 @@ private:
   void wake ();
 
   GWeakRef transport_; /* of the library */
-  GstRTSPStreamTransport *ours_ = nullptr;
-  GstRTSPStream *stream_;
   GMainContext *context_;
   std::atomic<guint64> &left_out_;
   std::mutex sending_; /* held while a message is handed over */
@@ -128,8 +127,7 @@ take_rtcp_list (GstBufferList *list, guint8, gpointer handle)
 
 TcpQueue::TcpQueue (
     GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out)
-    : stream_ (GST_RTSP_STREAM (g_object_ref (gst_rtsp_stream_transport_get_stream (transport)))),
-      context_ (g_main_context_ref (context)), left_out_ (left_out)
+    : context_ (g_main_context_ref (context)), left_out_ (left_out)
 {
   g_weak_ref_init (&transport_, transport);
 }
@@ -140,7 +138,6 @@ TcpQueue::~TcpQueue ()
     forget (message);
   g_weak_ref_clear (&transport_);
   g_main_context_unref (context_);
-  g_object_unref (stream_);
 }
 
 /* With the lock. */
@@ -271,6 +268,20 @@ TcpQueue::close ()
   std::lock_guard sending (sending_); /* what is being sent ends before */
   std::lock_guard guard (lock_);
   closed_ = true;
+  for (const Message &message : waiting_)
+    forget (message);
+  waiting_.clear ();
+}
+
+/* The viewer reported; its session lives on. */
+void
+TcpQueue::keep_alive ()
+{
+  auto transport = static_cast<GstRTSPStreamTransport *> (g_weak_ref_get (&transport_));
+  if (!transport)
+    return;
+  gst_rtsp_stream_transport_keep_alive (transport);
+  g_object_unref (transport);
 }
 
 /* ---- transports ---- */
@@ -295,26 +306,31 @@ delete_tap (gpointer user_data)
   delete tap;
 }
 
-/* A transport of ours in its place; the other one of the same channels. */
+/* A transport of ours in its place. The stream finds it by the address, too, when reports come. */
 static GstRTSPStreamTransport *
 make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
 {
+  const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
   GstRTSPTransport *copy = nullptr;
-  gchar *text = gst_rtsp_transport_as_text (
-      const_cast<GstRTSPTransport *> (gst_rtsp_stream_transport_get_transport (transport)));
   gst_rtsp_transport_new (&copy);
-  const bool parsed = text && gst_rtsp_transport_parse (text, copy) == GST_RTSP_OK;
-  g_free (text);
-  if (!parsed) {
-    gst_rtsp_transport_free (copy);
-    return nullptr;
-  }
+  copy->trans = to->trans;
+  copy->profile = to->profile;
+  copy->lower_transport = to->lower_transport;
+  copy->destination = g_strdup (to->destination);
+  copy->source = g_strdup (to->source);
+  copy->interleaved = to->interleaved;
+  copy->client_port = to->client_port;
+  copy->server_port = to->server_port;
+  copy->ssrc = to->ssrc;
   GstRTSPStreamTransport *ours =
       gst_rtsp_stream_transport_new (gst_rtsp_stream_transport_get_stream (transport), copy);
   gst_rtsp_stream_transport_set_callbacks (
       ours, take_rtp, take_rtcp, new Handle (queue), delete_handle);
   gst_rtsp_stream_transport_set_list_callbacks (
       ours, take_rtp_list, take_rtcp_list, new Handle (queue), delete_handle);
+  gst_rtsp_stream_transport_set_keepalive (
+      ours, [] (gpointer handle) { queue_of (handle).keep_alive (); }, new Handle (queue),
+      delete_handle);
   return ours;
 }
 
@@ -325,8 +341,6 @@ tap_transport (
   GstRTSPStream *stream = gst_rtsp_stream_transport_get_stream (transport);
   auto queue = std::make_shared<TcpQueue> (transport, context, left_out);
   GstRTSPStreamTransport *ours = make_transport (transport, queue);
-  if (!ours)
-    return; /* the library's own way, then */
   queue->self = queue;
   gst_rtsp_stream_transport_set_message_sent (
       transport, [] (gpointer handle) { queue_of (handle).note_sent (); }, new Handle (queue),

@@ -26,6 +26,7 @@ CAMERA = (  # factory that ends the stage, stage
     ("rtpneighbourcodepay", "rtpneighbourcodepay"),
 )
 VIEWER = (
+    (">queue", "queue before the decoder"),
     ("neighbourcodedec", "neighbourcodedec"),
     (">queue", "queue before cylinderfilter"),
     ("cylinderfilter", "cylinderfilter"),

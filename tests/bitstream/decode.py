@@ -32,6 +32,7 @@ SLICE_FIELDS = struct.Struct("<BBBBIQ8H")
 RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
+MAX_SLICES = 1 << 17  # of an access unit
 MAX_RIG_PIXELS = 1 << 27
 MOST_REPEATS = 8  # of the pixels of a view's ROI, in its slices
 KEY, INVERSE_DEPTH, REFERENCE = 1, 2, 4
@@ -229,7 +230,7 @@ class Reader:
 
         sound: list[Slice] = []
         for part in slices:
-            if part.lies_in(self.views.get(part.view)):
+            if part.lies_in(self.views.get(part.view)) and len(sound) < MAX_SLICES:
                 sound.append(part)
             else:
                 self.counts["damaged slices"] += 1

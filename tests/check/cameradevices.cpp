@@ -13,6 +13,7 @@
 #include <arv.h>
 #include <umockdev.h>
 
+#include <knownrigs.hpp>
 #include <rangecast/geometry/rig.hpp>
 
 using namespace rangecast;
@@ -382,6 +383,92 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
 }
 GST_END_TEST
 
+/* Written by the camera's owner, and kept in it. */
+static void
+name_camera (GigeCamera &camera, const char *name)
+{
+  char text[16] = {};
+  g_strlcpy (text, name, sizeof text);
+  fail_unless (arv_fake_camera_write_memory (
+      arv_gv_fake_camera_get_fake_camera (camera.camera), 0xe8, sizeof text, text));
+}
+
+GST_START_TEST (test_pair_is_found_by_user_defined_name)
+{
+  GigeCamera camera ("GIGE1");
+  if (!camera.is_running ())
+    RANGECAST_SKIP ("something else holds the port of GigE Vision");
+  name_camera (camera, "studio-left");
+  gchar *folder = g_dir_make_tmp ("rangecast-rigs-XXXXXX", nullptr);
+  const auto file = std::string (folder) + "/studio.yaml";
+  Rig rig;
+  View view = testing::ring_rig (1).views[0];
+  view.right = PartnerCamera{view.intrinsics, {}, {kIdentity3, {-0.06, 0, 0}}};
+  view.camera = "studio-left";
+  view.right->camera = "SN2";
+  rig.views.push_back (view);
+  fail_unless (save_rig (file, rig).ok ());
+  g_setenv ("RANGECAST_RIG_PATH", folder, TRUE);
+  TestBed bed;
+  bed.add (usb_camera (2, "SN2"));
+  Monitor monitor;
+  GstDevice *pair = monitor.find ("rig.file", file);
+  if (!pair) { /* the search took longer than the monitor waits */
+    monitor.wait_for (GST_MESSAGE_DEVICE_ADDED, "rig.file", file);
+    pair = monitor.find ("rig.file", file);
+  }
+  expect_text (pair, "camera.left", "studio-left");
+  gst_object_unref (pair);
+  std::filesystem::remove_all (folder);
+  g_free (folder);
+}
+GST_END_TEST
+
+GST_START_TEST (test_camera_is_called_by_all_its_names)
+{
+  FoundCamera camera;
+  camera.transport = FoundCamera::Transport::kGigEVision;
+  camera.id = "Maker-7";
+  camera.serial = "7";
+  camera.address = "10.0.0.7";
+  camera.physical_id = "00:11:22:33:44:55";
+  for (const char *name : {"Maker-7", "7", "10.0.0.7", "00:11:22:33:44:55"})
+    fail_unless (camera.is_called (name), "%s", name);
+  fail_if (camera.is_called ("")); /* it has no user-defined name */
+  camera.user_name = "left";
+  fail_unless (camera.is_called ("left"));
+}
+GST_END_TEST
+
+GST_START_TEST (test_rig_files_are_read_again_only_when_they_have_changed)
+{
+  gchar *folder = g_dir_make_tmp ("rangecast-rigs-XXXXXX", nullptr);
+  const auto file = std::string (folder) + "/studio.yaml";
+  Rig rig;
+  View view = testing::ring_rig (1).views[0];
+  view.right = PartnerCamera{view.intrinsics, {}, {kIdentity3, {-0.06, 0, 0}}};
+  view.camera = "SN1";
+  view.right->camera = "SN2";
+  rig.views.push_back (view);
+  fail_unless (save_rig (file, rig).ok ());
+  FoundCamera left, right;
+  left.serial = "SN1";
+  right.serial = "SN2";
+  KnownRigs rigs;
+  std::vector<std::string> problems;
+  for (int i = 0; i < 5; i++)
+    fail_unless_equals_int (int (rigs.pairs ({file}, {left, right}, problems).size ()), 1);
+  fail_unless_equals_int (int (rigs.reads ()), 1);
+  rig.views[0].camera = "another"; /* another length, too: clocks of file systems are coarse */
+  fail_unless (save_rig (file, rig).ok ());
+  fail_unless_equals_int (int (rigs.pairs ({file}, {left, right}, problems).size ()), 0);
+  fail_unless_equals_int (int (rigs.reads ()), 2);
+  fail_unless (problems.empty ());
+  std::filesystem::remove_all (folder);
+  g_free (folder);
+}
+GST_END_TEST
+
 GST_START_TEST (test_unreadable_rig_files_and_folders_do_no_harm)
 {
   gchar *folder = g_dir_make_tmp ("rangecast-rigs-XXXXXX", nullptr);
@@ -433,6 +520,9 @@ cameradevices_suite ()
   tcase_add_test (tc, test_hostile_descriptors_are_no_camera_and_no_crash);
   tcase_add_test (tc, test_gige_camera_is_listed_and_goes);
   tcase_add_test (tc, test_pair_of_a_known_rig_is_there_while_both_cameras_are);
+  tcase_add_test (tc, test_pair_is_found_by_user_defined_name);
+  tcase_add_test (tc, test_camera_is_called_by_all_its_names);
+  tcase_add_test (tc, test_rig_files_are_read_again_only_when_they_have_changed);
   tcase_add_test (tc, test_unreadable_rig_files_and_folders_do_no_harm);
   tcase_add_test (tc, test_probe_lists_without_starting);
   return suite;

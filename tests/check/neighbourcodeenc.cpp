@@ -546,7 +546,7 @@ GST_START_TEST (test_a_controller_may_set_what_costs_no_new_tables)
   const std::pair<const char *, const char *> expected[] = {
       {"neighbourcodeenc",
           "choice colour-threshold depth-threshold key-interval max-colour-threshold "
-          "max-depth-threshold max-slice-size min-force-key-unit-interval refresh-period "
+          "max-depth-threshold max-slice-size min-bitrate min-force-key-unit-interval refresh-period "
           "target-bitrate"},
       {"cylinderfilter", "agreement axis blend-width bodies colour-balance columns hidden-gap "
                          "hysteresis layer-gap mode smoothing unit-height"},

@@ -83,6 +83,41 @@ GST_START_TEST (test_no_packet_is_longer_than_the_mtu)
 }
 GST_END_TEST;
 
+/* Caps of a peer that wants transport-wide sequence numbers and the time of sending. */
+static constexpr const char *kWithExtensions =
+    "application/x-rtp, "
+    "extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01, "
+    "extmap-3=(string)urn:ietf:params:rtp-hdrext:ntp-64";
+
+GST_START_TEST (test_no_packet_is_longer_than_the_mtu_with_header_extensions)
+{
+  const Rig rig = ring_rig (2);
+  for (const guint mtu : {1240u, 1400u}) {
+    GstHarness *h = gst_harness_new ("rtpneighbourcodepay");
+    gst_harness_set_sink_caps_str (h, kWithExtensions);
+    g_object_set (h->element, "mtu", mtu, nullptr);
+    gst_harness_set_src_caps (h, coded_caps (rig));
+    gst_harness_push (h, access_unit (rig, 0, "max-slice-size=300"));
+    gsize longest = 0;
+    auto packets = pull_all (h);
+    fail_unless (packets.size () > 3);
+    for (GstBuffer *packet : packets) {
+      GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+      gpointer data = nullptr;
+      guint size = 0;
+      fail_unless (gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp));
+      fail_unless (gst_rtp_buffer_get_extension_onebyte_header (&rtp, 1, 0, &data, &size));
+      fail_unless_equals_int (size, 2);
+      gst_rtp_buffer_unmap (&rtp);
+      longest = std::max (longest, gst_buffer_get_size (packet));
+    }
+    unref_all (packets);
+    fail_unless (longest <= mtu, "%d bytes, mtu %d", int (longest), int (mtu));
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_every_packet_decodes_alone)
 {
   const Rig rig = ring_rig (3);
@@ -396,6 +431,7 @@ rtpneighbourcodepay_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu);
+  tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu_with_header_extensions);
   tcase_add_test (tc, test_every_packet_decodes_alone);
   tcase_add_test (tc, test_mtu_may_change_while_playing);
   tcase_add_test (tc, test_slice_or_rig_longer_than_the_mtu_is_one_error);

@@ -365,6 +365,37 @@ GST_START_TEST (test_it_is_live_and_says_its_latency)
 }
 GST_END_TEST;
 
+static GstClockTime
+latency_now (CameraPipeline &p)
+{
+  GstQuery *query = gst_query_new_latency ();
+  GstPad *pad = gst_element_get_static_pad (p.source (), "left");
+  GstClockTime least = 0;
+  fail_unless (gst_pad_query (pad, query));
+  gst_query_parse_latency (query, nullptr, &least, nullptr);
+  gst_query_unref (query);
+  gst_object_unref (pad);
+  return least;
+}
+
+/* Sinks ask when the pipeline goes to PLAYING, which is before cameras have answered. */
+GST_START_TEST (test_latency_before_the_cameras_answer_has_exposure_and_a_period)
+{
+  {
+    CameraPipeline p ("trigger=software exposure=5000"); /* of cameras that are not there */
+    gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+    fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + GST_SECOND / 30);
+  }
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software exposure=5000");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+  gst_element_set_state (p.pipeline (), GST_STATE_READY);
+  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
+  fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + kPeriod); /* as it was */
+}
+GST_END_TEST;
+
 GST_START_TEST (test_no_picture_is_taken_while_paused)
 {
   TestCameras cameras;
@@ -515,6 +546,7 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_runs_again_after_null_and_after_ready);
   tcase_add_test (tc, test_states_may_change_at_once);
   tcase_add_test (tc, test_it_is_live_and_says_its_latency);
+  tcase_add_test (tc, test_latency_before_the_cameras_answer_has_exposure_and_a_period);
   tcase_add_test (tc, test_no_picture_is_taken_while_paused);
   tcase_add_test (tc, test_eos_event_ends_all_pads);
   tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);

@@ -19,7 +19,9 @@ expect_exact_pairs (const char *properties, int cameras, double loss, int pairs,
       cameras, caps.c_str ());
   p.play_to_the_end ();
   fail_unless_equals_uint64 (p.seen (0).size () + p.stat ("overrun-left"), guint64 (pairs));
-  expect_pairs (p, cameras, GST_SECOND / fps / 2);
+  /* half a period by the stamps, whose reading is not exact on a busy machine; a shift is a whole
+   */
+  expect_pairs (p, cameras, GST_SECOND / fps * 6 / 10);
   guint64 dropped = 0, incomplete = 0;
   for (int side = 0; side < cameras; side++) {
     dropped += p.stat ((std::string ("dropped-") + kSides[side]).c_str ());

@@ -5,6 +5,7 @@
 #include <random>
 #include <rangecast/sync/camera_clock.hpp>
 #include <rangecast/sync/frame_sets.hpp>
+#include <rangecast/sync/partner_finder.hpp>
 #include <rangecast/sync/shot_finder.hpp>
 #include <rangecast/sync/ticks.hpp>
 #include <set>
@@ -426,6 +427,87 @@ TEST (CameraClock, restarted_clock_begins_anew)
   CameraClock clock;
   clock.host_time (500 * kSecond, 10 * kSecond);
   EXPECT_EQ (clock.host_time (kSecond, 11 * kSecond), 11 * kSecond);
+}
+
+/* ---- PartnerFinder ---- */
+
+namespace {
+
+/* Signals every 20 ms; the leading camera counts from 100, the other from 7. */
+constexpr std::int64_t kSignal = 20 * kMs;
+
+PartnerFinder
+learnt_finder (std::int64_t signals = 10)
+{
+  PartnerFinder finder;
+  finder.start (kSignal);
+  for (std::int64_t i = 0; i < signals; i++) {
+    finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
+    finder.place (static_cast<std::uint64_t> (7 + i), i * kSignal + kMs, true);
+  }
+  return finder;
+}
+
+} // namespace
+
+TEST (PartnerFinder, frame_with_a_wrong_stamp_is_found_by_its_number)
+{
+  PartnerFinder finder = learnt_finder ();
+  ASSERT_TRUE (finder.learnt ());
+  finder.leader (110, 10 * kSignal);
+  EXPECT_EQ (finder.place (17, 10 * kSignal + kSignal / 2 - kMs, true), 10 * kSignal);
+  finder.leader (111, 11 * kSignal);
+  EXPECT_EQ (finder.place (18, 3600 * kSecond, true), 11 * kSignal);
+}
+
+TEST (PartnerFinder, frame_whose_time_nobody_knows_is_found_by_its_number)
+{
+  PartnerFinder finder = learnt_finder ();
+  finder.leader (110, 10 * kSignal);
+  EXPECT_EQ (finder.place (17, {}, false), 10 * kSignal);
+  EXPECT_EQ (finder.place (18, {}, false), std::nullopt); /* its partner has not come */
+}
+
+TEST (PartnerFinder, numbers_decide_nothing_before_they_agreed_eight_times)
+{
+  PartnerFinder finder = learnt_finder (7);
+  finder.leader (110, 10 * kSignal);
+  const std::int64_t off = 10 * kSignal + kSignal / 2 - kMs;
+  EXPECT_FALSE (finder.learnt ());
+  EXPECT_EQ (finder.place (17, off, true), off);
+}
+
+TEST (PartnerFinder, missed_signal_shifts_nothing_where_there_are_stamps)
+{
+  PartnerFinder finder = learnt_finder ();
+  for (std::int64_t i = 10; i < 30; i++) { /* it missed signal 10 */
+    finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
+    if (i == 10)
+      continue;
+    EXPECT_EQ (finder.place (static_cast<std::uint64_t> (6 + i), i * kSignal + kMs, true),
+        i * kSignal + kMs);
+  }
+  finder.leader (130, 30 * kSignal);
+  EXPECT_EQ (finder.place (36, {}, false), 30 * kSignal) << "the new difference is not learnt";
+}
+
+TEST (PartnerFinder, arrival_that_is_one_period_late_once_changes_no_partner)
+{
+  PartnerFinder finder = learnt_finder ();
+  finder.leader (110, 10 * kSignal);
+  finder.leader (111, 11 * kSignal);
+  EXPECT_EQ (finder.place (17, 11 * kSignal, false), 10 * kSignal);
+  EXPECT_EQ (finder.place (18, 11 * kSignal + kMs, false), 11 * kSignal + kMs);
+}
+
+TEST (PartnerFinder, arrivals_that_are_a_period_off_three_times_are_believed)
+{
+  PartnerFinder finder = learnt_finder ();
+  for (std::int64_t i = 10; i < 13; i++)
+    finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
+  finder.place (16, 10 * kSignal, false);
+  finder.place (17, 11 * kSignal, false);
+  EXPECT_EQ (finder.place (18, 12 * kSignal, false), 12 * kSignal);
 }
 
 TEST (RecentValues, quantiles_are_of_the_last_values)

@@ -230,6 +230,8 @@ load_rig (const std::string &path, Rig &rig)
   if (!std::filesystem::is_regular_file (there))
     return {StatusCode::kNotFound,
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
+  if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
+    return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
   if (Status s = check_storage (path, "", false); !s.ok ())
     return {s.code (), s.message () + "; expected a rig file (YAML or JSON)"};
   Rig loaded;

@@ -40,7 +40,7 @@ AccessUnitDecoder::plan (
     if (unit_header.type != static_cast<std::uint8_t> (UnitType::kSlice))
       continue;
     PlannedSlice slice = {*unit, {}, slices_.size (), false};
-    if (!decoder_.read_header (*unit, slice.header).ok ()) {
+    if (slices_.size () == kMaxSlices || !decoder_.read_header (*unit, slice.header).ok ()) {
       result.bad_slices++;
       continue;
     }

@@ -26,7 +26,7 @@ KeyCheck::reset ()
 void
 KeyCheck::add (const SliceHeader &slice)
 {
-  all_key_ = all_key_ && slice.key;
+  all_key_ = all_key_ && slice.key && slices_.size () < kMaxSlices;
   if (all_key_)
     slices_.push_back (slice);
 }

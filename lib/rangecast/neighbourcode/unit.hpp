@@ -127,6 +127,9 @@ struct AccessUnitHeader {
 inline constexpr std::size_t kAccessUnitHeaderSize = 24;
 /** No access unit is longer. */
 inline constexpr std::uint32_t kMaxAccessUnitSize = 32u << 20;
+/** No access unit has more slices: a reader leaves out those beyond, so that short ones do not cost
+ *  it several times their bytes in memory. */
+inline constexpr std::size_t kMaxSlices = std::size_t{1} << 17;
 /** Comes before each access-unit unit of a byte stream. */
 inline constexpr std::array<std::uint8_t, 4> kStartCode = {0x00, 0x52, 0x43, 0x55};
 

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gio/gio.h>
+#include <gst/gst.h>
+
+#include <array>
+#include <vector>
+
+/** Whether both are the same address and port; unknown ones (null) are the same. */
+bool same_sender (GSocketAddress *a, GSocketAddress *b);
+
+/** Tells a stream from packets that only look like some: it has kPackets sound ones one after
+ *  another in its sequence numbers. They are kept, so that nothing is lost of it. */
+class SenderProbation {
+public:
+  static constexpr std::size_t kPackets = 4;
+  static constexpr std::size_t kCandidates = 8; ///< strangers that are known at a time
+
+  struct Packet {
+    GSocketAddress *address; ///< may be null; not owned
+    guint32 ssrc;
+    guint16 sequence;
+    int version; ///< of the neighbour code
+  };
+
+  SenderProbation () = default;
+  ~SenderProbation () { clear (); }
+  SenderProbation (const SenderProbation &) = delete;
+
+  void clear ();
+  /** Takes note of a packet.
+   *  @param buffer  (transfer none)
+   *  @param[out] stream  its packets so far, this one included, once it has passed: (transfer full)
+   *  @return whether it has */
+  bool add (const Packet &packet, GstBuffer *buffer, std::vector<GstBuffer *> &stream);
+
+private:
+  struct Candidate {
+    GSocketAddress *address = nullptr; /* a reference */
+    guint32 ssrc = 0;
+    guint16 sequence = 0; /* of the last packet */
+    int version = 0;
+    guint64 used = 0; /* 0: nobody */
+    std::vector<GstBuffer *> packets;
+
+    void clear ();
+  };
+
+  Candidate &find (const Packet &packet);
+
+  std::array<Candidate, kCandidates> candidates_;
+  guint64 uses_ = 0;
+};

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# A sender whose bit rate follows its receiver: two processes, RTP through a relay that lets so many
+# bits pass a second, RTCP beside it. The launch strings are those of docs/elements/neighbourcodeenc.md.
+
+twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
+caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"
+
+# Ports: +0 into the relay, +1 RTP out of it, +2 RTCP to the viewer, +3 RTCP to the sender.
+start_viewer () { # port seconds name caps
+  timeout -k 5 "$2" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf latency=50 \
+    udpsrc port=$(($1 + 1)) caps="$4" ! r.recv_rtp_sink_0 \
+    r. ! rtpneighbourcodedepay ! neighbourcodedec ! fakesink sync=false \
+    r.send_rtcp_src_0 ! udpsink host=127.0.0.1 port=$(($1 + 3)) sync=false async=false \
+    udpsrc port=$(($1 + 2)) ! r.recv_rtcp_sink_0 >"$3-viewer.log" 2>&1 &
+}
+
+start_sender () { # port seconds name caps encoder
+  # shellcheck disable=SC2086 # $5 is several properties
+  timeout -k 5 "$2" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf \
+    avatartestsrc is-live=true range-person-only=true "views=${views:-2}" ! video/x-range,width=320,height=240,framerate=15/1 ! neighbourcodeenc profile=entropy $5 \
+    ! rtpneighbourcodepay ! "$4" ! rtcpreports name=reports ! r.send_rtp_sink_0 \
+    r.send_rtp_src_0 ! udpsink host=127.0.0.1 port="$1" sync=false async=false \
+    r.send_rtcp_src_0 ! udpsink host=127.0.0.1 port=$(($1 + 2)) sync=false async=false \
+    udpsrc port=$(($1 + 3)) caps=application/x-rtcp ! reports.rtcp_sink reports.rtcp_src ! r.recv_rtcp_sink_0 \
+    >"$3-sender.log" 2>&1 &
+}
+
+run_pair () { # port seconds name caps kbit encoder
+  udp-relay --listen "$1" --to "127.0.0.1:$(($1 + 1))" --bandwidth "$5" >"$3-relay.log" 2>&1 &
+  start_viewer "$1" $(($2 + 2)) "$3" "$4"
+  start_sender "$1" "$2" "$3" "$4" "$6"
+}
+
+# usage: since FIELD LOG SKIP: what a counter of the depayloader rose by since its message number SKIP
+since () {
+  grep -o "rangecast-stats, element=(string)rtpneighbourcodedepay.*" "$2" | grep -oE " $1=\(guint64\)[0-9]+" |
+    grep -oE '[0-9]+$' | awk -v skip="$3" 'NR == skip { first = $1 } { last = $1 } END { print last - first }'
+}
+
+# usage: lost_of NAME SKIP: percent of packets that were lost after the first SKIP seconds
+lost_of () {
+  local lost packets
+  lost=$(since lost "$1-viewer.log" "$2") packets=$(since packets "$1-viewer.log" "$2")
+  [ $((lost + packets)) -gt 20 ] || fail "$1: only $packets packets came: $(tail -n 3 "$1-viewer.log" "$1-sender.log")"
+  echo $((100 * lost / (lost + packets)))
+}
+
+wait_for_pairs () {
+  for job in $(jobs -p); do
+    case "$(ps -o comm= "$job" 2>/dev/null)" in udp-relay) ;; *) wait "$job" 2>/dev/null || true ;; esac
+  done
+}
+
+test_a_narrow_link_loses_little_where_the_rate_follows_the_receiver () {
+  run_pair $((ports + 10)) 24 fixed "$caps,$twcc" 800 ''
+  run_pair $((ports + 20)) 24 adaptive "$caps,$twcc" 800 'adaptive-bitrate=true'
+  run_pair $((ports + 30)) 24 reports "$caps" 800 'adaptive-bitrate=true'
+  wait_for_pairs
+  local fixed adaptive reports
+  fixed=$(lost_of fixed 10) adaptive=$(lost_of adaptive 10) reports=$(lost_of reports 14)
+  echo "lost: $fixed % as it is, $adaptive % with transport-wide feedback, $reports % with receiver reports"
+  [ "$fixed" -ge 20 ] || fail "the link is no obstacle: only $fixed % lost"
+  [ "$adaptive" -le $((fixed / 3)) ] || fail "$adaptive % lost with feedback, $fixed % without"
+  [ "$reports" -le $((fixed * 2 / 3)) ] || fail "$reports % lost with receiver reports, $fixed % without"
+  grep -q 'neighbourcodeenc-adaptive-bitrate' adaptive-sender.log || fail "no message of the new bit rate"
+}
+
+test_below_the_worst_thresholds_frame_sets_are_left_out_before_slices_are_lost () {
+  local views=1
+  run_pair $((ports + 40)) 24 low "$caps,$twcc" 200 'adaptive-bitrate=true min-bitrate=50000 min-framerate=1/1'
+  wait_for_pairs
+  grep -qE 'adaptive-bitrate.* one-of=\(int\)([2-9]|[1-9][0-9])' low-sender.log || fail "all frame sets were sent: $(tail -n 3 low-sender.log)"
+  local lost
+  lost=$(lost_of low 10)
+  echo "lost: $lost %"
+  [ "$lost" -le 15 ] || fail "$lost % lost"
+}
