@@ -26,8 +26,8 @@ STEADY = ("camera0", "parent", "viewer")  # these run from beginning to end
 BLOCKS = 48  # medians that the line goes through
 PASSING = ("GstBuffer", "GstMemory", "GstEvent", "GstMessage", "GstQuery", "GstSample", "GstBufferList")
 PASSING_MORE = 150  # there may be at one time than at another
-# Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, Mesa's.
-LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
+# Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, the clock's, Mesa's.
+LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|GstSystemClock|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
 
 
 @dataclass
