@@ -10,6 +10,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 #include <gstrange/gstrange.h>
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -38,6 +39,7 @@ struct Options {
   gchar *snapshot = nullptr;
   gchar *frame_log = nullptr;
   gchar *threads_left = nullptr;
+  gchar *memory_log = nullptr;
   gchar *srtp_key = nullptr;
   gchar **launch = nullptr;
 };
@@ -349,6 +351,18 @@ open_frame_log (const char *path)
   return file;
 }
 
+/* What the process holds of its heap, without what the allocator keeps of what was given back. */
+static gboolean
+log_memory (gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  const auto heap = mallinfo2 ();
+  std::ofstream (runner->options.memory_log, std::ios::app)
+      << g_get_monotonic_time () / G_USEC_PER_SEC << ',' << (heap.uordblks + heap.hblkhd) / 1024
+      << '\n';
+  return G_SOURCE_CONTINUE;
+}
+
 static std::vector<std::string>
 other_threads ()
 {
@@ -447,6 +461,8 @@ play (Runner &runner)
     g_timeout_add_seconds (guint (runner.options.timeout_s), on_timeout, &runner);
   if (runner.options.progress)
     g_timeout_add_seconds (2, print_progress, &runner);
+  if (runner.options.memory_log)
+    g_timeout_add_seconds (5, log_memory, &runner);
   if (runner.options.base_time >= 0) {
     gst_element_set_start_time (runner.pipeline, GST_CLOCK_TIME_NONE);
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
@@ -503,6 +519,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
           "Write the last picture of the sink named snapshot", "PNG"},
       {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &options.frame_log,
           "Write a line for each frame: its time, latency and views with points", "CSV"},
+      {"memory-log", 0, 0, G_OPTION_ARG_FILENAME, &options.memory_log,
+          "Append a line every 5 s: time, KiB of the heap in use", "CSV"},
       {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &options.threads_left,
           "Write the names of threads that still run when the pipeline is gone", "FILE"},
       {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &options.srtp_key,
@@ -576,6 +594,7 @@ main (int argc, char **argv)
   g_free (runner.options.snapshot);
   g_free (runner.options.frame_log);
   g_free (runner.options.threads_left);
+  g_free (runner.options.memory_log);
   g_free (runner.options.srtp_key);
   g_strfreev (runner.options.launch);
   gst_deinit (); /* tracers write now what they found */

@@ -45,7 +45,8 @@ is_sign (std::string_view text)
          (text[0] == '-' && (next == ' ' || next == '\n' || next == '\r' || next == '-'));
 }
 
-/* What stands before a place: its last character, and the last one that is no space before that. */
+/* What stands before a place: its last character, and the last one before that which is no space
+ * and not of a byte order mark. */
 struct Before {
   char last = '\n', solid = '\n', solid_before_last = '\n';
 
@@ -53,7 +54,7 @@ struct Before {
   {
     last = c;
     solid_before_last = solid;
-    if (!std::isspace (static_cast<unsigned char> (c)))
+    if (std::isgraph (static_cast<unsigned char> (c)))
       solid = c;
   }
 };
@@ -82,11 +83,18 @@ has_header (std::string_view text, const std::string &header)
   return begin != std::string_view::npos && text.substr (begin).starts_with (header);
 }
 
+bool
+is_control (char c)
+{
+  return std::iscntrl (static_cast<unsigned char> (c)) && c != '\n' && c != '\r' && c != '\t';
+}
+
 /* Text that comes in blocks. */
 class StorageScanner {
 public:
-  explicit StorageScanner (std::string_view binary_type)
-      : header_ (binary_type.empty () ? "" : encoded_header (binary_type))
+  StorageScanner (std::string_view binary_type, bool xml_is_good)
+      : header_ (binary_type.empty () ? "" : encoded_header (binary_type)),
+        xml_is_good_ (xml_is_good)
   {
   }
 
@@ -94,20 +102,31 @@ public:
   void scan (std::string_view text, std::size_t count)
   {
     for (std::size_t i = 0; i < count && complaint_.empty (); i++) {
-      const std::string_view rest = text.substr (i);
-      if (is_sign (rest) && ++signs_ > kMaxSigns)
-        complaint_ = "has more than " + std::to_string (kMaxSigns) + " lists, maps or fields";
-      else if (const auto marker = behind_marker (rest, before_);
-               marker && (header_.empty () || !has_header (rest.substr (marker), header_)))
-        complaint_ =
-            header_.empty () ? "has binary data" : "has binary data of another type than expected";
+      complaint_ = look_at (text.substr (i));
       before_.add (text[i]);
     }
   }
   [[nodiscard]] const std::string &complaint () const { return complaint_; }
 
 private:
+  std::string look_at (std::string_view rest)
+  {
+    if (is_control (rest[0]))
+      return "has control characters, which no text has";
+    if (rest[0] == '<' && before_.solid == '\n' && !xml_is_good_)
+      return "is XML";
+    if (is_sign (rest) && ++signs_ > kMaxSigns)
+      return "has more than " + std::to_string (kMaxSigns) + " lists, maps or fields";
+    const std::size_t marker = behind_marker (rest, before_);
+    if (marker && header_.empty ())
+      return "has binary data";
+    if (marker && !has_header (rest.substr (marker), header_))
+      return "has binary data of another type than expected";
+    return {};
+  }
+
   std::string header_, complaint_;
+  bool xml_is_good_;
   int signs_ = 0;
   Before before_;
 };
@@ -115,7 +134,7 @@ private:
 } // namespace
 
 Status
-check_storage (const std::string &path, std::string_view binary_type)
+check_storage (const std::string &path, std::string_view binary_type, bool xml_is_good)
 {
   /* Reads what is not compressed as it is. OpenCV goes by the name. */
   const std::unique_ptr<gzFile_s, int (*) (gzFile)> file (gzopen (path.c_str (), "rb"), gzclose);
@@ -123,7 +142,7 @@ check_storage (const std::string &path, std::string_view binary_type)
     return {};
   if (!gzdirect (file.get ()) && !path.ends_with (".gz"))
     return {StatusCode::kBadData, path + ": is compressed; expected a name that ends in .gz"};
-  StorageScanner scanner (binary_type);
+  StorageScanner scanner (binary_type, xml_is_good);
   std::vector<char> text;
   std::size_t kept = 0;
   for (bool at_end = false; !at_end && scanner.complaint ().empty ();) {

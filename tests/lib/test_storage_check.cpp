@@ -105,6 +105,23 @@ TEST (StorageCheck, binary_data_without_a_type_are_refused)
       "binary");
 }
 
+TEST (StorageCheck, control_characters_are_refused)
+{
+  expect_refused (
+      TestFile ("a.yml", "%YAML:1.0\n---\n-$--\n" + std::string (40, '\0') + "a: 1\n"), "control");
+  expect_refused (TestFile ("b.xml", "<?xml version=" + std::string (40, '\0')), "control");
+  const TestFile good ("c.yml", "%YAML:1.0\n---\n\ta: \"\xc3\xa9\"\r\n");
+  EXPECT_TRUE (check_storage (good.path ()).ok ());
+}
+
+TEST (StorageCheck, xml_is_refused_where_it_is_not_expected)
+{
+  const TestFile file (
+      "a.yml", "\xef\xbb\xbf\n <?xml version=\"1.0\"?>\n<opencv_storage>\n</opencv_storage>\n");
+  EXPECT_TRUE (check_storage (file.path ()).ok ());
+  EXPECT_FALSE (check_storage (file.path (), "", false).ok ());
+}
+
 TEST (StorageCheck, binary_data_are_found_wherever_blocks_end)
 {
   for (int before = 65536 - 600; before < 65536 + 40; before += 7) {

@@ -53,8 +53,8 @@ class Host:
         self.process: subprocess.Popen | None = None
 
     def start(self) -> None:
-        left = self.out / "log" / f"{self.name}-{self.starts}.threads"
-        runner = ["rangecast-run", *self.run_options, "--threads-left", str(left)]
+        log = self.out / "log" / f"{self.name}-{self.starts}"
+        runner = ["rangecast-run", *self.run_options, "--threads-left", f"{log}.threads", "--memory-log", f"{log}.memory"]
         environment = dict(
             os.environ,
             RANGECAST_LAUNCH=" ".join("'" + word.replace("'", "'\\''") + "'" for word in runner),
@@ -63,8 +63,8 @@ class Host:
             GST_DEBUG="GST_TRACER:7",
             GST_DEBUG_NO_COLOR="1",
         )
-        with (self.out / "log" / f"{self.name}-{self.starts}.log").open("w") as log:
-            self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment)
+        with Path(f"{log}.log").open("w") as file:
+            self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, stdout=file, stderr=file, env=environment)
         self.starts += 1
 
     def running(self) -> bool:

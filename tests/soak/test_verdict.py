@@ -9,7 +9,6 @@ from pathlib import Path
 
 import verdict
 
-HOUR = 3600
 LIMITS = verdict.Limits(warm_up_s=600)
 OBJECT = "0:{:02}:00.0 1 0x1 TRACE GST_TRACER :0:: object-alive, type-name=(string){}, address=(gpointer)0x1;\n"
 
@@ -36,7 +35,7 @@ class Memory(unittest.TestCase):
         self.assertEqual(bad(verdict.judge_memory(process_samples(), LIMITS)), [])
 
     def test_four_percent_in_two_hours_are_growth(self) -> None:
-        self.assertIn("rss", bad(verdict.judge_memory(process_samples(grows_kb=3200), LIMITS))[0])
+        self.assertIn("resident", bad(verdict.judge_memory(process_samples(grows_kb=3200), LIMITS))[0])
 
     def test_one_step_is_no_growth(self) -> None:
         self.assertEqual(bad(verdict.judge_memory(process_samples(jump_kb=6000), LIMITS)), [])
@@ -44,6 +43,14 @@ class Memory(unittest.TestCase):
     def test_one_descriptor_and_one_thread_more_are_seen(self) -> None:
         found = bad(verdict.judge_memory(process_samples(fds=1, threads=1), LIMITS))
         self.assertEqual(found, ["parent: fds in the last quarter", "parent: threads in the last quarter"])
+
+    def test_heap_that_fills_is_seen_though_the_process_does_not_grow(self) -> None:
+        events = [{"seconds": "0.0", "clock_s": "100.0", "name": "parent", "what": "start", "status": ""}]
+        with tempfile.TemporaryDirectory() as folder:
+            for grows, found in ((0, 0), (1000, 1)):
+                lines = (f"{100 + 5 * i},{20000 + i % 7 + grows * i // 1440}\n" for i in range(1440))
+                (Path(folder) / "parent-0.memory").write_text("".join(lines))
+                self.assertEqual(len(bad(verdict.judge_heap(Path(folder), events, LIMITS))), found)
 
     def test_process_without_samples_is_no_success(self) -> None:
         self.assertTrue(bad(verdict.judge_memory(process_samples()[:110], LIMITS)))

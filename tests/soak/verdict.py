@@ -26,8 +26,8 @@ STEADY = ("camera0", "parent", "viewer")  # these run from beginning to end
 BLOCKS = 48  # medians that the line goes through
 PASSING = ("GstBuffer", "GstMemory", "GstEvent", "GstMessage", "GstQuery", "GstSample", "GstBufferList")
 PASSING_MORE = 150  # there may be at one time than at another
-# Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, Mesa's.
-LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
+# Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, the clock's, Mesa's.
+LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|GstSystemClock|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
 
 
 @dataclass
@@ -72,16 +72,32 @@ def grown(times: Sequence[float], values: Sequence[float]) -> tuple[float, float
     return slope * (times[-1] - times[0]), begin
 
 
+def judge_growth(what: str, times: list[float], kilobytes: list[float], limits: Limits) -> Finding:
+    growth, begin = grown(times, kilobytes)
+    percent = 100 * growth / begin
+    what = f"{what} grows by (of {begin / 1024:.1f} MiB), %"
+    return Finding(what, round(percent, 2), limits.growth_percent, percent < limits.growth_percent)
+
+
+def judge_heap(folder: Path, events: list[dict[str, str]], limits: Limits) -> list[Finding]:
+    """What is in use of the heap: what a leak fills, and what the allocator keeps of freed memory does not."""
+    findings = []
+    for path in (folder / f"{name}-0.memory" for name in STEADY):
+        if not path.exists() or not events:
+            continue
+        warm = float(events[0]["clock_s"]) + limits.warm_up_s
+        rows = [(float(t), float(kb)) for t, kb in (line.split(",") for line in path.read_text().split()) if float(t) >= warm]
+        if len(rows) >= 4:
+            findings.append(judge_growth(f"{path.stem[:-2]}: heap in use", [t for t, _ in rows], [kb for _, kb in rows], limits))
+    return findings
+
+
 def judge_process(name: str, rows: list[dict[str, str]], limits: Limits) -> list[Finding]:
     times = [float(row["seconds"]) for row in rows]
     if len(times) < 4:
         return [Finding(f"{name}: samples after the warm-up", len(times), "at least 4", False)]
     findings = []
-    for field in ("rss_kb", "anonymous_kb"):
-        growth, begin = grown(times, [float(row[field]) for row in rows])
-        percent = 100 * growth / begin
-        what = f"{name}: {field.removesuffix('_kb')} grows by (of {begin / 1024:.1f} MiB), %"
-        findings.append(Finding(what, round(percent, 2), limits.growth_percent, percent < limits.growth_percent))
+    findings.append(judge_growth(f"{name}: resident memory", times, [float(row["rss_kb"]) for row in rows], limits))
     for field in ("fds", "threads"):
         values = [int(row[field]) for row in rows]
         quarter = max(1, len(values) // 4)
@@ -222,6 +238,7 @@ def judge(out: Path, limits: Limits) -> list[Finding]:
     samples, frames, events = (read_csv(out / f"{name}.csv") for name in ("samples", "frames", "events"))
     return [
         *judge_memory(samples, limits),
+        *judge_heap(out / "log", events, limits),
         *judge_latency(frames, events, limits),
         *judge_returns(frames, events),
         *judge_ends(events),
