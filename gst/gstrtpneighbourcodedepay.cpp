@@ -60,6 +60,7 @@ struct GstRtpNeighbourCodeDepayPrivate {
   unsigned used_generation = 0;
   bool have_caps = false;
   std::size_t rig_views = 0;
+  guint64 view_bits = 0;              /* of the rig, by view-id; 0: not known yet */
   UnitGatherer access_unit;           /* slices that arrived so far */
   rangecast::KeyCheck key_check;      /* of them */
   bool has_gap = false;               /* packets were lost before or between them */
@@ -107,6 +108,7 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
   gst_caps_unref (caps);
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->view_bits = view_bits (stream.rig);
   GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.set_views (stream.rig);
 }
 
@@ -237,6 +239,16 @@ is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
   return priv->payload_type && priv->payload_type != type;
 }
 
+/* A slice of a view that the rig of this stream has not: behind a rangemux it would be drawn over
+ * the one that another host sends. */
+static bool
+is_foreign (const GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
+{
+  constexpr std::size_t kViewId = 4;
+  return priv->view_bits != 0 && unit.size () > kViewId && unit[kViewId] < rangecast::kMaxViews &&
+         !(priv->view_bits >> unit[kViewId] & 1);
+}
+
 static void
 take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
 {
@@ -247,6 +259,8 @@ take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView)) {
       bad += !take_rig_view (self, *unit);
+    } else if (header.type == static_cast<guint8> (UnitType::kSlice) && is_foreign (priv, *unit)) {
+      bad++;
     } else if (!priv->access_unit.add (*unit)) {
       bad++; /* it is hostile */
     } else {
@@ -369,6 +383,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
+    priv->view_bits = 0;
     priv->sequence.reset ();
     priv->payload_type.reset ();
     std::lock_guard guard (priv->lock);

@@ -58,7 +58,7 @@ struct GstRtpNeighbourCodeGuardPrivate {
   /* streaming thread only */
   GstClockTime last_time = 0;        /* of its last packet */
   std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
-  guint rival_packets = 0;           /* of a second sender, since it began */
+  guint rival_packets = 0;           /* of others while it sends */
   GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
   SenderProbation probation;
   bool warned_of_version = false;
@@ -245,10 +245,8 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
 {
   const bool here = same_sender (packet.address, priv->address);
   if (is_senders (priv, packet, here)) {
-    if (packet.ssrc == *priv->ssrc) {
+    if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;
-      priv->rival_packets = 0;
-    }
     return Verdict::kPasses;
   }
   const bool silent = !priv->ssrc || now >= priv->last_time + priv->timeout;

@@ -297,7 +297,9 @@ catch_up (GstStripRender *self, GstClockTime now)
   {
     std::lock_guard guard (priv->lock);
     const GstClockTime own = priv->latency + priv->grid.period ();
-    slack = std::max (priv->pipeline_latency, own) - priv->latency - priv->grid.tolerance ();
+    /* What drawing takes beyond a period is no time in which it may begin. */
+    slack = std::max (priv->pipeline_latency, own + priv->overdraw) - priv->overdraw -
+            priv->latency - priv->grid.tolerance ();
   }
   guint64 late = 0;
   PictureGrid::Picture picture;
@@ -331,6 +333,28 @@ tell_flow (GstStripRender *self, GstFlowReturn flow)
   gst_pad_push_event (GST_BASE_TRANSFORM (self)->srcpad, gst_event_new_eos ());
 }
 
+/* Pictures that take longer to draw than is left of their period would all be late, so the pipeline
+ * is told of more latency. One slow picture is none (shaders are made, the machine has other work);
+ * less again is never told, for each change is a jolt. */
+static void
+adapt_latency (GstStripRender *self, GstClockTime took)
+{
+  constexpr int kManySlow = 5;
+  GstStripRenderPrivate *priv = self->priv;
+  {
+    std::lock_guard guard (priv->lock);
+    const GstClockTime period = priv->grid.period ();
+    const GstClockTime rest = period - std::min (period, priv->grid.tolerance ());
+    const bool slow = period > 0 && took > rest + priv->overdraw;
+    priv->slow_pictures = slow ? priv->slow_pictures + 1 : 0;
+    if (priv->slow_pictures < kManySlow)
+      return;
+    priv->slow_pictures = 0;
+    priv->overdraw = std::min<GstClockTime> (took + took / 8 - rest, GST_SECOND);
+  }
+  gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+}
+
 /* Draws what is due now, one picture at most. @return when to call again, running time */
 static GstClockTime
 draw_due (GstStripRender *self)
@@ -354,6 +378,9 @@ draw_due (GstStripRender *self)
   GstFlowReturn flow = strip_draw_next (self, after_it, &out);
   const bool pushed = out;
   if (out) {
+    const GstClockTime drawn = strip_running_now (self);
+    if (GST_CLOCK_TIME_IS_VALID (drawn) && drawn > now)
+      adapt_latency (self, drawn - now);
     base->segment.position = GST_BUFFER_PTS (out);
     flow = gst_pad_push (base->srcpad, out);
   }
@@ -527,12 +554,14 @@ strip_reset_rate (GstStripRender *self)
   std::lock_guard guard (priv->lock);
   priv->grid.reset ();
   priv->earliest = GST_CLOCK_TIME_NONE;
+  priv->overdraw = 0;
+  priv->slow_pictures = 0;
   priv->flow = GST_FLOW_OK;
   priv->discont = false;
 }
 
 /* A live picture is begun when its frame set is sure, a quarter of a period after its time, and has
- * the rest of the period to be drawn in. */
+ * the rest of the period to be drawn in, and longer where that has turned out to be too short. */
 gboolean
 strip_answer_latency (GstStripRender *self, GstQuery *query)
 {
@@ -544,7 +573,8 @@ strip_answer_latency (GstStripRender *self, GstQuery *query)
   gst_query_parse_latency (query, &live, &least, &most);
   std::lock_guard guard (priv->lock);
   priv->latency = least;
-  const GstClockTime own = live ? priv->grid.period () : 0;
+  const GstClockTime period = priv->grid.period ();
+  const GstClockTime own = live && period > 0 ? period + priv->overdraw : 0;
   gst_query_set_latency (
       query, live, least + own, GST_CLOCK_TIME_IS_VALID (most) ? most + own : most);
   return TRUE;

@@ -44,8 +44,10 @@ struct GstStripRenderPrivate {
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is before it would be late */
   GstClockTime latency = 0;                    /* of upstream */
   GstClockTime pipeline_latency = 0;           /* as the LATENCY event tells */
-  GstFlowReturn flow = GST_FLOW_OK;            /* of the drawing thread's last push */
-  bool discont = false;                        /* pictures before the next one were left out */
+  GstClockTime overdraw = 0; /* latency that is told because drawing takes longer than a period */
+  int slow_pictures = 0;     /* the last ones, that took longer than was told */
+  GstFlowReturn flow = GST_FLOW_OK; /* of the drawing thread's last push */
+  bool discont = false;             /* pictures before the next one were left out */
 
   /* written with both stream locks, read with either */
   gstrange::RangeInfo info;

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/stereo/rectification.hpp>
+#include <rangecast/storage_check.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -59,6 +60,8 @@ scale_view (View &view, double scale)
 static cv::FileStorage
 open_storage (const std::string &path)
 {
+  if (const rangecast::Status s = rangecast::check_storage (path); !s.ok ())
+    throw BadInput{s.message ()};
   cv::FileStorage file;
   try {
     if (std::ifstream (path).good () && file.open (path, cv::FileStorage::READ))

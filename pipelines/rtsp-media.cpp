@@ -331,8 +331,15 @@ MediaHolder::hold (GstRTSPMedia *media)
 }
 
 void
+MediaHolder::wait_for_release ()
+{
+  std::lock_guard releasing (releasing_);
+}
+
+void
 MediaHolder::release ()
 {
+  std::lock_guard releasing (releasing_);
   std::unique_lock guard (lock_);
   GstRTSPMedia *media = media_;
   GPtrArray *transports = transports_;

@@ -44,9 +44,13 @@ public:
   bool hold (GstRTSPMedia *media);
   void release ();
   bool holds_any ();
+  /** Returns when no release() is at work: who asked for the media meanwhile would get one that
+   *  ends, and an error. */
+  void wait_for_release ();
 
 private:
-  std::mutex lock_;
+  std::mutex releasing_; /* taken before lock_ */
+  std::mutex lock_;      /* guards what follows */
   GstRTSPMedia *media_ = nullptr;
   GPtrArray *transports_ = nullptr;
 };

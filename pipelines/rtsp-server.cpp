@@ -73,6 +73,13 @@ on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
   request_key_frame_set (gst_rtsp_session_media_get_media (context->sessmedia));
 }
 
+static GstRTSPStatusCode
+before_describe (GstRTSPClient *, GstRTSPContext *, gpointer user_data)
+{
+  static_cast<Server *> (user_data)->holder.wait_for_release ();
+  return GST_RTSP_STS_OK;
+}
+
 /* The factory lets TCP pass, since the holder is such a viewer. */
 static GstRTSPStatusCode
 before_setup (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
@@ -119,6 +126,7 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   limit_send_buffer (client, server.options.send_buffer_kb * 1024);
+  g_signal_connect (client, "pre-describe-request", G_CALLBACK (before_describe), &server);
   g_signal_connect (client, "pre-setup-request", G_CALLBACK (before_setup), &server);
   g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
   g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);

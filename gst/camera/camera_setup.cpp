@@ -66,7 +66,7 @@ read_abilities (CameraControl &control, CameraAbilities &abilities)
   if (!status.ok ())
     return status;
   const char *current = arv_camera_get_pixel_format_as_string (control.camera (), nullptr);
-  std::ranges::stable_partition (abilities.pixel_formats,
+  std::stable_partition (abilities.pixel_formats.begin (), abilities.pixel_formats.end (),
       [&] (const std::string &name) { return current && name == current; });
   read_sizes (control, abilities);
   for (const std::string &source : control.entries ("TriggerSource")) {

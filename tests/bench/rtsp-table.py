@@ -4,8 +4,8 @@
 
 usage: rtsp-table.py [--viewers 1,2,5,...] [--frame-sets N] [--source LAUNCH]   (after: source pipelines/env.sh)
 Every row measures the server with N viewers by UDP, then by TCP, and beside it, in the same run, gst-launch-1.0 with the
-same source and a multiudpsink to N sockets (0: to one where nobody listens: the encoding alone). CPU time and frame sets are those
-between the first frame set and the last; memory is what is resident at the end.
+same source and a multiudpsink to N sockets: the encoding and the sending, without RTSP. Times are CPU time of the process for one
+frame set; "each more": for one viewer more than in the first row. Memory is what is resident at the end.
 """
 import argparse
 import os
@@ -100,30 +100,22 @@ def measure_server(options, count, tcp):
 
 
 def measure_launch(options, count):
-    first = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    others = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(max(count - 1, 0))]
-    for one in [first, *others]:
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    for one in sockets:
         one.bind(("127.0.0.1", 0))
-    clients = [one.getsockname()[1] for one in ([first, *others] if count else [])] or [9]
-    # The counter of the row with nobody: frame sets by the clock, since they are live.
-    sink = "multiudpsink sync=false clients=" + ",".join(f"127.0.0.1:{port}" for port in clients)
+    sink = "multiudpsink sync=false clients=" + ",".join(f"127.0.0.1:{one.getsockname()[1]}" for one in sockets)
     peer = subprocess.Popen(
         ["gst-launch-1.0", "-q", *f"{options.source} ! rtpneighbourcodepay ! {sink}".split()], stderr=subprocess.DEVNULL)
     try:
-        if not count:
-            time.sleep(3)
-            before, begin = cpu_ms(peer.pid), time.monotonic()
-            time.sleep(options.frame_sets / 15)
-            return (cpu_ms(peer.pid) - before) / ((time.monotonic() - begin) * 15), rss_mb(peer.pid)
         meter, frame_sets = Meter(peer.pid, options.frame_sets), 0
-        first.settimeout(60)
+        sockets[0].settimeout(60)
         while not meter.done(frame_sets):
-            frame_sets += first.recv(65536)[1] >> 7
+            frame_sets += sockets[0].recv(65536)[1] >> 7
         return meter.result(frame_sets)
     finally:
         peer.terminate()
         peer.wait(30)
-        for one in [first, *others]:
+        for one in sockets:
             one.close()
 
 
@@ -131,17 +123,19 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--viewers", default="1,2,5,10,20,50")
     parser.add_argument("--frame-sets", type=int, default=100)
-    parser.add_argument("--source", default=SOURCE, help="live, 15 frame sets a second")
+    parser.add_argument("--source", default=SOURCE)
     options = parser.parse_args()
-    alone, memory = measure_launch(options, 0)
-    print(f"Encoding alone (gst-launch-1.0, nobody listens): {alone:.1f} ms of CPU time a frame set, {memory:.0f} MB.\n")
-    print("| viewers | server, UDP: ms a frame set | ms a viewer | MB | server, TCP: ms a frame set | ms a viewer | MB "
-          "| multiudpsink: ms a frame set | ms a viewer | MB |")
+    print("| viewers | rtsp-server, UDP | each more | memory | rtsp-server, TCP | each more | memory | multiudpsink | each more | memory |")
     print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    ways = (lambda n: measure_server(options, n, False), lambda n: measure_server(options, n, True), lambda n: measure_launch(options, n))
+    first = [None] * len(ways)
     for count in map(int, options.viewers.split(",")):
         cells = [str(count)]
-        for cpu, memory in (measure_server(options, count, False), measure_server(options, count, True), measure_launch(options, count)):
-            cells += [f"{cpu:.1f}", f"{(cpu - alone) / count:.2f}", f"{memory:.0f}"]
+        for i, measure in enumerate(ways):
+            cpu, memory = measure(count)
+            first[i] = first[i] or (count, cpu)
+            more = count - first[i][0]
+            cells += [f"{cpu:.1f} ms", f"{(cpu - first[i][1]) / more:.2f} ms" if more else "", f"{memory:.0f} MB"]
         print("| " + " | ".join(cells) + " |", flush=True)
 
 

@@ -34,8 +34,8 @@ class Constants:
     parent_us: float = 13.0    # CPU of the parent for a packet, in and out
     parent_serial: float = 0.4  # share of that in the one thread that puts frame sets out
     relay_in_us: float = 7.0   # CPU of a relay to take a packet
-    relay_out_us: float = 1.6  # and to send it to one receiver
-    viewer_ms: float = 5.0     # CPU of a viewer for a view of a frame set of 320x240: decode, cylinder, draw
+    relay_out_us: float = 2.2  # and to send it to one receiver
+    viewer_ms: float = 2.3     # CPU of a viewer for a view of a frame set of 320x240: decode, cylinder, draw
     parent_mib: float = 60.0   # resident memory, without views
     view_mib: float = 0.6      # and for each
     cores: int = 8
@@ -48,16 +48,17 @@ def constants_from(path: str) -> Constants:
     with open(path, encoding="utf-8") as file:
         told = json.load(file)
     rows = told["rows"]
-    of = lambda what: [r for r in rows if r["what"] == what and r["packets_per_set"] > 0]
+    of = lambda what: [r for r in rows if r["what"] == what and r["packets_per_set"] > 0 and r["lost"] < 0.5]
+    passed_us = lambda r: 1e3 * r["cpu_ms"] / (r["packets_per_set"] * (1 - r["lost"]))  # what was lost cost nothing
     c = Constants()
     parents, relays, viewers = of("parent"), of("relay"), told["viewers"]
     if parents:
         largest = max(parents, key=lambda r: r["views"])
-        c = replace(c, parent_us=1e3 * largest["cpu_ms"] / largest["packets_per_set"])
+        c = replace(c, parent_us=passed_us(largest))
         base, slope = fit([(r["views"], r["rss_mib"]) for r in parents])
         c = replace(c, parent_mib=base, view_mib=max(slope, 0.0))
     if len(relays) >= 2:
-        base, slope = fit([(r["viewers"], 1e3 * r["cpu_ms"] / r["packets_per_set"]) for r in relays])
+        base, slope = fit([(r["viewers"], passed_us(r)) for r in relays])
         c = replace(c, relay_in_us=max(base, 0.0), relay_out_us=slope)
     if viewers:
         last = viewers[-1]

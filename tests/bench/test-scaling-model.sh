@@ -59,10 +59,10 @@ test_says_the_same_twice () {
 test_takes_what_parent_bench_measured () {
   cat >measured.json <<'END'
 {"rows": [
- {"what": "parent", "views": 4, "viewers": 1, "packets_per_set": 100, "cpu_ms": 2.0, "rss_mib": 64},
- {"what": "parent", "views": 8, "viewers": 1, "packets_per_set": 200, "cpu_ms": 5.0, "rss_mib": 68},
- {"what": "relay", "views": 8, "viewers": 1, "packets_per_set": 200, "cpu_ms": 2.0, "rss_mib": 10},
- {"what": "relay", "views": 8, "viewers": 11, "packets_per_set": 200, "cpu_ms": 6.0, "rss_mib": 10}],
+ {"what": "parent", "views": 4, "viewers": 1, "packets_per_set": 100, "cpu_ms": 2.0, "rss_mib": 64, "lost": 0},
+ {"what": "parent", "views": 8, "viewers": 1, "packets_per_set": 200, "cpu_ms": 5.0, "rss_mib": 68, "lost": 0},
+ {"what": "relay", "views": 8, "viewers": 1, "packets_per_set": 200, "cpu_ms": 2.0, "rss_mib": 10, "lost": 0},
+ {"what": "relay", "views": 8, "viewers": 11, "packets_per_set": 200, "cpu_ms": 4.5, "rss_mib": 10, "lost": 0.25}],
  "viewers": [{"views": 8, "decode_ms": 8, "cylinder_ms": 16, "draw_ms": 24}]}
 END
   model --measured measured.json >out.txt

@@ -215,6 +215,29 @@ GST_START_TEST (test_nothing_comes_out_before_the_rig_is_known)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_slices_of_views_that_the_rig_has_not_are_damaged_units)
+{
+  const Sent three (ring_rig (3), 2, "rtpneighbourcodepay mtu=1400 config-interval=0");
+  const Sent two (ring_rig (2), 1);
+  GstHarness *h = receiver (gst_caps_ref (two.caps));
+  for (GstBuffer *packet : three.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  for (int i = 0; i < 2; i++) {
+    GstBuffer *received = gst_harness_pull (h);
+    const std::vector<guint8> bytes = bytes_of (received);
+    UnitReader reader (bytes);
+    UnitHeader header;
+    unsigned views = 0;
+    while (const auto unit = reader.next (header))
+      views |= 1u << (*unit)[4];
+    fail_unless_equals_int (views, 0b011);
+    gst_buffer_unref (received);
+  }
+  fail_unless (stat (h, "bad-units") > 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_damaged_packets_are_counted_and_never_fatal)
 {
   const Sent sent (ring_rig (2), 3);
@@ -342,6 +365,7 @@ rtpneighbourcodedepay_suite ()
   tcase_add_test (tc, test_rig_of_64_views_comes_in_band);
   tcase_add_test (tc, test_rig_of_the_caps_suffices);
   tcase_add_test (tc, test_nothing_comes_out_before_the_rig_is_known);
+  tcase_add_test (tc, test_slices_of_views_that_the_rig_has_not_are_damaged_units);
   tcase_add_test (tc, test_damaged_packets_are_counted_and_never_fatal);
   tcase_add_test (tc, test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set);
   tcase_add_test (tc, test_bad_rig_in_the_caps_is_one_error);

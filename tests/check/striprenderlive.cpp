@@ -589,6 +589,56 @@ GST_START_TEST (test_thread_that_is_held_by_the_sink_leaves_nothing_out)
 }
 GST_END_TEST;
 
+/* A camera whose path takes its time: a picture is drawn for 120 ms. */
+static gboolean
+let_time_pass (GstControlSource *source, GstClockTime, gdouble *value)
+{
+  auto clock = static_cast<GstTestClock *> (g_object_get_data (G_OBJECT (source), "clock"));
+  gst_test_clock_advance_time (clock, 120 * GST_MSECOND);
+  *value = 0.5;
+  return TRUE;
+}
+
+GST_START_TEST (test_drawing_that_takes_longer_than_a_period_is_told_as_latency_once)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (live.r, bus);
+  GstControlSource *path = gst_interpolation_control_source_new ();
+  g_object_set_data (G_OBJECT (path), "clock", live.clock);
+  path->get_value = let_time_pass;
+  gst_object_add_control_binding (
+      GST_OBJECT (live.r), gst_direct_control_binding_new (GST_OBJECT (live.r), "azimuth", path));
+  live.push (0);
+  fail_unless_equals_uint64 (gst_harness_query_latency (live.h), kPeriod);
+  gst_bus_set_flushing (bus, TRUE); /* the message that tells of the rate */
+  gst_bus_set_flushing (bus, FALSE);
+  live.next ();
+  for (int i = 0; i < 12;) { /* it waits for no time that has come already */
+    if (GstBuffer *picture = gst_harness_try_pull (live.h)) {
+      gst_buffer_unref (picture);
+      i++;
+    } else if (gst_test_clock_peek_id_count (live.clock) > 0) {
+      gst_test_clock_crank (live.clock);
+    } else {
+      g_usleep (1000);
+    }
+  }
+  g_object_set (live.r, "hold-time", guint64{0}, nullptr);
+  /* A picture is begun a quarter of a period after its time; with an eighth of 120 ms to spare. */
+  fail_unless_equals_uint64 (gst_harness_query_latency (live.h), kPeriod / 4 + 135 * GST_MSECOND);
+  GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_LATENCY);
+  fail_unless (message != nullptr);
+  gst_message_unref (message);
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_LATENCY) == nullptr);
+  gst_element_set_bus (live.r, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (path);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own)
 {
   Live live ("", "framerate=5/1");
@@ -662,6 +712,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_late_pictures_of_a_held_frame_set_are_left_out_and_counted);
   tcase_add_test (tc, test_thread_that_comes_too_late_leaves_pictures_out);
   tcase_add_test (tc, test_thread_that_is_held_by_the_sink_leaves_nothing_out);
+  tcase_add_test (tc, test_drawing_that_takes_longer_than_a_period_is_told_as_latency_once);
   tcase_add_test (tc, test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own);
   return suite;
 }

@@ -35,16 +35,14 @@ caps_of_fields (Bytes bytes, bool coded)
   std::array<gint, 5> numbers{}; /* width, height, views, frame rate */
   const gsize used = std::min (bytes.size (), sizeof numbers);
   std::memcpy (numbers.data (), bytes.data (), used);
-  GstCaps *caps = coded
-                      ? gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version", G_TYPE_INT,
-                            1, "alignment", G_TYPE_STRING, "slice", nullptr)
-                      : gst_caps_new_simple (
-                            GST_RANGE_MEDIA_TYPE, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
+  GstCaps *caps = coded ? gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version", G_TYPE_INT,
+                              1, "alignment", G_TYPE_STRING, "slice", nullptr)
+                        : gst_caps_new_simple (
+                              GST_RANGE_MEDIA_TYPE, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
   gst_caps_set_simple (caps, "width", G_TYPE_INT, numbers[0], "height", G_TYPE_INT, numbers[1],
       "views", G_TYPE_INT, numbers[2], nullptr);
   if (numbers[4] != 0 && numbers[3] > -G_MAXINT && numbers[4] > -G_MAXINT)
-    gst_caps_set_simple (
-        caps, "framerate", GST_TYPE_FRACTION, numbers[3], numbers[4], nullptr);
+    gst_caps_set_simple (caps, "framerate", GST_TYPE_FRACTION, numbers[3], numbers[4], nullptr);
   GstBuffer *rig = gst_buffer_new_memdup (bytes.data () + used, bytes.size () - used);
   gst_caps_set_simple (caps, "rig", GST_TYPE_BUFFER, rig, nullptr);
   gst_buffer_unref (rig);
@@ -99,8 +97,7 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
   if (size == 0)
     return 0;
   const Bytes bytes (data + 1, size - 1);
-  GstCaps *caps =
-      data[0] & kText ? caps_of_text (bytes) : caps_of_fields (bytes, data[0] & kCoded);
+  GstCaps *caps = data[0] & kText ? caps_of_text (bytes) : caps_of_fields (bytes, data[0] & kCoded);
   if (!caps)
     return 0;
   check (caps);

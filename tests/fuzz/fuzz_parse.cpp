@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Any bytes through neighbourcodeparse and its typefinder: as a byte stream that comes in pieces,
- * to access units; or as access units (as rtpneighbourcodedepay passes them on), to the byte stream.
- * The first byte says which, and how large the pieces are. */
+ * to access units; or as access units (as rtpneighbourcodedepay passes them on), to the byte
+ * stream. The first byte says which, and how large the pieces are. */
 #include <gst/base/gsttypefindhelper.h>
 #include <gst/check/gstharness.h>
 
@@ -107,8 +107,8 @@ static void
 find_type (Bytes bytes)
 {
   static GstTypeFindFactory *factory = [] {
-    auto feature = gst_registry_find_feature (gst_registry_get (),
-        "application/x-neighbour-code", GST_TYPE_TYPE_FIND_FACTORY);
+    auto feature = gst_registry_find_feature (
+        gst_registry_get (), "application/x-neighbour-code", GST_TYPE_TYPE_FIND_FACTORY);
     expect (feature != nullptr);
     return GST_TYPE_FIND_FACTORY (gst_plugin_feature_load (feature));
   }();

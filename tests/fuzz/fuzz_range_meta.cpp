@@ -85,9 +85,9 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
       if (image.roi.empty ())
         continue;
       touch (image);
-      frame.crop (i, {image.roi.x + image.roi.width / 2, image.roi.y + image.roi.height / 2,
-                         image.roi.width - image.roi.width / 2,
-                         image.roi.height - image.roi.height / 2});
+      frame.crop (
+          i, {image.roi.x + image.roi.width / 2, image.roi.y + image.roi.height / 2,
+                 image.roi.width - image.roi.width / 2, image.roi.height - image.roi.height / 2});
       touch (frame.views ()[i]);
     }
   }

@@ -73,7 +73,7 @@ wait_for_sets_after () { # ms views count seconds
       END { exit !ok }' || return 0
     sleep 0.5
   done
-  fail "never $3 frame sets of $2 in $4 s: $(list | cut -d' ' -f2- | uniq -c | tail -n 12) $(cat parent.log)"
+  fail "never $3 frame sets of $2 in $4 s: $(list | cut -d' ' -f2- | uniq -c | tail -n 12) $(tail -n 20 parent.log)"
 }
 
 # Ms from a time on to the first frame set with a view.
@@ -96,6 +96,11 @@ others_went_on () { # from-ms views...
   local gap
   gap=$(longest_gap "$@")
   [ "${gap:-999999}" -le 1500 ] || fail "the others paused for $gap ms: $(stream-report all.rcnc)"
+}
+
+# What stream-report says of a view under that name.
+field () { # view name
+  stream-report all.rcnc | awk -v view="$1" -v name="$2" '$2 == view { for (i = 3; i < NF; i++) if ($i == name) print $(i + 1) }'
 }
 
 report () { echo "$1: $2"; }

@@ -25,7 +25,7 @@ struct ViewFrame {
 struct ViewReport {
   std::uint64_t frames = 0, missing = 0, damaged = 0, restarts = 0;
   std::int64_t first_ms = 0, last_ms = 0, gap_ms = 0;
-  std::uint32_t number = 0;
+  std::uint32_t number = 0, began = 0; /* the last one; the first one since the last restart */
 };
 
 using FrameSet = std::map<int, ViewFrame>;
@@ -56,12 +56,15 @@ add (std::map<int, ViewReport> &reports, const FrameSet &frame_set)
     ViewReport &report = reports[id];
     if (report.frames == 0) {
       report.first_ms = view.capture_ms;
+      report.began = view.number;
     } else {
       report.gap_ms = std::max (report.gap_ms, view.capture_ms - report.last_ms);
       if (view.number > report.number)
         report.missing += view.number - report.number - 1;
-      else
+      else {
         report.restarts++; /* an encoder counts from 0 */
+        report.began = view.number;
+      }
     }
     report.frames++;
     report.damaged += view.covered != view.pixels;
@@ -94,8 +97,10 @@ main (int argc, char **argv)
     std::fprintf (stderr,
         "usage: stream-report [--list] FILE.rcnc\n"
         "For each view: frames, those missing between the first and the last by their numbers,\n"
-        "those that lack slices, how often its encoder began again, and the longest time from one\n"
-        "capture time to the next. --list: capture time (ms) and views of each frame set.\n");
+        "those that lack slices, how often its encoder began again and which of its frames was "
+        "the\n"
+        "first to come since, and the longest time from one capture time to the next. --list: "
+        "capture time (ms) and views of each frame set.\n");
     return 2;
   }
   std::ifstream file (argv[argc - 1], std::ios::binary);
@@ -120,7 +125,8 @@ main (int argc, char **argv)
   if (!list)
     for (const auto &[id, r] : reports)
       std::printf ("view %d frames %" PRIu64 " missing %" PRIu64 " damaged %" PRIu64
-                   " restarts %" PRIu64 " gap %" PRId64 " ms of %" PRId64 " ms\n",
-          id, r.frames, r.missing, r.damaged, r.restarts, r.gap_ms, r.last_ms - r.first_ms);
+                   " restarts %" PRIu64 " began %" PRIu32 " gap %" PRId64 " ms of %" PRId64 " ms\n",
+          id, r.frames, r.missing, r.damaged, r.restarts, r.began, r.gap_ms,
+          r.last_ms - r.first_ms);
   return 0;
 }

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # pipelines/rtsp-server: what it says, who may watch, who joins late, who is slow, and who is hostile.
 
+# Their helpers, not their tests.
+source "$source_dir/tests/pipelines/test-viewer.sh"
+for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
+
 viewers=$source_dir/tests/pipelines/rtsp_viewers.py
 figure="avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc"
 
@@ -329,6 +333,22 @@ test_picture_of_a_stream () {
   timeout -k 5 90 gst-launch-1.0 playbin "uri=$url" video-sink="videoconvert ! identity eos-after=5 ! pngenc ! multifilesink location=play-%02d.png" \
     >player.log 2>&1 || fail "$(tail -n 5 player.log)"
   expect_file play-02.png 5000
+  stop_server
+}
+
+viewer_shows () {
+  open_viewer "$url" --latency 50 --size 320x240
+  quits_with q
+}
+player_shows () { shows_and_turns gst-play-1.0 --no-interactive "$url"; }
+
+test_players_show_a_stream_in_a_window () {
+  need_display
+  serve -- "${figure/avatartestsrc/avatartestsrc motion=0 noise=0}"
+  export url
+  in_display viewer_shows
+  command -v gst-play-1.0 >/dev/null || skip "no gst-play-1.0 (Debian package gstreamer1.0-plugins-base-apps)"
+  in_display player_shows
   stop_server
 }
 

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 
+#include "../storage_check.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -230,6 +232,8 @@ load_rig (const std::string &path, Rig &rig)
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
   if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
     return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
+  if (Status s = check_storage (path); !s.ok ())
+    return {s.code (), s.message () + "; expected a rig file"};
   Rig loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);

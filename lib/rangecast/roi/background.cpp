@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "../storage_check.hpp"
+
 namespace rangecast {
 
 static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
@@ -207,6 +209,8 @@ load_backgrounds (const std::string &path, std::vector<std::pair<int, Background
   std::error_code error;
   if (!std::filesystem::is_regular_file (path, error))
     return {StatusCode::kNotFound, path + ": no such file; " + expected};
+  if (Status s = check_storage (path, "8f"); !s.ok ())
+    return {s.code (), s.message () + "; " + expected};
   std::vector<std::pair<int, BackgroundModel>> loaded;
   try {
     const cv::FileStorage file (path, cv::FileStorage::READ);

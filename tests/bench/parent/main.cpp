@@ -26,7 +26,7 @@ const char *const kUsage =
     "  --recording FILE  byte stream with all views; a row each\n"
     "  --fps N           frame sets a second (default 30)\n"
     "  --seconds N       that count, after one to get ready (default 5)\n"
-    "  --port N          first of the UDP ports (default 47100)\n"
+    "  --port N          first of the UDP ports (default 27100)\n"
     "  --relay N         also a relay with one viewer and with N, for the last recording\n"
     "  --viewer          also what decoding and cylinderfilter cost a viewer\n"
     "  --draw            and striprender, into a picture of 640x480\n"

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <map>
+#include <rangecast/neighbourcode/unit.hpp>
 
 #include "process.hpp"
 #include "traffic.hpp"
@@ -43,9 +44,9 @@ wait_for_packets (const Process &process, const Viewer &viewer)
 {
   for (double waited = 0; !viewer.has_any (); waited += 0.05) {
     if (!process.runs ())
-      return {StatusCode::kBadData, "the process ended at once: are its ports free?"};
+      return {StatusCode::kBadData, "ended at once: " + process.said ()};
     if (waited > kStartSeconds)
-      return {StatusCode::kBadData, "nothing came out within 20 s"};
+      return {StatusCode::kBadData, "nothing came out within 20 s: " + process.said ()};
     sleep_s (0.05);
   }
   return {};
@@ -66,13 +67,13 @@ sum_up (const Window &window, const std::vector<CameraHosts::Sent> &sent,
 {
   struct Came {
     std::uint32_t slices = 0;
-    double latency_ms = 0;
+    std::uint64_t last_ns = 0;
   };
   std::map<std::uint64_t, Came> came;
   for (const Viewer::Arrival &a : arrivals) {
     Came &c = came[a.capture_ns];
     c.slices += a.slices;
-    c.latency_ms = std::max (c.latency_ms, a.latency_ms);
+    c.last_ns = std::max (c.last_ns, a.arrival_ns);
   }
   std::vector<double> latencies;
   double slices = 0, received = 0, sets = 0, packets = 0;
@@ -85,7 +86,7 @@ sum_up (const Window &window, const std::vector<CameraHosts::Sent> &sent,
     received += std::min (c.slices, s.slices);
     sets++;
     if (c.slices > 0)
-      latencies.push_back (c.latency_ms);
+      latencies.push_back (double (c.last_ns - s.sent_ns) / 1e6);
   }
   std::ranges::sort (latencies);
   row.p50_ms = percentile (latencies, 0.5);
@@ -174,6 +175,7 @@ process_cpu_ms ()
 }
 
 struct Counted {
+  bool begins = false; /* the first frame set with pixels is on its way */
   int frames = 0;
   double first_ms = 0, last_ms = 0;
 };
@@ -183,9 +185,29 @@ count (GstPad *, GstPadProbeInfo *, gpointer data)
 {
   auto counted = static_cast<Counted *> (data);
   counted->last_ms = process_cpu_ms ();
-  if (counted->frames++ == 0)
+  if (counted->begins && counted->frames++ == 0)
     counted->first_ms = counted->last_ms;
   return GST_PAD_PROBE_OK;
+}
+
+/* Backgrounds are learnt from frame sets of which nothing is left: at most 64 empty slices. */
+GstPadProbeReturn
+look_for_pixels (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  if (gst_buffer_get_size (GST_PAD_PROBE_INFO_BUFFER (info)) > 64 * rangecast::kSliceHeaderSize)
+    static_cast<Counted *> (data)->begins = true;
+  return GST_PAD_PROBE_OK;
+}
+
+void
+add_probe (GstElement *pipeline, const char *name, const char *pad_name, GstPadProbeCallback probe,
+    Counted &counted)
+{
+  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), name);
+  GstPad *pad = gst_element_get_static_pad (element, pad_name);
+  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, probe, &counted, nullptr);
+  gst_object_unref (pad);
+  gst_object_unref (element);
 }
 
 /* CPU ms a frame set of a launch string that ends in an element named sink. The first frame set is
@@ -201,11 +223,8 @@ cost_of (const std::string &launch, double &ms)
     return {StatusCode::kNotFound, text};
   }
   Counted counted;
-  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "sink");
-  GstPad *pad = gst_element_get_static_pad (sink, "sink");
-  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, count, &counted, nullptr);
-  gst_object_unref (pad);
-  gst_object_unref (sink);
+  add_probe (pipeline, "parse", "src", look_for_pixels, counted);
+  add_probe (pipeline, "sink", "sink", count, counted);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
   GstBus *bus = gst_element_get_bus (pipeline);
   GstMessage *message = gst_bus_timed_pop_filtered (
@@ -283,7 +302,7 @@ measure_relay (Recording &recording, int viewers, const Settings &settings, Row 
 Status
 measure_viewer (const std::string &path, bool draw, ViewerRow &row)
 {
-  const std::string source = "filesrc location=\"" + path + "\" ! neighbourcodeparse ! ";
+  const std::string source = "filesrc location=\"" + path + "\" ! neighbourcodeparse name=parse ! ";
   const std::string end = "fakesink name=sink sync=false";
   double read = 0, decode = 0, cylinder = 0, drawn = 0;
   if (Status s = cost_of (source + end, read); !s.ok ())

@@ -11,8 +11,8 @@ namespace bench {
 
 struct Settings {
   double fps = 30;
-  int seconds = 5; ///< that count
-  int port = 47100;
+  int seconds = 5;                       ///< that count
+  int port = 27100;                      ///< below those that the kernel gives away
   std::string parent = "parent-host.sh"; ///< its path
 };
 

@@ -3,11 +3,14 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 namespace bench {
 
@@ -17,19 +20,21 @@ Process::Process (const std::vector<std::string> &command)
   for (const std::string &word : command)
     arguments.push_back (const_cast<char *> (word.c_str ()));
   arguments.push_back (nullptr);
+  output_ = memfd_create ("output", MFD_CLOEXEC);
   pid_ = fork ();
   if (pid_ != 0)
     return;
   setpgid (0, 0);
-  const int nothing = open ("/dev/null", O_RDWR);
-  dup2 (nothing, 1);
-  dup2 (nothing, 2);
+  dup2 (open ("/dev/null", O_RDONLY), 0);
+  dup2 (output_, 1);
+  dup2 (output_, 2);
   execvp (arguments[0], arguments.data ());
   _exit (127);
 }
 
 Process::~Process ()
 {
+  close (output_);
   if (pid_ <= 0)
     return;
   kill (-pid_, SIGINT);
@@ -40,6 +45,22 @@ Process::~Process ()
   }
   kill (-pid_, SIGKILL);
   waitpid (pid_, nullptr, 0);
+}
+
+std::string
+Process::said () const
+{
+  std::string text (4096, '\0');
+  text.resize (std::size_t (std::max<ssize_t> (pread (output_, text.data (), text.size (), 0), 0)));
+  std::istringstream lines (text);
+  std::string last;
+  for (std::string line; std::getline (lines, line);) {
+    if (!line.empty ())
+      last = line;
+    if (line.find ("ERROR") != std::string::npos)
+      break;
+  }
+  return last;
 }
 
 bool

@@ -11,7 +11,7 @@ namespace bench {
 
 class Process {
 public:
-  /** Starts a program that is looked for in PATH; its output goes to /dev/null. */
+  /** Starts a program that is looked for in PATH; what it says is kept for said(). */
   explicit Process (const std::vector<std::string> &command);
   /** Ends it: SIGINT, and SIGKILL where that does not help within seconds. */
   ~Process ();
@@ -19,6 +19,8 @@ public:
   Process &operator= (const Process &) = delete;
 
   [[nodiscard]] bool runs () const;
+  /** The first error that it told of, or its last line. */
+  [[nodiscard]] std::string said () const;
   /** CPU time of all its threads that live, ms: of the kernel for them, too. */
   [[nodiscard]] double cpu_ms () const;
   /** Resident memory, MiB. */
@@ -26,6 +28,7 @@ public:
 
 private:
   pid_t pid_ = -1;
+  int output_ = -1; /* a file in memory */
 };
 
 } // namespace bench

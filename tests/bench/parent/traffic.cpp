@@ -81,9 +81,8 @@ Viewer::take (const std::uint8_t *packet, std::size_t size, std::uint64_t now)
     return;
   std::uint64_t capture;
   std::memcpy (&capture, packet + fields[0], sizeof capture);
-  const double latency_ms = (double (now) - double (capture)) / 1e6;
   std::lock_guard guard (lock_);
-  arrivals_.push_back ({capture, latency_ms, std::uint32_t (fields.size ())});
+  arrivals_.push_back ({capture, now, std::uint32_t (fields.size ())});
   any_ = true;
 }
 
@@ -173,7 +172,7 @@ CameraHosts::send_frame (std::uint64_t number, std::uint64_t capture_ns)
 {
   const std::size_t frame = number % recording_.frames ();
   const auto timestamp = std::uint32_t (std::llround (double (number) * 90000 / fps_));
-  Sent sent{capture_ns, std::uint32_t (recording_.slices (frame)), 0};
+  Sent sent{capture_ns, now_ns (), std::uint32_t (recording_.slices (frame)), 0};
   for (std::size_t v = 0; v < recording_.views.size (); v++) {
     auto &packets = recording_.views[v][frame];
     sockaddr_in to = local (first_port_ + int (v));
@@ -208,7 +207,7 @@ CameraHosts::run ()
     clock_nanosleep (CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
     const std::uint64_t now = now_ns ();
     worst_delay_ms_ = std::max (worst_delay_ms_.load (), double (now - due) / 1e6);
-    send_frame (number, now);
+    send_frame (number, due);
   }
 }
 

@@ -23,8 +23,8 @@ public:
   void stop ();
 
   struct Arrival {
-    std::uint64_t capture_ns = 0; ///< when it was sent, CLOCK_MONOTONIC
-    double latency_ms = 0;        ///< from then to the packet
+    std::uint64_t capture_ns = 0; ///< of its slices
+    std::uint64_t arrival_ns = 0; ///< CLOCK_MONOTONIC
     std::uint32_t slices = 0;     ///< in it
   };
   /** Packets since open(), those without slices left out. */
@@ -43,7 +43,8 @@ private:
 };
 
 /** Sends a recording in real time, all views of a frame set at once, over and over. Each slice says
- *  when it was sent as its capture time. */
+ *  when it was due as its capture time: cameras fire on time, also where a busy machine sends late.
+ */
 class CameraHosts {
 public:
   CameraHosts (Recording &recording, double fps, int first_port);
@@ -52,7 +53,7 @@ public:
   void stop ();
 
   struct Sent {
-    std::uint64_t capture_ns = 0;
+    std::uint64_t capture_ns = 0, sent_ns = 0; ///< CLOCK_MONOTONIC
     std::uint32_t slices = 0, packets = 0;
   };
   [[nodiscard]] std::vector<Sent> sent ();

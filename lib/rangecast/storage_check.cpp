@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "storage_check.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cctype>
+#include <memory>
+#include <opencv2/core/persistence.hpp>
+#include <vector>
+
+namespace rangecast {
+namespace {
+
+/* Signs that may begin a collection or an element: a rig of 64 views has 3,500 in XML, and each may
+ * take some 300 bytes of stack. */
+constexpr int kMaxSigns = 10000;
+/* What a rule looks at together: a marker, the spaces behind it, and the header of its data. */
+constexpr std::size_t kLookAhead = 512, kBlock = 65536;
+/* OpenCV fills the name of the type up to so many bytes, which are 32 in base64. */
+constexpr std::size_t kHeaderBytes = 24;
+
+std::string
+encoded_header (std::string_view type)
+{
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes (type), text;
+  bytes.resize (kHeaderBytes, ' ');
+  for (std::size_t i = 0; i < kHeaderBytes; i += 3) {
+    const unsigned three =
+        unsigned (bytes[i]) << 16 | unsigned (bytes[i + 1]) << 8 | unsigned (bytes[i + 2]);
+    for (int shift = 18; shift >= 0; shift -= 6)
+      text += kDigits[three >> shift & 63];
+  }
+  return text;
+}
+
+/* "- " begins an element of a list, "-1" is a number. */
+bool
+is_sign (std::string_view text)
+{
+  const char next = text.size () > 1 ? text[1] : '\n';
+  return std::string_view ("[{<:").find (text[0]) != std::string_view::npos ||
+         (text[0] == '-' && (next == ' ' || next == '\n' || next == '\r' || next == '-'));
+}
+
+/* What stands before a place: its last character, and the last one that is no space before that. */
+struct Before {
+  char last = '\n', solid = '\n', solid_before_last = '\n';
+
+  void add (char c)
+  {
+    last = c;
+    solid_before_last = solid;
+    if (!std::isspace (static_cast<unsigned char> (c)))
+      solid = c;
+  }
+};
+
+/* Where data in base64 begin if `text` begins with a marker for them; else 0. The markers are
+ * YAML's !!binary, XML's type_id="binary" and JSON's "$base64$. */
+std::size_t
+behind_marker (std::string_view text, const Before &before)
+{
+  static constexpr std::string_view kWord = "binary", kJson = "$base64$";
+  if (text.starts_with (kJson))
+    return kJson.size ();
+  if (!text.starts_with (kWord))
+    return 0;
+  const char next = text.size () > kWord.size () ? text[kWord.size ()] : '\n';
+  const bool tag = before.last == '!' || before.last == '^' || before.last == ':';
+  const bool attribute = (before.last == '"' || before.last == '\'') && next == before.last &&
+                         before.solid_before_last == '=';
+  return tag || attribute ? kWord.size () : 0;
+}
+
+bool
+has_header (std::string_view text, const std::string &header)
+{
+  const auto begin = text.find_first_not_of (" \r\n|>\"'");
+  return begin != std::string_view::npos && text.substr (begin).starts_with (header);
+}
+
+/* Text that comes in blocks. */
+class StorageScanner {
+public:
+  explicit StorageScanner (std::string_view binary_type)
+      : header_ (binary_type.empty () ? "" : encoded_header (binary_type))
+  {
+  }
+
+  /** Looks at the first `count` bytes of `text`; the others say what follows. */
+  void scan (std::string_view text, std::size_t count)
+  {
+    for (std::size_t i = 0; i < count && complaint_.empty (); i++) {
+      const std::string_view rest = text.substr (i);
+      if (is_sign (rest) && ++signs_ > kMaxSigns)
+        complaint_ = "has more than " + std::to_string (kMaxSigns) + " lists, maps or fields";
+      else if (const auto marker = behind_marker (rest, before_);
+               marker && (header_.empty () || !has_header (rest.substr (marker), header_)))
+        complaint_ =
+            header_.empty () ? "has binary data" : "has binary data of another type than expected";
+      before_.add (text[i]);
+    }
+  }
+  [[nodiscard]] const std::string &complaint () const { return complaint_; }
+
+private:
+  std::string header_, complaint_;
+  int signs_ = 0;
+  Before before_;
+};
+
+} // namespace
+
+Status
+check_storage (const std::string &path, std::string_view binary_type)
+{
+  /* Reads what is not compressed as it is. OpenCV goes by the name. */
+  const std::unique_ptr<gzFile_s, int (*) (gzFile)> file (gzopen (path.c_str (), "rb"), gzclose);
+  if (!file)
+    return {};
+  if (!gzdirect (file.get ()) && !path.ends_with (".gz"))
+    return {StatusCode::kBadData, path + ": is compressed; expected a name that ends in .gz"};
+  StorageScanner scanner (binary_type);
+  std::vector<char> text;
+  std::size_t kept = 0;
+  for (bool at_end = false; !at_end && scanner.complaint ().empty ();) {
+    text.resize (kept + kBlock);
+    const int got = gzread (file.get (), text.data () + kept, kBlock);
+    at_end = got < int (kBlock);
+    const std::size_t size = kept + std::size_t (std::max (got, 0));
+    const std::size_t count = at_end ? size : size - kLookAhead;
+    scanner.scan ({text.data (), size}, count);
+    std::copy (text.begin () + std::ptrdiff_t (count), text.begin () + std::ptrdiff_t (size),
+        text.begin ());
+    kept = size - count;
+  }
+  if (!scanner.complaint ().empty ())
+    return {StatusCode::kBadData, path + ": " + scanner.complaint ()};
+  return {};
+}
+
+} // namespace rangecast

@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "test-support.hpp"
+
+#include <fstream>
+#include <opencv2/core/persistence.hpp>
+#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/roi/background.hpp>
+#include <rangecast/storage_check.hpp>
+#include <unistd.h>
+
+using namespace rangecast;
+using rangecast::testing::ring_rig;
+
+namespace {
+
+/* A file that goes with its scope. */
+class TestFile {
+public:
+  TestFile (const std::string &name, const std::string &text = "")
+      : path_ (::testing::TempDir () + std::to_string (getpid ()) + "-" + name)
+  {
+    std::ofstream (path_) << text;
+  }
+  ~TestFile () { std::filesystem::remove (path_); }
+  [[nodiscard]] const std::string &path () const { return path_; }
+
+private:
+  std::string path_;
+};
+
+std::string
+repeated (const std::string &text, int count)
+{
+  std::string all;
+  for (int i = 0; i < count; i++)
+    all += text;
+  return all;
+}
+
+void
+expect_refused (const TestFile &file, const char *why)
+{
+  const Status status = check_storage (file.path (), "8f");
+  EXPECT_EQ (status.code (), StatusCode::kBadData);
+  EXPECT_TRUE (status.message ().starts_with (file.path ()));
+  EXPECT_NE (status.message ().find (why), std::string::npos) << status.message ();
+  Rig rig;
+  EXPECT_EQ (load_rig (file.path (), rig).code (), StatusCode::kBadData);
+  std::vector<std::pair<int, BackgroundModel>> views;
+  EXPECT_EQ (load_backgrounds (file.path (), views).code (), StatusCode::kBadData);
+}
+
+std::string
+matrix_text (const char *name, int type)
+{
+  cv::FileStorage file (
+      name, cv::FileStorage::WRITE | cv::FileStorage::MEMORY | cv::FileStorage::BASE64);
+  file << "pixels"
+       << cv::Mat (cv::Mat::ones (2, 3 * CV_MAT_CN (type), CV_MAT_DEPTH (type)))
+              .reshape (CV_MAT_CN (type));
+  return file.releaseAndGetString ();
+}
+
+TEST (StorageCheck, collections_nested_without_end_are_refused)
+{
+  constexpr int kDeep = 300000; /* of which each ends a process that reads it */
+  const char *kinds[][3] = {{"a.yml", "%YAML:1.0\n---\na: ", "[\n "},
+      {"b.yml", "%YAML:1.0\n---\n", "- "}, {"c.yml", "%YAML:1.0\n---\n", "a:"},
+      {"d.json", "{ \"a\": ", "[\n"}, {"e.json", "", "{ \"a\": "},
+      {"f.xml", "<?xml version=\"1.0\"?>\n<opencv_storage>\n", "<a>\n"}};
+  for (const auto &[name, begin, part] : kinds)
+    expect_refused (TestFile (name, begin + repeated (part, kDeep)), "lists, maps or fields");
+}
+
+TEST (StorageCheck, as_many_collections_as_are_let_through_do_no_harm)
+{
+  for (const char *part : {"[\n ", "- ", "a:"}) {
+    const TestFile file ("a.yml", "%YAML:1.0\n---\na: " + repeated (part, 9990));
+    EXPECT_TRUE (check_storage (file.path ()).ok ());
+    Rig rig;
+    EXPECT_EQ (load_rig (file.path (), rig).code (), StatusCode::kBadData);
+  }
+  for (const auto &[name, begin, part] : {std::array{"a.json", "", "{ \"a\": "},
+           std::array{"a.xml", "<?xml version=\"1.0\"?>\n<opencv_storage>\n", "<a>\n"}}) {
+    const TestFile file (name, begin + repeated (part, 4990));
+    EXPECT_TRUE (check_storage (file.path ()).ok ());
+    Rig rig;
+    EXPECT_EQ (load_rig (file.path (), rig).code (), StatusCode::kBadData);
+  }
+}
+
+TEST (StorageCheck, binary_data_without_a_type_are_refused)
+{
+  /* OpenCV would read these for ever. */
+  const std::string nothing (64, 'A');
+  expect_refused (
+      TestFile ("a.yml", "%YAML:1.0\n---\na: !!binary |\n    " + nothing + "\n"), "binary");
+  expect_refused (
+      TestFile ("b.yml", "%YAML:1.0\n---\na: !<tag:yaml.org,2002:binary> |\n  " + nothing + "\n"),
+      "binary");
+  expect_refused (TestFile ("c.json", "{ \"a\": \"$base64$" + nothing + "\" }\n"), "binary");
+  expect_refused (
+      TestFile ("d.xml", "<?xml version=\"1.0\"?>\n<opencv_storage>\n<a type_id=\"binary\">\n" +
+                             nothing + "</a>\n</opencv_storage>\n"),
+      "binary");
+}
+
+TEST (StorageCheck, binary_data_are_found_wherever_blocks_end)
+{
+  for (int before = 65536 - 600; before < 65536 + 40; before += 7) {
+    const TestFile file ("a.yml", "%YAML:1.0\n---\n#" + std::string (std::size_t (before), 'x') +
+                                      "\na: !!binary |\n    " + std::string (64, 'A') + "\n");
+    EXPECT_FALSE (check_storage (file.path (), "8f").ok ()) << before;
+  }
+}
+
+TEST (StorageCheck, matrices_of_the_expected_type_pass)
+{
+  for (const char *name : {"a.yml", "b.json", "c.xml"}) {
+    const TestFile right (name, matrix_text (name, CV_32FC (8))),
+        other (name, matrix_text (name, CV_8UC3));
+    EXPECT_FALSE (check_storage (other.path (), "8f").ok ()) << name;
+    EXPECT_FALSE (check_storage (TestFile (name, matrix_text (name, CV_32FC (8))).path ()).ok ());
+    const TestFile again (name, matrix_text (name, CV_32FC (8)));
+    EXPECT_TRUE (check_storage (again.path (), "8f").ok ()) << name;
+  }
+}
+
+TEST (StorageCheck, largest_rig_passes)
+{
+  Rig rig = ring_rig (kMaxViews);
+  for (View &view : rig.views) {
+    PartnerCamera partner;
+    partner.camera = "binary";
+    partner.intrinsics = view.intrinsics;
+    partner.partner_from_left.translation = {-0.1, 0, 0};
+    view.name = "a view: [ of { many } ] <-> binary";
+    view.right = view.third = partner;
+  }
+  for (const char *name : {"a.yml", "b.json"}) {
+    const TestFile file (name);
+    ASSERT_TRUE (save_rig (file.path (), rig).ok ());
+    EXPECT_TRUE (check_storage (file.path ()).ok ()) << check_storage (file.path ()).message ();
+    Rig again;
+    EXPECT_TRUE (load_rig (file.path (), again).ok ());
+  }
+}
+
+TEST (StorageCheck, compressed_file_is_looked_into_and_must_say_so)
+{
+  const std::string text = "%YAML:1.0\n---\na: " + repeated ("[\n ", 20000);
+  const TestFile named ("a.yml.gz"), hidden ("a.yml");
+  {
+    cv::FileStorage file (named.path (), cv::FileStorage::WRITE);
+    file << "a"
+         << "[";
+    for (int i = 0; i < 20000; i++)
+      file << "["
+           << "]";
+    file << "]";
+  }
+  EXPECT_FALSE (check_storage (named.path ()).ok ());
+  std::filesystem::copy_file (
+      named.path (), hidden.path (), std::filesystem::copy_options::overwrite_existing);
+  const Status status = check_storage (hidden.path ());
+  EXPECT_NE (status.message ().find ("compressed"), std::string::npos) << status.message ();
+}
+
+} // namespace
