@@ -6,7 +6,7 @@ bench=${RANGECAST_BUILD:-$source_dir/build}/tests/bench/network_bench
 
 # usage: send OPTIONS... -> result.json; ends with an error where a point is wrong
 send () {
-  timeout -k 5 60 "$bench" --views 2 --size 160x120 --fps 30 --frames 50 --jitter-buffer 120 "$@" >result.json ||
+  timeout -k 5 60 "$bench" --views 2 --size 160x120 --fps 30 --frames 60 --jitter-buffer 120 "$@" >result.json ||
     fail "$* : $(cat result.json)"
 }
 expect () { # condition
