@@ -158,3 +158,23 @@ test_a_stopped_viewer_costs_no_memory () {
   [ "$(resident_kb "$parent")" -lt $((parent_before + 8192)) ] || fail "parent: $parent_before kB, then $(resident_kb "$parent")"
   [ "$(resident_kb "$viewer")" -lt $((viewer_before + 16384)) ] || fail "viewer: $viewer_before kB, then $(resident_kb "$viewer")"
 }
+
+# The launch strings of docs/streaming.md, as they stand there but for the ports.
+test_launch_strings_of_the_docs_run () {
+  local line i file
+  net_need
+  net_open
+  net_host here
+  awk '/^```$/ { inside = !inside; next } inside' "$source_dir/docs/streaming.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' >lines
+  [ "$(wc -l <lines)" = 6 ] || fail "expected three receivers and three senders: $(wc -l <lines)"
+  while read -r line; do
+    net_on here timeout -k 5 100 bash -c "exec $line" >>launch.log 2>&1 &
+  done <lines
+  for file in fec rtx srtp; do
+    for ((i = 0; i < 80; i++)); do
+      [ ! -s $file.rcnc ] || [ "$(timeout 60 count-points $file.rcnc 2>/dev/null | grep -c '^frame set')" -lt 8 ] || break
+      sleep 1
+    done
+    [ "$i" -lt 80 ] || fail "$file: $(tail -n 5 launch.log)"
+  done
+}

@@ -25,7 +25,7 @@ const char *const kUsage =
     "  --fec PERCENT      (default 0: none)\n"
     "  --rtx              retransmission\n"
     "  --feedback         the receiver may ask for key frame sets\n"
-    "  --views N, --size WxH, --fps N, --frames N  (default 4, 320x240, 15, 90)\n"
+    "  --views N, --size WxH, --fps N, --frames N  (default 4, 320x240, 15, 100)\n"
     "  --jitter-buffer MS (default 60)\n"
     "  --network-delay MS each way (default 5)\n";
 
@@ -143,7 +143,7 @@ main (int argc, char **argv)
   options.number ("--views", c.views, 1, 16);
   options.size ("--size", c.width, c.height, 16, 2048);
   options.number ("--fps", c.fps, 1, 120);
-  options.number ("--frames", c.frames, 3 * kQuietFrames, 2000);
+  options.number ("--frames", c.frames, kQuietFrames + kRecoveryFrames + 4, 2000);
   options.number ("--jitter-buffer", c.jitter_buffer_ms, 0, 5000);
   options.number ("--network-delay", c.delay_ms, 0, 1000);
   for (const char *name : {"--loss", "--burst", "--duplicate", "--reorder", "--reorder-by",

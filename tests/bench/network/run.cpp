@@ -226,7 +226,8 @@ receiver_launch (const NetworkCase &c)
       kRtpCaps + "\" ! rtpneighbourcodeguard";
   if (c.feedback || c.rtx)
     s += " ! capssetter caps=application/x-rtp,payload=96 ! session.recv_rtp_sink rtpsession "
-         "name=session rtp-profile=avpf rtcp-min-interval=20000000 session.send_rtcp_src ! appsink name=rtcp sync=false "
+         "name=session rtp-profile=avpf rtcp-min-interval=20000000 session.send_rtcp_src ! appsink "
+         "name=rtcp sync=false "
          "async=false session.recv_rtp_src";
   if (c.rtx)
     s += std::string (" ! rtprtxreceive payload-type-map=") + kRtxMap;
@@ -347,7 +348,7 @@ judge (const NetworkCase &c, Collected &sent, Collected &got, const std::vector<
   long long expected = 0, right = 0;
   int whole = 0, last_broken = -1;
   int64_t last_ns = 0;
-  const int end_of_faults = c.frames - kQuietFrames;
+  const int end_of_faults = c.frames - kRecoveryFrames;
   for (const auto &[number, frame_set] : sent.frame_sets) {
     const auto found = got.frame_sets.find (number);
     const bool came = found != got.frame_sets.end ();
@@ -395,7 +396,7 @@ send_all (const NetworkCase &c, const Scene &scene, GstElement *in, std::vector<
   gst_app_src_set_caps (GST_APP_SRC (in), scene.caps);
   for (int i = 0; i < c.frames; i++) {
     std::this_thread::sleep_for (std::chrono::nanoseconds (begin_ns + i * interval_ns - now_ns ()));
-    if (i == kQuietFrames || i == c.frames - kQuietFrames)
+    if (i == kQuietFrames || i == c.frames - kRecoveryFrames)
       for (Wire *wire : wires)
         wire->set (i == kQuietFrames ? bad : quiet);
     GstBuffer *buffer = gst_buffer_copy (scene.at (i));

@@ -10,12 +10,12 @@
 /** One run. */
 struct NetworkCase {
   std::string name;     ///< of the fault, for tables
-  FaultSettings faults; ///< both ways; begin after kQuietFrames, end as many before the last one
+  FaultSettings faults; ///< both ways; after kQuietFrames, until kRecoveryFrames before the end
   std::string encoder;  ///< properties of neighbourcodeenc
   int fec_percent = 0;
   bool rtx = false;
   bool feedback = false; ///< the receiver may ask for key frame sets (and does for rtx)
-  int views = 4, width = 320, height = 240, fps = 15, frames = 90;
+  int views = 4, width = 320, height = 240, fps = 15, frames = 100;
   int jitter_buffer_ms = 60;
   int delay_ms = 5; ///< of the network, each way, always
 };
@@ -34,7 +34,8 @@ struct NetworkResult {
   FaultCounters network;  ///< what happened to packets from the sender
 };
 
-inline constexpr int kQuietFrames = 12;
+inline constexpr int kQuietFrames = 12;    ///< before the faults
+inline constexpr int kRecoveryFrames = 20; ///< and after them: longer than a refresh at 15/s
 
 /** @return nothing and says why on stderr if the pipelines cannot be made */
 bool run_network_case (const NetworkCase &settings, NetworkResult &result);
