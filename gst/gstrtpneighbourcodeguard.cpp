@@ -6,7 +6,7 @@
  * Lets the packets of one sender of coded frame sets through, and nothing else that arrives at its
  * port: no other bytes, no other codec, no second sender, not its own packets from elsewhere. A
  * sender is who sends some sound packets one after another; another one takes over when it has been
- * silent, or at once from the same address and port. It belongs between udpsrc and rtpjitterbuffer,
+ * silent, sooner from the same address and port. It belongs between udpsrc and rtpjitterbuffer,
  * which one packet of a foreign stream brings out of step. Directly behind udpsrc it has the kernel
  * drop what a flood of foreign packets brings, before it takes the good ones' room.
  *
@@ -41,6 +41,9 @@ GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 enum { PROP_0, PROP_TIMEOUT, PROP_STATS };
 
 static constexpr GstClockTime kDefaultTimeout = 500 * GST_MSECOND;
+/* Of two streams from one address and port the second waits so long: it may be a program that began
+ * again, but also two that share a socket or a relay. */
+static constexpr GstClockTime kBeginsAgain = 250 * GST_MSECOND;
 static constexpr guint kRivalPackets = 100;  /* before somebody is told of them */
 static constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
 
@@ -63,6 +66,7 @@ struct GstRtpNeighbourCodeGuardPrivate {
   SenderProbation probation;
   bool warned_of_version = false;
   GSocket *filtered = nullptr; /* udpsrc's, while the kernel filters for us */
+  bool filter_rests = false;   /* while the sender is silent */
   GstCaps *caps = nullptr;     /* as they came */
 };
 
@@ -169,9 +173,23 @@ find_socket (GstRtpNeighbourCodeGuard *self)
 static void
 stop_filter (GstRtpNeighbourCodeGuardPrivate *priv)
 {
-  if (priv->filtered)
+  if (priv->filtered && !priv->filter_rests)
     SenderFilter::detach (priv->filtered);
   g_clear_object (&priv->filtered);
+  priv->filter_rests = false;
+}
+
+/* The next sender may be among those that it keeps out; or this one comes back. */
+static void
+rest_filter (GstRtpNeighbourCodeGuardPrivate *priv, bool rests)
+{
+  if (!priv->filtered || priv->filter_rests == rests)
+    return;
+  priv->filter_rests = rests;
+  if (rests)
+    SenderFilter::detach (priv->filtered);
+  else
+    SenderFilter::attach (priv->filtered, priv->address);
 }
 
 static void
@@ -247,14 +265,16 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
   if (is_senders (priv, packet, here)) {
     if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;
+    rest_filter (priv, false);
     return Verdict::kPasses;
   }
-  const bool silent = !priv->ssrc || now >= priv->last_time + priv->timeout;
-  if (silent && priv->filtered)
-    stop_filter (priv); /* the next sender may be among those that it keeps out */
+  const GstClockTime waited = now > priv->last_time ? now - priv->last_time : 0;
+  const bool silent = !priv->ssrc || waited >= priv->timeout || (here && waited >= kBeginsAgain);
+  if (!priv->ssrc || waited >= priv->timeout)
+    rest_filter (priv, true);
   if (packet.version == 0)
     return Verdict::kForeign;
-  if (packet.units && !silent && !here)
+  if (packet.units && !silent)
     return ++priv->rival_packets == kRivalPackets ? Verdict::kRival : Verdict::kForeign;
   if (!packet.units && priv->warned_of_version)
     return Verdict::kForeign;

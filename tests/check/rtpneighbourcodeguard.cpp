@@ -195,14 +195,41 @@ GST_START_TEST (test_a_second_sender_is_told_once_and_waits_until_the_first_is_s
 }
 GST_END_TEST;
 
-GST_START_TEST (test_a_sender_that_begins_again_from_its_port_passes_at_once)
+GST_START_TEST (test_a_sender_that_begins_again_from_its_port_passes_sooner_than_another)
 {
   Guard guard;
-  Sender sender;
+  Sender sender, other = {.ssrc = 5, .address = "10.0.0.2"};
   guard.send_many (sender, 10);
+  guard.time += 300 * GST_MSECOND;
+  fail_unless_equals_int (guard.send_many (other, 10), 0);
   sender.ssrc = 77;
   sender.sequence = 60000;
   fail_unless_equals_int (guard.send_many (sender, 10), 10);
+}
+GST_END_TEST;
+
+/* A relay, or two payloaders before one udpsink. */
+GST_START_TEST (test_two_streams_from_one_port_do_not_take_turns)
+{
+  Guard guard;
+  Sender one, two = {.ssrc = 2};
+  guard.send_many (one, 10);
+  for (int i = 0; i < 50; i++) {
+    fail_unless_equals_int (guard.send_many (two, 10), 0);
+    fail_unless_equals_int (guard.send_many (one, 10), 10);
+  }
+  fail_unless_equals_int (guard.warnings ("Two senders"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_without_a_timeout_nobody_takes_over)
+{
+  Guard guard;
+  g_object_set (guard.h->element, "timeout", G_MAXUINT64, nullptr);
+  Sender one, two = {.ssrc = 2, .address = "10.0.0.2"};
+  guard.send_many (one, 10);
+  guard.time += 3600 * GST_SECOND;
+  fail_unless_equals_int (guard.send_many (two, 10), 0);
 }
 GST_END_TEST;
 
@@ -280,7 +307,9 @@ rtpneighbourcodeguard_suite ()
   tcase_add_test (tc, test_copies_of_the_good_stream_from_another_address_or_port_do_not_pass);
   tcase_add_test (tc, test_damaged_packets_of_the_sender_do_not_pass_but_other_payload_types_do);
   tcase_add_test (tc, test_a_second_sender_is_told_once_and_waits_until_the_first_is_silent);
-  tcase_add_test (tc, test_a_sender_that_begins_again_from_its_port_passes_at_once);
+  tcase_add_test (tc, test_a_sender_that_begins_again_from_its_port_passes_sooner_than_another);
+  tcase_add_test (tc, test_two_streams_from_one_port_do_not_take_turns);
+  tcase_add_test (tc, test_without_a_timeout_nobody_takes_over);
   tcase_add_test (tc, test_sound_packets_out_of_order_are_no_sender);
   tcase_add_test (tc, test_another_version_is_told_once_and_does_not_pass);
   tcase_add_test (tc, test_packets_that_do_not_say_where_they_come_from_are_told_apart_by_ssrc);
