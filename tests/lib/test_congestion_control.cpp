@@ -226,6 +226,36 @@ TEST (CongestionControl, worst_of_several_receivers_counts)
   EXPECT_LT (control.bits_per_s (), 4e6);
 }
 
+/* With early feedback (AVPF) a report comes at once when a packet was lost, and is of few. */
+TEST (CongestionControl, loss_of_1_percent_in_reports_of_3_packets_hardly_lowers_the_rate)
+{
+  CongestionControl control;
+  control.configure ({100e3, 5e6});
+  std::mt19937 random (2);
+  std::uint64_t now = 1'000'000'000;
+  double lowest = 5e6;
+  for (int i = 0; i < 3000; i++) {
+    int lost = 0;
+    for (int k = 0; k < 3; k++)
+      lost += random () % 100 == 0;
+    control.receiver_report ({1, lost / 3.0, 3, 0, 0}, 5e6, now += 10'000'000);
+    lowest = std::min (lowest, control.bits_per_s ());
+  }
+  EXPECT_GT (lowest, 0.75 * 5e6);
+}
+
+TEST (CongestionControl, queue_of_one_of_50_receivers_is_seen)
+{
+  CongestionControl control;
+  control.configure ({100e3, 5e6});
+  std::uint64_t now = 1'000'000'000;
+  for (int second = 0; second < 6; second++)
+    for (std::uint32_t receiver = 0; receiver < 50; receiver++)
+      control.receiver_report (
+          {receiver, 0, 100, 0, receiver == 30 && second > 2 ? 0.4 : 0.05}, 5e6, now += 20'000'000);
+  EXPECT_LT (control.bits_per_s (), 5e6);
+}
+
 TEST (CongestionControl, jitter_that_rises_keeps_receiver_reports_from_raising_the_rate)
 {
   for (const double jitter : {0.001, 0.1}) {

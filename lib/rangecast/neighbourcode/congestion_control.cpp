@@ -32,7 +32,7 @@ constexpr double kNearBelow = 0.92, kNearAbove = 1.08, kDoubling = 2;
 constexpr double kHeadroom = 1.5, kMore = 50'000;
 
 constexpr std::uint64_t kLossIntervalNs = 500 * kMs;
-constexpr double kLeastPackets = 20;
+constexpr double kLeastPackets = 20, kManyPackets = 150;
 
 constexpr std::uint64_t kSilencePacketsNs = 3'000 * kMs, kSilenceReportsNs = 15'000 * kMs;
 constexpr int kMostHalvings = 10;
@@ -41,11 +41,24 @@ constexpr int kMostHalvings = 10;
  * Reports older than the last do not count. */
 constexpr double kRoundTripQueue = 0.1, kJitter = 0.03;
 constexpr std::uint64_t kFreshNs = 15'000 * kMs, kReportIntervalNs = 400 * kMs;
+constexpr std::uint64_t kLongestLossNs = 2'000 * kMs;
+constexpr double kLongestElapsed = 6;
+/* No more is sent while one loses so much beyond the usual. */
+constexpr double kReportedLoss = 0.02;
 
 double
 seconds (std::uint64_t ns)
 {
   return 1e-9 * static_cast<double> (ns);
+}
+
+/* Whether to judge loss now. Where one or two of few packets were lost, more are waited for. */
+bool
+is_enough (double packets, double lost, std::uint64_t span_ns)
+{
+  if (span_ns >= kLongestLossNs)
+    return packets > 0;
+  return packets >= kLeastPackets && (lost < 0.5 || lost > 2.5 || packets >= kManyPackets);
 }
 
 } // namespace
@@ -172,7 +185,7 @@ void
 CongestionControl::judge_loss (std::uint64_t now_ns)
 {
   const std::uint64_t span = last_sent_ns_ - losses_since_ns_;
-  if (counted_ < kLeastPackets || span < kLossIntervalNs)
+  if (span < kLossIntervalNs || !is_enough (counted_, counted_lost_, span))
     return;
   const double share = counted_lost_ / counted_;
   const bool congestion = loss_.judge (share, counted_, seconds (span));
@@ -227,7 +240,7 @@ CongestionControl::find_receiver (std::uint32_t id, std::uint64_t now_ns)
   }
   *oldest = Receiver ();
   oldest->id = id;
-  oldest->time_ns = now_ns;
+  oldest->time_ns = oldest->since_ns = now_ns;
   return *oldest;
 }
 
@@ -238,45 +251,64 @@ CongestionControl::receiver_report (
   if (source_ == Source::kPackets && now_ns - report_ns_ < kSilencePacketsNs)
     return;
   Receiver &receiver = find_receiver (report.receiver, now_ns);
+  const double packets = report.packets > 0 ? report.packets : kLeastPackets;
   receiver.time_ns = std::max<std::uint64_t> (now_ns, 1);
-  receiver.lost = std::clamp (report.lost, 0.0, 1.0);
-  receiver.packets = report.packets;
+  receiver.has_news = true;
+  receiver.packets += packets;
+  receiver.lost += packets * std::clamp (report.lost, 0.0, 1.0);
   if (report.round_trip_s > 0)
     receiver.queue_s = report.round_trip_s - receiver.round_trip.add (now_ns, report.round_trip_s);
   receiver.jitters = report.jitter_s - receiver.jitter.add (now_ns, report.jitter_s) > kJitter;
-  if (source_ == Source::kReports && now_ns - report_ns_ < kReportIntervalNs)
-    return; /* with the next one */
-  judge_receivers (sent_bits_per_s, now_ns);
+  if (source_ != Source::kReports)
+    judged_ns_ = 0;
+  note_report (Source::kReports, now_ns);
+  if (judged_ns_ == 0 || now_ns - judged_ns_ >= kReportIntervalNs)
+    judge_receivers (sent_bits_per_s, now_ns);
+}
+
+/* Loss of a receiver that has not reported since is still the worst, but no reason to send less
+ * once more. */
+CongestionControl::Worst
+CongestionControl::find_worst (std::uint64_t now_ns)
+{
+  Worst worst;
+  for (Receiver &receiver : receivers_) {
+    if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
+      continue;
+    const bool is_judged = is_enough (receiver.packets, receiver.lost, now_ns - receiver.since_ns);
+    if (is_judged) {
+      receiver.share = receiver.lost / receiver.packets;
+      receiver.of = receiver.packets;
+      receiver.packets = receiver.lost = 0;
+      receiver.since_ns = now_ns;
+    }
+    if (receiver.share > worst.lost || (is_judged && receiver.share == worst.lost))
+      worst = {receiver.share, receiver.of, worst.queue_s, is_judged, worst.jitters};
+    if (receiver.has_news)
+      worst.queue_s = std::max (worst.queue_s, receiver.queue_s);
+    worst.jitters = worst.jitters || receiver.jitters;
+    receiver.has_news = false;
+  }
+  return worst;
 }
 
 void
 CongestionControl::judge_receivers (double sent_bits_per_s, std::uint64_t now_ns)
 {
-  double lost = 0, packets = 0;
-  bool jitters = false;
-  queue_s_ = 0;
-  for (const Receiver &receiver : receivers_) {
-    if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
-      continue;
-    if (receiver.lost >= lost) {
-      lost = receiver.lost;
-      packets = receiver.packets;
-    }
-    queue_s_ = std::max (queue_s_, receiver.queue_s);
-    jitters = jitters || receiver.jitters;
-  }
-  const bool first = source_ != Source::kReports;
-  const double elapsed = first ? 0 : std::min (seconds (now_ns - report_ns_), 6.0);
-  note_report (Source::kReports, now_ns);
-  const bool congestion =
-      loss_.judge (lost, packets > 0 ? packets : 500, elapsed) || queue_s_ > kRoundTripQueue;
+  const double elapsed =
+      judged_ns_ == 0 ? 0 : std::min (seconds (now_ns - judged_ns_), kLongestElapsed);
+  const Worst worst = find_worst (now_ns);
+  queue_s_ = worst.queue_s;
+  judged_ns_ = now_ns;
+  const bool loses = worst.is_new && loss_.judge (worst.lost, worst.packets, elapsed);
+  const bool is_bad = worst.lost - loss_.usual () > kReportedLoss;
   /* A report that comes at once after a decrease is still of the time before. */
   const bool waits = decrease_ns_ > 0 && now_ns - decrease_ns_ < 2 * kReactionNs;
   if (waits || sent_bits_per_s <= 0)
     return;
-  if (congestion)
-    decrease (sent_bits_per_s * (1 - lost), now_ns);
-  else if (!jitters)
+  if (loses || queue_s_ > kRoundTripQueue)
+    decrease (sent_bits_per_s * (1 - worst.lost), now_ns);
+  else if (!worst.jitters && !is_bad)
     increase (sent_bits_per_s, elapsed);
 }
 

@@ -48,7 +48,9 @@ public:
    *  wrong, by some frame intervals, as its deltas and the packets that they are of do not agree.
    *  @param now_ns  of any steady clock, the same for all calls */
   void packets (std::span<const PacketReport> packets, std::uint64_t now_ns);
-  /** The worst of several receivers counts.
+  /** The worst of several receivers counts, of up to 64. Its loss is judged over 20 packets or two
+   *  seconds at least: with early feedback reports are of few packets, and come because one was
+   *  lost.
    *  @param sent_bits_per_s  the rate of what was sent of late */
   void receiver_report (const ReceiverReport &report, double sent_bits_per_s, std::uint64_t now_ns);
   /** Before each frame set: where reports stay away, the rate falls to half every 3 s (packets) or
@@ -69,8 +71,12 @@ private:
   enum class Source : std::uint8_t { kNone, kPackets, kReports };
   struct Receiver {
     std::uint32_t id = 0;
-    std::uint64_t time_ns = 0; /* 0: free */
-    double lost = 0, packets = 0, queue_s = 0;
+    std::uint64_t time_ns = 0;    /* of its last report; 0: free */
+    double packets = 0, lost = 0; /* since its loss was judged */
+    std::uint64_t since_ns = 0;   /* when that was */
+    double share = 0, of = 0;     /* of packets lost, the last that was judged */
+    bool has_news = false;        /* since the last judgement */
+    double queue_s = 0;
     bool jitters = false;
     RecentLeast round_trip, jitter;
   };
@@ -83,7 +89,12 @@ private:
   void judge_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
   void judge_loss (std::uint64_t now_ns);
   void count_losses (const PacketReport &packet);
+  struct Worst {
+    double lost = 0, packets = 0, queue_s = 0;
+    bool is_new = false, jitters = false;
+  };
   Receiver &find_receiver (std::uint32_t id, std::uint64_t now_ns);
+  Worst find_worst (std::uint64_t now_ns);
   void judge_receivers (double sent_bits_per_s, std::uint64_t now_ns);
 
   CongestionSettings settings_;
@@ -109,7 +120,8 @@ private:
   std::uint64_t losses_since_ns_ = 0; /* sent time of the first packet that is counted */
   double counted_ = 0, counted_lost_ = 0;
 
-  std::array<Receiver, 16> receivers_{}; /* the latest */
+  std::array<Receiver, 64> receivers_{}; /* the latest */
+  std::uint64_t judged_ns_ = 0;          /* when receivers were judged last */
 };
 
 } // namespace rangecast

@@ -34,6 +34,9 @@ constexpr double kOtherClock = 10;
  * never usual. */
 constexpr double kHarmlessLoss = 0.02, kMostUsualLoss = 0.1;
 
+/* Packets that must be lost: of one or two nothing follows. */
+constexpr double kLeastLost = 2.5;
+
 /* The loss that stays of that before, where less is sent, if it was usual. */
 constexpr double kStays = 0.6;
 
@@ -190,7 +193,8 @@ LossJudge::judge (double share, double packets, double elapsed_s)
   if (share < usual_)
     usual_ += 0.3 * (share - usual_);
   const double chance = 2.5 * std::sqrt (usual_ * (1 - usual_) / std::max (packets, 1.0));
-  return share - usual_ > std::max (kHarmlessLoss, chance);
+  const double excess = share - usual_;
+  return excess > std::max (kHarmlessLoss, chance) && excess * packets > kLeastLost;
 }
 
 void
