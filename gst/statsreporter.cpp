@@ -34,6 +34,8 @@ struct StatsReporter::State {
   std::array<gint32, kMostLatencies> latencies_us{};
   std::size_t n_latencies = 0; /* beyond the array's size they have gone round */
 
+  std::atomic<bool> is_reporting{false}; /* because of the timer */
+
   GWeakRef element; /* has a lock of its own; written before the timer runs */
 
   State () { g_weak_ref_init (&element, nullptr); }
@@ -42,6 +44,7 @@ struct StatsReporter::State {
   void unschedule ();
   void begin_interval (GstElement *e, Collect read);
   void report (bool at_end);
+  static void report_elsewhere (const std::shared_ptr<State> &self);
   std::vector<GstStructure *> make_messages (
       GstElement *e, const std::vector<StatsRow> &rows, GstClockTime interval);
 };
@@ -210,6 +213,33 @@ StatsReporter::State::report (bool at_end)
 
 /* ---- the timer ---- */
 
+/* The clock's thread is that of all timers of the process: whoever handles the message at once, or
+ * the end of an element whose last reference this may be, must not hold it up. */
+void
+StatsReporter::State::report_elsewhere (const std::shared_ptr<State> &self)
+{
+  struct Job {
+    std::shared_ptr<State> state;
+    GstElement *element;
+  };
+  if (self->is_reporting.exchange (true)) /* somebody handles the last message still */
+    return;
+  auto e = static_cast<GstElement *> (g_weak_ref_get (&self->element));
+  if (!e)
+    return;
+  const auto work = [] (GstElement *, gpointer data) {
+    State &state = *static_cast<Job *> (data)->state;
+    state.report (false);
+    state.is_reporting = false;
+  };
+  const auto forget = [] (gpointer data) {
+    auto job = static_cast<Job *> (data);
+    gst_object_unref (job->element);
+    delete job;
+  };
+  gst_element_call_async (e, work, new Job{self, e}, forget);
+}
+
 /* With `lock`. */
 void
 StatsReporter::State::unschedule ()
@@ -234,7 +264,7 @@ StatsReporter::State::schedule (const std::shared_ptr<State> &self)
   gst_object_unref (clock);
   const auto on_time = [] (GstClock *, GstClockTime time, GstClockID, gpointer data) -> gboolean {
     if (GST_CLOCK_TIME_IS_VALID (time))
-      (*static_cast<std::shared_ptr<State> *> (data))->report (false);
+      report_elsewhere (*static_cast<std::shared_ptr<State> *> (data));
     return TRUE;
   };
   const auto forget = [] (gpointer data) { delete static_cast<std::shared_ptr<State> *> (data); };

@@ -35,8 +35,8 @@ guint64 view_bits (const rangecast::Rig &rig);
  *
  *  A timer of GStreamer's system clock does it, so that a stream that stalls is seen to: there is
  *  no streaming thread then. Nothing is posted but in PLAYING, and at the end of the stream.
- *  Nothing is allocated but once an interval. No function may be called with a lock held that
- *  `collect` takes. */
+ *  Nothing is allocated but once an interval. start() and finish() may not be called with a
+ *  lock held that `collect` takes. */
 class StatsReporter {
 public:
   /** Reads the counters; on any thread, with locks of the element's own. The element's own row is

@@ -13,6 +13,9 @@
 static thread_local GstClockTime last_capture = GST_CLOCK_TIME_NONE;
 static thread_local gint64 last_rtp_time = -1;
 
+/* Some 200 MB: ten minutes of four views at 30/s. */
+static constexpr std::size_t kMostPassages = 4000000;
+
 static gint64
 thread_cpu_ns ()
 {
@@ -64,7 +67,10 @@ LatencyTrace::note (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
   const Passage passage = {
       point, last_capture, now, last_rtp_time, gint64 (gettid ()), thread_cpu_ns ()};
   std::lock_guard guard (trace.lock_);
-  trace.passages_.push_back (passage);
+  if (trace.passages_.size () < kMostPassages)
+    trace.passages_.push_back (passage);
+  else
+    trace.is_full_ = true;
   return GST_PAD_PROBE_OK;
 }
 
@@ -113,6 +119,9 @@ LatencyTrace::write (const char *path) const
   if (!file)
     return false;
   std::fputs ("# factory element.pad capture-ns rtp-time passed-ns thread thread-cpu-ns\n", file);
+  if (is_full_)
+    g_printerr ("rangecast-run: %s: full after %zu buffers; what came later is missing\n", path,
+        kMostPassages);
   for (const Passage &p : passages_)
     std::fprintf (file, "%s %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 "\n",
         p.point->name.c_str (), GST_CLOCK_TIME_IS_VALID (p.capture) ? std::int64_t (p.capture) : -1,

@@ -41,6 +41,7 @@ private:
 
   GstElement *pipeline_;
   std::vector<std::unique_ptr<Point>> points_;
-  std::mutex lock_; /* guards passages_ */
-  std::deque<Passage> passages_;
+  std::mutex lock_;              /* guards what follows */
+  std::deque<Passage> passages_; /* grows without moving what is there */
+  bool is_full_ = false;
 };
