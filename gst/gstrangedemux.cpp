@@ -145,7 +145,10 @@ push_gap (GstRangeDemux *self, GstPad *pad, GstBuffer *frame_set)
   self->priv->counters.gaps++;
   if (GST_CLOCK_TIME_IS_VALID (time))
     gst_pad_push_event (pad, gst_event_new_gap (time, duration));
-  return gst_pad_is_linked (pad) ? GST_PAD_LAST_FLOW_RETURN (pad) : GST_FLOW_NOT_LINKED;
+  if (!gst_pad_is_linked (pad))
+    return GST_FLOW_NOT_LINKED;
+  const GstFlowReturn last = GST_PAD_LAST_FLOW_RETURN (pad);
+  return last == GST_FLOW_NOT_LINKED ? GST_FLOW_OK : last; /* it was not, then */
 }
 
 static GstFlowReturn
@@ -439,7 +442,8 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames (frame sets), buffers (of single views), gaps (views that "
-          "frame sets lacked), dropped (views and units that are damaged or that no pad is for)",
+          "frame sets lacked), dropped (units that are damaged or of an unknown kind; views whose "
+          "planes do not lie in their buffer)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
