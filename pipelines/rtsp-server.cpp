@@ -305,8 +305,6 @@ load_certificate (const RtspOptions &options)
   return certificate;
 }
 
-static const char kEverybody[] = "everybody";
-
 /* An RTSP server of the library has certificates and passwords in one object. */
 static bool
 set_auth (Server &server)
@@ -325,20 +323,13 @@ set_auth (Server &server)
       gst_rtsp_auth_set_tls_certificate (auth, certificate);
     g_clear_object (&certificate);
   }
-  for (const RtspUser &user : options.users) {
-    GstRTSPToken *token = gst_rtsp_token_new (
-        GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, user.name.c_str (), nullptr);
+  GstRTSPToken *token =
+      gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kViewerRole, nullptr);
+  for (const RtspUser &user : options.users)
     gst_rtsp_auth_add_digest (auth, user.name.c_str (), user.password.c_str (), token);
-    gst_rtsp_token_unref (token);
-  }
-  if (options.users.empty ()) {
-    gst_rtsp_media_factory_add_role (server.factory, kEverybody, "media.factory.access",
-        G_TYPE_BOOLEAN, TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
-    GstRTSPToken *token =
-        gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kEverybody, nullptr);
+  if (options.users.empty ())
     gst_rtsp_auth_set_default_token (auth, token);
-    gst_rtsp_token_unref (token);
-  }
+  gst_rtsp_token_unref (token);
   gst_rtsp_server_set_auth (server.server, auth);
   g_object_unref (auth);
   return good;
