@@ -284,9 +284,10 @@ make_factory (const RtspOptions &options, StreamCounts &counts,
     gst_rtsp_media_factory_set_retransmission_time (
         factory, guint64 (options.retransmission_ms) * GST_MSECOND);
   }
-  for (const RtspUser &user : options.users)
-    gst_rtsp_media_factory_add_role (factory, user.name.c_str (), "media.factory.access",
-        G_TYPE_BOOLEAN, TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
+  /* One role for all who may watch: a role's name is that of a GstStructure, a user's need not be.
+   */
+  gst_rtsp_media_factory_add_role (factory, kViewerRole, "media.factory.access", G_TYPE_BOOLEAN,
+      TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
   g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
       new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
   return factory;

@@ -11,6 +11,9 @@
 
 #include "rtsp-options.hpp"
 
+/** The role of the factory that its viewers must have, where there is authentication. */
+inline constexpr char kViewerRole[] = "viewer";
+
 /** Counted since the start; any thread. */
 struct StreamCounts {
   std::atomic<guint64> frame_sets = 0;   /* that the launch string gave */

@@ -45,6 +45,7 @@ struct Server {
   gint64 stats_at_us = 0;
   std::thread starter; /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
+  std::atomic<bool> ending = false; /* end_stream() will be called */
   std::atomic<bool> stopping = false;
 
   std::mutex lock;                               /* guards what follows */
@@ -88,7 +89,14 @@ before_setup (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   gchar *transport = nullptr;
   gst_rtsp_message_get_header (context->request, GST_RTSP_HDR_TRANSPORT, &transport, 0);
-  const bool is_tcp = transport && std::strstr (transport, "/TCP");
+  gchar **offers = g_strsplit (transport ? transport : "", ",", -1);
+  bool is_tcp = *offers != nullptr; /* and nothing else is offered */
+  for (gchar **offer = offers; *offer; offer++) {
+    gchar *upper = g_ascii_strup (*offer, -1);
+    is_tcp = is_tcp && std::strstr (upper, "/TCP");
+    g_free (upper);
+  }
+  g_strfreev (offers);
   return is_tcp && !static_cast<Server *> (user_data)->options.tcp
              ? GST_RTSP_STS_UNSUPPORTED_TRANSPORT
              : GST_RTSP_STS_OK;
@@ -200,6 +208,7 @@ end_stream (gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   close_all (server);
+  server.ending = false;
   server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
   return G_SOURCE_REMOVE;
 }
@@ -212,6 +221,8 @@ on_stream_end (Server &server, const std::string &why)
     return;
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
+  if (server.ending.exchange (true))
+    return; /* one failure often is two messages */
   g_timeout_add (why.empty () ? 500 : 0, end_stream, &server); /* EOS goes to the viewers before */
 }
 
@@ -305,8 +316,6 @@ load_certificate (const RtspOptions &options)
   return certificate;
 }
 
-static const char kEverybody[] = "everybody";
-
 /* An RTSP server of the library has certificates and passwords in one object. */
 static bool
 set_auth (Server &server)
@@ -325,20 +334,13 @@ set_auth (Server &server)
       gst_rtsp_auth_set_tls_certificate (auth, certificate);
     g_clear_object (&certificate);
   }
-  for (const RtspUser &user : options.users) {
-    GstRTSPToken *token = gst_rtsp_token_new (
-        GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, user.name.c_str (), nullptr);
+  GstRTSPToken *token =
+      gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kViewerRole, nullptr);
+  for (const RtspUser &user : options.users)
     gst_rtsp_auth_add_digest (auth, user.name.c_str (), user.password.c_str (), token);
-    gst_rtsp_token_unref (token);
-  }
-  if (options.users.empty ()) {
-    gst_rtsp_media_factory_add_role (server.factory, kEverybody, "media.factory.access",
-        G_TYPE_BOOLEAN, TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
-    GstRTSPToken *token =
-        gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kEverybody, nullptr);
+  if (options.users.empty ())
     gst_rtsp_auth_set_default_token (auth, token);
-    gst_rtsp_token_unref (token);
-  }
+  gst_rtsp_token_unref (token);
   gst_rtsp_server_set_auth (server.server, auth);
   g_object_unref (auth);
   return good;

@@ -21,7 +21,8 @@ struct Message {
 };
 
 /* Locks: `sending`, then `lock`. `lock` is not held while anything is called. */
-class TcpQueue {
+/* Behind the callbacks of transports; shared, since those may run while it is closed. */
+class TcpQueue : public std::enable_shared_from_this<TcpQueue> {
 public:
   TcpQueue (
       GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out);
@@ -31,9 +32,6 @@ public:
   void note_sent ();
   void keep_alive ();
   void close ();
-
-  /* The one behind a transport's callbacks; shared, since they may run while it is closed. */
-  std::shared_ptr<TcpQueue> self;
 
 private:
   void leave_out_all ();
@@ -184,6 +182,9 @@ TcpQueue::take (const Message &message)
 void
 TcpQueue::wake ()
 {
+  Handle handle = weak_from_this ().lock ();
+  if (!handle)
+    return;
   {
     std::lock_guard guard (lock_);
     if (woken_ || draining_ || busy_ || closed_ || waiting_.empty ())
@@ -196,7 +197,7 @@ TcpQueue::wake ()
     queue_of (handle).send_waiting ();
     return G_SOURCE_REMOVE;
   };
-  g_source_set_callback (source, send, new Handle (self), delete_handle);
+  g_source_set_callback (source, send, new Handle (std::move (handle)), delete_handle);
   g_source_attach (source, context_);
   g_source_unref (source);
 }
@@ -300,7 +301,6 @@ delete_tap (gpointer user_data)
 {
   auto tap = static_cast<Tap *> (user_data);
   gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
-  tap->queue->self.reset ();
   g_object_unref (tap->ours);
   g_object_unref (tap->stream);
   delete tap;
@@ -341,7 +341,6 @@ tap_transport (
   GstRTSPStream *stream = gst_rtsp_stream_transport_get_stream (transport);
   auto queue = std::make_shared<TcpQueue> (transport, context, left_out);
   GstRTSPStreamTransport *ours = make_transport (transport, queue);
-  queue->self = queue;
   gst_rtsp_stream_transport_set_message_sent (
       transport, [] (gpointer handle) { queue_of (handle).note_sent (); }, new Handle (queue),
       delete_handle);
