@@ -92,15 +92,18 @@ is_control (char c)
 /* Text that comes in blocks. */
 class StorageScanner {
 public:
-  StorageScanner (std::string_view binary_type, bool xml_is_good)
-      : header_ (binary_type.empty () ? "" : encoded_header (binary_type)),
-        xml_is_good_ (xml_is_good)
+  explicit StorageScanner (const StorageLimits &limits)
+      : limits_ (limits),
+        header_ (limits.binary_type.empty () ? "" : encoded_header (limits.binary_type))
   {
   }
 
   /** Looks at the first `count` bytes of `text`; the others say what follows. */
   void scan (std::string_view text, std::size_t count)
   {
+    bytes_ += count;
+    if (bytes_ > limits_.max_bytes)
+      complaint_ = "has more than " + std::to_string (limits_.max_bytes) + " bytes";
     for (std::size_t i = 0; i < count && complaint_.empty (); i++) {
       complaint_ = look_at (text.substr (i));
       before_.add (text[i]);
@@ -113,7 +116,7 @@ private:
   {
     if (is_control (rest[0]))
       return "has control characters, which no text has";
-    if (rest[0] == '<' && before_.solid == '\n' && !xml_is_good_)
+    if (rest[0] == '<' && before_.solid == '\n' && !limits_.xml)
       return "is XML";
     if (is_sign (rest) && ++signs_ > kMaxSigns)
       return "has more than " + std::to_string (kMaxSigns) + " lists, maps or fields";
@@ -125,8 +128,9 @@ private:
     return {};
   }
 
+  const StorageLimits limits_;
   std::string header_, complaint_;
-  bool xml_is_good_;
+  std::uint64_t bytes_ = 0;
   int signs_ = 0;
   Before before_;
 };
@@ -134,7 +138,7 @@ private:
 } // namespace
 
 Status
-check_storage (const std::string &path, std::string_view binary_type, bool xml_is_good)
+check_storage (const std::string &path, const StorageLimits &limits)
 {
   /* Reads what is not compressed as it is. OpenCV goes by the name. */
   const std::unique_ptr<gzFile_s, int (*) (gzFile)> file (gzopen (path.c_str (), "rb"), gzclose);
@@ -142,7 +146,7 @@ check_storage (const std::string &path, std::string_view binary_type, bool xml_i
     return {};
   if (!gzdirect (file.get ()) && !path.ends_with (".gz"))
     return {StatusCode::kBadData, path + ": is compressed; expected a name that ends in .gz"};
-  StorageScanner scanner (binary_type, xml_is_good);
+  StorageScanner scanner (limits);
   std::vector<char> text;
   std::size_t kept = 0;
   for (bool at_end = false; !at_end && scanner.complaint ().empty ();) {

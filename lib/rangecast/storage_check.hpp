@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -8,16 +9,19 @@
 
 namespace rangecast {
 
+/** What a file may be. */
+struct StorageLimits {
+  std::uint64_t max_bytes = 64 << 20; ///< unpacked, where it is compressed
+  std::string_view binary_type = "";  ///< of data in base64, as OpenCV writes it ("8f"); "": none
+  bool xml = true;                    ///< besides YAML and JSON
+};
+
 /** Whether cv::FileStorage may be given a file of somebody else's to read. Its parsers (of 4.6)
  * call themselves once for each level of nesting, so that a short file ends the process; never end
  * at binary data whose header names no type; and read beyond lines that hold a 0. Refuses files
  * with more collections than any of ours has, binary data with another header, and control
  * characters. Reads the file once, in blocks (also .gz).
- *  @param binary_type  what data in base64 may consist of, as OpenCV writes it ("8f"); "": no such
- *                      data is expected
- *  @param xml_is_good  whether the file may be XML, besides YAML and JSON
  *  @return kBadData that begins with the path; kOk too if the file cannot be opened */
-Status check_storage (
-    const std::string &path, std::string_view binary_type = "", bool xml_is_good = true);
+Status check_storage (const std::string &path, const StorageLimits &limits = {});
 
 } // namespace rangecast

@@ -7,6 +7,7 @@
 #include <rangecast/roi/background.hpp>
 #include <rangecast/storage_check.hpp>
 #include <unistd.h>
+#include <zlib.h>
 
 using namespace rangecast;
 using rangecast::testing::ring_rig;
@@ -40,7 +41,7 @@ repeated (const std::string &text, int count)
 void
 expect_refused (const TestFile &file, const char *why)
 {
-  const Status status = check_storage (file.path (), "8f");
+  const Status status = check_storage (file.path (), {.binary_type = "8f"});
   EXPECT_EQ (status.code (), StatusCode::kBadData);
   EXPECT_TRUE (status.message ().starts_with (file.path ()));
   EXPECT_NE (status.message ().find (why), std::string::npos) << status.message ();
@@ -119,7 +120,7 @@ TEST (StorageCheck, xml_is_refused_where_it_is_not_expected)
   const TestFile file (
       "a.yml", "\xef\xbb\xbf\n <?xml version=\"1.0\"?>\n<opencv_storage>\n</opencv_storage>\n");
   EXPECT_TRUE (check_storage (file.path ()).ok ());
-  EXPECT_FALSE (check_storage (file.path (), "", false).ok ());
+  EXPECT_FALSE (check_storage (file.path (), {.xml = false}).ok ());
 }
 
 TEST (StorageCheck, binary_data_are_found_wherever_blocks_end)
@@ -127,7 +128,7 @@ TEST (StorageCheck, binary_data_are_found_wherever_blocks_end)
   for (int before = 65536 - 600; before < 65536 + 40; before += 7) {
     const TestFile file ("a.yml", "%YAML:1.0\n---\n#" + std::string (std::size_t (before), 'x') +
                                       "\na: !!binary |\n    " + std::string (64, 'A') + "\n");
-    EXPECT_FALSE (check_storage (file.path (), "8f").ok ()) << before;
+    EXPECT_FALSE (check_storage (file.path (), {.binary_type = "8f"}).ok ()) << before;
   }
 }
 
@@ -136,10 +137,10 @@ TEST (StorageCheck, matrices_of_the_expected_type_pass)
   for (const char *name : {"a.yml", "b.json", "c.xml"}) {
     const TestFile right (name, matrix_text (name, CV_32FC (8))),
         other (name, matrix_text (name, CV_8UC3));
-    EXPECT_FALSE (check_storage (other.path (), "8f").ok ()) << name;
+    EXPECT_FALSE (check_storage (other.path (), {.binary_type = "8f"}).ok ()) << name;
     EXPECT_FALSE (check_storage (TestFile (name, matrix_text (name, CV_32FC (8))).path ()).ok ());
     const TestFile again (name, matrix_text (name, CV_32FC (8)));
-    EXPECT_TRUE (check_storage (again.path (), "8f").ok ()) << name;
+    EXPECT_TRUE (check_storage (again.path (), {.binary_type = "8f"}).ok ()) << name;
   }
 }
 
@@ -161,6 +162,23 @@ TEST (StorageCheck, largest_rig_passes)
     Rig again;
     EXPECT_TRUE (load_rig (file.path (), again).ok ());
   }
+}
+
+TEST (StorageCheck, file_that_unpacks_to_more_than_the_limit_is_refused)
+{
+  const TestFile file ("a.yml.gz");
+  const std::unique_ptr<gzFile_s, int (*) (gzFile)> packed (
+      gzopen (file.path ().c_str (), "wb"), gzclose);
+  const std::string line = "# " + std::string (1021, 'x') + "\n";
+  for (int i = 0; i < 8 << 10; i++)
+    gzwrite (packed.get (), line.data (), unsigned (line.size ()));
+  gzflush (packed.get (), Z_FINISH);
+  EXPECT_LT (std::filesystem::file_size (file.path ()), 1u << 20);
+  EXPECT_TRUE (check_storage (file.path (), {.max_bytes = 9 << 20}).ok ());
+  const Status status = check_storage (file.path (), {.max_bytes = 7 << 20});
+  EXPECT_NE (status.message ().find ("bytes"), std::string::npos) << status.message ();
+  Rig rig;
+  EXPECT_EQ (load_rig (file.path (), rig).code (), StatusCode::kBadData);
 }
 
 TEST (StorageCheck, compressed_file_is_looked_into_and_must_say_so)

@@ -13,6 +13,8 @@ namespace rangecast {
 static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
 
 constexpr int kFileVersion = 2;
+/* In base64 a pixel takes 43 bytes, and spaces: some 20 views of 1920x1080. */
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{2} << 30;
 constexpr std::uint32_t kLongestAdaptMs = 10'000;
 constexpr int kAdaptSteps = 1000; // of 10 ms
 
@@ -209,7 +211,7 @@ load_backgrounds (const std::string &path, std::vector<std::pair<int, Background
   std::error_code error;
   if (!std::filesystem::is_regular_file (path, error))
     return {StatusCode::kNotFound, path + ": no such file; " + expected};
-  if (Status s = check_storage (path, "8f"); !s.ok ())
+  if (Status s = check_storage (path, {.max_bytes = kMaxFileBytes, .binary_type = "8f"}); !s.ok ())
     return {s.code (), s.message () + "; " + expected};
   std::vector<std::pair<int, BackgroundModel>> loaded;
   try {
