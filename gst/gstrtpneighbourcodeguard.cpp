@@ -261,7 +261,8 @@ static Verdict
 judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
     GstBuffer *buffer, std::vector<GstBuffer *> &stream)
 {
-  const bool here = same_sender (packet.address, priv->address);
+  /* What rtprtxreceive put together again has no address; what comes from the network has. */
+  const bool here = !packet.address || same_sender (packet.address, priv->address);
   if (is_senders (priv, packet, here)) {
     if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;

@@ -14,13 +14,14 @@ usage: record.sh FILE [options]
   --size WxH     picture size (default 320x240)
   --frames N     frame sets (default 60)
 With --listen:
+  --jitter MS    jitter buffer (default 50)
   --multicast GROUP  the parent sends to this multicast group
   --interface IF  network interface to the group (default: the system's choice)
 END
   rtp_usage_receiver
 }
 
-file= listen= views=4 size=320x240 frames=60 group=
+file= listen= views=4 size=320x240 frames=60 group= jitter=50
 while [ $# -gt 0 ]; do
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
@@ -32,6 +33,7 @@ while [ $# -gt 0 ]; do
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --frames) frames=${2:-}; shift ;;
+    --jitter) jitter=${2:-}; shift ;;
     --multicast) group=${2:-}; shift ;;
     --interface) rtp_interface=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
@@ -47,8 +49,9 @@ need_size "$size" --size
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
+  need_number "$jitter" --jitter 0 10000
   rtp_check receiver
-  receive_rtp 0 "$listen" 50 4194304 "$group"
+  receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
   source=("${rtp[@]}")
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true

@@ -103,9 +103,10 @@ receive_rtp () {
       rtpsession "name=session$1" rtp-profile=avpf rtcp-min-interval=20000000 "session$1.send_rtcp_src")
     [ -z "$rtp_key" ] || rtp+=(! "encrypt$1.rtcp_sink_0" srtpenc "name=encrypt$1" "encrypt$1.rtcp_src_0")
     rtp+=(! udpsink "host=$host" "port=$port" sync=false async=false "session$1.recv_rtp_src")
-    [ -z "$rtp_rtx" ] || rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
-    rtp+=(! rtpneighbourcodeguard) # names the stream in requests
   fi
+  # Also where nobody asks: it drops what the sender sends again because somebody else asked.
+  rtp+=(! rtprtxreceive "payload-type-map=$rtx_map")
+  [ -z "$rtp_feedback" ] || rtp+=(! rtpneighbourcodeguard) # names the stream in requests
   [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
   # Of the number of a sender that begins again nothing follows: expect a second of loss at most.
   rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)

@@ -9,6 +9,17 @@ namespace {
 constexpr std::size_t kKeyBytes = 30; /* of AES-128 in counter mode, RFC 3711 */
 constexpr guint kClosedPackets = 20;  /* in a row, before somebody is told */
 
+constexpr guint kKeysAtATime = 16;         /* that srtpdec gets for SSRCs it does not know ... */
+constexpr gint64 kKeysTimeUs = 10'000'000; /* ... in so long: each costs it memory for ever */
+
+/** Who got the key of a srtpdec: before it can know whether packets are genuine, it asks for each
+ *  SSRC that comes. */
+struct Granted {
+  GstBuffer *key;
+  gint64 since_us = 0;
+  guint count = 0;
+};
+
 /** What goes into a srtpdec and comes out of it; its streaming threads count. */
 struct Watched {
   std::string name, path;
@@ -43,10 +54,18 @@ read_key (const char *path)
 GstCaps *
 on_request_key (GstElement *, guint ssrc, gpointer user_data)
 {
+  auto granted = static_cast<Granted *> (user_data);
+  const gint64 now_us = g_get_monotonic_time ();
+  if (now_us - granted->since_us > kKeysTimeUs) {
+    granted->since_us = now_us;
+    granted->count = 0;
+  }
+  if (++granted->count > kKeysAtATime)
+    return nullptr; /* the packet is dropped; a good sender's next ones ask again */
   return gst_caps_new_simple ("application/x-srtp", "ssrc", G_TYPE_UINT, ssrc, "srtp-key",
-      GST_TYPE_BUFFER, static_cast<GstBuffer *> (user_data), "srtp-cipher", G_TYPE_STRING,
-      "aes-128-icm", "srtp-auth", G_TYPE_STRING, "hmac-sha1-80", "srtcp-cipher", G_TYPE_STRING,
-      "aes-128-icm", "srtcp-auth", G_TYPE_STRING, "hmac-sha1-80", nullptr);
+      GST_TYPE_BUFFER, granted->key, "srtp-cipher", G_TYPE_STRING, "aes-128-icm", "srtp-auth",
+      G_TYPE_STRING, "hmac-sha1-80", "srtcp-cipher", G_TYPE_STRING, "aes-128-icm", "srtcp-auth",
+      G_TYPE_STRING, "hmac-sha1-80", nullptr);
 }
 
 GstPadProbeReturn
@@ -92,9 +111,11 @@ watch (GstElement *decrypter, const char *path)
 }
 
 void
-release_key (gpointer key, GClosure *)
+release_key (gpointer data, GClosure *)
 {
-  gst_buffer_unref (static_cast<GstBuffer *> (key));
+  auto granted = static_cast<Granted *> (data);
+  gst_buffer_unref (granted->key);
+  delete granted;
 }
 
 } // namespace
@@ -113,7 +134,7 @@ give_srtp_key (GstElement *pipeline, const char *path)
       g_object_set (element, "key", key, nullptr);
     } else if (g_str_equal (name, "srtpdec")) {
       g_signal_connect_data (element, "request-key", G_CALLBACK (on_request_key),
-          gst_buffer_ref (key), release_key, GConnectFlags (0));
+          new Granted{gst_buffer_ref (key)}, release_key, GConnectFlags (0));
       watch (element, path);
     }
   }
