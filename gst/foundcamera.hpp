@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,8 @@ struct FoundCamera {
   std::string serial;      ///< empty if the camera does not tell
   std::string address;     ///< IP address, or the device node of a USB camera
   std::string physical_id; ///< MAC address; empty for USB
-  std::string user_name;   ///< GigE: the user-defined name; empty if it has none
-  std::string problem;     ///< why it cannot be opened and what to do; empty if it can
+  std::optional<std::string> user_name; ///< GigE: the user-defined name; none: it did not say
+  std::string problem;                  ///< why it cannot be opened and what to do; empty if it can
 
   bool operator== (const FoundCamera &) const = default;
 

@@ -98,16 +98,16 @@ GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdevicepr
 
 /*** What is there ***/
 
-/** A camera's user-defined name, which discovery does not tell: it is asked for once, while the
- *  camera stays. */
-static std::string
+/** A camera's user-defined name, which discovery does not tell: it is asked for until it answers,
+ *  and once while it stays. */
+static std::optional<std::string>
 user_name_of (const CameraInfo &info, const FoundCameras &known)
 {
   const auto is_same = [&] (const FoundCamera &camera) {
     return camera.id == info.id && camera.address == info.address;
   };
   const auto at = std::ranges::find_if (known, is_same);
-  return at != known.end () ? at->user_name : read_user_name (info.address).value_or ("");
+  return at != known.end () && at->user_name ? at->user_name : read_user_name (info.address);
 }
 
 /** The GigE Vision cameras that answer. USB comes from libusb, which tells about hotplug and

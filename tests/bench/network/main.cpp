@@ -6,6 +6,7 @@
 
 #include <gst/gst.h>
 
+#include <cmath>
 #include <cstdio>
 
 namespace {
@@ -43,6 +44,12 @@ print_json (const NetworkCase &c, const NetworkResult &r)
       r.wrong_points, r.freeze_ms, r.recovery_ms, r.latency_p50_ms, r.latency_p99_ms, r.media_kbit,
       r.extra_share, (unsigned long long)r.network.in, (unsigned long long)r.network.lost);
   std::fflush (stdout);
+}
+
+std::string
+recovery_text (const NetworkResult &r)
+{
+  return r.recovery_ms < 0 ? "not in time" : std::to_string (std::lround (r.recovery_ms)) + " ms";
 }
 
 std::vector<NetworkCase>
@@ -110,10 +117,11 @@ table (const NetworkCase &base, std::span<const Kind> kinds, bool only_losses, b
       if (json)
         print_json (c, r);
       else
-        std::printf ("| %s | %s | %.1f %% | %.0f %% | %lld | %.0f ms | %.0f ms | %.0f, %.0f ms | "
+        std::printf ("| %s | %s | %.1f %% | %.0f %% | %lld | %.0f ms | %s | %.0f, %.0f ms | "
                      "%.0f %% |\n",
             c.name.c_str (), kind.name, 100 * r.points_share, 100 * r.whole_share, r.wrong_points,
-            r.freeze_ms, r.recovery_ms, r.latency_p50_ms, r.latency_p99_ms, 100 * r.extra_share);
+            r.freeze_ms, recovery_text (r).c_str (), r.latency_p50_ms, r.latency_p99_ms,
+            100 * r.extra_share);
       std::fflush (stdout);
     }
   return right;
