@@ -11,8 +11,8 @@
  * |[
  * gst-launch-1.0 udpsrc port=5004
  * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
- * rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec ! cylinderfilter ! striprender !
- * glimagesink
+ * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
