@@ -127,7 +127,7 @@ test_a_viewer_that_joins_gets_a_key_frame_set_through_the_parent () {
 }
 
 points_per_set () { # file
-  timeout 60 count-points "$1" 2>/dev/null | awk '/^frame set/ { n++ } / points/ { sum += $(NF - 1) } END { print int (n > 20 ? sum / n : 0) }'
+  timeout 60 count-points "$1" 2>/dev/null | awk '/^frame set/ { n++ } / points/ { sum += $3 } END { print int (n > 20 ? sum / n : 0) }'
 }
 
 # Of two viewers that lose a fifth of their packets the first, who is helped, has many more points.
