@@ -42,6 +42,8 @@ CamSourceSession::open_cameras ()
     std::unique_ptr<Camera> camera;
     CameraInfo seen;
     CameraStatus status = Camera::open (names_[i], camera, &seen);
+    if (status.fault () == CameraFault::kBusy && wait_for_leavers ())
+      status = Camera::open (names_[i], camera, &seen);
     if (status.fault () == CameraFault::kBusy)
       status = busy_or_twice (seen, i, std::move (status));
     CameraAbilities abilities;

@@ -17,6 +17,10 @@ static constexpr Milliseconds kRetry{1000}, kGapTime{100};
 static constexpr GstClockTime kClockPatience = 10 * GST_SECOND;
 
 /* Exposed, and on its way no longer than until the next one: else pictures would pile up. */
+/* Sessions of this process that were told to stop and have not ended: one that looked for its
+ * cameras may open one yet, for the moment until it sees that nobody wants it. */
+static std::atomic<int> leaving = 0;
+
 GstClockTime
 CamSourceSession::latency_of (GstClockTime exposure, GstClockTime period)
 {
@@ -64,6 +68,7 @@ CamSourceSession::begin (Setup setup)
     {
       std::lock_guard guard (self->lock_);
       self->ended_ = true;
+      leaving -= self->quit_;
       self->changed_.notify_all ();
     }
     self.reset ();
@@ -353,6 +358,7 @@ CamSourceSession::ask_to_stop ()
 {
   {
     std::lock_guard guard (lock_);
+    leaving += !quit_ && !ended_;
     quit_ = true;
     changed_.notify_all ();
   }
@@ -372,6 +378,18 @@ CamSourceSession::set_has_cameras (bool has)
   std::lock_guard guard (lock_);
   has_cameras_ = has;
   changed_.notify_all ();
+}
+
+bool
+CamSourceSession::wait_for_leavers ()
+{
+  static constexpr Milliseconds kLook (50), kMost (5000);
+  bool waited = false;
+  for (Milliseconds passed (0); leaving > 0 && !quits () && passed < kMost; passed += kLook) {
+    waited = true;
+    std::this_thread::sleep_for (kLook);
+  }
+  return waited && !quits ();
 }
 
 bool

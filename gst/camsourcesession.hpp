@@ -83,6 +83,8 @@ private:
   End one_guarded_life ();
   End one_life ();
   bool open_with_gaps ();
+  /** @return whether there were such sessions of this process, and this one is still wanted */
+  bool wait_for_leavers ();
   bool stands_fault ();
   bool tell_fault ();
   void rest_before_retry ();
