@@ -35,6 +35,8 @@ split_address () {
   host=${1%:*} port=${1##*:}
   [[ "$1" == *:* && -n "$host" && "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1 ] && [ "$port" -le 65535 ] ||
     die "$2: expected HOST:PORT, got '$1'"
+  [[ "$host" =~ ^[0-9.]+$ || "$host" == *:* ]] || getent ahosts "$host" >/dev/null || # udpsink would say nothing
+    die "$2: no host is called '$host'"
 }
 
 # usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets $addresses for multiudpsink
@@ -45,6 +47,9 @@ split_addresses () {
   for one in "${list[@]}"; do split_address "$one" "$2"; done
   addresses=$1
 }
+
+# usage: has_display -> false where a window would show nothing to anybody
+has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
 
 # usage: need_number VALUE option minimum maximum
 need_number () {

@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <glib-unix.h>
 
+#include <clocale>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -213,6 +214,7 @@ quit (gpointer loop)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   FakeCameraOptions options;
   if (const int status = read_fake_camera_options (argc, argv, options); status >= 0)
     return status;

@@ -28,6 +28,7 @@ done
 [ -n "$file" ] || { usage >&2; die "expected a file to play"; }
 [ -f "$file" ] || die "no file '$file'"
 need_size "$size" --size
+[ -n "$film" ] || has_display || die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
 
 # gst-launch-1.0 -e may wait for ever after an error that comes before the first picture.
 if [ -z "${RANGECAST_LAUNCH:-}" ] && command -v rangecast-run >/dev/null; then

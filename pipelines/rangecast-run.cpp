@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <clocale>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -559,6 +560,7 @@ open_stats (Runner &runner)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   Runner runner;
   if (!parse_arguments (&argc, &argv, runner.options) || !open_stats (runner))
     return 2;

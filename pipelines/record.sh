@@ -50,6 +50,7 @@ need_size "$size" --size
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
   need_number "$jitter" --jitter 0 10000
+  [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
   rtp_check receiver
   receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
   source=("${rtp[@]}")

@@ -4,6 +4,7 @@
 #include <gst/app/gstappsrc.h>
 #include <gst/gst.h>
 
+#include <clocale>
 #include <cmath>
 #include <cstdio>
 #include <gstrange/gstrange.h>
@@ -428,6 +429,7 @@ parse_arguments (int *argc, char ***argv, Options &options)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   Options options;
   const int status = parse_arguments (&argc, &argv, options) ? (check_rig (options) ? 0 : 1) : 2;
   g_free (options.png);

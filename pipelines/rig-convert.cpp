@@ -3,6 +3,7 @@
  * Luxonis (OAK-D) factory calibration, or a Middlebury calib.txt. */
 #include <glib.h>
 
+#include <clocale>
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
@@ -436,6 +437,7 @@ parse_arguments (int *argc, char ***argv, Options &options)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   Options options;
   int status = 0;
   if (!parse_arguments (&argc, &argv, options))

@@ -12,6 +12,7 @@
 #include <netinet/tcp.h>
 
 #include <algorithm>
+#include <clocale>
 #include <cstdio>
 #include <cstring>
 #include <map>
@@ -450,6 +451,7 @@ serve (Server &server, GSource *source)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   int result = 1;
   {
     Server server;

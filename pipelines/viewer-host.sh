@@ -45,11 +45,13 @@ need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
 need_size "$size" --size
 [[ -z "$group" || "$group" =~ ^2(2[4-9]|3[0-9])(\.[0-9]{1,3}){3}$ ]] || die "--multicast: expected a group from 224.0.0.0 to 239.255.255.255, got '$group'"
+[ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 rtp_check receiver
 receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
 sinks=(picture. ! queue max-size-buffers=2 leaky=downstream ! fakesink name=snapshot sync=false async=false)
 if [ -n "$window" ]; then
+  has_display || echo "viewer-host.sh: --window: neither DISPLAY nor WAYLAND_DISPLAY is set; only a sink that needs none will show anything" >&2
   sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink sync=false)
 fi
 if [ -n "$out" ]; then

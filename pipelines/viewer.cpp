@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <clocale>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -659,6 +660,7 @@ clear (Viewer &viewer)
 int
 main (int argc, char **argv)
 {
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   Viewer viewer;
   if (!parse_arguments (&argc, &argv, viewer.options)) {
     clear_options (viewer.options);
