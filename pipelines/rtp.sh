@@ -110,7 +110,8 @@ receive_rtp () {
   [ -z "$rtp_fec" ] || rtp+=(! rtpstorage size-time=500000000)
   # Of the number of a sender that begins again nothing follows: expect a second of loss at most.
   rtp+=(! rtpjitterbuffer "latency=$3" max-dropout-time=1000 max-misorder-time=500)
-  [ -z "$rtp_rtx" ] || rtp+=(do-retransmission=true)
+  # Without rtx-next-seqnum=false the first packet of a frame set that is later than the one before counts as lost.
+  [ -z "$rtp_rtx" ] || rtp+=(do-retransmission=true rtx-next-seqnum=false)
   [ -z "$rtp_fec" ] || rtp+=(do-lost=true ! rtpulpfecdec pt=122)
   rtp+=(! rtpneighbourcodedepay)
 }

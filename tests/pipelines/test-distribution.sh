@@ -163,6 +163,26 @@ test_retransmission_makes_frame_sets_whole_between_hosts () {
   expect_repair
 }
 
+# Capture times of the frame sets of a file that lack nothing.
+whole_times () { # file
+  "${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/stream-report" --list "$1" 2>/dev/null | awk '!/!/ { print $1 }' | sort
+}
+
+# Who may ask takes nothing for lost that is only late.
+test_retransmission_costs_nothing_on_a_good_network () {
+  start_network one two
+  camera_options="--input range --encoder profile=entropy"
+  start_hosts --to "$(list one two)" --rtx --feedback 5200
+  start_viewer two
+  start_viewer one --rtx --feedback "$(net_address parent):5200"
+  wait_for_whole_sets one.rcnc 40 90
+  wait_for_whole_sets two.rcnc 40 90
+  local first last missing
+  first=$(whole_times one.rcnc | head -n 1) last=$(whole_times one.rcnc | tail -n 1)
+  missing=$(comm -13 <(whole_times one.rcnc) <(whole_times two.rcnc) | awk -v a="$first" -v b="$last" '$1 > a && $1 < b' | wc -l)
+  [ "$missing" -le 1 ] || fail "$missing frame sets of those that came without retransmission did not come with it"
+}
+
 resident_kb () { awk '/^VmRSS/ { print $2 }' "/proc/$1/status"; }
 
 # Nothing grows where a viewer does not read: neither the parent, nor the viewer when it goes on.

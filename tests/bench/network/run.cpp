@@ -238,7 +238,7 @@ receiver_launch (const NetworkCase &c)
   s += " ! rtpjitterbuffer max-dropout-time=1000 max-misorder-time=500 latency=" +
        std::to_string (c.jitter_buffer_ms);
   if (c.rtx)
-    s += " do-retransmission=true";
+    s += " do-retransmission=true rtx-next-seqnum=false";
   if (c.fec_percent)
     s += " do-lost=true ! rtpulpfecdec pt=122";
   return s +
