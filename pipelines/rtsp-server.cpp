@@ -220,11 +220,12 @@ on_stream_end (Server &server, const std::string &why)
 {
   if (server.stopping)
     return;
+  if (server.ending.exchange (true))
+    return; /* one failure often is several messages, of which the first says why */
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
-  if (server.ending.exchange (true))
-    return; /* one failure often is two messages */
-  g_timeout_add (why.empty () ? 500 : 0, end_stream, &server); /* EOS goes to the viewers before */
+  /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
+  g_timeout_add (500, end_stream, &server);
 }
 
 /* Runs the launch string before anybody asks for it. It takes as long as it waits for its first
