@@ -47,11 +47,15 @@ struct Server {
   std::thread starter; /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
   std::atomic<bool> ending = false; /* end_stream() will be called */
+  std::atomic<gint64> ended_at_us = 0, asked_at_us = 0;
   std::atomic<bool> stopping = false;
 
   std::mutex lock;                               /* guards what follows */
   std::map<GstRTSPClient *, gint64> connections; /* connected when; monotonic, us */
 };
+
+/* In which a player that has got its DESCRIBE goes on to SETUP. */
+static constexpr gint64 kSetup_us = 2 * G_USEC_PER_SEC;
 
 /* ---- connections ---- */
 
@@ -80,7 +84,11 @@ on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 static GstRTSPStatusCode
 before_describe (GstRTSPClient *, GstRTSPContext *, gpointer user_data)
 {
-  static_cast<Server *> (user_data)->holder.wait_for_release ();
+  auto server = static_cast<Server *> (user_data);
+  while (server->ending && !server->stopping) /* what ends is not joined: the next run is */
+    g_usleep (20000);
+  server->asked_at_us = g_get_monotonic_time (); /* has no session yet, but is not to be let down */
+  server->holder.wait_for_release ();
   return GST_RTSP_STS_OK;
 }
 
@@ -188,10 +196,16 @@ close_useless_connections (Server &server)
   g_list_free_full (clients, g_object_unref);
 }
 
+/* But for those who came when the stream had ended: they wait for the next run. */
 static GstRTSPFilterResult
-close_connection (GstRTSPServer *, GstRTSPClient *, gpointer)
+close_connection (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 {
-  return GST_RTSP_FILTER_REMOVE;
+  auto &server = *static_cast<Server *> (user_data);
+  std::lock_guard guard (server.lock);
+  const auto found = server.connections.find (client);
+  return server.ending && found != server.connections.end () && found->second > server.ended_at_us
+             ? GST_RTSP_FILTER_KEEP
+             : GST_RTSP_FILTER_REMOVE;
 }
 
 /* ---- the stream ---- */
@@ -200,7 +214,7 @@ static void
 close_all (Server &server)
 {
   g_list_free_full (
-      gst_rtsp_server_client_filter (server.server, close_connection, nullptr), g_object_unref);
+      gst_rtsp_server_client_filter (server.server, close_connection, &server), g_object_unref);
   server.holder.release ();
 }
 
@@ -222,6 +236,7 @@ on_stream_end (Server &server, const std::string &why)
     return;
   if (server.ending.exchange (true))
     return; /* one failure often is several messages, of which the first says why */
+  server.ended_at_us = g_get_monotonic_time ();
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
   /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
@@ -296,7 +311,7 @@ on_second (gpointer user_data)
     server.idle_since_us = now;
   if (server.options.always)
     keep_running (server);
-  else if (server.idle_since_us > 0 &&
+  else if (server.idle_since_us > 0 && !server.ending && now - server.asked_at_us > kSetup_us &&
            now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
     server.holder.release ();
   print_stats (server);
