@@ -78,8 +78,8 @@ GST_ELEMENT_REGISTER_DEFINE (
 
 /* ---- caps ---- */
 
-/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes the
- * requests for key frame sets (PLI, FIR) that an encoder before us answers. */
+/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes
+ * the requests for key frame sets (PLI, FIR) that an encoder before us answers. */
 static gboolean
 set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
 {
