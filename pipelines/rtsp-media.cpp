@@ -388,8 +388,17 @@ MediaHolder::hold (GstRTSPMedia *media)
     g_ptr_array_add (transports_, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
   media_ = GST_RTSP_MEDIA (g_object_ref (media));
   gst_rtsp_media_complete_pipeline (media, transports_);
-  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
   return true;
+}
+
+void
+MediaHolder::start (GstRTSPMedia *media)
+{
+  std::lock_guard guard (lock_);
+  if (media_ != media || started_)
+    return;
+  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
+  started_ = true;
 }
 
 void
@@ -409,6 +418,7 @@ MediaHolder::release (GstRTSPMedia *only)
   GPtrArray *transports = transports_;
   media_ = nullptr;
   transports_ = nullptr;
+  started_ = false;
   guard.unlock ();
   if (!media)
     return;

@@ -47,9 +47,12 @@ void request_key_frame_set (GstRTSPMedia *media);
 class MediaHolder {
 public:
   ~MediaHolder () { release (); }
-  /** Starts it if it is not running. Another one that was held is left alone until release().
+  /** Gets it ready. Another one that was held is left alone until release().
    *  @return whether it is held */
   bool hold (GstRTSPMedia *media);
+  /** If it is held. Its first viewer must have been connected before, to get its first frame set.
+   */
+  void start (GstRTSPMedia *media);
   /** @param only  nothing happens if another one is held; nullptr: whatever is held */
   void release (GstRTSPMedia *only = nullptr);
   bool holds_any ();
@@ -62,4 +65,5 @@ private:
   std::mutex lock_;      /* guards what follows */
   GstRTSPMedia *media_ = nullptr;
   GPtrArray *transports_ = nullptr;
+  bool started_ = false;
 };

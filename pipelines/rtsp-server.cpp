@@ -93,7 +93,9 @@ on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   queue_tcp_transports (context->session, context->sessmedia, server.counts.left_out);
-  request_key_frame_set (gst_rtsp_session_media_get_media (context->sessmedia));
+  GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
+  server.holder.start (media);
+  request_key_frame_set (media);
 }
 
 static void
@@ -343,7 +345,8 @@ start_media (Server &server)
     GstRTSPThread *thread =
         gst_rtsp_thread_pool_get_thread (pool, GST_RTSP_THREAD_TYPE_MEDIA, &context);
     if (gst_rtsp_media_prepare (media, thread)) {
-      server.holder.hold (media);
+      if (server.holder.hold (media))
+        server.holder.start (media);
       gst_rtsp_media_unprepare (media); /* the holder has its own share of it */
     }
     g_object_unref (pool);
