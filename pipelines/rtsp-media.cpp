@@ -87,8 +87,41 @@ make_stream_bin (const std::string &launch, GError **error)
 
 struct Stage {
   StreamCounts *counts;
-  std::function<void (const std::string &)> on_end;
+  StreamEnd on_end;
 };
+
+/* Who hears what a media says; it may say its last when it is gone already. */
+struct Listener {
+  Listener (GstRTSPMedia *media, const StreamEnd &on_end) : on_end_ (on_end)
+  {
+    g_weak_ref_init (&media_, media);
+  }
+  ~Listener () { g_weak_ref_clear (&media_); }
+  void tell (bool is_over, const std::string &why)
+  {
+    auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
+    if (!media)
+      return;
+    on_end_ (media, is_over, why);
+    g_object_unref (media);
+  }
+
+private:
+  GWeakRef media_;
+  StreamEnd on_end_;
+};
+
+static void
+delete_listener (gpointer listener)
+{
+  delete static_cast<Listener *> (listener);
+}
+
+static void
+delete_listener_of_signal (gpointer listener, GClosure *)
+{
+  delete_listener (listener);
+}
 
 static void
 delete_stage (gpointer stage, GClosure *)
@@ -99,11 +132,11 @@ delete_stage (gpointer stage, GClosure *)
 static void
 on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
 {
-  const auto &on_end = static_cast<Stage *> (user_data)->on_end;
+  auto &listener = *static_cast<Listener *> (user_data);
   GError *error = nullptr;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
     if (GST_IS_PIPELINE (message->src))
-      on_end ("");
+      listener.tell (true, "");
     return;
   }
   const bool is_error = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR;
@@ -113,7 +146,7 @@ on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
     gst_message_parse_warning (message, &error, nullptr);
   const std::string text = std::string (GST_OBJECT_NAME (message->src)) + ": " + error->message;
   if (is_error)
-    on_end (text);
+    listener.tell (true, text);
   else
     g_printerr ("rtsp-server: warning: %s\n", text.c_str ());
   g_error_free (error);
@@ -140,6 +173,16 @@ on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   } else if (gst_video_event_is_force_key_unit (GST_PAD_PROBE_INFO_EVENT (info))) {
     counts.key_requests++;
   }
+  return GST_PAD_PROBE_OK;
+}
+
+/* Viewers are told of the end when the payloader has passed it; the sinks, and so the bus, come to
+ * it only when the last frame set's time is over. */
+static GstPadProbeReturn
+on_payload_event (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+{
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS)
+    static_cast<Listener *> (user_data)->tell (false, "");
   return GST_PAD_PROBE_OK;
 }
 
@@ -184,8 +227,8 @@ on_media_configure (GstRTSPMediaFactory *, GstRTSPMedia *media, gpointer user_da
     GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
     gst_bus_enable_sync_message_emission (bus);
     for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
-      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message), new Stage (*stage),
-          delete_stage, GConnectFlags (0));
+      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
+          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
     gst_object_unref (bus);
     gst_object_unref (pipeline);
   }
@@ -195,6 +238,9 @@ on_media_configure (GstRTSPMediaFactory *, GstRTSPMedia *media, gpointer user_da
         GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
                          GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
         on_payload, stage->counts, nullptr);
+    if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
+      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_payload_event,
+          new Listener (media, stage->on_end), delete_listener);
     gst_object_unref (pad);
   }
   g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
@@ -215,6 +261,7 @@ request_key_frame_set (GstRTSPMedia *media)
 G_BEGIN_DECLS
 struct LaunchFactory {
   GstRTSPMediaFactory parent;
+  gint run; /* atomic */
 };
 struct LaunchFactoryClass {
   GstRTSPMediaFactoryClass parent_class;
@@ -235,6 +282,20 @@ launch_factory_create_element (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
   return bin;
 }
 
+/* Whatever port or query a viewer asks with, it gets the one run. */
+static gchar *
+launch_factory_gen_key (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
+{
+  return g_strdup_printf (
+      "%d", g_atomic_int_get (&reinterpret_cast<LaunchFactory *> (factory)->run));
+}
+
+void
+begin_new_run (GstRTSPMediaFactory *factory)
+{
+  g_atomic_int_inc (&reinterpret_cast<LaunchFactory *> (factory)->run);
+}
+
 static void
 launch_factory_init (LaunchFactory *)
 {
@@ -244,6 +305,7 @@ static void
 launch_factory_class_init (LaunchFactoryClass *klass)
 {
   GST_RTSP_MEDIA_FACTORY_CLASS (klass)->create_element = launch_factory_create_element;
+  GST_RTSP_MEDIA_FACTORY_CLASS (klass)->gen_key = launch_factory_gen_key;
 }
 
 static void
@@ -258,8 +320,7 @@ set_multicast (GstRTSPMediaFactory *factory, const MulticastRange &range)
 }
 
 GstRTSPMediaFactory *
-make_factory (const RtspOptions &options, StreamCounts &counts,
-    std::function<void (const std::string &)> on_end)
+make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end)
 {
   auto factory = GST_RTSP_MEDIA_FACTORY (g_object_new (launch_factory_get_type (), nullptr));
   gst_rtsp_media_factory_set_launch (factory, options.launch.c_str ());
@@ -327,8 +388,17 @@ MediaHolder::hold (GstRTSPMedia *media)
     g_ptr_array_add (transports_, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
   media_ = GST_RTSP_MEDIA (g_object_ref (media));
   gst_rtsp_media_complete_pipeline (media, transports_);
-  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
   return true;
+}
+
+void
+MediaHolder::start (GstRTSPMedia *media)
+{
+  std::lock_guard guard (lock_);
+  if (media_ != media || started_)
+    return;
+  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
+  started_ = true;
 }
 
 void
@@ -338,14 +408,17 @@ MediaHolder::wait_for_release ()
 }
 
 void
-MediaHolder::release ()
+MediaHolder::release (GstRTSPMedia *only)
 {
   std::lock_guard releasing (releasing_);
   std::unique_lock guard (lock_);
+  if (only && media_ != only)
+    return;
   GstRTSPMedia *media = media_;
   GPtrArray *transports = transports_;
   media_ = nullptr;
   transports_ = nullptr;
+  started_ = false;
   guard.unlock ();
   if (!media)
     return;

@@ -27,12 +27,17 @@ struct StreamCounts {
  *  @return nullptr, with error set, if it cannot be made */
 GstElement *make_stream_bin (const std::string &launch, GError **error);
 
+/** Called by any thread when a stream ends: maybe first when its viewers are told, then when it is
+ *  over. The text is empty at EOS, otherwise what went wrong. */
+using StreamEnd = std::function<void (GstRTSPMedia *media, bool is_over, const std::string &why)>;
+
 /** The factory of the one media; by it clients of the server get theirs.
- *  @param counts  must live as long as the factory
- *  @param on_end  called by any thread when the stream ended; its text is empty at EOS, otherwise
- *                 what went wrong */
-GstRTSPMediaFactory *make_factory (const RtspOptions &options, StreamCounts &counts,
-    std::function<void (const std::string &)> on_end);
+ *  @param counts  must live as long as the factory */
+GstRTSPMediaFactory *make_factory (
+    const RtspOptions &options, StreamCounts &counts, StreamEnd on_end);
+
+/** Who comes from now on gets a media of its own, not the one that others have. Any thread. */
+void begin_new_run (GstRTSPMediaFactory *factory);
 
 /** Lets every payloader of the media ask its encoder for a key frame set, with the rig. */
 void request_key_frame_set (GstRTSPMedia *media);
@@ -42,10 +47,14 @@ void request_key_frame_set (GstRTSPMedia *media);
 class MediaHolder {
 public:
   ~MediaHolder () { release (); }
-  /** Starts it if it is not running. Another one that was held is left alone until release().
+  /** Gets it ready. Another one that was held is left alone until release().
    *  @return whether it is held */
   bool hold (GstRTSPMedia *media);
-  void release ();
+  /** If it is held. Its first viewer must have been connected before, to get its first frame set.
+   */
+  void start (GstRTSPMedia *media);
+  /** @param only  nothing happens if another one is held; nullptr: whatever is held */
+  void release (GstRTSPMedia *only = nullptr);
   bool holds_any ();
   /** Returns when no release() is at work: who asked for the media meanwhile would get one that
    *  ends, and an error. */
@@ -56,4 +65,5 @@ private:
   std::mutex lock_;      /* guards what follows */
   GstRTSPMedia *media_ = nullptr;
   GPtrArray *transports_ = nullptr;
+  bool started_ = false;
 };

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -31,6 +32,13 @@ static constexpr guint kMostContent = 16384; /* bytes */
 static constexpr int kSpareConnections = 32;
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
+/* So long the last frame set may last, after which a stream is over. */
+static constexpr guint kSlowestEnd_ms = 2000;
+
+struct Connection {
+  gint64 since_us = 0;                 /* monotonic */
+  const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
+};
 
 struct Server {
   RtspOptions options;
@@ -46,16 +54,23 @@ struct Server {
   gint64 stats_at_us = 0;
   std::thread starter; /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
-  std::atomic<bool> ending = false; /* end_stream() will be called */
-  std::atomic<gint64> ended_at_us = 0, asked_at_us = 0;
+  std::atomic<gint64> asked_at_us = 0;
   std::atomic<bool> stopping = false;
 
-  std::mutex lock;                               /* guards what follows */
-  std::map<GstRTSPClient *, gint64> connections; /* connected when; monotonic, us */
+  std::mutex lock; /* guards what follows */
+  std::map<GstRTSPClient *, Connection> connections;
+  std::set<GstRTSPMedia *> ending; /* end_stream() will be called for them */
 };
 
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
 static constexpr gint64 kSetup_us = 2 * G_USEC_PER_SEC;
+
+static bool
+is_ending (Server &server)
+{
+  std::lock_guard guard (server.lock);
+  return !server.ending.empty ();
+}
 
 /* ---- connections ---- */
 
@@ -78,14 +93,26 @@ on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   queue_tcp_transports (context->session, context->sessmedia, server.counts.left_out);
-  request_key_frame_set (gst_rtsp_session_media_get_media (context->sessmedia));
+  GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
+  server.holder.start (media);
+  request_key_frame_set (media);
+}
+
+static void
+on_describe_or_setup (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  std::lock_guard guard (server.lock);
+  const auto found = server.connections.find (client);
+  if (found != server.connections.end ())
+    found->second.media = context->media;
 }
 
 static GstRTSPStatusCode
 before_describe (GstRTSPClient *, GstRTSPContext *, gpointer user_data)
 {
   auto server = static_cast<Server *> (user_data);
-  while (server->ending && !server->stopping) /* what ends is not joined: the next run is */
+  while (is_ending (*server) && !server->stopping) /* what ends is not joined: the next run is */
     g_usleep (20000);
   server->asked_at_us = g_get_monotonic_time (); /* has no session yet, but is not to be let down */
   server->holder.wait_for_release ();
@@ -115,6 +142,10 @@ static GstRTSPStatusCode
 before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
+  /* The stream is not one viewer's to wind. Even to its beginning, as most players ask, the library
+   * may fail to, and then that media never answers anybody again. */
+  for (GstRTSPHeaderField field : {GST_RTSP_HDR_RANGE, GST_RTSP_HDR_SCALE, GST_RTSP_HDR_SPEED})
+    gst_rtsp_message_remove_header (context->request, field, -1);
   server.holder.hold (gst_rtsp_session_media_get_media (context->sessmedia));
   return GST_RTSP_STS_OK;
 }
@@ -147,6 +178,8 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
   limit_send_buffer (client, server.options.send_buffer_kb * 1024);
   g_signal_connect (client, "pre-describe-request", G_CALLBACK (before_describe), &server);
   g_signal_connect (client, "pre-setup-request", G_CALLBACK (before_setup), &server);
+  g_signal_connect (client, "describe-request", G_CALLBACK (on_describe_or_setup), &server);
+  g_signal_connect (client, "setup-request", G_CALLBACK (on_describe_or_setup), &server);
   g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
   g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);
   g_signal_connect (client, "pause-request", G_CALLBACK (on_pause_or_teardown), &server);
@@ -154,7 +187,7 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
   g_signal_connect (client, "new-session", G_CALLBACK (on_new_session), &server);
   g_signal_connect (client, "closed", G_CALLBACK (on_closed), &server);
   std::lock_guard guard (server.lock);
-  server.connections[client] = g_get_monotonic_time ();
+  server.connections[client].since_us = g_get_monotonic_time ();
 }
 
 /* It comes before the library's own handler, which takes the connection away. */
@@ -188,7 +221,8 @@ close_useless_connections (Server &server)
       continue;
     std::unique_lock guard (server.lock);
     const auto found = server.connections.find (client);
-    const bool is_late = found != server.connections.end () && now - found->second > patience;
+    const bool is_late =
+        found != server.connections.end () && now - found->second.since_us > patience;
     guard.unlock ();
     if (is_late || many > 0)
       gst_rtsp_client_close (client);
@@ -196,51 +230,103 @@ close_useless_connections (Server &server)
   g_list_free_full (clients, g_object_unref);
 }
 
-/* But for those who came when the stream had ended: they wait for the next run. */
-static GstRTSPFilterResult
-close_connection (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
-{
-  auto &server = *static_cast<Server *> (user_data);
-  std::lock_guard guard (server.lock);
-  const auto found = server.connections.find (client);
-  return server.ending && found != server.connections.end () && found->second > server.ended_at_us
-             ? GST_RTSP_FILTER_KEEP
-             : GST_RTSP_FILTER_REMOVE;
-}
-
 /* ---- the stream ---- */
+
+static GstRTSPFilterResult
+remove_client (GstRTSPServer *, GstRTSPClient *, gpointer)
+{
+  return GST_RTSP_FILTER_REMOVE;
+}
 
 static void
 close_all (Server &server)
 {
   g_list_free_full (
-      gst_rtsp_server_client_filter (server.server, close_connection, &server), g_object_unref);
+      gst_rtsp_server_client_filter (server.server, remove_client, nullptr), g_object_unref);
   server.holder.release ();
+}
+
+static const char kEndedKey[] = "rangecast-ended"; /* of a media: is over */
+
+/* A media, and the server that it is of. */
+struct Ending {
+  Server &server;
+  GstRTSPMedia *media;
+};
+
+static void
+delete_ending (gpointer user_data)
+{
+  auto ending = static_cast<Ending *> (user_data);
+  g_object_unref (ending->media);
+  delete ending;
+}
+
+static GstRTSPFilterResult
+close_viewer (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
+{
+  const auto &ending = *static_cast<Ending *> (user_data);
+  std::lock_guard guard (ending.server.lock);
+  const auto found = ending.server.connections.find (client);
+  return found != ending.server.connections.end () && found->second.media == ending.media
+             ? GST_RTSP_FILTER_REMOVE
+             : GST_RTSP_FILTER_KEEP;
+}
+
+/* Those of UDP viewers outlive their connections. */
+static GstRTSPFilterResult
+close_session (GstRTSPSessionPool *, GstRTSPSession *session, gpointer user_data)
+{
+  const auto has = [] (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer wanted) {
+    return gst_rtsp_session_media_get_media (media) == wanted ? GST_RTSP_FILTER_REF
+                                                              : GST_RTSP_FILTER_KEEP;
+  };
+  GList *found = gst_rtsp_session_filter (session, has, static_cast<Ending *> (user_data)->media);
+  const bool is_viewer = found != nullptr;
+  g_list_free_full (found, g_object_unref);
+  return is_viewer ? GST_RTSP_FILTER_REMOVE : GST_RTSP_FILTER_KEEP;
 }
 
 static gboolean
 end_stream (gpointer user_data)
 {
-  auto &server = *static_cast<Server *> (user_data);
-  close_all (server);
-  server.ending = false;
+  auto ending = static_cast<Ending *> (user_data);
+  Server &server = ending->server;
+  {
+    std::lock_guard guard (server.lock);
+    if (server.ending.count (ending->media) == 0)
+      return G_SOURCE_REMOVE; /* it was called before */
+    g_object_set_data (G_OBJECT (ending->media), kEndedKey, ending->media);
+  }
+  g_list_free_full (
+      gst_rtsp_server_client_filter (server.server, close_viewer, ending), g_object_unref);
+  g_list_free_full (
+      gst_rtsp_session_pool_filter (server.sessions, close_session, ending), g_object_unref);
+  server.holder.release (ending->media);
   server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
+  std::lock_guard guard (server.lock);
+  server.ending.erase (ending->media);
   return G_SOURCE_REMOVE;
 }
 
 /* Whoever comes next gets a new run of the launch string. */
 static void
-on_stream_end (Server &server, const std::string &why)
+on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::string &why)
 {
-  if (server.stopping)
-    return;
-  if (server.ending.exchange (true))
-    return; /* one failure often is several messages, of which the first says why */
-  server.ended_at_us = g_get_monotonic_time ();
+  {
+    std::lock_guard guard (server.lock);
+    if (server.stopping || g_object_get_data (G_OBJECT (media), kEndedKey))
+      return; /* one failure often is several messages, of which the first says why */
+    if (is_over)
+      g_object_set_data (G_OBJECT (media), kEndedKey, media);
+    if (server.ending.insert (media).second)
+      begin_new_run (server.factory);
+  }
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
   /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
-  g_timeout_add (500, end_stream, &server);
+  g_timeout_add_full (G_PRIORITY_DEFAULT, is_over ? 500 : kSlowestEnd_ms, end_stream,
+      new Ending{server, GST_RTSP_MEDIA (g_object_ref (media))}, delete_ending);
 }
 
 /* Runs the launch string before anybody asks for it. It takes as long as it waits for its first
@@ -259,7 +345,8 @@ start_media (Server &server)
     GstRTSPThread *thread =
         gst_rtsp_thread_pool_get_thread (pool, GST_RTSP_THREAD_TYPE_MEDIA, &context);
     if (gst_rtsp_media_prepare (media, thread)) {
-      server.holder.hold (media);
+      if (server.holder.hold (media))
+        server.holder.start (media);
       gst_rtsp_media_unprepare (media); /* the holder has its own share of it */
     }
     g_object_unref (pool);
@@ -311,7 +398,8 @@ on_second (gpointer user_data)
     server.idle_since_us = now;
   if (server.options.always)
     keep_running (server);
-  else if (server.idle_since_us > 0 && !server.ending && now - server.asked_at_us > kSetup_us &&
+  else if (server.idle_since_us > 0 && !is_ending (server) &&
+           now - server.asked_at_us > kSetup_us &&
            now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
     server.holder.release ();
   print_stats (server);
@@ -392,8 +480,10 @@ set_up (Server &server)
   server.sessions = gst_rtsp_server_get_session_pool (server.server);
   gst_rtsp_session_pool_set_max_sessions (server.sessions, guint (options.max_viewers));
   g_signal_connect (server.sessions, "session-removed", G_CALLBACK (on_session_removed), nullptr);
-  server.factory = make_factory (
-      options, server.counts, [&server] (const std::string &why) { on_stream_end (server, why); });
+  server.factory = make_factory (options, server.counts,
+      [&server] (GstRTSPMedia *media, bool is_over, const std::string &why) {
+        on_stream_end (server, media, is_over, why);
+      });
   GstRTSPMountPoints *mounts = gst_rtsp_server_get_mount_points (server.server);
   gst_rtsp_mount_points_add_factory (
       mounts, options.mount.c_str (), GST_RTSP_MEDIA_FACTORY (g_object_ref (server.factory)));
