@@ -18,6 +18,8 @@ packages=(
   libgtest-dev python3 iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )
 
+installed= # "yes" once packages were
+
 missing_packages () {
   local package
   for package in "${packages[@]}"; do
@@ -38,11 +40,16 @@ install_packages () {
   $sudo apt-get update -qq
   # shellcheck disable=SC2086
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+  installed=yes
 }
 
 build () {
   local log=build/setup.log
   mkdir -p build
+  # What was left out of build/ for want of a package is not, from now on.
+  if [ -n "$installed" ] && [ -f build/build.ninja ]; then
+    { meson configure build --clearcache && meson setup build --reconfigure; } >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+  fi
   [ -f build/build.ninja ] || { echo "setup.sh: configuring"; meson setup build >"$log" 2>&1 || { cat "$log" >&2; return 1; }; }
   ninja -C build >"$log" 2>&1 || { cat "$log" >&2; return 1; }
 }

@@ -57,6 +57,7 @@ AvatarClock::next ()
   moment.pts = moment.capture_time = since_ + time_of (frame_);
   moment.duration = since_ + time_of (frame_ + 1) - moment.pts;
   moment.index = index_++;
+  moment.tick = frame_;
   moment.discont = discont_;
   discont_ = false;
   frame_++;
@@ -133,6 +134,7 @@ AvatarClock::take_tick (guint64 tick, AvatarMoment &moment)
   if (gap && tick > last_tick_ && !paused_since_tick_)
     skipped_ += tick - last_tick_ - 1;
   moment.index = index_++;
+  moment.tick = tick;
   moment.discont = discont_ || gap;
   discont_ = paused_since_tick_ = false;
   last_tick_ = tick;

@@ -10,6 +10,7 @@
 struct AvatarMoment {
   GstClockTime pts, duration, capture_time;
   guint64 index; ///< pictures before it: in the stream, or (not live, after a seek) from time 0
+  guint64 tick;  ///< number of the frame period that capture_time begins, at the present rate
   bool discont;
 };
 

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "avatarpainter.hpp"
 
+#include <algorithm>
 #include <array>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
+#include <new>
 
 using rangecast::PixelFormat;
 using rangecast::Rgbx;
@@ -19,6 +21,14 @@ AvatarPainter::start (const AvatarSettings &settings)
 {
   settings_ = settings;
   scene_.reset ();
+  forget_loop ();
+}
+
+void
+AvatarPainter::forget_loop ()
+{
+  for (auto &pictures : loop_)
+    std::vector<Rgbx> ().swap (pictures); /* gives the memory back */
 }
 
 Status
@@ -32,6 +42,7 @@ AvatarPainter::set_size (int width, int height)
     return {};
   s.width = width;
   s.height = height;
+  forget_loop ();
   scene_.reset (); /* a model and its rooms are large: not two at a time */
   if (Status status = Scene::create (s, scene_); !status.ok ())
     return status;
@@ -81,10 +92,67 @@ seconds (GstClockTime time)
   return static_cast<double> (time) / GST_SECOND;
 }
 
+/* The pictures of one camera's loop, one below the other. */
+Status
+AvatarPainter::draw_loop (SceneCamera camera, double period_s)
+{
+  constexpr std::size_t kMostPixels = std::size_t{1} << 28; /* 1 GiB */
+  const int width = settings_.scene.width, height = settings_.scene.height;
+  const std::size_t pixels = std::size_t (width) * std::size_t (height);
+  if (settings_.loop_frames > kMostPixels / pixels)
+    return {StatusCode::kBadValue,
+        "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
+            std::to_string (kMostPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
+            std::to_string (height) + ", which take 1 GiB a camera"};
+  std::vector<Rgbx> &pictures = loop_[int (camera)];
+  try {
+    pictures.resize (settings_.loop_frames * pixels);
+  } catch (const std::bad_alloc &) {
+    return {StatusCode::kNoSpace, "loop-frames: no memory left for so many pictures"};
+  }
+  for (guint i = 0; i < settings_.loop_frames; i++)
+    if (Status s = scene_->render (MAX (settings_.view_id, 0), camera, i * period_s, false,
+            {pictures.data () + i * pixels, width, height,
+                static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width},
+            {}, {});
+        !s.ok ())
+      return s;
+  return {};
+}
+
+/* Forwards, and back again without showing either end twice. */
+rangecast::ImageView<const Rgbx>
+AvatarPainter::looped (SceneCamera camera, guint64 tick) const
+{
+  const int width = settings_.scene.width, height = settings_.scene.height;
+  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : tick % (2 * n - 2),
+                i = at < n ? at : 2 * n - 2 - at;
+  return {loop_[int (camera)].data () + i * std::size_t (width) * std::size_t (height), width,
+      height, static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+}
+
+Status
+AvatarPainter::render (
+    SceneCamera camera, const AvatarMoment &moment, rangecast::ImageView<Rgbx> picture)
+{
+  if (settings_.loop_frames == 0 || empty_at (moment))
+    return scene_->render (MAX (settings_.view_id, 0), camera, seconds (moment.capture_time),
+        empty_at (moment), picture, {}, {});
+  const auto from = looped (camera, moment.tick);
+  for (int y = 0; y < picture.height; y++)
+    std::copy_n (from.row (y), picture.width, picture.row (y));
+  return {};
+}
+
 Status
 AvatarPainter::draw_raw (
     SceneCamera camera, const GstVideoInfo &video, const AvatarMoment &moment, GstBuffer *buffer)
 {
+  if (settings_.loop_frames > 0 && loop_[int (camera)].empty ())
+    if (Status s = draw_loop (
+            camera, double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video));
+        !s.ok ())
+      return s;
   GstVideoFrame frame;
   if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
     return {StatusCode::kNoSpace, "cannot map an output buffer"};
@@ -96,8 +164,7 @@ AvatarPainter::draw_raw (
   const rangecast::ImageView<Rgbx> picture{
       direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
       direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
-  const Status status = scene_->render (MAX (settings_.view_id, 0), camera,
-      seconds (moment.capture_time), empty_at (moment), picture, {}, {});
+  const Status status = render (camera, moment, picture);
   if (status.ok () && !direct)
     rangecast::convert_pixels (picture, format, pixels, stride);
   gst_video_frame_unmap (&frame);

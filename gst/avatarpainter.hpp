@@ -17,6 +17,8 @@ public:
   void start (const AvatarSettings &settings);
   /** Makes the scene, if its size is another one, and writes its rig file. */
   rangecast::Status set_size (int width, int height);
+  /** Pictures that were drawn ahead are drawn again: for a new frame rate. */
+  void forget_loop ();
 
   /** Fixed but for the pixel format of raw pictures. */
   [[nodiscard]] GstCaps *make_range_caps (int fps_n, int fps_d) const;
@@ -28,6 +30,11 @@ public:
   rangecast::Status draw_range (const AvatarMoment &moment, GstBuffer *buffer);
 
 private:
+  rangecast::Status render (rangecast::SceneCamera camera, const AvatarMoment &moment,
+      rangecast::ImageView<rangecast::Rgbx> picture);
+  rangecast::Status draw_loop (rangecast::SceneCamera camera, double period_s);
+  [[nodiscard]] rangecast::ImageView<const rangecast::Rgbx> looped (
+      rangecast::SceneCamera camera, guint64 tick) const;
   [[nodiscard]] bool empty_at (const AvatarMoment &moment) const
   {
     return moment.index < settings_.empty_frames;
@@ -36,4 +43,5 @@ private:
   AvatarSettings settings_;
   std::unique_ptr<rangecast::Scene> scene_;
   std::vector<rangecast::Rgbx> scratch_; ///< a picture before it gets its pixel format
+  std::vector<rangecast::Rgbx> loop_[3]; ///< by camera: all pictures of its loop, or none
 };

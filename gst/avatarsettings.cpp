@@ -27,6 +27,7 @@ enum {
   PROP_WALL_TEXTURE,
   PROP_WALL_WARMTH,
   PROP_CHAIR,
+  PROP_LOOP_FRAMES,
 };
 
 static std::string
@@ -72,6 +73,9 @@ AvatarSettings::set (guint id, const GValue *value)
       return true;
     case PROP_EMPTY_FRAMES:
       empty_frames = g_value_get_uint (value);
+      return true;
+    case PROP_LOOP_FRAMES:
+      loop_frames = g_value_get_uint (value);
       return true;
     case PROP_NUM_BUFFERS:
       num_buffers = g_value_get_int (value);
@@ -162,6 +166,9 @@ AvatarSettings::get (guint id, GValue *value) const
       return true;
     case PROP_EMPTY_FRAMES:
       g_value_set_uint (value, empty_frames);
+      return true;
+    case PROP_LOOP_FRAMES:
+      g_value_set_uint (value, loop_frames);
       return true;
     case PROP_NUM_BUFFERS:
       g_value_set_int (value, num_buffers);
@@ -309,6 +316,10 @@ install_model_and_stream (const Installer &to)
 {
   to.add_uint (PROP_EMPTY_FRAMES, "empty-frames", "Empty frames",
       "So many frames at first show the room without the figure (default: 0)", 0);
+  to.add_uint (PROP_LOOP_FRAMES, "loop-frames", "Loop frames",
+      "Draw so many pictures of the figure once and show them forwards and backwards, as cameras "
+      "that cost no drawing; left, right and third only (0, the default: draw each picture)",
+      0);
   to.add_int (PROP_NUM_BUFFERS, "num-buffers", "Number of buffers",
       "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);
   to.add_bool (PROP_IS_LIVE, "is-live", "Is live",

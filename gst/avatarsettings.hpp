@@ -13,7 +13,8 @@ struct AvatarSettings {
   rangecast::SceneSettings scene; ///< all but the size, which the caps decide
   int view_id = kAllViews;
   guint empty_frames = 0;
-  int num_buffers = -1; ///< frames; -1: no end
+  guint loop_frames = 0; ///< 0: each picture is drawn
+  int num_buffers = -1;  ///< frames; -1: no end
   bool is_live = false;
   std::string rig_export; ///< file; empty: none
   bool person_only = false;

@@ -181,6 +181,8 @@ AvatarStream::negotiate (const AvatarPads &pads)
   GstFlowReturn flow =
       gst_range_flow_return (element_, painter_.set_size (format.width, format.height));
   const bool new_rate = clock_.set_rate (format.fps_n, format.fps_d);
+  if (new_rate)
+    painter_.forget_loop ();
   for (const auto &pad : pads)
     if (flow == GST_FLOW_OK)
       flow = negotiate_pad (*pad, format);

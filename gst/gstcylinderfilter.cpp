@@ -372,6 +372,8 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
   auto self = GST_CYLINDER_FILTER (object);
   if (id == PROP_AXIS_POSITION || id == PROP_AXIS_DIRECTION)
     return gst_cylinder_filter_set_axis_vector (self, id, value);
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return self->priv->reporter.set_interval (g_value_get_uint (value));
   const std::lock_guard guard (self->priv->lock);
   rangecast::CylinderSettings &settings = self->priv->settings;
   switch (id) {
@@ -413,9 +415,6 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
       break;
     case PROP_N_THREADS:
       settings.threads = g_value_get_int (value);
-      break;
-    case PROP_STATS_INTERVAL:
-      self->priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);

@@ -240,20 +240,19 @@ note_references (GstNeighbourCodeDecPrivate *priv)
     priv->is_temporal = std::ranges::any_of (views, refers);
 }
 
-static GstFlowReturn
-decode_bytes (
-    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
-{
-  GstNeighbourCodeDecPrivate *priv = self->priv;
+/* Settings of one frame set. */
+struct FrameSettings {
   bool conceal;
   int n_threads;
-  {
-    std::lock_guard guard (priv->lock);
-    conceal = priv->conceal == CONCEAL_LAST;
-    n_threads = priv->n_threads;
-  }
+};
+
+static GstFlowReturn
+decode_bytes (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes,
+    const FrameSettings &settings, GstBuffer **output)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
   GstBuffer *older = priv->shown.begin (input);
-  if (!conceal)
+  if (!settings.conceal)
     older = nullptr;
   DecoderResult result;
   priv->decoder.plan (bytes, result, older);
@@ -261,7 +260,7 @@ decode_bytes (
   const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
   if (flow != GST_FLOW_OK)
     return flow;
-  const Status status = decode_into (priv, buffer, older, n_threads, result);
+  const Status status = decode_into (priv, buffer, older, settings.n_threads, result);
   count_frame (priv, result, bytes.size ());
   note_references (priv);
   request_key_unit (self, input, result);
@@ -275,27 +274,18 @@ decode_bytes (
   return GST_FLOW_OK;
 }
 
-static void
-keep_for_concealment (GstNeighbourCodeDecPrivate *priv, GstBuffer *output)
-{
-  bool conceal;
-  {
-    std::lock_guard guard (priv->lock);
-    conceal = priv->conceal == CONCEAL_LAST;
-  }
-  if (conceal)
-    priv->shown.keep (output);
-  else
-    priv->shown.forget ();
-}
-
 /* `input` gives times and flags; bytes are its own, or also those of slices that came later. */
 static GstFlowReturn
 decode_frame_set (
     GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  const GstFlowReturn flow = decode_bytes (self, input, bytes, output);
+  FrameSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = {priv->conceal == CONCEAL_LAST, priv->n_threads};
+  }
+  const GstFlowReturn flow = decode_bytes (self, input, bytes, settings, output);
   if (flow != GST_FLOW_OK)
     return flow;
   GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, *output);
@@ -305,7 +295,10 @@ decode_frame_set (
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (*output, capture);
   GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
-  keep_for_concealment (priv, *output);
+  if (settings.conceal)
+    priv->shown.keep (*output);
+  else
+    priv->shown.forget ();
   priv->reporter.passed (GST_ELEMENT (self), *output);
   return GST_FLOW_OK;
 }
@@ -466,6 +459,8 @@ gst_neighbour_code_dec_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
   switch (id) {
     case PROP_CONCEAL:
@@ -476,9 +471,6 @@ gst_neighbour_code_dec_set_property (
       break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
-      break;
-    case PROP_STATS_INTERVAL:
-      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);

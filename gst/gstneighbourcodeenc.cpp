@@ -498,6 +498,8 @@ gst_neighbour_code_enc_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
   EncoderSettings &settings = priv->settings;
   if (priv->rate_settings.set (id, value))
@@ -541,9 +543,6 @@ gst_neighbour_code_enc_set_property (
       break;
     case PROP_N_THREADS:
       priv->n_threads = g_value_get_int (value);
-      break;
-    case PROP_STATS_INTERVAL:
-      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);

@@ -30,6 +30,7 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
 #include <string>
 
@@ -37,6 +38,7 @@
 
 using rangecast::RangeImage;
 using rangecast::RegisterInto;
+using rangecast::size_text;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
@@ -130,12 +132,6 @@ gst_range_combine_into_get_type (void)
 }
 
 /* ---- the view ---- */
-
-static std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
-}
 
 /* A view of the rig at the size of the pictures. */
 static Status

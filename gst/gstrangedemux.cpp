@@ -33,6 +33,7 @@
 #include <vector>
 
 #include "codedviews.hpp"
+#include "statsreporter.hpp"
 
 using gstrange::RangeInfo;
 using rangecast::kMaxViews;
@@ -42,7 +43,7 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
 #define GST_CAT_DEFAULT gst_range_demux_debug
 
-enum { PROP_0, PROP_STATS };
+enum { PROP_0, PROP_STATS, PROP_STATS_INTERVAL };
 
 struct DemuxPad {
   GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
@@ -56,6 +57,7 @@ struct DemuxCounters {
 
 struct GstRangeDemuxPrivate {
   DemuxCounters counters{};
+  StatsReporter reporter; /* has locks of its own */
   /* A bin sends a seek to all of its sinks, which all come here: once is enough. */
   std::atomic<guint32> last_seek = GST_SEQNUM_INVALID;
 
@@ -165,6 +167,22 @@ push_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
   return gst_pad_push (entry.pad, view);
 }
 
+/* Views that the rig does not name: nobody gets them. */
+static guint64
+count_views_without_pad (const GstRangeDemuxPrivate *priv, GstBuffer *frame_set)
+{
+  guint64 n = 0;
+  if (priv->coded) {
+    for (int id = 0; id < kMaxViews; id++)
+      n += !priv->pads[id].pad && priv->units.has (id);
+    return n;
+  }
+  gpointer state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (frame_set, &state))
+    n += meta->view_id >= guint (kMaxViews) || !priv->pads[meta->view_id].pad;
+  return n;
+}
+
 static GstFlowReturn
 push_views (GstRangeDemux *self, GstBuffer *frame_set)
 {
@@ -193,6 +211,8 @@ gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   }
   if (flow == GST_FLOW_OK) {
     priv->counters.frames++;
+    priv->counters.dropped += count_views_without_pad (priv, buffer);
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
     flow = push_views (self, buffer);
   }
   gst_buffer_unref (buffer);
@@ -319,6 +339,7 @@ take_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
   if (told || gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   priv->coded = coded;
+  priv->reporter.set_views (priv->info.rig);
   follow_rig (self, sink);
   return TRUE;
 }
@@ -361,6 +382,7 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       break;
     case GST_EVENT_EOS:
       complain_without_pads (self);
+      self->priv->reporter.finish ();
       break;
     default:
       break;
@@ -370,18 +392,28 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
 
 /* ---- life ---- */
 
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const DemuxCounters &counters = GST_RANGE_DEMUX (element)->priv->counters;
+  return {{.counters = {.frames = counters.frames.load (), .lost = counters.gaps.load ()}}};
+}
+
 static GstStateChangeReturn
 gst_range_demux_change_state (GstElement *element, GstStateChange transition)
 {
   auto self = GST_RANGE_DEMUX (element);
   GstRangeDemuxPrivate *priv = self->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
     for (auto *counter : {&priv->counters.frames, &priv->counters.buffers, &priv->counters.gaps,
              &priv->counters.dropped})
       *counter = 0;
+    priv->reporter.start (element, collect_stats);
+  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_range_demux_parent_class)->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* pads are inactive: nobody streams */
+    priv->reporter.stop ();
     for (DemuxPad &entry : priv->pads)
       if (entry.pad)
         remove_pad (self, entry);
@@ -396,6 +428,15 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
 }
 
 static void
+gst_range_demux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_STATS_INTERVAL)
+    GST_RANGE_DEMUX (object)->priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
 gst_range_demux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   const DemuxCounters &counters = GST_RANGE_DEMUX (object)->priv->counters;
@@ -405,6 +446,8 @@ gst_range_demux_get_property (GObject *object, guint id, GValue *value, GParamSp
                    counters.frames.load (), "buffers", G_TYPE_UINT64, counters.buffers.load (),
                    "gaps", G_TYPE_UINT64, counters.gaps.load (), "dropped", G_TYPE_UINT64,
                    counters.dropped.load (), nullptr));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, GST_RANGE_DEMUX (object)->priv->reporter.interval ());
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
@@ -436,6 +479,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
+  object_class->set_property = gst_range_demux_set_property;
   object_class->get_property = gst_range_demux_get_property;
   object_class->finalize = gst_range_demux_finalize;
 
@@ -443,8 +487,10 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since start: frames (frame sets), buffers (of single views), gaps (views that "
           "frame sets lacked), dropped (units that are damaged or of an unknown kind; views whose "
-          "planes do not lie in their buffer)",
+          "planes do not lie in their buffer; views that the rig does not name)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

@@ -5,7 +5,9 @@
  *
  * Puts the views of several streams together, all raw or all coded, matched by capture time. In a
  * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
- * one that is gone, and takes it back when it returns. No pixel is copied.
+ * one that is gone, and takes it back when it returns. Of up to 16 streams no pixel is copied (as
+ * many memories as a #GstBuffer holds); of more, those of the first 15 are shared, and those of the
+ * others are copied once.
  *
  * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
  * at the same time.
@@ -30,6 +32,7 @@
 #include <vector>
 
 #include "clockpublisher.hpp"
+#include "muxframeset.hpp"
 #include "muxsteps.hpp"
 #include "muxstreams.hpp"
 #include "muxwaiting.hpp"
@@ -44,8 +47,9 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
 
 static constexpr GstClockTime kOutOfStep = MuxSteps::kOutOfStep;
-/* A stream of which nothing came for so long is silent: it has no say any more. */
-static constexpr GstClockTime kSilent = 2 * GST_SECOND;
+/* A recording may begin or pause so much later than most: it waits, and the others go without it.
+ * What is further away has another clock. */
+static constexpr GstClockTime kOtherRecording = 60 * GST_SECOND;
 /* What lasts so long is told. Pictures that a host which stood still sends at once are not. */
 static constexpr GstClockTime kWorthTelling = GST_SECOND;
 static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
@@ -63,12 +67,16 @@ struct GstRangeMuxPrivate {
 
   std::atomic<bool> caps_dirty = true; /* the streams have to be chosen again */
 
-  /* streaming thread only */
+  /* streaming thread only; vectors are kept for their memory */
   bool live = false;
-  rangecast::Rig rig; /* of rig_file; empty: any */
+  MuxPads pads_now;       /* while it works on them, see PadsNow */
+  WaitingBuffers waiting; /* the same */
+  rangecast::Rig rig;     /* of rig_file; empty: any */
   MuxSteps steps;
-  std::vector<MuxSteps::Stream> votes; /* kept for their memory */
+  FrameSetJoiner joiner;
+  std::vector<MuxSteps::Stream> votes;
   std::vector<MuxPad *> voters;
+  std::vector<GstClockTime> captures;
   GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstClockTime last_capture = GST_CLOCK_TIME_NONE; /* of the last frame set */
@@ -99,32 +107,23 @@ current_pads (GstRangeMux *self)
   return self->priv->pads;
 }
 
-/* ---- what becomes of each stream ---- */
-
-/* Why a stream is left out, for people. @param offset  ahead of the others, ns */
-static std::string
-explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset)
-{
-  const std::string seconds = std::to_string (double (ABS (offset)) / GST_SECOND) + " s";
-  switch (state) {
-    case MuxState::kSilent:
-      return ": nothing came for " + std::to_string (kSilent / GST_SECOND) +
-             " s; the others go on without it";
-    case MuxState::kLate:
-      return ": all that comes is too late, capture times are " + seconds +
-             " behind the others'; left out; expected a host and a network that keep up, a clock "
-             "in step, or a greater latency";
-    case MuxState::kOutOfStep:
-      return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
-             " the others': the host's clock is not in step; left out until it is";
-    case MuxState::kOtherRig:
-      return ": " + entry.other_rig.message () + "; left out";
-    case MuxState::kClash:
-      return ": " + entry.clash.message () + "; left out";
-    default:
-      return ": is back";
+/* The pads that there are, while it lives. For the streaming thread: allocates nothing. */
+class PadsNow {
+public:
+  explicit PadsNow (GstRangeMux *self) : pads_ (self->priv->pads_now)
+  {
+    std::lock_guard guard (self->priv->lock);
+    pads_ = self->priv->pads;
   }
-}
+  ~PadsNow () { pads_.clear (); } /* those that were released may go */
+  PadsNow (const PadsNow &) = delete;
+  const MuxPads &operator* () const { return pads_; }
+
+private:
+  MuxPads &pads_;
+};
+
+/* ---- what becomes of each stream ---- */
 
 /* Tells a state to people, by a warning, and to applications. */
 static void
@@ -274,7 +273,7 @@ note_arrivals (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &wai
   for (const auto &entry : pads) {
     if (!GST_CLOCK_TIME_IS_VALID (entry->seen))
       entry->seen = now; /* it did not come so far */
-    const bool alive = entry->waits || now <= entry->seen || now - entry->seen <= kSilent;
+    const bool alive = entry->waits || now <= entry->seen || now - entry->seen <= kSilentAfter;
     if (alive != entry->alive)
       priv->caps_dirty = true;
     entry->alive = alive;
@@ -309,19 +308,23 @@ judge_steps (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiti
     priv->voters[i]->in_step = priv->votes[i].in_step;
 }
 
-/* Not live: PTS may begin anywhere, and every stream that has not ended has a buffer here. */
+/* Not live: PTS may begin anywhere, and every stream that has not ended has a buffer here. Of two
+ * that are apart nobody knows which one is wrong: the earlier one goes alone, the other one waits.
+ */
 static void
 judge_recordings (GstRangeMuxPrivate *priv, const WaitingBuffers &waiting)
 {
   if (waiting.list.empty ())
     return;
-  std::vector<GstClockTime> captures;
+  std::vector<GstClockTime> &captures = priv->captures;
+  captures.clear ();
   for (const Waiting &w : waiting.list)
     captures.push_back (w.capture);
   std::ranges::nth_element (captures, captures.begin () + captures.size () / 2);
   const GstClockTime median = captures[captures.size () / 2];
+  const bool can_vote = captures.size () >= 3;
   for (const Waiting &w : waiting.list)
-    w.entry->in_step = distance (w.capture, median) <= kOutOfStep;
+    w.entry->in_step = !can_vote || distance (w.capture, median) <= kOtherRecording;
   if (GST_CLOCK_TIME_IS_VALID (priv->last_capture) && median + kOutOfStep < priv->last_capture)
     priv->last_capture = GST_CLOCK_TIME_NONE; /* all of them began again */
 }
@@ -382,19 +385,6 @@ drop_past_gaps (const WaitingBuffers &waiting, GstClockTime tolerance, bool time
   return any;
 }
 
-/* Adds the views of one stream. @return false if one of them is there already */
-static bool
-append (GstBuffer *frame_set, GstBuffer *buffer, bool coded)
-{
-  if (!coded)
-    return gst_range_buffer_append (frame_set, buffer);
-  gst_buffer_copy_into (frame_set, buffer, GST_BUFFER_COPY_MEMORY, 0, -1);
-  if (GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
-    GST_BUFFER_FLAG_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
-  gst_buffer_add_parent_buffer_meta (frame_set, buffer); /* its pool gets it back after us */
-  return true;
-}
-
 static void
 report_clash (GstRangeMux *self, MuxPad &entry)
 {
@@ -406,28 +396,50 @@ report_clash (GstRangeMux *self, MuxPad &entry)
                                   ": its buffers have views that another pad has, too; dropped"});
 }
 
-static GstFlowReturn
-push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
-    GstClockTime tolerance, std::size_t streams)
+/* Takes the buffers of one frame set from their pads.
+ * @param[out] running  of the oldest of them
+ * @return how many */
+static std::size_t
+join_matching (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
+    GstClockTime tolerance, GstClockTime &running)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  GstBuffer *frame_set = gst_buffer_new ();
-  GstClockTime running = GST_CLOCK_TIME_NONE;
+  const auto matches = [&] (const Waiting &w) { return w.capture <= first + tolerance; };
+  guint memories = 0;
+  for (const Waiting &w : waiting.list)
+    memories += matches (w) ? gst_buffer_n_memory (w.buffer) : 0;
+  priv->joiner.begin (memories, waiting.list.front ().entry->coded);
+  running = GST_CLOCK_TIME_NONE;
   std::size_t matched = 0;
   for (const Waiting &w : waiting.list) {
-    if (w.capture > first + tolerance)
+    if (!matches (w))
       continue;
     gst_aggregator_pad_drop_buffer (w.entry->pad); /* we hold a reference */
-    if (!append (frame_set, w.buffer, w.entry->coded))
+    if (!priv->joiner.add (w.buffer))
       report_clash (self, *w.entry);
-    if (GST_CLOCK_TIME_IS_VALID (w.running))
-      running = GST_CLOCK_TIME_IS_VALID (running) ? std::min (running, w.running) : w.running;
+    running = std::min (running, w.running); /* NONE is the greatest number there is */
     matched++;
     set_state (self, *w.entry, MuxState::kIn, w.running);
     std::lock_guard guard (priv->lock);
     w.entry->received++;
     w.entry->matched++;
     w.entry->last_skew = GST_CLOCK_DIFF (first, w.capture);
+  }
+  return matched;
+}
+
+static GstFlowReturn
+push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
+    GstClockTime tolerance, std::size_t streams)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  GstClockTime running;
+  const std::size_t matched = join_matching (self, waiting, first, tolerance, running);
+  GstBuffer *frame_set = priv->joiner.finish ();
+  if (!frame_set) {
+    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
+        ("no memory to put %" G_GSIZE_FORMAT " streams together", matched));
+    return GST_FLOW_ERROR;
   }
   if (GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (priv->last_running))
     running = std::max (running, priv->last_running); /* never backwards */
@@ -444,13 +456,10 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
 }
 
 static GstFlowReturn
-gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
+aggregate_waiting (
+    GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting, bool timeout)
 {
-  auto self = GST_RANGE_MUX (aggregator);
   GstRangeMuxPrivate *priv = self->priv;
-  const MuxPads pads = current_pads (self);
-  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const WaitingBuffers waiting (pads, priv->live);
   if (waiting.list.empty () && waiting.gaps.empty ()) {
     if (waiting.missing > 0 || waiting.ended == 0)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -478,13 +487,27 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   return push_frame_set (self, waiting, first, tolerance, pads.size ());
 }
 
+static GstFlowReturn
+gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
+{
+  auto self = GST_RANGE_MUX (aggregator);
+  GstRangeMuxPrivate *priv = self->priv;
+  const PadsNow pads (self);
+  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  priv->waiting.take (*pads, priv->live);
+  const GstFlowReturn flow = aggregate_waiting (self, *pads, priv->waiting, timeout);
+  priv->waiting.release ();
+  return flow;
+}
+
 /* The deadline counts from the oldest buffer that waits. Without one there is nothing to wait for,
  * and so no deadline. */
 static GstClockTime
 gst_range_mux_get_next_time (GstAggregator *aggregator)
 {
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
+  const PadsNow pads (GST_RANGE_MUX (aggregator));
+  for (const auto &entry : *pads) {
     GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
     if (!buffer)
       continue;
@@ -596,6 +619,7 @@ gst_range_mux_stop (GstAggregator *aggregator)
 {
   GST_RANGE_MUX (aggregator)->priv->reporter.stop ();
   GST_RANGE_MUX (aggregator)->priv->clock.stop ();
+  GST_RANGE_MUX (aggregator)->priv->joiner.drop ();
   return TRUE;
 }
 
@@ -633,6 +657,8 @@ static void
 gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
   switch (id) {
     case PROP_MAX_SKEW:
@@ -643,9 +669,6 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
       break;
     case PROP_RIG:
       priv->rig_file = g_value_get_string (value) ? g_value_get_string (value) : "";
-      break;
-    case PROP_STATS_INTERVAL:
-      priv->reporter.set_interval (g_value_get_uint (value));
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);

@@ -21,6 +21,7 @@
 #include <gst/video/gstvideopool.h>
 #include <gst/video/video.h>
 
+#include <algorithm>
 #include <atomic>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -255,6 +256,10 @@ gst_range_split_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
     for (const auto &pad : flow == GST_FLOW_OK ? current_pads (self) : SplitPads{}) {
       const GstFlowReturn pushed = push_view (self, *pad, frame, buffer);
       std::lock_guard guard (self->priv->lock);
+      /* Of a pad that was released meanwhile: it is not in the combiner, which would hand its
+       * FLUSHING on all the same. */
+      if (std::ranges::find (self->priv->pads, pad) == self->priv->pads.end ())
+        continue;
       flow = gst_flow_combiner_update_pad_flow (self->priv->combiner, pad->pad, pushed);
       if (flow != GST_FLOW_OK)
         break;
@@ -360,12 +365,12 @@ static void
 gst_range_split_release_pad (GstElement *element, GstPad *pad)
 {
   auto self = GST_RANGE_SPLIT (element);
-  gst_pad_set_active (pad, FALSE);
-  {
+  { /* first, so that a push which the next line ends is known for one of a pad that goes */
     std::lock_guard guard (self->priv->lock);
     std::erase_if (self->priv->pads, [&] (const auto &entry) { return entry->pad == pad; });
     gst_flow_combiner_remove_pad (self->priv->combiner, pad);
   }
+  gst_pad_set_active (pad, FALSE);
   gst_element_remove_pad (element, pad);
 }
 

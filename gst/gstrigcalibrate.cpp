@@ -31,8 +31,10 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/geometry/size_text.hpp>
 
 using rangecast::CalibrationCamera;
+using rangecast::size_text;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::TileLayout;
@@ -99,12 +101,6 @@ current_properties (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
   return self->priv->properties;
-}
-
-static std::string
-size_text (const GstVideoInfo &info)
-{
-  return std::to_string (info.width) + "x" + std::to_string (info.height);
 }
 
 /* ---- jobs ---- */
@@ -436,7 +432,8 @@ take_caps (GstRigCalibrate *self, CalibrationSource &camera, GstCaps *caps)
   if (begun && camera.has_info &&
       (info.width != camera.info.width || info.height != camera.info.height))
     return {StatusCode::kBadSize, "pad " + name + ": pictures changed from " +
-                                      size_text (camera.info) + " to " + size_text (info) +
+                                      size_text (camera.info.width, camera.info.height) + " to " +
+                                      size_text (info.width, info.height) +
                                       "; expected one size throughout a calibration"};
   camera.info = info;
   camera.has_info = true;

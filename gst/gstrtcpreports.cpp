@@ -5,7 +5,9 @@
  *
  * Tells an encoder what receivers report in plain RTCP: of each report block about the stream that
  * goes through from sink to src, in the RTCP that goes through from rtcp_sink to rtcp_src, it sends
- * an event RangecastReceiverReport upstream. Both streams go through untouched.
+ * an event RangecastReceiverReport upstream. The stream goes through untouched, and so does RTCP of
+ * its receivers, at most `max-receivers` of them; other RTCP does not get to rtpsession, which
+ * would keep a source for everybody it ever names.
  *
  * ## Example launch line
  * |[
@@ -20,30 +22,29 @@
  */
 #include "gstrtcpreports.h"
 
+#include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
 
-#include <algorithm>
-#include <array>
 #include <mutex>
+#include <optional>
+
+#include "rtcpreceivers.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtcp_reports_debug);
 #define GST_CAT_DEFAULT gst_rtcp_reports_debug
 
-/* What was last reported by one receiver of one stream. */
-struct Known {
-  guint32 receiver = 0, sender = 0, highest = 0;
-  guint64 use = 0; /* 0: free; the least was used longest ago */
-};
+enum { PROP_0, PROP_MAX_RECEIVERS, PROP_STATS };
 
 struct GstRtcpReportsPrivate {
   std::mutex lock; /* guards what follows; never held across a push */
-  guint32 ssrc = 0;
-  bool has_ssrc = false;
+  guint max_receivers = RtcpReceivers::kDefaultMost;
+  std::optional<guint32> ssrc;
   int clock_rate = 90000;
+  guint receivers = 0;                /* now */
+  guint64 refused = 0, malformed = 0; /* packets of RTCP since start */
 
   /* streaming thread of rtcp_sink only */
-  std::array<Known, 64> known;
-  guint64 uses = 0;
+  RtcpReceivers known;
 };
 
 struct _GstRtcpReports {
@@ -64,26 +65,132 @@ static GstStaticPadTemplate rtcp_src_template = GST_STATIC_PAD_TEMPLATE (
 G_DEFINE_TYPE (GstRtcpReports, gst_rtcp_reports, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (rtcpreports, "rtcpreports", GST_RANK_NONE, GST_TYPE_RTCP_REPORTS)
 
+/* ---- who speaks ---- */
+
+/* The stream, as it is when a packet of RTCP comes. */
+struct Stream {
+  guint32 ssrc;
+  guint clock_rate;
+};
+
+/* What a compound packet is looked at for before anybody believes it. */
+struct Compound {
+  std::optional<guint32> speaker; /* that all of it is from, but for feedback */
+  std::optional<guint32> asker;   /* of feedback */
+  bool of_several = false;        /* as mixers send it: one packet would make many sources */
+  bool reports = false;           /* on our stream */
+
+  void speaks (guint32 ssrc)
+  {
+    of_several |= speaker.value_or (ssrc) != ssrc;
+    speaker = ssrc;
+  }
+};
+
+/* RFC 5104, 4.3.1: full intra requests name their streams apart. */
+static bool
+asks_full_picture (GstRTCPPacket *packet, guint32 ssrc)
+{
+  const guint8 *fci = gst_rtcp_packet_fb_get_fci (packet);
+  const guint words = gst_rtcp_packet_fb_get_fci_length (packet);
+  for (guint i = 0; i + 1 < words; i += 2)
+    if (GST_READ_UINT32_BE (fci + 4 * i) == ssrc)
+      return true;
+  return false;
+}
+
+static void
+read_blocks (GstRTCPPacket *packet, guint32 ssrc, Compound &compound)
+{
+  for (guint i = 0; i < gst_rtcp_packet_get_rb_count (packet); i++) {
+    guint32 stream = 0;
+    gst_rtcp_packet_get_rb (
+        packet, i, &stream, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
+    compound.reports |= stream == ssrc;
+  }
+}
+
+static void
+read_speaker (GstRTCPPacket *packet, guint32 ssrc, Compound &compound)
+{
+  guint32 sender = 0;
+  switch (gst_rtcp_packet_get_type (packet)) {
+    case GST_RTCP_TYPE_RR:
+      compound.speaks (gst_rtcp_packet_rr_get_ssrc (packet));
+      return read_blocks (packet, ssrc, compound);
+    case GST_RTCP_TYPE_SR:
+      gst_rtcp_packet_sr_get_sender_info (packet, &sender, nullptr, nullptr, nullptr, nullptr);
+      compound.speaks (sender);
+      return read_blocks (packet, ssrc, compound);
+    case GST_RTCP_TYPE_SDES:
+      for (gboolean more = gst_rtcp_packet_sdes_first_item (packet); more;
+           more = gst_rtcp_packet_sdes_next_item (packet))
+        compound.speaks (gst_rtcp_packet_sdes_get_ssrc (packet));
+      return;
+    case GST_RTCP_TYPE_BYE:
+      for (guint i = 0; i < gst_rtcp_packet_bye_get_ssrc_count (packet); i++)
+        compound.speaks (gst_rtcp_packet_bye_get_nth_ssrc (packet, i));
+      return;
+    case GST_RTCP_TYPE_RTPFB:
+    case GST_RTCP_TYPE_PSFB:
+      compound.asker = gst_rtcp_packet_fb_get_sender_ssrc (packet);
+      compound.reports |= gst_rtcp_packet_fb_get_media_ssrc (packet) == ssrc ||
+                          (gst_rtcp_packet_get_type (packet) == GST_RTCP_TYPE_PSFB &&
+                              gst_rtcp_packet_fb_get_type (packet) == GST_RTCP_PSFB_TYPE_FIR &&
+                              asks_full_picture (packet, ssrc));
+      return;
+    default:
+      return;
+  }
+}
+
+static Compound
+read_compound (GstRTCPBuffer *rtcp, guint32 ssrc)
+{
+  Compound compound;
+  GstRTCPPacket packet;
+  for (gboolean more = gst_rtcp_buffer_get_first_packet (rtcp, &packet); more;
+       more = gst_rtcp_packet_move_to_next (&packet))
+    read_speaker (&packet, ssrc, compound);
+  return compound;
+}
+
+static GstClockTime
+time_of (GstBuffer *buffer)
+{
+  const GstClockTime time = GST_BUFFER_DTS_OR_PTS (buffer);
+  return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
+}
+
+/* @return nullptr: it is no receiver of ours */
+static RtcpReceivers::Receiver *
+admit (GstRtcpReportsPrivate *priv, GstBuffer *buffer, const Compound &compound, guint32 ssrc,
+    guint most)
+{
+  const auto speaker = compound.speaker ? compound.speaker : compound.asker;
+  if (!speaker || compound.of_several || *speaker == ssrc) /* our own: looped, or forged */
+    return nullptr;
+  const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer);
+  return priv->known.admit (
+      *speaker, meta ? meta->addr : nullptr, compound.reports, time_of (buffer), most);
+}
+
 /* ---- reports ---- */
 
 struct ReportBlock {
-  guint32 receiver = 0, sender = 0, highest = 0, jitter = 0, last_sr = 0, delay = 0;
+  guint32 sender = 0, highest = 0, jitter = 0, last_sr = 0, delay = 0;
   guint8 fraction_lost = 0;
 };
 
 /* Packets since the receiver's last report; 0: not known. */
 static guint32
-count_packets (GstRtcpReportsPrivate *priv, const ReportBlock &block)
+count_packets (RtcpReceivers::Receiver &receiver, const ReportBlock &block)
 {
-  const auto same = [&] (const Known &known) {
-    return known.use > 0 && known.receiver == block.receiver && known.sender == block.sender;
-  };
-  auto known = std::ranges::find_if (priv->known, same);
-  const bool is_new = known == priv->known.end ();
-  if (is_new)
-    known = std::ranges::min_element (priv->known, {}, &Known::use);
-  const guint32 packets = is_new ? 0 : block.highest - known->highest;
-  *known = {block.receiver, block.sender, block.highest, ++priv->uses};
+  const bool is_new = !receiver.has_reported || receiver.stream != block.sender;
+  const guint32 packets = is_new ? 0 : block.highest - receiver.highest;
+  receiver.has_reported = true;
+  receiver.stream = block.sender;
+  receiver.highest = block.highest;
   return packets < (1u << 24) ? packets : 0;
 }
 
@@ -103,19 +210,12 @@ round_trip_time (const ReportBlock &block)
 }
 
 static void
-send_report (GstRtcpReports *self, const ReportBlock &block)
+send_report (GstRtcpReports *self, RtcpReceivers::Receiver &receiver, const ReportBlock &block,
+    guint clock_rate)
 {
-  GstRtcpReportsPrivate *priv = self->priv;
-  guint clock_rate = 90000;
-  {
-    std::lock_guard guard (priv->lock);
-    if (!priv->has_ssrc || priv->ssrc != block.sender)
-      return;
-    clock_rate = guint (priv->clock_rate);
-  }
   GstStructure *report = gst_structure_new ("RangecastReceiverReport", "ssrc", G_TYPE_UINT,
-      block.receiver, "fraction-lost", G_TYPE_DOUBLE, block.fraction_lost / 256.0, "packets",
-      G_TYPE_UINT, count_packets (priv, block), "jitter", G_TYPE_UINT64,
+      receiver.ssrc, "fraction-lost", G_TYPE_DOUBLE, block.fraction_lost / 256.0, "packets",
+      G_TYPE_UINT, count_packets (receiver, block), "jitter", G_TYPE_UINT64,
       gst_util_uint64_scale (block.jitter, GST_SECOND, clock_rate), "round-trip-time",
       G_TYPE_UINT64, round_trip_time (block), nullptr);
   GST_LOG_OBJECT (self, "%" GST_PTR_FORMAT, report);
@@ -123,22 +223,23 @@ send_report (GstRtcpReports *self, const ReportBlock &block)
 }
 
 static void
-send_reports (GstRtcpReports *self, GstRTCPPacket *packet)
+send_reports (GstRtcpReports *self, GstRTCPBuffer *rtcp, RtcpReceivers::Receiver &receiver,
+    const Stream &stream)
 {
-  const GstRTCPType type = gst_rtcp_packet_get_type (packet);
-  ReportBlock block;
-  if (type == GST_RTCP_TYPE_RR)
-    block.receiver = gst_rtcp_packet_rr_get_ssrc (packet);
-  else if (type == GST_RTCP_TYPE_SR)
-    gst_rtcp_packet_sr_get_sender_info (
-        packet, &block.receiver, nullptr, nullptr, nullptr, nullptr);
-  else
-    return;
-  for (guint i = 0; i < gst_rtcp_packet_get_rb_count (packet); i++) {
-    gint32 lost_ever = 0;
-    gst_rtcp_packet_get_rb (packet, i, &block.sender, &block.fraction_lost, &lost_ever,
-        &block.highest, &block.jitter, &block.last_sr, &block.delay);
-    send_report (self, block);
+  GstRTCPPacket packet;
+  for (gboolean more = gst_rtcp_buffer_get_first_packet (rtcp, &packet); more;
+       more = gst_rtcp_packet_move_to_next (&packet)) {
+    const GstRTCPType type = gst_rtcp_packet_get_type (&packet);
+    if (type != GST_RTCP_TYPE_RR && type != GST_RTCP_TYPE_SR)
+      continue;
+    for (guint i = 0; i < gst_rtcp_packet_get_rb_count (&packet); i++) {
+      ReportBlock block;
+      gint32 lost_ever = 0;
+      gst_rtcp_packet_get_rb (&packet, i, &block.sender, &block.fraction_lost, &lost_ever,
+          &block.highest, &block.jitter, &block.last_sr, &block.delay);
+      if (block.sender == stream.ssrc)
+        send_report (self, receiver, block, stream.clock_rate);
+    }
   }
 }
 
@@ -146,16 +247,35 @@ static GstFlowReturn
 gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RTCP_REPORTS (parent);
-  GstRTCPBuffer rtcp = GST_RTCP_BUFFER_INIT;
-  if (gst_rtcp_buffer_validate_reduced (buffer) &&
-      gst_rtcp_buffer_map (buffer, GST_MAP_READ, &rtcp)) {
-    GstRTCPPacket packet;
-    for (gboolean more = gst_rtcp_buffer_get_first_packet (&rtcp, &packet); more;
-         more = gst_rtcp_packet_move_to_next (&packet))
-      send_reports (self, &packet);
-    gst_rtcp_buffer_unmap (&rtcp);
+  GstRtcpReportsPrivate *priv = self->priv;
+  std::optional<Stream> stream;
+  guint most = 0;
+  {
+    std::lock_guard guard (priv->lock);
+    most = priv->max_receivers;
+    if (priv->ssrc)
+      stream = {*priv->ssrc, guint (priv->clock_rate)};
   }
-  return gst_pad_push (self->rtcp_src, buffer);
+  GstRTCPBuffer rtcp = GST_RTCP_BUFFER_INIT;
+  RtcpReceivers::Receiver *receiver = nullptr;
+  const bool sound = gst_rtcp_buffer_validate_reduced (buffer) &&
+                     gst_rtcp_buffer_map (buffer, GST_MAP_READ, &rtcp);
+  if (sound && stream)
+    receiver = admit (priv, buffer, read_compound (&rtcp, stream->ssrc), stream->ssrc, most);
+  if (receiver)
+    send_reports (self, &rtcp, *receiver, *stream);
+  if (sound)
+    gst_rtcp_buffer_unmap (&rtcp);
+  {
+    std::lock_guard guard (priv->lock);
+    priv->receivers = priv->known.size ();
+    priv->malformed += !sound;
+    priv->refused += sound && !receiver;
+  }
+  if (receiver)
+    return gst_pad_push (self->rtcp_src, buffer);
+  gst_buffer_unref (buffer);
+  return GST_FLOW_OK;
 }
 
 /* ---- the stream itself ---- */
@@ -170,7 +290,6 @@ note_packet (GstRtcpReports *self, GstBuffer *buffer)
   gst_rtp_buffer_unmap (&rtp);
   std::lock_guard guard (self->priv->lock);
   self->priv->ssrc = ssrc;
-  self->priv->has_ssrc = true;
 }
 
 static GstFlowReturn
@@ -233,11 +352,44 @@ gst_rtcp_reports_change_state (GstElement *element, GstStateChange transition)
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (element)->priv;
     std::lock_guard guard (priv->lock);
-    priv->has_ssrc = false;
-    priv->known = {};
-    priv->uses = 0;
+    priv->ssrc.reset ();
+    priv->known.clear ();
+    priv->receivers = 0;
+    priv->refused = priv->malformed = 0;
   }
   return result;
+}
+
+static void
+gst_rtcp_reports_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
+  if (id != PROP_MAX_RECEIVERS) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  priv->max_receivers = g_value_get_uint (value);
+}
+
+static void
+gst_rtcp_reports_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
+  std::lock_guard guard (priv->lock);
+  switch (id) {
+    case PROP_MAX_RECEIVERS:
+      g_value_set_uint (value, priv->max_receivers);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (
+          value, gst_structure_new ("application/x-rtcpreports-stats", "receivers", G_TYPE_UINT64,
+                     guint64 (priv->receivers), "refused", G_TYPE_UINT64, priv->refused,
+                     "malformed", G_TYPE_UINT64, priv->malformed, nullptr));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
 }
 
 static void
@@ -278,7 +430,22 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
+  object_class->set_property = gst_rtcp_reports_set_property;
+  object_class->get_property = gst_rtcp_reports_get_property;
   object_class->finalize = gst_rtcp_reports_finalize;
+
+  g_object_class_install_property (object_class, PROP_MAX_RECEIVERS,
+      g_param_spec_uint ("max-receivers", "Max receivers",
+          "RTCP of so many receivers gets through at a time, and of a quarter of them from one "
+          "address, 1 to 4096 (default 256)",
+          1, 4096, RtcpReceivers::kDefaultMost,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Receivers now; packets of RTCP since start that were refused (of nobody who receives "
+          "the stream, or of too many), and malformed",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
   element_class->change_state = gst_rtcp_reports_change_state;
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

@@ -30,10 +30,12 @@
 #include <optional>
 #include <rangecast/neighbourcode/unit.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "senderfilter.hpp"
 #include "senderprobation.hpp"
+#include "senderrivals.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
@@ -44,7 +46,9 @@ static constexpr GstClockTime kDefaultTimeout = 500 * GST_MSECOND;
 /* Of two streams from one address and port the second waits so long: it may be a program that began
  * again, but also two that share a socket or a relay. */
 static constexpr GstClockTime kBeginsAgain = 250 * GST_MSECOND;
-static constexpr guint kRivalPackets = 100;  /* before somebody is told of them */
+/* Without a sender, so many packets that are not sound, the first of them so long ago. */
+static constexpr guint kUnsoundPackets = 20;
+static constexpr GstClockTime kUnsoundTime = 3 * GST_SECOND;
 static constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
 
 struct GuardCounters {
@@ -61,10 +65,12 @@ struct GstRtpNeighbourCodeGuardPrivate {
   /* streaming thread only */
   GstClockTime last_time = 0;        /* of its last packet */
   std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
-  guint rival_packets = 0;           /* of others while it sends */
   GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
   SenderProbation probation;
-  bool warned_of_version = false;
+  SenderRivals rivals, other_versions; /* while it sends */
+  guint64 unsound = 0;                 /* packets since the last one that passed */
+  GstClockTime unsound_since = 0;
+  bool warned_of_version = false, warned_of_unsound = false;
   GSocket *filtered = nullptr; /* udpsrc's, while the kernel filters for us */
   bool filter_rests = false;   /* while the sender is silent */
   GstCaps *caps = nullptr;     /* as they came */
@@ -123,6 +129,7 @@ version_of_units (std::span<const guint8> payload)
 
 /* What of a packet the guard looks at. */
 struct Packet {
+  bool is_rtp = false; /* else only its address is known */
   guint32 ssrc = 0;
   guint16 sequence = 0;
   guint8 payload_type = 0;
@@ -131,12 +138,16 @@ struct Packet {
   GSocketAddress *address = nullptr; /* the buffer's */
 };
 
-static bool
-read_packet (GstBuffer *buffer, Packet &packet)
+static Packet
+read_packet (GstBuffer *buffer)
 {
+  Packet packet;
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  if (const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer))
+    packet.address = meta->addr;
   if (!gst_rtp_buffer_map (buffer, GST_MAP_READ, &rtp))
-    return false;
+    return packet;
+  packet.is_rtp = true;
   const std::span<const guint8> payload (
       static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
       gst_rtp_buffer_get_payload_len (&rtp));
@@ -149,9 +160,7 @@ read_packet (GstBuffer *buffer, Packet &packet)
       !packet.units && payload.size () > kRtxHeader &&
       version_of_units (payload.subspan (kRtxHeader)) == rangecast::kBitstreamVersion;
   gst_rtp_buffer_unmap (&rtp);
-  if (const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer))
-    packet.address = meta->addr;
-  return true;
+  return packet;
 }
 
 /* ---- the kernel's help ---- */
@@ -226,14 +235,14 @@ time_of (GstBuffer *buffer)
   return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
 }
 
-enum class Verdict { kPasses, kPassesAsFirst, kForeign, kRival, kOtherVersion };
+enum class Verdict { kPasses, kPassesAsFirst, kForeign, kUnsound, kRival, kOtherVersion };
 
 /* Under the lock: a packet of the sender, or one that was lost and comes again.
  * @param here  it comes from the sender's address and port */
 static bool
 is_senders (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
 {
-  if (!priv->ssrc || !here)
+  if (!priv->ssrc || !here || !packet.is_rtp)
     return false;
   if (packet.ssrc == *priv->ssrc) /* slices, or FEC */
     return packet.units || packet.payload_type != priv->payload_type;
@@ -253,7 +262,36 @@ take_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
   g_set_object (&priv->address, packet.address);
   priv->rtx_ssrc.reset ();
   priv->probation.clear ();
+  priv->rivals.clear ();
+  priv->other_versions.clear ();
+  priv->warned_of_unsound = false;
   priv->counters.senders++;
+}
+
+/* Under the lock: a packet that nobody can use, while nobody sends what we can. */
+static Verdict
+judge_unsound (GstRtpNeighbourCodeGuardPrivate *priv, GstClockTime now)
+{
+  if (priv->unsound++ == 0)
+    priv->unsound_since = now;
+  const bool tell = !priv->warned_of_unsound && priv->unsound >= kUnsoundPackets &&
+                    now >= priv->unsound_since && now - priv->unsound_since >= kUnsoundTime;
+  priv->warned_of_unsound |= tell;
+  return tell ? Verdict::kUnsound : Verdict::kForeign;
+}
+
+/* Under the lock: a sound packet of somebody else while the sender sends. */
+static Verdict
+judge_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packet &packet)
+{
+  if (packet.version == rangecast::kBitstreamVersion)
+    return priv->rivals.add (packet, priv->last_time) ? Verdict::kRival : Verdict::kForeign;
+  /* Who sends packets of our version as well sends damaged copies. */
+  if (packet.ssrc == *priv->ssrc || priv->rivals.comes_from (packet.address) ||
+      priv->warned_of_version || !priv->other_versions.add (packet, priv->last_time))
+    return Verdict::kForeign;
+  priv->warned_of_version = true;
+  return Verdict::kOtherVersion;
 }
 
 /* Under the lock. @param[out] stream  the packets that pass with kPassesAsFirst */
@@ -266,6 +304,7 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
   if (is_senders (priv, packet, here)) {
     if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;
+    priv->unsound = 0;
     rest_filter (priv, false);
     return Verdict::kPasses;
   }
@@ -274,13 +313,14 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
   if (!priv->ssrc || waited >= priv->timeout)
     rest_filter (priv, true);
   if (packet.version == 0)
-    return Verdict::kForeign;
-  if (packet.units && !silent)
-    return ++priv->rival_packets == kRivalPackets ? Verdict::kRival : Verdict::kForeign;
+    return silent ? judge_unsound (priv, now) : Verdict::kForeign;
+  const SenderProbation::Packet known = {
+      packet.address, packet.ssrc, packet.sequence, packet.version, now};
+  if (!silent)
+    return judge_rival (priv, known);
   if (!packet.units && priv->warned_of_version)
     return Verdict::kForeign;
-  if (!priv->probation.add (
-          {packet.address, packet.ssrc, packet.sequence, packet.version}, buffer, stream))
+  if (!priv->probation.add (known, buffer, stream))
     return Verdict::kForeign;
   if (!packet.units) {
     priv->warned_of_version = true;
@@ -288,7 +328,7 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
   }
   take_sender (priv, packet);
   priv->last_time = now;
-  priv->rival_packets = 0;
+  priv->unsound = 0;
   return Verdict::kPassesAsFirst;
 }
 
@@ -317,13 +357,32 @@ push_first (GstRtpNeighbourCodeGuard *self, std::vector<GstBuffer *> &stream)
   return flow;
 }
 
-static void
-warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet)
+static std::string
+text_of (GSocketAddress *address)
 {
+  if (!G_IS_INET_SOCKET_ADDRESS (address))
+    return "somewhere";
+  gchar *text = g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address));
+  const std::string copy = text;
+  g_free (text);
+  return copy;
+}
+
+static void
+warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 unsound)
+{
+  if (verdict == Verdict::kUnsound)
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("%" G_GUINT64_FORMAT " packets came and none is sound: expected coded frame sets of "
+         "version %d; they are another codec's, or encrypted (--key)",
+            unsound, rangecast::kBitstreamVersion),
+        (nullptr));
   if (verdict == Verdict::kRival)
     GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-        ("Two senders at one port: packets of SSRC %08x are dropped, expected those of %08x",
-            packet.ssrc, *self->priv->ssrc),
+        ("Two senders at one port: packets of SSRC %08x from %s are dropped, expected those of "
+         "%08x from %s",
+            packet.ssrc, text_of (packet.address).c_str (), *self->priv->ssrc,
+            text_of (self->priv->address).c_str ()),
         (nullptr));
   if (verdict == Verdict::kOtherVersion)
     gst_range_post_warning (GST_ELEMENT (self),
@@ -338,14 +397,14 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
-  Packet packet;
+  const Packet packet = read_packet (buffer);
   Verdict verdict = Verdict::kForeign;
   std::vector<GstBuffer *> stream; /* empty, and so without memory, but when a sender begins */
-  const bool is_rtp = read_packet (buffer, packet);
+  guint64 unsound = 0;
   {
     std::lock_guard guard (priv->lock);
-    if (is_rtp)
-      verdict = judge (priv, packet, time_of (buffer), buffer, stream);
+    verdict = judge (priv, packet, time_of (buffer), buffer, stream);
+    unsound = priv->unsound;
     priv->counters.passed += verdict == Verdict::kPasses          ? 1
                              : verdict == Verdict::kPassesAsFirst ? stream.size ()
                                                                   : 0;
@@ -360,7 +419,7 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
     gst_buffer_unref (buffer); /* the stream has it */
     return push_first (self, stream);
   }
-  warn_of (self, verdict, packet);
+  warn_of (self, verdict, packet, unsound);
   for (GstBuffer *held : stream)
     gst_buffer_unref (held);
   gst_buffer_unref (buffer);
@@ -375,7 +434,9 @@ forget_sender (GstRtpNeighbourCodeGuardPrivate *priv)
   priv->ssrc.reset ();
   priv->rtx_ssrc.reset ();
   priv->probation.clear ();
-  priv->rival_packets = 0;
+  priv->rivals.clear ();
+  priv->other_versions.clear ();
+  priv->unsound = 0;
   g_clear_object (&priv->address);
 }
 
@@ -432,7 +493,7 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
     gst_caps_replace (&self->priv->caps, nullptr);
     std::lock_guard guard (self->priv->lock);
     forget_sender (self->priv);
-    self->priv->warned_of_version = false;
+    self->priv->warned_of_version = self->priv->warned_of_unsound = false;
     self->priv->counters = {};
   }
   return result;
@@ -508,8 +569,8 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
 
   g_object_class_install_property (object_class, PROP_TIMEOUT,
       g_param_spec_uint64 ("timeout", "Timeout",
-          "Another sender takes over when the one that passes has been silent for so long, "
-          "nanoseconds",
+          "Another sender takes over when the one that passes has been silent for so long, in "
+          "nanoseconds, 0 to 2^64 - 1 (never); default 500000000 (500 ms)",
           0, G_MAXUINT64, kDefaultTimeout,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,

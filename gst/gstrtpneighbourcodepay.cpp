@@ -123,6 +123,7 @@ struct Packer {
   GstBufferList *packets;
   gsize room; /* payload bytes of a packet */
   GstClockTime pts, dts;
+  bool unreadable = false; /* memory that could not be mapped */
 
   void add (GstBuffer *units, gsize offset, gsize size)
   {
@@ -151,8 +152,10 @@ struct Packer {
       end = offset + unit.size ();
       return true;
     };
-    if (!for_each_unit (buffer, take, damage))
+    if (!for_each_unit (buffer, take, damage)) {
+      unreadable = true;
       return {};
+    }
     if (!too_long && end > begin)
       add (buffer, begin, end - begin);
     return too_long;
@@ -264,6 +267,20 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
   return GST_FLOW_ERROR;
 }
 
+/* Makes packets of a frame set, or of some of its slices, and of the rig where that is due. */
+static std::optional<UnitHeader>
+pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool with_rig)
+{
+  std::optional<UnitHeader> too_long;
+  if (with_rig) {
+    GstBuffer *rig =
+        gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
+    too_long = packer.pack (rig);
+    gst_buffer_unref (rig);
+  }
+  return too_long ? too_long : packer.pack (buffer);
+}
+
 static GstFlowReturn
 gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *buffer)
 {
@@ -276,19 +293,16 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
       gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
   const bool is_last =
       !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
-  std::optional<UnitHeader> too_long;
   const bool begins = begins_frame_set (self->priv, buffer, is_last);
   self->priv->frame_sets += begins;
-  if (begins && config_is_due (self, running)) {
-    GstBuffer *rig =
-        gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
-    too_long = packer.pack (rig);
-    gst_buffer_unref (rig);
-  }
-  if (!too_long)
-    too_long = packer.pack (buffer);
+  const auto too_long = pack_all (self, packer, buffer, begins && config_is_due (self, running));
   self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   gst_buffer_unref (buffer);
+  if (packer.unreadable) {
+    gst_buffer_list_unref (packer.packets);
+    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+    return GST_FLOW_ERROR;
+  }
   if (too_long) {
     gst_buffer_list_unref (packer.packets);
     return refuse_long_unit (base, *too_long, mtu, packer.room);

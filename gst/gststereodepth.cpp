@@ -34,6 +34,7 @@
 #include <gst/video/video.h>
 
 #include <atomic>
+#include <cmath>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -41,12 +42,14 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
+#include <rangecast/geometry/size_text.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 #include <string>
 
 using rangecast::ImageView;
 using rangecast::Rgbx;
 using rangecast::Roi;
+using rangecast::size_text;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
@@ -300,6 +303,18 @@ gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
 
 /* ---- data ---- */
 
+/* What the counter of frames since a full picture begins with. Hosts of one rig that see something
+ * new all match full pictures at that moment; so that they do not go on doing so together, and keep
+ * each other waiting, views count from different numbers: the golden ratio's multiples keep any
+ * number of them apart. View 0 counts from 0. */
+static int
+refresh_phase (int view_id, int interval)
+{
+  constexpr double kGolden = 0.6180339887498949;
+  const double turns = std::max (view_id, 0) * kGolden;
+  return static_cast<int> ((turns - std::floor (turns)) * interval);
+}
+
 /* What to match of the pair that was taken. */
 static Roi
 next_roi (GstStereoDepthPrivate *priv)
@@ -315,8 +330,11 @@ next_roi (GstStereoDepthPrivate *priv)
   }
   roi.width = std::min (roi.width, full.width - roi.x);
   roi.height = std::min (roi.height, full.height - roi.y);
-  if (interval == 0 || roi.empty () || ++priv->since_refresh >= interval ||
-      priv->core.changed_outside (roi)) {
+  if (interval == 0 || roi.empty () || priv->core.changed_outside (roi)) {
+    priv->since_refresh = refresh_phase (priv->core.range_view ().id, interval);
+    return full;
+  }
+  if (++priv->since_refresh >= interval) {
     priv->since_refresh = 0;
     return full;
   }

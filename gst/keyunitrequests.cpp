@@ -22,8 +22,11 @@ KeyUnitRequests::note (GstEvent *event)
     return true;
   constexpr std::size_t kMost = 32;
   std::lock_guard guard (lock_);
+  const Request request = {running_time, all_headers != FALSE, count};
   if (waiting_.size () < kMost)
-    waiting_.push_back ({running_time, all_headers != FALSE, count});
+    waiting_.push_back (request);
+  else if (!GST_CLOCK_TIME_IS_VALID (running_time)) /* "at once" is never forgotten */
+    waiting_.back () = request;
   return true;
 }
 

@@ -9,8 +9,8 @@
 /** Requests for key frame sets (GstForceKeyUnit) that wait for their time. Any thread. */
 class KeyUnitRequests {
 public:
-  /** Takes note of an event from upstream or downstream. Of too many that wait the latest are
-   *  forgotten. @return false if it is another event */
+  /** Takes note of an event from upstream or downstream. Of too many that wait for
+   *  their time the latest are forgotten. @return false if it is another event */
   bool note (GstEvent *event);
 
   /** Whether somebody asked for the frame set of this running time to be a key one. */

@@ -49,6 +49,30 @@ MuxPad::title () const
   return text;
 }
 
+std::string
+explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset)
+{
+  const std::string seconds = std::to_string (double (ABS (offset)) / GST_SECOND) + " s";
+  switch (state) {
+    case MuxState::kSilent:
+      return ": nothing came for " + std::to_string (kSilentAfter / GST_SECOND) +
+             " s; the others go on without it";
+    case MuxState::kLate:
+      return ": all that comes is too late, capture times are " + seconds +
+             " behind the others'; left out; expected a host and a network that keep up, a clock "
+             "in step, or a greater latency";
+    case MuxState::kOutOfStep:
+      return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
+             " the others': the host's clock is not in step; left out until it is";
+    case MuxState::kOtherRig:
+      return ": " + entry.other_rig.message () + "; left out";
+    case MuxState::kClash:
+      return ": " + entry.clash.message () + "; left out";
+    default:
+      return ": is back";
+  }
+}
+
 /* ---- which streams go together ---- */
 
 /* The format of most streams that come; of those chosen before if as many have the other one. */

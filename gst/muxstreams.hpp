@@ -22,6 +22,9 @@ enum class MuxState {
  */
 const char *name_of (MuxState state);
 
+/** A stream of which nothing came for so long is silent: it has no say any more. */
+inline constexpr GstClockTime kSilentAfter = 2 * GST_SECOND;
+
 /** A sink pad of rangemux and what is known of its stream. */
 struct MuxPad {
   explicit MuxPad (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
@@ -59,6 +62,10 @@ struct MuxPad {
   GstClockTimeDiff last_skew = 0; ///< ns behind the oldest of its frame set
   GstClockTimeDiff offset = 0;    ///< ns, capture time ahead of the pipeline's clock as it came
 };
+/** What goes on with a stream, for people: follows its title().
+ *  @param offset  of its capture times, ahead of the others', ns */
+std::string explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset);
+
 using MuxPads = std::vector<std::shared_ptr<MuxPad>>;
 
 /** What the frame sets of the chosen streams are. */

@@ -14,11 +14,17 @@ struct Waiting {
   GstClockTime capture, running;
 };
 
-/* All buffers that wait; unrefs them when it goes. */
+/* All buffers that wait, from take() to release(). Keeps its memory from one frame set to the next.
+ */
 class WaitingBuffers {
 public:
-  WaitingBuffers (const MuxPads &pads, bool live)
+  WaitingBuffers () = default;
+  ~WaitingBuffers () { release (); }
+  WaitingBuffers (const WaitingBuffers &) = delete;
+
+  void take (const MuxPads &pads, bool live)
   {
+    release ();
     for (const auto &entry : pads) {
       GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
       if (buffer)
@@ -31,13 +37,15 @@ public:
         ended++;
     }
   }
-  ~WaitingBuffers ()
+  void release ()
   {
-    for (const auto *waiting : {&list, &gaps})
+    for (auto *waiting : {&list, &gaps}) {
       for (const Waiting &w : *waiting)
         gst_buffer_unref (w.buffer);
+      waiting->clear ();
+    }
+    missing = ended = 0;
   }
-  WaitingBuffers (const WaitingBuffers &) = delete;
 
   std::vector<Waiting> list, gaps;
   int missing = 0, ended = 0;

@@ -2,6 +2,7 @@
 #include "senderprobation.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 bool
 same_sender (GSocketAddress *a, GSocketAddress *b)
@@ -14,6 +15,15 @@ same_sender (GSocketAddress *a, GSocketAddress *b)
   return g_inet_socket_address_get_port (x) == g_inet_socket_address_get_port (y) &&
          g_inet_address_equal (
              g_inet_socket_address_get_address (x), g_inet_socket_address_get_address (y));
+}
+
+/* Whatever the ports. Unknown ones are nobody's. */
+static bool
+same_host (GSocketAddress *a, GSocketAddress *b)
+{
+  return G_IS_INET_SOCKET_ADDRESS (a) && G_IS_INET_SOCKET_ADDRESS (b) &&
+         g_inet_address_equal (g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (a)),
+             g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (b)));
 }
 
 void
@@ -33,7 +43,20 @@ SenderProbation::clear ()
     candidate.clear ();
 }
 
-/* The one who sent it; the one that was silent for longest makes room for somebody new. */
+SenderProbation::Candidate &
+SenderProbation::make_room (const Packet &packet)
+{
+  const auto theirs = [&] (const Candidate &c) {
+    return c.used > 0 && same_host (c.address, packet.address);
+  };
+  const bool only_theirs = std::ranges::count_if (candidates_, theirs) >= kPerHost;
+  return *std::ranges::min_element (candidates_, {}, [&] (const Candidate &c) {
+    const bool stale = c.used == 0 || packet.time < c.heard || packet.time - c.heard >= kStale;
+    const bool spared = !stale && only_theirs && !theirs (c);
+    return std::tuple (spared, stale ? 0 : c.packets.size (), c.used);
+  });
+}
+
 SenderProbation::Candidate &
 SenderProbation::find (const Packet &packet)
 {
@@ -41,7 +64,7 @@ SenderProbation::find (const Packet &packet)
     if (c.used > 0 && c.ssrc == packet.ssrc && c.version == packet.version &&
         same_sender (c.address, packet.address))
       return c;
-  Candidate &c = *std::ranges::min_element (candidates_, {}, &Candidate::used);
+  Candidate &c = make_room (packet);
   c.clear ();
   c.ssrc = packet.ssrc;
   c.version = packet.version;
@@ -56,6 +79,7 @@ SenderProbation::add (const Packet &packet, GstBuffer *buffer, std::vector<GstBu
 {
   Candidate &c = find (packet);
   c.used = ++uses_;
+  c.heard = packet.time;
   if (!c.packets.empty () && packet.sequence == c.sequence)
     return false; /* the network doubled it */
   if (!c.packets.empty () && packet.sequence != guint16 (c.sequence + 1)) {

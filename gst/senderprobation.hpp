@@ -11,17 +11,25 @@
 bool same_sender (GSocketAddress *a, GSocketAddress *b);
 
 /** Tells a stream from packets that only look like some: it has kPackets sound ones one after
- *  another in its sequence numbers. They are kept, so that nothing is lost of it. */
+ *  another in its sequence numbers. They are kept, so that nothing is lost of it.
+ *
+ *  Where a flood of strangers takes all places, room for somebody new is made by who was silent for
+ *  kStale; else, where his own host has kPerHost places, by one of these; else by anybody: who has
+ *  fewest packets, and of these the one that was silent for longest. So a flood from one host never
+ *  drives out a stream of another one, nor any flood of ever new strangers one of two packets. */
 class SenderProbation {
 public:
   static constexpr std::size_t kPackets = 4;
-  static constexpr std::size_t kCandidates = 8; ///< strangers that are known at a time
+  static constexpr std::size_t kCandidates = 64; ///< strangers that are known at a time
+  static constexpr std::ptrdiff_t kPerHost = 16; ///< of them at one address, whatever its port
+  static constexpr GstClockTime kStale = 5 * GST_SECOND;
 
   struct Packet {
     GSocketAddress *address; ///< may be null; not owned
     guint32 ssrc;
     guint16 sequence;
     int version; ///< of the neighbour code
+    GstClockTime time;
   };
 
   SenderProbation () = default;
@@ -41,6 +49,7 @@ private:
     guint32 ssrc = 0;
     guint16 sequence = 0; /* of the last packet */
     int version = 0;
+    GstClockTime heard = 0;
     guint64 used = 0; /* 0: nobody */
     std::vector<GstBuffer *> packets;
 
@@ -48,6 +57,7 @@ private:
   };
 
   Candidate &find (const Packet &packet);
+  Candidate &make_room (const Packet &packet);
 
   std::array<Candidate, kCandidates> candidates_;
   guint64 uses_ = 0;

@@ -20,14 +20,16 @@ struct RowBefore {
 };
 
 struct StatsReporter::State {
-  /* Locks, in this order: `reporting`, then whatever collect() takes; `lock` alone. Neither is held
-   * while posting. */
+  /* Locks, in this order: `reporting`, then what collect() takes or `lock`. So no element's lock
+   * may be held where `reporting` is taken: start(), finish(). Whoever has `lock` calls nothing but
+   * the clock. None is held while posting. */
   std::mutex reporting; /* guards before, since */
   std::vector<RowBefore> before;
   GstClockTime since = 0; /* when the interval began */
 
-  mutable std::mutex lock; /* guards what follows */
-  guint interval_ms = kDefaultIntervalMs;
+  std::atomic<guint> interval_ms = kDefaultIntervalMs; /* written with `lock` */
+
+  std::mutex lock;           /* guards what follows */
   Collect collect = nullptr; /* null: stopped */
   GstClockID timer = nullptr;
   guint64 views = 0;
@@ -44,7 +46,7 @@ struct StatsReporter::State {
   void unschedule ();
   void begin_interval (GstElement *e, Collect read);
   void report (bool at_end);
-  static void report_elsewhere (const std::shared_ptr<State> &self);
+  void report_elsewhere ();
   std::vector<GstStructure *> make_messages (
       GstElement *e, const std::vector<StatsRow> &rows, GstClockTime interval);
 };
@@ -214,30 +216,24 @@ StatsReporter::State::report (bool at_end)
 /* ---- the timer ---- */
 
 /* The clock's thread is that of all timers of the process: whoever handles the message at once, or
- * the end of an element whose last reference this may be, must not hold it up. */
+ * the end of an element whose last reference this may be, must not hold it up. So this reference
+ * goes to a thread of GStreamer's pool, whose own one keeps the element, and with it the state,
+ * until the work is done. */
 void
-StatsReporter::State::report_elsewhere (const std::shared_ptr<State> &self)
+StatsReporter::State::report_elsewhere ()
 {
-  struct Job {
-    std::shared_ptr<State> state;
-    GstElement *element;
-  };
-  if (self->is_reporting.exchange (true)) /* somebody handles the last message still */
+  if (is_reporting.exchange (true)) /* somebody handles the last message still */
     return;
-  auto e = static_cast<GstElement *> (g_weak_ref_get (&self->element));
+  auto e = static_cast<GstElement *> (g_weak_ref_get (&element));
   if (!e)
     return;
-  const auto work = [] (GstElement *, gpointer data) {
-    State &state = *static_cast<Job *> (data)->state;
+  const auto work = [] (GstElement *element, gpointer data) {
+    State &state = *static_cast<State *> (data);
     state.report (false);
     state.is_reporting = false;
+    gst_object_unref (element); /* the clock's thread's */
   };
-  const auto forget = [] (gpointer data) {
-    auto job = static_cast<Job *> (data);
-    gst_object_unref (job->element);
-    delete job;
-  };
-  gst_element_call_async (e, work, new Job{self, e}, forget);
+  gst_element_call_async (e, work, this, nullptr);
 }
 
 /* With `lock`. */
@@ -264,7 +260,7 @@ StatsReporter::State::schedule (const std::shared_ptr<State> &self)
   gst_object_unref (clock);
   const auto on_time = [] (GstClock *, GstClockTime time, GstClockID, gpointer data) -> gboolean {
     if (GST_CLOCK_TIME_IS_VALID (time))
-      report_elsewhere (*static_cast<std::shared_ptr<State> *> (data));
+      (*static_cast<std::shared_ptr<State> *> (data))->report_elsewhere ();
     return TRUE;
   };
   const auto forget = [] (gpointer data) { delete static_cast<std::shared_ptr<State> *> (data); };
@@ -304,7 +300,6 @@ StatsReporter::set_interval (guint interval_ms)
 guint
 StatsReporter::interval () const
 {
-  std::lock_guard guard (state_->lock);
   return state_->interval_ms;
 }
 

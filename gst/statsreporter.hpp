@@ -50,7 +50,7 @@ public:
 
   /** Installs `stats-interval`. */
   static void install (GObjectClass *object_class, guint property_id);
-  /** Milliseconds; 0: off. Any thread. */
+  /** Milliseconds; 0: off. Any thread, without a lock of the element's: it sets a timer. */
   void set_interval (guint interval_ms);
   [[nodiscard]] guint interval () const;
 

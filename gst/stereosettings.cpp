@@ -192,12 +192,6 @@ get_stereo_setting (const Settings &settings, guint id, GValue *value)
 
 /* ---- the view ---- */
 
-std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
-}
-
 static Status
 view_from_rig (const Settings &p, int width, int height, View &view)
 {

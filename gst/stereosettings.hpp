@@ -36,8 +36,5 @@ bool get_stereo_setting (const StereoDepthSettings &settings, guint id, GValue *
 rangecast::Status make_stereo_view (
     const StereoDepthSettings &settings, int width, int height, rangecast::View &view);
 
-/** For messages: 320x240. */
-std::string size_text (int width, int height);
-
 GType gst_stereo_depth_algorithm_get_type (void);
 #define GST_TYPE_STEREO_DEPTH_ALGORITHM (gst_stereo_depth_algorithm_get_type ())

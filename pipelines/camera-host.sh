@@ -21,6 +21,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --views N       number of views in the rig, for avatar (default 4)
   --size WxH      picture size, for avatar and cameras (default 320x240)
   --fps N         frames per second, for avatar, cameras and image sequences (default 15)
+  --loop N        avatar's pictures are drawn ahead: N of them, shown forwards and backwards, so that
+                  the cameras cost next to no CPU, as real ones (default 0: each is drawn)
   --format WHAT   rgb (default), bayer or grey: pictures that the cameras send
   --trigger HOW   free-run, software (default), hardware or action, for cameras
   --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
@@ -28,6 +30,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --action-send yes|no  with --trigger action, whether this host sends the commands, which reach the
                   cameras of all hosts of the network: one does (default: the host of view 0)
   --reconnect     wait for cameras that are gone or not there yet, instead of ending
+  --threads N     cores that this host's pictures may be worked on by at a time (default: all); where
+                  several hosts share one machine, fewer take less of it
   --learn N       frames from which the background is learnt (default 20)
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true"
 END
@@ -35,7 +39,7 @@ END
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= action_send= reconnect=false encoder=
+format=rgb trigger=software clock_server= action_send= reconnect=false encoder= loop=0 threads=
 while [ $# -gt 0 ]; do
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
@@ -52,6 +56,8 @@ while [ $# -gt 0 ]; do
     --size) size=${2:-}; shift ;;
     --fps) fps=${2:-}; shift ;;
     --learn) learn=${2:-}; shift ;;
+    --threads) threads=${2:-}; shift ;;
+    --loop) loop=${2:-}; shift ;;
     --format) format=${2:-}; shift ;;
     --trigger) trigger=${2:-}; shift ;;
     --clock-server) clock_server=${2:-}; shift ;;
@@ -66,6 +72,11 @@ need_number "$view" --view 0 63
 need_number "$views" --views 1 64
 need_number "$fps" --fps 1 1000
 need_number "$learn" --learn 1 100000
+need_number "$loop" --loop 0 100000
+if [ -n "$threads" ]; then
+  need_number "$threads" --threads 1 1024
+  export OPENCV_FOR_THREADS_NUM=$threads # OpenCV's own pool works for our loops, too
+fi
 need_size "$size" --size
 case "$trigger" in
   free-run | software | hardware | action) ;;
@@ -81,7 +92,9 @@ if [ -n "$clock_server" ]; then
   split_address "$clock_server" --clock-server
   [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs fire by this machine's clock"
 fi
+[ "$loop" = 0 ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 rtp_check sender
+[[ ! "$encoder" =~ adaptive-bitrate=\"?(true|1|yes|TRUE|True) ]] || rtp_adaptive=yes
 send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
@@ -139,12 +152,12 @@ case "$input" in
   cameras | cameras=*) read_cameras left right ;;
   avatar | avatar=*)
     caps="video/x-raw,format=RGBx,width=${size%x*},height=${size#*x},framerate=$fps/1"
-    cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))")
+    cameras=(avatartestsrc name=cameras is-live=true "views=$views" "view-id=$view" "empty-frames=$((learn + 5))" "loop-frames=$loop")
     [ "$input" = avatar ] || cameras+=("location=${input#avatar=}")
     cameras+=(cameras.left ! "$caps" ! queue max-size-buffers=2 ! depth.left
       cameras.right ! "$caps" ! queue max-size-buffers=2 ! depth.right) ;;
   *)
-    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, cameras, cameras=LEFT,RIGHT or a folder of recorded pairs"
+    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, cameras=LEFT,RIGHT or a folder of recorded pairs"
     read_side left
     cameras=("${side[@]}" ! queue ! depth.left)
     read_side right

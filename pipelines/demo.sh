@@ -15,6 +15,8 @@ usage: demo.sh [options]
   --input WHAT  avatar (default), avatar=MODEL.glb, range, a folder of recorded pairs with its rig.yaml
                 (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
                 shows, made on this machine's loopback network by fake-cameras
+  --loop N      the cameras' pictures of avatar are drawn ahead: N of them, shown forwards and
+                backwards, so that cameras cost next to no CPU, as real ones (default: each is drawn)
   --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
   --size WxH    size of the camera pictures (default 320x240)
   --frames N    frame sets to render (default 150)
@@ -26,15 +28,22 @@ usage: demo.sh [options]
   --trace       also write when each buffer passed each pad to DIR/log/HOST.trace, for
                 tests/bench/latency-budget.py
   --jitter MS   jitter buffers of the parent and the viewer (default: theirs)
+  --mtu BYTES   largest packet (default 1400); on loopback, as in a network with jumbo frames, it may
+                be larger, which costs less CPU time
+  --threads N   cores that each camera host may use at a time (default: this machine's, divided by the
+                number of views, at least 1: all of them work on the same moment's pictures)
   --latency MS  how long the parent waits for a late view (default: its own)
 With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts' statistics go there, for top.sh.
 END
 }
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency= loop= threads= mtu=
 while [ $# -gt 0 ]; do
   case "$1" in
     --input) input=${2:-}; shift ;;
+    --threads) threads=${2:-}; shift ;;
+    --mtu) mtu=${2:-}; shift ;;
+    --loop) loop=${2:-}; shift ;;
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --frames) frames=${2:-}; shift ;;
@@ -62,6 +71,10 @@ need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
 [ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
 [ -z "$latency" ] || need_number "$latency" --latency 0 10000
+[ -z "$mtu" ] || need_number "$mtu" --mtu 256 65000
+[ -z "$threads" ] || need_number "$threads" --threads 1 1024
+[ -z "$loop" ] || need_number "$loop" --loop 0 100000
+[ -z "$loop" ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 [ -n "$out" ] || die "--out: expected a folder"
 out=$(absolute "$out")
 case "$input" in
@@ -108,10 +121,11 @@ case "$input" in
     need_number "$views" --views 1 64
     model=()
     [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")
+    [[ "$input" != avatar=* || -f "${input#avatar=}" ]] || die "--input: no model '${input#avatar=}'"
     gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
       ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
   *)
-    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, cameras, or a folder with a rig.yaml"
+    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, or a folder with a rig.yaml"
     cp "$input/rig.yaml" "$rig"
     recorded_views=$(grep -c '^ *id:' "$rig" || true)
     views=${views:-$recorded_views}
@@ -136,15 +150,17 @@ case "$input" in
   *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
+[ -n "$threads" ] || { threads=$(($(nproc) / views)) && [ "$threads" -ge 1 ] || threads=1; }
 parent_port=$port viewer_port=$((port + views))
 echo "$views stereo cameras at $size, $fps frame sets/s: $views camera hosts, parent and viewer"
 for ((i = 0; i < views; i++)); do
   start "camera$i" pipelines/camera-host.sh --view "$i" --views "$views" --rig "$rig" --input "$input" \
-    --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))"
+    --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))" ${loop:+--loop "$loop"} --threads "$threads" \
+    ${mtu:+--mtu "$mtu"}
 done
 run_options=
 start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port" \
-  ${jitter:+--jitter "$jitter"} ${latency:+--latency "$latency"}
+  ${jitter:+--jitter "$jitter"} ${latency:+--latency "$latency"} ${mtu:+--mtu "$mtu"}
 
 [ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
 RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \

@@ -28,6 +28,19 @@ launch () {
   )
 }
 
+# usage: drop_empty FILE [TEXT] before `launch`: when that has ended, a FILE without a byte goes. With TEXT that is said
+# then, and not that there is no access unit in what came.
+drop_empty () {
+  exec 2> >(
+    trap '' INT TERM # it ends with what it reads
+    sed -u "${2:+/No access unit found: /,/GstNeighbourCodeParse:/d}" >&2
+    if [ -f "$1" ] && [ ! -s "$1" ]; then
+      rm -f "$1"
+      [ -z "${2:-}" ] || echo "$(basename "$0"): $2" >&2
+    fi
+  )
+}
+
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 
 # usage: split_address HOST:PORT option -> sets $host and $port
@@ -55,6 +68,12 @@ has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
 need_number () {
   [[ "$1" =~ ^[0-9]+$ ]] && [ "$1" -ge "$3" ] && [ "$1" -le "$4" ] ||
     die "$2: expected a whole number from $3 to $4, got '$1'"
+}
+
+# usage: need_degrees VALUE option
+need_degrees () {
+  [[ "$1" =~ ^-?([0-9]{1,4})(\.[0-9]+)?$ ]] && [ $((10#${BASH_REMATCH[1]})) -lt 3600 ] ||
+    die "$2: expected degrees per second, less than 3600, e.g. 30 or -7.5, got '$1'"
 }
 
 need_size () {

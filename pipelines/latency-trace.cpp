@@ -13,9 +13,6 @@
 static thread_local GstClockTime last_capture = GST_CLOCK_TIME_NONE;
 static thread_local gint64 last_rtp_time = -1;
 
-/* Some 200 MB: ten minutes of four views at 30/s. */
-static constexpr std::size_t kMostPassages = 4000000;
-
 static gint64
 thread_cpu_ns ()
 {

@@ -11,16 +11,20 @@
 
 /** Notes when each buffer passes each source pad of a pipeline (and the sinks' pads), so that
  *  tests/bench/latency-budget.py can tell where the time goes. Costs about a microsecond a buffer
- *  and pad. */
+ *  and pad. Of a long run the first kMostPassages are kept: some 200 MB, ten minutes of four views
+ * at 30/s; write() says so. */
 class LatencyTrace {
 public:
+  static constexpr std::size_t kMostPassages = 4000000;
+
   /** Pads that there are now; the pipeline must outlive the trace. */
   explicit LatencyTrace (GstElement *pipeline);
   LatencyTrace (const LatencyTrace &) = delete;
   LatencyTrace &operator= (const LatencyTrace &) = delete;
 
   /** A line a buffer: factory, element.pad, capture time of its frame set (or of the last one on
-   *  that thread), RTP time (or -), when it passed, thread, CPU time of the thread; all ns.
+   *  that thread; -1: none), RTP time (-1: none), when it passed, thread, CPU time of the thread;
+   * ns.
    *  @return false if the file cannot be written. After the pipeline has stopped. */
   bool write (const char *path) const;
 
@@ -42,6 +46,6 @@ private:
   GstElement *pipeline_;
   std::vector<std::unique_ptr<Point>> points_;
   std::mutex lock_;              /* guards what follows */
-  std::deque<Passage> passages_; /* grows without moving what is there */
+  std::deque<Passage> passages_; /* to kMostPassages; grows without moving what is there */
   bool is_full_ = false;
 };

@@ -58,11 +58,21 @@ need_number "$rtp_ttl" --ttl 0 255
 need_number "$jitter" --jitter 0 10000
 need_number "$latency" --latency 0 10000
 [ -z "$clock_port" ] || need_number "$clock_port" --clock-port 1 65535
+[ -z "$rtp_interface" ] || [[ "$to" =~ (^|,)(22[4-9]|23[0-9])\. ]] || die "--interface: expected with a multicast group in --to"
+# usage: need_own_port PORT option: none that cameras send to
+need_own_port () {
+  [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is that of view $(($1 - listen)) (--listen $listen)"
+}
+[ -z "$clock_port" ] || need_own_port "$clock_port" --clock-port
 IFS=, read -ra feedbacks <<<"$cameras_feedback"
 [ ${#feedbacks[@]} = 0 ] || [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
 [ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: expected --cameras, too"
 [ -z "$rig" ] || [ -f "$rig" ] || die "--rig: no file '$rig'"
 rtp_check sender
+if [ -n "$rtp_feedback" ]; then
+  need_own_port "$rtp_feedback" --feedback
+  [ "$rtp_feedback" != "$clock_port" ] || die "--feedback: port $rtp_feedback is that of --clock-port"
+fi
 send_rtp "$to"
 viewers=("${rtp[@]}")
 

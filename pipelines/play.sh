@@ -28,6 +28,7 @@ done
 [ -n "$file" ] || { usage >&2; die "expected a file to play"; }
 [ -f "$file" ] || die "no file '$file'"
 need_size "$size" --size
+need_degrees "$orbit" --orbit
 [ -n "$film" ] || has_display || die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
 
 # gst-launch-1.0 -e may wait for ever after an error that comes before the first picture.
@@ -38,6 +39,7 @@ picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
+  drop_empty "$film"
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else
   launch "${view[@]}" ! glimagesink

@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 
+[ "${1:-}" != --help ] || { echo "usage: range-to-ply.sh RECORDING OUT-%05d.ply"; exit 0; }
 [ $# = 2 ] || die "usage: range-to-ply.sh RECORDING OUT-%05d.ply"
 [ -f "$1" ] || die "no file '$1'"
 launch filesrc "location=$1" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter ! plyenc \

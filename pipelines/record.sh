@@ -47,10 +47,12 @@ need_number "$views" --views 1 64
 need_number "$frames" --frames 1 1000000
 need_size "$size" --size
 
+[ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
+[ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
+
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
   need_number "$jitter" --jitter 0 10000
-  [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
   rtp_check receiver
   receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
   source=("${rtp[@]}")
@@ -58,5 +60,6 @@ else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
 fi
+drop_empty "$file" ${listen:+"nothing came to port $listen (no coded frame set): $file is not written"}
 launch "${source[@]}" ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
   ! filesink "location=$file"

@@ -2,7 +2,7 @@
 # Sourced by the scripts of hosts: the part of a launch string between coded frame sets and UDP, on
 # either side, with what the options in rtp_usage_* ask for. docs/streaming.md explains it.
 
-rtp_fec= rtp_rtx= rtp_key= rtp_interface= rtp_ttl=1 rtp_feedback=
+rtp_fec= rtp_rtx= rtp_key= rtp_interface= rtp_ttl=1 rtp_feedback= rtp_adaptive= rtp_mtu=
 
 rtp_usage_sender () {
   cat <<'END_OF_USAGE'
@@ -10,6 +10,8 @@ rtp_usage_sender () {
                   (1 to 100; default none)
   --feedback PORT receivers' RTCP arrives at this UDP port: requests for key frame sets, for lost packets
   --rtx           send lost packets again to receivers with --rtx; needs --feedback
+  --mtu BYTES     largest packet (256 to 65000, default 1400); larger ones, where the network takes them
+                  (jumbo frames: 8900), cost less CPU time on all hosts
   --key FILE      encrypt (SRTP) with the key in FILE: 60 hexadecimal digits
 END_OF_USAGE
 }
@@ -33,6 +35,8 @@ rtp_option () {
       else
         rtp_fec=yes taken=1
       fi ;;
+    --mtu)
+      if [ "$1" = sender ]; then rtp_mtu=$3; else taken=0; fi ;;
     --rtx) rtp_rtx=yes taken=1 ;;
     --key) rtp_key=$3 ;;
     --feedback) rtp_feedback=$3 ;;
@@ -46,6 +50,7 @@ rtp_check () { # sender|receiver
     if [ "$1" = sender ]; then need_number "$rtp_feedback" --feedback 1 65535; else split_address "$rtp_feedback" --feedback; fi
   fi
   [ -z "$rtp_rtx" ] || [ -n "$rtp_feedback" ] || die "--rtx: expected --feedback, too"
+  [ -z "$rtp_mtu" ] || need_number "$rtp_mtu" --mtu 256 65000
   [ -n "$rtp_key" ] || return 0
   # gst-launch-1.0 takes a key on its command line only, where everybody on the machine reads it.
   [[ "$(cat "$rtp_key" 2>/dev/null)" =~ ^[0-9a-fA-F]{60}$ ]] || die "--key: expected a file of 60 hexadecimal digits, got '$rtp_key'"
@@ -64,9 +69,10 @@ rtx_map='application/x-rtp-pt-map,96=(uint)97,122=(uint)123'
 send_rtp () {
   local target twcc=
   split_addresses "$1" --to
-  rtp=(rtpneighbourcodepay)
-  # Of several receivers rtpsession would mix the transport-wide feedback.
-  [[ "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
+  rtp=(rtpneighbourcodepay ${rtp_mtu:+"mtu=$rtp_mtu"})
+  # Of several receivers rtpsession would mix the transport-wide feedback. It remembers every packet until there is some (70
+  # bytes each, for ever where nobody gives any): for those only who adapt to it.
+  [[ -z "$rtp_adaptive" || "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
   [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc" ! rtcpreports name=reports)
   [ -z "$rtp_fec" ] || rtp+=(! rtpulpfecenc "percentage=$rtp_fec" pt=122)
   [ -z "$rtp_rtx" ] || rtp+=(! rtprtxsend max-size-time=500 "payload-type-map=$rtx_map")

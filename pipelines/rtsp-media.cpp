@@ -3,6 +3,9 @@
 
 #include <gst/video/video.h>
 
+#include "rtsp-join.hpp"
+#include "rtsp-tcp-viewer.hpp"
+
 static const char kCodedType[] = "application/x-neighbour-code";
 
 /* ---- the launch string ---- */
@@ -198,13 +201,14 @@ payload_pad (GstRTSPMedia *media)
   return pad;
 }
 
+static const char kPreparedKey[] = "rangecast-prepared"; /* of a media: has its first frame set */
+
 /* Live frame sets go out as soon as they are there: they carry their times, and the viewer's jitter
  * buffer goes by them. Others (files) must be held back to their times. */
 static void
 on_prepared (GstRTSPMedia *media, gpointer)
 {
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
+  g_object_set_data (G_OBJECT (media), kPreparedKey, media);
   GstQuery *query = gst_query_new_latency ();
   gboolean is_live = FALSE;
   if (GstPad *pad = payload_pad (media)) {
@@ -214,36 +218,6 @@ on_prepared (GstRTSPMedia *media, gpointer)
   }
   gst_rtsp_media_set_rate_control (media, !is_live);
   gst_query_unref (query);
-  gst_clear_object (&pipeline);
-  gst_object_unref (bin);
-}
-
-static void
-on_media_configure (GstRTSPMediaFactory *, GstRTSPMedia *media, gpointer user_data)
-{
-  auto stage = static_cast<Stage *> (user_data);
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
-    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
-    gst_bus_enable_sync_message_emission (bus);
-    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
-      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
-          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
-    gst_object_unref (bus);
-    gst_object_unref (pipeline);
-  }
-  gst_object_unref (bin);
-  if (GstPad *pad = payload_pad (media)) {
-    gst_pad_add_probe (pad,
-        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
-                         GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
-        on_payload, stage->counts, nullptr);
-    if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
-      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_payload_event,
-          new Listener (media, stage->on_end), delete_listener);
-    gst_object_unref (pad);
-  }
-  g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
 }
 
 void
@@ -261,7 +235,9 @@ request_key_frame_set (GstRTSPMedia *media)
 G_BEGIN_DECLS
 struct LaunchFactory {
   GstRTSPMediaFactory parent;
-  gint run; /* atomic */
+  gint run;        /* atomic */
+  gint ends;       /* atomic: the server does */
+  GWeakRef latest; /* media */
 };
 struct LaunchFactoryClass {
   GstRTSPMediaFactoryClass parent_class;
@@ -297,15 +273,90 @@ begin_new_run (GstRTSPMediaFactory *factory)
 }
 
 static void
-launch_factory_init (LaunchFactory *)
+launch_factory_init (LaunchFactory *factory)
 {
+  g_weak_ref_init (&factory->latest, nullptr);
+}
+
+static void
+launch_factory_finalize (GObject *object)
+{
+  g_weak_ref_clear (&reinterpret_cast<LaunchFactory *> (object)->latest);
+  G_OBJECT_CLASS (launch_factory_parent_class)->finalize (object);
 }
 
 static void
 launch_factory_class_init (LaunchFactoryClass *klass)
 {
+  G_OBJECT_CLASS (klass)->finalize = launch_factory_finalize;
   GST_RTSP_MEDIA_FACTORY_CLASS (klass)->create_element = launch_factory_create_element;
   GST_RTSP_MEDIA_FACTORY_CLASS (klass)->gen_key = launch_factory_gen_key;
+}
+
+/* Who waits for its first frame set waits no longer: the library takes an error so, and waits up to
+ * 20 seconds otherwise. */
+static void
+fail (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GError *error = g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server ends");
+    gst_element_post_message (
+        GST_ELEMENT (pipeline), gst_message_new_error (pipeline, error, nullptr));
+    g_error_free (error);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+}
+
+void
+end_waiting (GstRTSPMediaFactory *factory)
+{
+  auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
+  g_atomic_int_set (&launch_factory->ends, 1);
+  auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&launch_factory->latest));
+  if (!media)
+    return;
+  if (!g_object_get_data (G_OBJECT (media), kPreparedKey))
+    fail (media);
+  g_object_unref (media);
+}
+
+static void
+on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer user_data)
+{
+  auto stage = static_cast<Stage *> (user_data);
+  auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  prepare_tcp_queues (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+    gst_bus_enable_sync_message_emission (bus);
+    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
+      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
+          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
+    gst_object_unref (bus);
+    GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
+    if (payloader && gst_rtsp_media_n_streams (media) == 1)
+      JoinGate::install (media, GST_ELEMENT (pipeline), payloader);
+    gst_clear_object (&payloader);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+  if (GstPad *pad = payload_pad (media)) {
+    gst_pad_add_probe (pad,
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
+                         GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
+        on_payload, stage->counts, nullptr);
+    if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
+      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_payload_event,
+          new Listener (media, stage->on_end), delete_listener);
+    gst_object_unref (pad);
+  }
+  g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
+  g_weak_ref_set (&launch_factory->latest, media);
+  if (g_atomic_int_get (&launch_factory->ends))
+    fail (media);
 }
 
 static void
@@ -352,87 +403,4 @@ make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end
   g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
       new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
   return factory;
-}
-
-/* ---- the holder ---- */
-
-/* A transport that sends nothing to nobody. */
-static GstRTSPStreamTransport *
-make_dry_transport (GstRTSPStream *stream)
-{
-  GstRTSPTransport *transport = nullptr;
-  gst_rtsp_transport_new (&transport);
-  transport->trans = GST_RTSP_TRANS_RTP;
-  transport->profile = GST_RTSP_PROFILE_AVPF;
-  transport->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
-  transport->interleaved = {0, 1};
-  transport->destination = g_strdup ("nobody"); /* reports are compared with it */
-  GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
-  const auto swallow = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
-  const auto swallow_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
-  gst_rtsp_stream_transport_set_callbacks (dry, swallow, swallow, nullptr, nullptr);
-  gst_rtsp_stream_transport_set_list_callbacks (dry, swallow_list, swallow_list, nullptr, nullptr);
-  return dry;
-}
-
-bool
-MediaHolder::hold (GstRTSPMedia *media)
-{
-  std::lock_guard guard (lock_);
-  if (media_)
-    return media_ == media;
-  if (!gst_rtsp_media_prepare (media, nullptr))
-    return false;
-  transports_ = g_ptr_array_new_with_free_func (g_object_unref);
-  for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
-    g_ptr_array_add (transports_, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
-  media_ = GST_RTSP_MEDIA (g_object_ref (media));
-  gst_rtsp_media_complete_pipeline (media, transports_);
-  return true;
-}
-
-void
-MediaHolder::start (GstRTSPMedia *media)
-{
-  std::lock_guard guard (lock_);
-  if (media_ != media || started_)
-    return;
-  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports_);
-  started_ = true;
-}
-
-void
-MediaHolder::wait_for_release ()
-{
-  std::lock_guard releasing (releasing_);
-}
-
-void
-MediaHolder::release (GstRTSPMedia *only)
-{
-  std::lock_guard releasing (releasing_);
-  std::unique_lock guard (lock_);
-  if (only && media_ != only)
-    return;
-  GstRTSPMedia *media = media_;
-  GPtrArray *transports = transports_;
-  media_ = nullptr;
-  transports_ = nullptr;
-  started_ = false;
-  guard.unlock ();
-  if (!media)
-    return;
-  for (guint i = 0; i < transports->len; i++)
-    gst_rtsp_stream_transport_set_active (
-        GST_RTSP_STREAM_TRANSPORT (g_ptr_array_index (transports, i)), FALSE);
-  gst_rtsp_media_unprepare (media);
-  g_ptr_array_unref (transports);
-  g_object_unref (media);
-}
-
-bool
-MediaHolder::holds_any ()
-{
-  std::lock_guard guard (lock_);
-  return media_ != nullptr;
 }

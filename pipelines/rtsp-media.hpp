@@ -6,7 +6,6 @@
 
 #include <atomic>
 #include <functional>
-#include <mutex>
 #include <string>
 
 #include "rtsp-options.hpp"
@@ -39,31 +38,9 @@ GstRTSPMediaFactory *make_factory (
 /** Who comes from now on gets a media of its own, not the one that others have. Any thread. */
 void begin_new_run (GstRTSPMediaFactory *factory);
 
+/** The server ends: nobody waits any longer for a first frame set, which may be 20 seconds. Any
+ *  thread. */
+void end_waiting (GstRTSPMediaFactory *factory);
+
 /** Lets every payloader of the media ask its encoder for a key frame set, with the rig. */
 void request_key_frame_set (GstRTSPMedia *media);
-
-/** Keeps a media running, as a viewer would that throws away what comes. So it goes on while
- * viewers come and go, and packets flow where the only viewer is slow. Any thread. */
-class MediaHolder {
-public:
-  ~MediaHolder () { release (); }
-  /** Gets it ready. Another one that was held is left alone until release().
-   *  @return whether it is held */
-  bool hold (GstRTSPMedia *media);
-  /** If it is held. Its first viewer must have been connected before, to get its first frame set.
-   */
-  void start (GstRTSPMedia *media);
-  /** @param only  nothing happens if another one is held; nullptr: whatever is held */
-  void release (GstRTSPMedia *only = nullptr);
-  bool holds_any ();
-  /** Returns when no release() is at work: who asked for the media meanwhile would get one that
-   *  ends, and an error. */
-  void wait_for_release ();
-
-private:
-  std::mutex releasing_; /* taken before lock_ */
-  std::mutex lock_;      /* guards what follows */
-  GstRTSPMedia *media_ = nullptr;
-  GPtrArray *transports_ = nullptr;
-  bool started_ = false;
-};

@@ -83,6 +83,21 @@ is_multicast (const std::string &text)
   return is;
 }
 
+/* Whether they are of one kind, and the last is not before the first. */
+static bool
+is_range (const MulticastRange &range)
+{
+  GInetAddress *first = g_inet_address_new_from_string (range.first.c_str ());
+  GInetAddress *last = g_inet_address_new_from_string (range.last.c_str ());
+  const bool is = first && last &&
+                  g_inet_address_get_family (first) == g_inet_address_get_family (last) &&
+                  std::memcmp (g_inet_address_to_bytes (first), g_inet_address_to_bytes (last),
+                      g_inet_address_get_native_size (first)) <= 0;
+  g_clear_object (&first);
+  g_clear_object (&last);
+  return is;
+}
+
 /* ADDRESS[-ADDRESS]:PORT-PORT[/TTL], both of IPv4: an IPv6 address has colons of its own. */
 static bool
 parse_multicast (const char *text, MulticastRange &range)
@@ -106,7 +121,8 @@ parse_multicast (const char *text, MulticastRange &range)
       range.first_port % 2 != 0 || range.last_port <= range.first_port || range.last_port > 65535 ||
       range.ttl < 1 || range.ttl > 255)
     return bad_option ("--multicast", kExpected, text);
-  return true;
+  return is_range (range) ||
+         bad_option ("--multicast", "the first address before the second", text);
 }
 
 static bool

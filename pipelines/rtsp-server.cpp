@@ -17,10 +17,11 @@
 #include <cstring>
 #include <map>
 #include <mutex>
-#include <set>
 #include <string>
 #include <thread>
 
+#include "rtsp-holder.hpp"
+#include "rtsp-join.hpp"
 #include "rtsp-media.hpp"
 #include "rtsp-options.hpp"
 #include "rtsp-tcp-viewer.hpp"
@@ -30,15 +31,21 @@ static constexpr guint kThreads = 4; /* that serve connections */
 static constexpr guint kMostContent = 16384; /* bytes */
 /* Connections that are no viewers: those that ask only, or have not got so far. */
 static constexpr int kSpareConnections = 32;
+static constexpr int kBacklog = 64; /* connections that the kernel holds until they are taken */
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
 /* So long the last frame set may last, after which a stream is over. */
 static constexpr guint kSlowestEnd_ms = 2000;
+static constexpr guint kLastWords_ms = 500;
 
 struct Connection {
   gint64 since_us = 0;                 /* monotonic */
   const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
+  bool is_closing = false;             /* its socket is closed; the rest follows */
 };
+
+/* Of a media, under the lock of the server: it is over; its viewers were sent away. */
+static constexpr char kOverKey[] = "rangecast-over", kEndedKey[] = "rangecast-ended";
 
 struct Server {
   RtspOptions options;
@@ -54,12 +61,11 @@ struct Server {
   gint64 stats_at_us = 0;
   std::thread starter; /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
-  std::atomic<gint64> asked_at_us = 0;
   std::atomic<bool> stopping = false;
 
   std::mutex lock; /* guards what follows */
   std::map<GstRTSPClient *, Connection> connections;
-  std::set<GstRTSPMedia *> ending; /* end_stream() will be called for them */
+  std::map<GstRTSPMedia *, GSource *> ending; /* with the timer that calls end_stream() */
 };
 
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
@@ -88,24 +94,35 @@ limit_send_buffer (GstRTSPClient *client, int bytes)
 #endif
 }
 
-static void
-on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
+/* ---- requests; in threads that serve connections ---- */
+
+static void leave_ended_soon (Server &server, GstRTSPMedia *media);
+
+static bool
+has_ended (Server &server, GstRTSPMedia *media)
 {
-  auto &server = *static_cast<Server *> (user_data);
-  queue_tcp_transports (context->session, context->sessmedia, server.counts.left_out);
-  GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
-  server.holder.start (media);
-  request_key_frame_set (media);
+  std::lock_guard guard (server.lock);
+  return g_object_get_data (G_OBJECT (media), kEndedKey) != nullptr;
 }
 
 static void
 on_describe_or_setup (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
-  std::lock_guard guard (server.lock);
-  const auto found = server.connections.find (client);
-  if (found != server.connections.end ())
-    found->second.media = context->media;
+  if (!context->media)
+    return;
+  {
+    std::lock_guard guard (server.lock);
+    const auto found = server.connections.find (client);
+    if (found != server.connections.end ()) {
+      found->second.media = context->media;
+      found->second.since_us = g_get_monotonic_time (); /* it asks for something */
+    }
+  }
+  if (has_ended (server, context->media)) /* it came when the others were sent away */
+    leave_ended_soon (server, context->media);
+  else /* or it would end with a viewer that leaves before it plays, and who asks then fails */
+    server.holder.hold (context->media);
 }
 
 static GstRTSPStatusCode
@@ -114,46 +131,94 @@ before_describe (GstRTSPClient *, GstRTSPContext *, gpointer user_data)
   auto server = static_cast<Server *> (user_data);
   while (is_ending (*server) && !server->stopping) /* what ends is not joined: the next run is */
     g_usleep (20000);
-  server->asked_at_us = g_get_monotonic_time (); /* has no session yet, but is not to be let down */
-  server->holder.wait_for_release ();
-  return GST_RTSP_STS_OK;
+  server->holder.note_asking (); /* has no session yet, but is not to be let down */
+  return server->stopping ? GST_RTSP_STS_SERVICE_UNAVAILABLE : GST_RTSP_STS_OK;
 }
 
-/* The factory lets TCP pass, since the holder is such a viewer. */
+/* UNKNOWN for what is no transport. */
+static GstRTSPLowerTrans
+lower_transport_of (const char *offer)
+{
+  GstRTSPTransport *transport = nullptr;
+  gst_rtsp_transport_new (&transport);
+  const GstRTSPLowerTrans lower = gst_rtsp_transport_parse (offer, transport) == GST_RTSP_OK
+                                      ? transport->lower_transport
+                                      : GST_RTSP_LOWER_TRANS_UNKNOWN;
+  gst_rtsp_transport_free (transport);
+  return lower;
+}
+
+/* The factory lets TCP pass, since the holder is such a viewer. The library takes the first offer
+ * that the factory lets pass. */
 static GstRTSPStatusCode
 before_setup (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
-  gchar *transport = nullptr;
-  gst_rtsp_message_get_header (context->request, GST_RTSP_HDR_TRANSPORT, &transport, 0);
-  gchar **offers = g_strsplit (transport ? transport : "", ",", -1);
-  bool is_tcp = *offers != nullptr; /* and nothing else is offered */
-  for (gchar **offer = offers; *offer; offer++) {
-    gchar *upper = g_ascii_strup (*offer, -1);
-    is_tcp = is_tcp && std::strstr (upper, "/TCP");
-    g_free (upper);
-  }
+  const RtspOptions &options = static_cast<Server *> (user_data)->options;
+  gchar *offered = nullptr;
+  gst_rtsp_message_get_header (context->request, GST_RTSP_HDR_TRANSPORT, &offered, 0);
+  if (options.tcp || !offered)
+    return GST_RTSP_STS_OK;
+  const int served = (options.udp ? GST_RTSP_LOWER_TRANS_UDP : 0) |
+                     (options.multicast.first.empty () ? 0 : GST_RTSP_LOWER_TRANS_UDP_MCAST);
+  int chosen = GST_RTSP_LOWER_TRANS_UNKNOWN;
+  gchar **offers = g_strsplit (offered, ",", -1);
+  for (gchar **offer = offers; *offer && !chosen; offer++)
+    chosen = lower_transport_of (g_strstrip (*offer)) & (served | GST_RTSP_LOWER_TRANS_TCP);
   g_strfreev (offers);
-  return is_tcp && !static_cast<Server *> (user_data)->options.tcp
-             ? GST_RTSP_STS_UNSUPPORTED_TRANSPORT
-             : GST_RTSP_STS_OK;
+  return chosen == GST_RTSP_LOWER_TRANS_TCP ? GST_RTSP_STS_UNSUPPORTED_TRANSPORT : GST_RTSP_STS_OK;
 }
 
 static GstRTSPStatusCode
 before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
+  GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
+  if (has_ended (server, media)) {
+    leave_ended_soon (server, media);
+    return GST_RTSP_STS_SERVICE_UNAVAILABLE;
+  }
   /* The stream is not one viewer's to wind. Even to its beginning, as most players ask, the library
    * may fail to, and then that media never answers anybody again. */
   for (GstRTSPHeaderField field : {GST_RTSP_HDR_RANGE, GST_RTSP_HDR_SCALE, GST_RTSP_HDR_SPEED})
     gst_rtsp_message_remove_header (context->request, field, -1);
-  server.holder.hold (gst_rtsp_session_media_get_media (context->sessmedia));
+  server.holder.hold (media);
+  if (const auto gate = JoinGate::of (media))
+    gate->hold_back (context->sessmedia);
   return GST_RTSP_STS_OK;
 }
 
 static void
-on_pause_or_teardown (GstRTSPClient *, GstRTSPContext *context, gpointer)
+on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 {
-  drop_tcp_transports (context->session);
+  auto &server = *static_cast<Server *> (user_data);
+  GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
+  /* Whose viewer is the first gets what comes first, which is a key frame set. */
+  queue_tcp_transports (
+      context->sessmedia, server.counts.left_out, server.holder.has_started (media));
+  if (const auto gate = JoinGate::of (media))
+    gate->note_playing (context->sessmedia);
+  server.holder.start (media);
+  request_key_frame_set (media);
+}
+
+/* Before the library takes a viewer away. */
+static void
+forget_viewer (GstRTSPSession *session)
+{
+  drop_tcp_transports (session);
+  const auto forget = [] (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer) {
+    if (const auto gate = JoinGate::of (gst_rtsp_session_media_get_media (media)))
+      gate->forget (media);
+    return GST_RTSP_FILTER_KEEP;
+  };
+  g_list_free_full (gst_rtsp_session_filter (session, forget, nullptr), g_object_unref);
+}
+
+static GstRTSPStatusCode
+before_pause_or_teardown (GstRTSPClient *, GstRTSPContext *context, gpointer)
+{
+  forget_viewer (context->session);
+  return GST_RTSP_STS_OK;
 }
 
 static void
@@ -164,11 +229,11 @@ on_new_session (GstRTSPClient *, GstRTSPSession *session, gpointer user_data)
 }
 
 static void
-on_closed (GstRTSPClient *client, gpointer user_data)
+on_client_gone (gpointer user_data, GObject *client)
 {
   auto &server = *static_cast<Server *> (user_data);
   std::lock_guard guard (server.lock);
-  server.connections.erase (client);
+  server.connections.erase (reinterpret_cast<GstRTSPClient *> (client));
 }
 
 static void
@@ -182,10 +247,10 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
   g_signal_connect (client, "setup-request", G_CALLBACK (on_describe_or_setup), &server);
   g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
   g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);
-  g_signal_connect (client, "pause-request", G_CALLBACK (on_pause_or_teardown), &server);
-  g_signal_connect (client, "teardown-request", G_CALLBACK (on_pause_or_teardown), &server);
+  g_signal_connect (client, "pre-pause-request", G_CALLBACK (before_pause_or_teardown), &server);
+  g_signal_connect (client, "pre-teardown-request", G_CALLBACK (before_pause_or_teardown), &server);
   g_signal_connect (client, "new-session", G_CALLBACK (on_new_session), &server);
-  g_signal_connect (client, "closed", G_CALLBACK (on_closed), &server);
+  g_object_weak_ref (G_OBJECT (client), on_client_gone, &server);
   std::lock_guard guard (server.lock);
   server.connections[client].since_us = g_get_monotonic_time ();
 }
@@ -194,8 +259,10 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 static void
 on_session_removed (GstRTSPSessionPool *, GstRTSPSession *session, gpointer)
 {
-  drop_tcp_transports (session);
+  forget_viewer (session);
 }
+
+/* ---- too many connections ---- */
 
 static bool
 has_session (GstRTSPClient *client)
@@ -206,28 +273,78 @@ has_session (GstRTSPClient *client)
   return has;
 }
 
-/* Those that connected and then asked for nothing, and those beyond the limit. */
+/* Those that connected and then asked for nothing. */
 static void
-close_useless_connections (Server &server)
+close_idle_connections (Server &server)
 {
   const gint64 now = g_get_monotonic_time ();
   const gint64 patience = (server.options.timeout_s + kSlowestStart_s) * G_USEC_PER_SEC;
-  int many = -server.options.max_viewers - kSpareConnections;
   GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
   for (GList *item = clients; item; item = item->next) {
     auto client = GST_RTSP_CLIENT (item->data);
-    many++;
-    if (has_session (client))
-      continue;
     std::unique_lock guard (server.lock);
     const auto found = server.connections.find (client);
     const bool is_late =
         found != server.connections.end () && now - found->second.since_us > patience;
     guard.unlock ();
-    if (is_late || many > 0)
+    if (is_late && !has_session (client))
       gst_rtsp_client_close (client);
   }
   g_list_free_full (clients, g_object_unref);
+}
+
+static std::size_t
+count_connections (Server &server)
+{
+  std::lock_guard guard (server.lock);
+  return std::size_t (std::count_if (server.connections.begin (), server.connections.end (),
+      [] (const auto &one) { return !one.second.is_closing; }));
+}
+
+/* Of those that are no viewers.
+ * @return whether there was one */
+static bool
+close_oldest_connection (Server &server)
+{
+  GstRTSPClient *oldest = nullptr;
+  gint64 since_us = G_MAXINT64;
+  GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
+  for (GList *item = clients; item; item = item->next) {
+    auto client = GST_RTSP_CLIENT (item->data);
+    if (has_session (client))
+      continue;
+    std::lock_guard guard (server.lock);
+    const auto found = server.connections.find (client);
+    if (found == server.connections.end () || found->second.is_closing ||
+        found->second.since_us >= since_us)
+      continue;
+    oldest = client;
+    since_us = found->second.since_us;
+  }
+  if (oldest) {
+    std::unique_lock guard (server.lock);
+    server.connections[oldest].is_closing = true;
+    guard.unlock ();
+    gst_rtsp_client_close (oldest);
+  }
+  g_list_free_full (clients, g_object_unref);
+  return oldest != nullptr;
+}
+
+/* Each connection is a file descriptor, whoever is behind it. The oldest that is no viewer makes
+ * room, so that a crowd that says nothing cannot keep others out. */
+static gboolean
+on_incoming (GSocket *socket, GIOCondition condition, gpointer user_data)
+{
+  auto &server = *static_cast<Server *> (user_data);
+  const auto most = std::size_t (server.options.max_viewers + kSpareConnections);
+  if ((condition & G_IO_IN) && count_connections (server) >= most &&
+      !close_oldest_connection (server)) {
+    GSocket *refused = g_socket_accept (socket, nullptr, nullptr);
+    g_clear_object (&refused);
+    return G_SOURCE_CONTINUE;
+  }
+  return gst_rtsp_server_io_func (socket, condition, server.server);
 }
 
 /* ---- the stream ---- */
@@ -246,20 +363,21 @@ close_all (Server &server)
   server.holder.release ();
 }
 
-static const char kEndedKey[] = "rangecast-ended"; /* of a media: is over */
-
 /* A media, and the server that it is of. */
 struct Ending {
+  Ending (Server &server, GstRTSPMedia *media)
+      : server (server), media (GST_RTSP_MEDIA (g_object_ref (media)))
+  {
+  }
+  ~Ending () { g_object_unref (media); }
   Server &server;
   GstRTSPMedia *media;
 };
 
 static void
-delete_ending (gpointer user_data)
+delete_ending (gpointer ending)
 {
-  auto ending = static_cast<Ending *> (user_data);
-  g_object_unref (ending->media);
-  delete ending;
+  delete static_cast<Ending *> (ending);
 }
 
 static GstRTSPFilterResult
@@ -287,26 +405,76 @@ close_session (GstRTSPSessionPool *, GstRTSPSession *session, gpointer user_data
   return is_viewer ? GST_RTSP_FILTER_REMOVE : GST_RTSP_FILTER_KEEP;
 }
 
+/* In the main loop. */
+static void
+send_viewers_away (Ending &ending)
+{
+  Server &server = ending.server;
+  g_list_free_full (
+      gst_rtsp_server_client_filter (server.server, close_viewer, &ending), g_object_unref);
+  g_list_free_full (
+      gst_rtsp_session_pool_filter (server.sessions, close_session, &ending), g_object_unref);
+}
+
+/* Who got to a stream just when it had ended would see nothing for ever. */
+static void
+leave_ended_soon (Server &server, GstRTSPMedia *media)
+{
+  const auto leave = [] (gpointer ending) -> gboolean {
+    send_viewers_away (*static_cast<Ending *> (ending));
+    return G_SOURCE_REMOVE;
+  };
+  g_timeout_add_full (G_PRIORITY_DEFAULT, 100, leave, new Ending (server, media), delete_ending);
+}
+
 static gboolean
 end_stream (gpointer user_data)
 {
-  auto ending = static_cast<Ending *> (user_data);
-  Server &server = ending->server;
+  auto &ending = *static_cast<Ending *> (user_data);
+  Server &server = ending.server;
   {
     std::lock_guard guard (server.lock);
-    if (server.ending.count (ending->media) == 0)
-      return G_SOURCE_REMOVE; /* it was called before */
-    g_object_set_data (G_OBJECT (ending->media), kEndedKey, ending->media);
+    g_object_set_data (G_OBJECT (ending.media), kEndedKey, ending.media);
   }
-  g_list_free_full (
-      gst_rtsp_server_client_filter (server.server, close_viewer, ending), g_object_unref);
-  g_list_free_full (
-      gst_rtsp_session_pool_filter (server.sessions, close_session, ending), g_object_unref);
-  server.holder.release (ending->media);
+  send_viewers_away (ending);
+  server.holder.release (ending.media);
   server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
   std::lock_guard guard (server.lock);
-  server.ending.erase (ending->media);
+  const auto found = server.ending.find (ending.media);
+  if (found != server.ending.end ()) {
+    g_source_destroy (found->second); /* it may be a later one than this */
+    g_source_unref (found->second);
+    server.ending.erase (found);
+  }
   return G_SOURCE_REMOVE;
+}
+
+/* With the lock. One timer for each media: what comes last says when. */
+static void
+end_stream_in (Server &server, GstRTSPMedia *media, guint ms)
+{
+  GSource *&timer = server.ending[media];
+  if (timer) {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
+  timer = g_timeout_source_new (ms);
+  g_source_set_callback (timer, end_stream, new Ending (server, media), delete_ending);
+  g_source_attach (timer, nullptr);
+}
+
+static void
+forget_endings (Server &server)
+{
+  std::map<GstRTSPMedia *, GSource *> ending;
+  {
+    std::lock_guard guard (server.lock);
+    ending.swap (server.ending);
+  }
+  for (const auto &[media, timer] : ending) {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
 }
 
 /* Whoever comes next gets a new run of the launch string. */
@@ -315,18 +483,20 @@ on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::str
 {
   {
     std::lock_guard guard (server.lock);
-    if (server.stopping || g_object_get_data (G_OBJECT (media), kEndedKey))
+    if (server.stopping || g_object_get_data (G_OBJECT (media), kOverKey))
       return; /* one failure often is several messages, of which the first says why */
     if (is_over)
-      g_object_set_data (G_OBJECT (media), kEndedKey, media);
-    if (server.ending.insert (media).second)
+      g_object_set_data (G_OBJECT (media), kOverKey, media);
+    else if (g_object_get_data (G_OBJECT (media), kEndedKey))
+      return;
+    if (server.ending.count (media) == 0 && !g_object_get_data (G_OBJECT (media), kEndedKey))
       begin_new_run (server.factory);
+    /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
+    if (!g_object_get_data (G_OBJECT (media), kEndedKey))
+      end_stream_in (server, media, is_over ? kLastWords_ms : kSlowestEnd_ms);
   }
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
-  /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
-  g_timeout_add_full (G_PRIORITY_DEFAULT, is_over ? 500 : kSlowestEnd_ms, end_stream,
-      new Ending{server, GST_RTSP_MEDIA (g_object_ref (media))}, delete_ending);
 }
 
 /* Runs the launch string before anybody asks for it. It takes as long as it waits for its first
@@ -339,19 +509,19 @@ start_media (Server &server)
   gst_rtsp_url_parse (text.c_str (), &url);
   GstRTSPMedia *media = gst_rtsp_media_factory_construct (server.factory, url);
   gst_rtsp_url_free (url);
-  if (media) {
+  if (media && !server.stopping) {
     GstRTSPThreadPool *pool = gst_rtsp_server_get_thread_pool (server.server);
     GstRTSPContext context = {};
     GstRTSPThread *thread =
         gst_rtsp_thread_pool_get_thread (pool, GST_RTSP_THREAD_TYPE_MEDIA, &context);
     if (gst_rtsp_media_prepare (media, thread)) {
-      if (server.holder.hold (media))
+      if (!server.stopping && server.holder.hold (media))
         server.holder.start (media);
       gst_rtsp_media_unprepare (media); /* the holder has its own share of it */
     }
     g_object_unref (pool);
-    g_object_unref (media);
   }
+  g_clear_object (&media);
   server.starting = false;
 }
 
@@ -390,7 +560,7 @@ on_second (gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   gst_rtsp_session_pool_cleanup (server.sessions);
-  close_useless_connections (server);
+  close_idle_connections (server);
   const gint64 now = g_get_monotonic_time ();
   if (gst_rtsp_session_pool_get_n_sessions (server.sessions) > 0)
     server.idle_since_us = 0;
@@ -399,9 +569,8 @@ on_second (gpointer user_data)
   if (server.options.always)
     keep_running (server);
   else if (server.idle_since_us > 0 && !is_ending (server) &&
-           now - server.asked_at_us > kSetup_us &&
            now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
-    server.holder.release ();
+    server.holder.release_unless_asked_since (now - kSetup_us);
   print_stats (server);
   return G_SOURCE_CONTINUE;
 }
@@ -474,6 +643,7 @@ set_up (Server &server)
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
+  gst_rtsp_server_set_backlog (server.server, kBacklog);
   GstRTSPThreadPool *threads = gst_rtsp_server_get_thread_pool (server.server);
   gst_rtsp_thread_pool_set_max_threads (threads, kThreads);
   g_object_unref (threads);
@@ -515,8 +685,7 @@ listen (Server &server)
   }
   GSource *source =
       g_socket_create_source (socket, GIOCondition (G_IO_IN | G_IO_ERR | G_IO_HUP), nullptr);
-  g_source_set_callback (source, G_SOURCE_FUNC (gst_rtsp_server_io_func),
-      g_object_ref (server.server), g_object_unref);
+  g_source_set_callback (source, G_SOURCE_FUNC (on_incoming), &server, nullptr);
   g_source_attach (source, nullptr);
   std::printf ("serving %s://%s:%d%s\n", options.certificate_file.empty () ? "rtsp" : "rtsps",
       options.address.c_str (), port_of (socket), options.mount.c_str ());
@@ -547,6 +716,8 @@ serve (Server &server, GSource *source)
   g_source_remove (interrupt);
   g_source_remove (terminate);
   g_source_destroy (source);
+  forget_endings (server);
+  end_waiting (server.factory);
   close_all (server);
   if (server.starter.joinable ())
     server.starter.join ();
@@ -575,6 +746,8 @@ main (int argc, char **argv)
       g_object_unref (server.sessions);
       g_object_unref (server.server);
       gst_rtsp_thread_pool_cleanup ();
+      std::lock_guard guard (server.lock); /* with which the threads wrote to it */
+      server.connections.clear ();
     }
   }
   gst_deinit ();

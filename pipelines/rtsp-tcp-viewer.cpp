@@ -9,6 +9,8 @@
 #include <mutex>
 #include <vector>
 
+#include "rtsp-join.hpp"
+
 static constexpr std::size_t kMostFrameSets = 4;
 /* Frame sets of many slices may come as one packet each; reports are few. */
 static constexpr std::size_t kMostMessages = 65536;
@@ -20,12 +22,14 @@ struct Message {
   guint32 timestamp; /* of RTP */
 };
 
-/* Locks: `sending`, then `lock`. `lock` is not held while anything is called. */
+/* Locks: `sending`, then `lock`, then a JoinGate's. Nothing but the gate is called while `lock` is
+ * held. */
 /* Behind the callbacks of transports; shared, since those may run while it is closed. */
 class TcpQueue : public std::enable_shared_from_this<TcpQueue> {
 public:
-  TcpQueue (
-      GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out);
+  /** @param gate  nullptr: nothing is held back */
+  TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
+      std::atomic<guint64> &left_out, std::shared_ptr<JoinGate> gate);
   ~TcpQueue ();
   void take (const Message &message);
   void send_waiting ();
@@ -34,6 +38,7 @@ public:
   void close ();
 
 private:
+  bool is_held_back (const Message &message);
   void leave_out_all ();
   bool pop (Message &message);
   bool hand_over (const Message &message);
@@ -42,9 +47,11 @@ private:
   GWeakRef transport_; /* of the library */
   GMainContext *context_;
   std::atomic<guint64> &left_out_;
-  std::mutex sending_; /* held while a message is handed over */
+  std::mutex sending_;    /* held while a message is handed over */
+  const gint64 until_us_; /* monotonic; held back no longer */
 
-  std::mutex lock_; /* guards all below */
+  std::mutex lock_;                /* guards all below */
+  std::shared_ptr<JoinGate> gate_; /* until a key frame set begins */
   std::deque<Message> waiting_;
   std::size_t frame_sets_ = 0; /* among them */
   bool busy_ = false;          /* a message is on its way */
@@ -123,9 +130,10 @@ take_rtcp_list (GstBufferList *list, guint8, gpointer handle)
 
 /* ---- the queue ---- */
 
-TcpQueue::TcpQueue (
-    GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out)
-    : context_ (g_main_context_ref (context)), left_out_ (left_out)
+TcpQueue::TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
+    std::atomic<guint64> &left_out, std::shared_ptr<JoinGate> gate)
+    : context_ (g_main_context_ref (context)), left_out_ (left_out),
+      until_us_ (g_get_monotonic_time () + kLongestHold_us), gate_ (std::move (gate))
 {
   g_weak_ref_init (&transport_, transport);
 }
@@ -136,6 +144,19 @@ TcpQueue::~TcpQueue ()
     forget (message);
   g_weak_ref_clear (&transport_);
   g_main_context_unref (context_);
+}
+
+/* With the lock. */
+bool
+TcpQueue::is_held_back (const Message &message)
+{
+  if (!gate_ || !message.is_rtp)
+    return false;
+  GstBuffer *first = message.list ? gst_buffer_list_get (message.list, 0) : message.buffer;
+  if (!gate_->begins_key_frame_set (first) && g_get_monotonic_time () < until_us_)
+    return true;
+  gate_ = nullptr;
+  return false;
 }
 
 /* With the lock. */
@@ -157,7 +178,7 @@ void
 TcpQueue::take (const Message &message)
 {
   std::unique_lock guard (lock_);
-  if (closed_ || waiting_.size () >= kMostMessages) {
+  if (closed_ || waiting_.size () >= kMostMessages || is_held_back (message)) {
     guard.unlock ();
     forget (message);
     return;
@@ -287,24 +308,85 @@ TcpQueue::keep_alive ()
 
 /* ---- transports ---- */
 
+class Taps;
+
 /* What a transport of the library has of ours. */
 struct Tap {
   Handle queue;
   GstRTSPStream *stream;
   GstRTSPStreamTransport *ours;
+  std::shared_ptr<Taps> taps; /* of the media */
 };
 
-static const char kTapKey[] = "rangecast-tcp-queue";
+/* Those of one media. A stream that still has a transport cannot leave the pipeline (the library
+ * says so and goes on: the elements are freed while they run), and a closed connection frees its
+ * transports when its thread comes to it. So they leave the stream when the media ends. */
+class Taps {
+public:
+  /* False if the media is ending. */
+  bool add (Tap *tap)
+  {
+    std::lock_guard guard (lock_);
+    if (ended_)
+      return false;
+    gst_rtsp_stream_add_transport (tap->stream, tap->ours);
+    taps_.push_back (tap);
+    return true;
+  }
+  void remove (Tap *tap)
+  {
+    std::lock_guard guard (lock_);
+    if (std::erase (taps_, tap) > 0)
+      gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
+  }
+  void end ()
+  {
+    std::lock_guard guard (lock_);
+    ended_ = true;
+    for (Tap *tap : taps_)
+      gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
+    taps_.clear ();
+  }
 
+private:
+  std::mutex lock_; /* taken before that of a stream */
+  bool ended_ = false;
+  std::vector<Tap *> taps_; /* in their streams */
+};
+
+using TapsHandle = std::shared_ptr<Taps>;
+
+static const char kTapKey[] = "rangecast-tcp-queue";   /* of a transport: its Tap */
+static const char kTapsKey[] = "rangecast-tcp-queues"; /* of a media: a TapsHandle */
+
+/* Maybe in hand_over(), which drops the last reference: so it does not close the queue. */
 static void
 delete_tap (gpointer user_data)
 {
   auto tap = static_cast<Tap *> (user_data);
-  gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
+  tap->taps->remove (tap);
   g_object_unref (tap->ours);
   g_object_unref (tap->stream);
   delete tap;
 }
+
+/* Comes before the streams leave the pipeline. */
+static void
+on_target_state (GstRTSPMedia *media, GstState state, gpointer)
+{
+  if (state == GST_STATE_NULL)
+    (*static_cast<TapsHandle *> (g_object_get_data (G_OBJECT (media), kTapsKey)))->end ();
+}
+
+void
+prepare_tcp_queues (GstRTSPMedia *media)
+{
+  g_object_set_data_full (G_OBJECT (media), kTapsKey, new TapsHandle (std::make_shared<Taps> ()),
+      [] (gpointer taps) { delete static_cast<TapsHandle *> (taps); });
+  g_signal_connect (media, "target-state", G_CALLBACK (on_target_state), nullptr);
+}
+
+static const char kHandleKey[] = "rangecast-tcp-queue-handle"; /* of ours */
 
 /* A transport of ours in its place. The stream finds it by the address, too, when reports come. */
 static GstRTSPStreamTransport *
@@ -326,8 +408,12 @@ make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
       gst_rtsp_stream_transport_new (gst_rtsp_stream_transport_get_stream (transport), copy);
   gst_rtsp_stream_transport_set_callbacks (
       ours, take_rtp, take_rtcp, new Handle (queue), delete_handle);
+  /* The library (1.22) frees what belongs to the other callbacks, but never what belongs to these.
+   */
+  auto handle = new Handle (queue);
+  g_object_set_data_full (G_OBJECT (ours), kHandleKey, handle, delete_handle);
   gst_rtsp_stream_transport_set_list_callbacks (
-      ours, take_rtp_list, take_rtcp_list, new Handle (queue), delete_handle);
+      ours, take_rtp_list, take_rtcp_list, handle, nullptr);
   gst_rtsp_stream_transport_set_keepalive (
       ours, [] (gpointer handle) { queue_of (handle).keep_alive (); }, new Handle (queue),
       delete_handle);
@@ -335,19 +421,23 @@ make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
 }
 
 static void
-tap_transport (
-    GstRTSPStreamTransport *transport, GMainContext *context, std::atomic<guint64> &left_out)
+tap_transport (GstRTSPStreamTransport *transport, GstRTSPMedia *media, GMainContext *context,
+    std::atomic<guint64> &left_out, const std::shared_ptr<JoinGate> &gate)
 {
   GstRTSPStream *stream = gst_rtsp_stream_transport_get_stream (transport);
-  auto queue = std::make_shared<TcpQueue> (transport, context, left_out);
-  GstRTSPStreamTransport *ours = make_transport (transport, queue);
+  auto taps = static_cast<TapsHandle *> (g_object_get_data (G_OBJECT (media), kTapsKey));
+  auto queue = std::make_shared<TcpQueue> (transport, context, left_out, gate);
+  auto tap = new Tap{
+      queue, GST_RTSP_STREAM (g_object_ref (stream)), make_transport (transport, queue), *taps};
+  gst_rtsp_stream_remove_transport (stream, transport);
+  if (!(*taps)->add (tap)) {
+    delete_tap (tap);
+    return;
+  }
   gst_rtsp_stream_transport_set_message_sent (
       transport, [] (gpointer handle) { queue_of (handle).note_sent (); }, new Handle (queue),
       delete_handle);
-  gst_rtsp_stream_remove_transport (stream, transport);
-  gst_rtsp_stream_add_transport (stream, ours);
-  g_object_set_data_full (G_OBJECT (transport), kTapKey,
-      new Tap{queue, GST_RTSP_STREAM (g_object_ref (stream)), ours}, delete_tap);
+  g_object_set_data_full (G_OBJECT (transport), kTapKey, tap, delete_tap);
 }
 
 /* The TCP transports of one media. */
@@ -368,14 +458,19 @@ tcp_transports (GstRTSPSessionMedia *media)
 }
 
 void
-queue_tcp_transports (GstRTSPSession *, GstRTSPSessionMedia *media, std::atomic<guint64> &left_out)
+queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out, bool holds_back)
 {
   GSource *source = g_main_current_source ();
   if (!source)
     return;
+  GstRTSPMedia *whole = gst_rtsp_session_media_get_media (media);
   for (GstRTSPStreamTransport *transport : tcp_transports (media)) {
     if (!g_object_get_data (G_OBJECT (transport), kTapKey))
-      tap_transport (transport, g_source_get_context (source), left_out);
+      tap_transport (transport, whole, g_source_get_context (source), left_out,
+          holds_back ? JoinGate::of (whole) : nullptr);
+    else /* each PLAY puts it in again */
+      gst_rtsp_stream_remove_transport (
+          gst_rtsp_stream_transport_get_stream (transport), transport);
     g_object_unref (transport);
   }
 }

@@ -13,11 +13,15 @@
 
 #include <atomic>
 
-/** Puts such a queue between the TCP transports of a session and their streams. Call it when the
+/** To be called when a media is made, before queue_tcp_transports() for it. */
+void prepare_tcp_queues (GstRTSPMedia *media);
+
+/** Puts such a queue between the TCP transports of a viewer and their streams. Call it when the
  *  viewer's PLAY was answered, from the thread that serves its connection.
- *  @param left_out  counts the frame sets that are left out; must outlive the session */
+ *  @param left_out    counts the frame sets that are left out; must outlive the session
+ *  @param holds_back  nothing is sent before a key frame set begins */
 void queue_tcp_transports (
-    GstRTSPSession *session, GstRTSPSessionMedia *media, std::atomic<guint64> &left_out);
+    GstRTSPSessionMedia *media, std::atomic<guint64> &left_out, bool holds_back);
 
 /** Ends the queues of a session; the viewer gets no more. Any thread; to be called before the
  *  library takes the connection away from its transports in another thread than its own. */

@@ -4,27 +4,20 @@
 #include <atomic>
 #include <string>
 
+#include "srtp-gate.hpp"
+
 namespace {
 
-constexpr std::size_t kKeyBytes = 30; /* of AES-128 in counter mode, RFC 3711 */
-constexpr guint kClosedPackets = 20;  /* in a row, before somebody is told */
-
-constexpr guint kKeysAtATime = 16;         /* that srtpdec gets for SSRCs it does not know ... */
-constexpr gint64 kKeysTimeUs = 10'000'000; /* ... in so long: each costs it memory for ever */
-
-/** Who got the key of a srtpdec: before it can know whether packets are genuine, it asks for each
- *  SSRC that comes. */
-struct Granted {
-  GstBuffer *key;
-  gint64 since_us = 0;
-  guint count = 0;
-};
+constexpr std::size_t kKeyBytes = 30;       /* of AES-128 in counter mode, RFC 3711 */
+constexpr guint kClosedPackets = 20;        /* in a row, before somebody is told, ... */
+constexpr gint64 kClosedTimeUs = 3'000'000; /* ... and for so long: a flood is no wrong key */
 
 /** What goes into a srtpdec and comes out of it; its streaming threads count. */
 struct Watched {
   std::string name, path;
-  std::atomic<guint> closed = 0; /* packets in a row that did not open */
-  bool told = false;             /* one streaming thread per pad, and one pad counts in */
+  std::atomic<guint> closed = 0;           /* packets in a row that did not open */
+  std::atomic<gint64> closed_since_us = 0; /* when the first of them came */
+  bool told = false;                       /* one streaming thread per pad, and one pad counts in */
 };
 
 GstBuffer *
@@ -51,28 +44,15 @@ read_key (const char *path)
   return nullptr;
 }
 
-GstCaps *
-on_request_key (GstElement *, guint ssrc, gpointer user_data)
-{
-  auto granted = static_cast<Granted *> (user_data);
-  const gint64 now_us = g_get_monotonic_time ();
-  if (now_us - granted->since_us > kKeysTimeUs) {
-    granted->since_us = now_us;
-    granted->count = 0;
-  }
-  if (++granted->count > kKeysAtATime)
-    return nullptr; /* the packet is dropped; a good sender's next ones ask again */
-  return gst_caps_new_simple ("application/x-srtp", "ssrc", G_TYPE_UINT, ssrc, "srtp-key",
-      GST_TYPE_BUFFER, granted->key, "srtp-cipher", G_TYPE_STRING, "aes-128-icm", "srtp-auth",
-      G_TYPE_STRING, "hmac-sha1-80", "srtcp-cipher", G_TYPE_STRING, "aes-128-icm", "srtcp-auth",
-      G_TYPE_STRING, "hmac-sha1-80", nullptr);
-}
-
 GstPadProbeReturn
 on_packet_in (GstPad *, GstPadProbeInfo *, gpointer user_data)
 {
   auto watched = static_cast<Watched *> (user_data);
-  if (++watched->closed == kClosedPackets && !watched->told) {
+  const gint64 now_us = g_get_monotonic_time ();
+  if (watched->closed++ == 0)
+    watched->closed_since_us = now_us;
+  if (watched->closed >= kClosedPackets && now_us - watched->closed_since_us >= kClosedTimeUs &&
+      !watched->told) {
     watched->told = true;
     g_printerr (
         "WARNING: %s: packets do not open with the key in %s: the sender has another key, or "
@@ -110,14 +90,6 @@ watch (GstElement *decrypter, const char *path)
   }
 }
 
-void
-release_key (gpointer data, GClosure *)
-{
-  auto granted = static_cast<Granted *> (data);
-  gst_buffer_unref (granted->key);
-  delete granted;
-}
-
 } // namespace
 
 bool
@@ -133,9 +105,8 @@ give_srtp_key (GstElement *pipeline, const char *path)
     if (g_str_equal (name, "srtpenc")) {
       g_object_set (element, "key", key, nullptr);
     } else if (g_str_equal (name, "srtpdec")) {
-      g_signal_connect_data (element, "request-key", G_CALLBACK (on_request_key),
-          new Granted{gst_buffer_ref (key)}, release_key, GConnectFlags (0));
-      watch (element, path);
+      watch (element, path); /* before the gate: it sees what that drops */
+      add_srtp_gate (element, key);
     }
   }
   gst_buffer_unref (key);

@@ -6,10 +6,10 @@ usage: top.sh [options] [SOURCE]
   SOURCE          udp://ADDRESS:PORT to listen there (default udp://0.0.0.0:5990), a file of JSON
                   lines, or - for stdin: JSON lines, or what `gst-launch-1.0 -m ...` prints
   --once          print the table once, plainly: at the end of a file or of stdin, else when
-                  --seconds have passed
-  --seconds N     with --once: listen for so long (default 3)
+                  --seconds have passed; status 1 if a file or stdin has no statistics in it
+  --seconds N     with --once: listen for so long (0 to 86400, default 3)
   --plain         print the table again and again, one below the other: for pipes
-  --interval N    seconds between tables (default 1)
+  --interval N    seconds between tables (0.1 to 3600, default 1)
   --host NAME     what to call the host of `gst-launch-1.0 -m` lines (default: this machine's name)
   --forward udp://HOST:PORT  show nothing: send what comes there, for another top.sh
 
@@ -35,7 +35,7 @@ FORGET_S = 600
 
 # As a frame set meets them; within a host rows keep this order.
 ORDER = ("stereocamsrc", "stereodepth", "roiextract", "neighbourcodeenc", "rtpneighbourcodedepay", "rangemux",
-         "rtpneighbourcodepay", "neighbourcodedec", "cylinderfilter", "striprender")
+         "rtpneighbourcodepay", "rangedemux", "neighbourcodedec", "cylinderfilter", "striprender")
 
 
 # ---- input ----
@@ -235,7 +235,12 @@ def parse_arguments():
     parser.add_argument("--interval", type=float, default=1)
     parser.add_argument("--host", default=socket.gethostname())
     parser.add_argument("--forward")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if not 0 <= options.seconds <= 86400:
+        parser.error(f"--seconds: expected 0 to 86400, got {options.seconds:g}")
+    if not 0.1 <= options.interval <= 3600:
+        parser.error(f"--interval: expected 0.1 to 3600, got {options.interval:g}")
+    return options
 
 
 def run(options):
@@ -263,6 +268,8 @@ def run(options):
             due = now + options.interval
         if source.ended and not source.is_plain_file:
             break
+    if options.once and source.ended and not table.rows and not forward:
+        sys.exit(f"top.sh: {options.source}: no statistics in it; expected lines of rangecast-run --stats, or of gst-launch-1.0 -m")
     if not forward:
         show(table, clear)
 

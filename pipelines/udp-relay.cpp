@@ -8,6 +8,7 @@
 #include <net/if.h>
 #include <netdb.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -149,6 +150,10 @@ cable_end (const std::string &interface)
   const int fd = socket (AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, htons (ETH_P_ALL));
   if (fd < 0)
     refuse_with_reason ("--between " + interface);
+  ifreq request = {};
+  interface.copy (request.ifr_name, sizeof request.ifr_name - 1);
+  if (ioctl (fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_LOOPBACK))
+    refuse ("--between " + interface + ": is no cable, but this machine's loopback");
   sockaddr_ll address = {};
   address.sll_family = AF_PACKET;
   address.sll_protocol = htons (ETH_P_ALL);
@@ -175,6 +180,17 @@ struct Settings {
   FaultSettings faults;
 };
 
+std::vector<std::string>
+read_cable (const std::string &value)
+{
+  const std::size_t comma = value.find (',');
+  const std::string one = value.substr (0, comma),
+                    two = comma == std::string::npos ? "" : value.substr (comma + 1);
+  if (one.empty () || two.empty () || one == two)
+    refuse ("--between " + value + ": expected two interfaces, INTERFACE,INTERFACE");
+  return {one, two};
+}
+
 Settings
 read_options (int argc, char **argv)
 {
@@ -195,18 +211,25 @@ read_options (int argc, char **argv)
       if (port < 1 || port > 65535)
         refuse ("--listen " + value + ": expected a port from 1 to 65535");
       settings.links.emplace_back (port, "");
-    } else if (name == "--to" && !settings.links.empty ()) {
+    } else if (name == "--to") {
+      if (settings.links.empty () || !settings.links.back ().second.empty ())
+        refuse ("--to " + value + ": expected after a --listen PORT of its own");
       settings.links.back ().second = value;
-    } else if (name == "--between" && value.find (',') != std::string::npos) {
-      settings.cable = {value.substr (0, value.find (',')), value.substr (value.find (',') + 1)};
+    } else if (name == "--between") {
+      settings.cable = read_cable (value);
     } else if (!read_fault_option (name, value, settings.faults, problem)) {
-      refuse ("unknown option '" + name + "', or in a wrong place (--help lists the options)");
+      refuse ("unknown option '" + name + "' (--help lists the options)");
     }
     if (!problem.empty ())
       refuse (name + " " + value + ": expected " + problem);
   }
+  for (const auto &[port, target] : settings.links)
+    if (target.empty ())
+      refuse ("--listen " + std::to_string (port) + ": expected --to HOST:PORT after it");
   if (settings.links.empty () == settings.cable.empty ())
-    refuse ("expected --listen PORT --to HOST:PORT, or --between INTERFACE,INTERFACE");
+    refuse (settings.links.empty ()
+                ? "expected --listen PORT --to HOST:PORT, or --between INTERFACE,INTERFACE"
+                : "--listen and --between: expected one of them");
   return settings;
 }
 

@@ -14,7 +14,7 @@ const char kViewerKeys[] =
 static bool
 bad_option (const char *option, const char *expected, const char *got)
 {
-  g_printerr ("viewer: %s: expected %s, got '%s'\n", option, expected, got);
+  g_printerr ("rangecast-viewer: %s: expected %s, got '%s'\n", option, expected, got);
   return false;
 }
 
@@ -84,12 +84,13 @@ check_display ()
   const bool is_seen =
       g_strcmp0 (window, "egl-device") != 0 && g_strcmp0 (window, "surfaceless") != 0;
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY"))
-    g_printerr (
-        "viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the environment; "
-        "pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
+    g_printerr ("rangecast-viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the "
+                "environment; "
+                "pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
   else if (!is_seen)
     g_printerr (
-        "viewer: GST_GL_WINDOW=%s draws without a window: expected it not to be set\n", window);
+        "rangecast-viewer: GST_GL_WINDOW=%s draws without a window: expected it not to be set\n",
+        window);
   else
     return true;
   return false;
@@ -126,9 +127,9 @@ parse_arguments (int *argc, char ***argv, ViewerOptions &options)
   bool parsed = g_option_context_parse (context, argc, argv, &error);
   const guint inputs = options.inputs ? g_strv_length (options.inputs) : 0;
   if (!parsed)
-    g_printerr ("viewer: %s\n", error->message);
+    g_printerr ("rangecast-viewer: %s\n", error->message);
   else if (inputs + (options.listen != 0) != 1) {
-    g_printerr ("viewer: expected one file, one URI, or --listen PORT, see --help\n");
+    g_printerr ("rangecast-viewer: expected one file, one URI, or --listen PORT, see --help\n");
     parsed = false;
   }
   g_clear_error (&error);

@@ -47,7 +47,7 @@ struct Viewer {
 static void
 fail (Viewer &viewer, const std::string &text)
 {
-  g_printerr ("viewer: %s\n", text.c_str ());
+  g_printerr ("rangecast-viewer: %s\n", text.c_str ());
   viewer.failed = true;
   g_main_loop_quit (viewer.loop);
 }
@@ -73,7 +73,7 @@ write_file (const std::string &path, GstBuffer *buffer)
 {
   GstMapInfo map;
   if (!gst_buffer_map (buffer, &map, GST_MAP_READ)) {
-    g_printerr ("viewer: %s: cannot read what was to be written\n", path.c_str ());
+    g_printerr ("rangecast-viewer: %s: cannot read what was to be written\n", path.c_str ());
     return;
   }
   GError *error = nullptr;
@@ -81,7 +81,7 @@ write_file (const std::string &path, GstBuffer *buffer)
           path.c_str (), reinterpret_cast<const gchar *> (map.data), gssize (map.size), &error))
     std::printf ("wrote %s\n", path.c_str ());
   else
-    g_printerr ("viewer: %s\n", error->message);
+    g_printerr ("rangecast-viewer: %s\n", error->message);
   std::fflush (stdout);
   g_clear_error (&error);
   gst_buffer_unmap (buffer, &map);
@@ -103,7 +103,8 @@ write_last_picture (Viewer &viewer)
     write_file (free_name (viewer, "png"), gst_sample_get_buffer (converted));
     gst_sample_unref (converted);
   } else {
-    g_printerr ("viewer: no PNG of the picture: %s\n", error ? error->message : "unknown error");
+    g_printerr (
+        "rangecast-viewer: no PNG of the picture: %s\n", error ? error->message : "unknown error");
   }
   g_clear_error (&error);
   return true;
@@ -118,7 +119,7 @@ write_picture (gpointer user_data)
     return G_SOURCE_REMOVE;
   if (viewer.patience-- > 0)
     return G_SOURCE_CONTINUE;
-  g_printerr ("viewer: there is no picture yet\n");
+  g_printerr ("rangecast-viewer: there is no picture yet\n");
   return G_SOURCE_REMOVE;
 }
 
@@ -142,8 +143,8 @@ tell_end (GstElement *pipeline, const std::string &path)
   if (message && !error)
     std::printf ("wrote %s\n", path.c_str ());
   else
-    g_printerr (
-        "viewer: %s: %s\n", path.c_str (), error ? error->message : "writing takes too long");
+    g_printerr ("rangecast-viewer: %s: %s\n", path.c_str (),
+        error ? error->message : "writing takes too long");
   std::fflush (stdout);
   g_clear_error (&error);
   if (message)
@@ -157,7 +158,7 @@ write_points (Viewer &viewer)
 {
   GstSample *sample = take_frame_set (viewer);
   if (!sample) {
-    g_printerr ("viewer: there are no points yet\n");
+    g_printerr ("rangecast-viewer: there are no points yet\n");
     return;
   }
   GError *error = nullptr;
@@ -178,7 +179,7 @@ write_points (Viewer &viewer)
     gst_object_unref (out);
     gst_object_unref (encoder);
   } else {
-    g_printerr ("viewer: no point cloud: %s\n", error->message);
+    g_printerr ("rangecast-viewer: no point cloud: %s\n", error->message);
   }
   g_clear_error (&error);
   gst_sample_unref (sample);
@@ -340,7 +341,7 @@ say_that_nothing_comes (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   if (!viewer.seen_frames)
-    g_printerr ("viewer: nothing to show yet; is somebody sending?\n");
+    g_printerr ("rangecast-viewer: nothing to show yet; is somebody sending?\n");
   return G_SOURCE_REMOVE;
 }
 
@@ -351,9 +352,9 @@ add (Viewer &viewer, const char *factory)
 {
   GstElement *element = gst_element_factory_make (factory, nullptr);
   if (!element) {
-    g_printerr (
-        "viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the plugins of "
-        "gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
+    g_printerr ("rangecast-viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the "
+                "plugins of "
+                "gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
         factory);
     std::exit (1);
   }
@@ -514,7 +515,8 @@ is_supported (const char *uri)
   gchar *scheme = gst_uri_get_protocol (uri);
   const bool supported = scheme && gst_uri_protocol_is_supported (GST_URI_SRC, scheme);
   if (!supported)
-    g_printerr ("viewer: %s: no plugin of GStreamer opens %s://\n", uri, scheme ? scheme : "");
+    g_printerr (
+        "rangecast-viewer: %s: no plugin of GStreamer opens %s://\n", uri, scheme ? scheme : "");
   g_free (scheme);
   return supported;
 }
@@ -527,7 +529,7 @@ input_uri (const char *input)
     return is_supported (input) ? g_strdup (input) : nullptr;
   if (g_file_test (input, G_FILE_TEST_IS_REGULAR))
     return gst_filename_to_uri (input, nullptr);
-  g_printerr ("viewer: %s: %s\n", input,
+  g_printerr ("rangecast-viewer: %s: %s\n", input,
       g_file_test (input, G_FILE_TEST_IS_DIR)   ? "is a folder; expected a .rcnc recording in it"
       : g_file_test (input, G_FILE_TEST_EXISTS) ? "is no ordinary file; expected a .rcnc recording"
                                                 : "no such file");

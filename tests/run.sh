@@ -5,6 +5,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.."
 ./setup.sh || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
+rm -f build/meson-logs/testlog.json # a name that no test has makes no new one
 meson test -C build --print-errorlogs --no-rebuild "$@"
 status=$?
 python3 tests/summary.py build/meson-logs/testlog.json "$status"

@@ -7,6 +7,7 @@ usage: summary.py testlog.json MESON_EXIT_STATUS
 GoogleTest, Check and our shell tests each print their own closing lines; a program that died
 without one counts as one failure. Exits non-zero when anything failed."""
 import json
+import os
 import re
 import sys
 
@@ -42,6 +43,9 @@ def counts_of(output):
 def main():
     log, meson_status = sys.argv[1], int(sys.argv[2])
     total = [0, 0, 0]
+    if not os.path.exists(log):
+        print("no test ran: is there one of that name? (meson test -C build --list)\n0 passed, 1 failed, 0 skipped")
+        return 1
     with open(log, encoding="utf-8") as lines:
         for line in lines:
             test = json.loads(line)

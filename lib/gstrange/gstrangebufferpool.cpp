@@ -23,7 +23,9 @@ struct _GstRangeBufferPool {
   GstBufferPool parent;
 
   guint views;
-  gsize view_size; /* bytes of the full image of one view */
+  gsize view_size;             /* bytes of the full image of one view */
+  gboolean waits_for_memories; /* while max-buffers does not make others wait for each buffer */
+  GstAtomicQueue *shared;      /* buffers that came back before their memories did */
 };
 
 G_DEFINE_TYPE (GstRangeBufferPool, gst_range_buffer_pool, GST_TYPE_BUFFER_POOL)
@@ -154,6 +156,7 @@ gst_range_buffer_pool_set_config (GstBufferPool *pool, GstStructure *config)
     GST_WARNING_OBJECT (pool, "caps larger than any rig: %" GST_PTR_FORMAT, caps);
     return FALSE;
   }
+  self->waits_for_memories = max == 0;
   self->views = static_cast<guint> (views);
   self->view_size = full_view_size (static_cast<gsize> (width), static_cast<gsize> (height));
   gst_buffer_pool_config_set_params (
@@ -177,20 +180,9 @@ gst_range_buffer_pool_alloc_buffer (
   return *buffer ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-static GstFlowReturn
-gst_range_buffer_pool_acquire_buffer (
-    GstBufferPool *pool, GstBuffer **buffer, GstBufferPoolAcquireParams *params)
-{
-  const GstFlowReturn flow = GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)
-                                 ->acquire_buffer (pool, buffer, params);
-  if (flow == GST_FLOW_OK)
-    empty_memories (*buffer);
-  return flow;
-}
-
 /* The base class keeps a buffer only if it comes back with the size that it had at first. */
 static void
-gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
+reset_whole (GstBufferPool *pool, GstBuffer *buffer)
 {
   auto self = GST_RANGE_BUFFER_POOL (pool);
   const bool one_for_all = has_one_memory_for_all (self->views);
@@ -204,17 +196,83 @@ gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
   GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->reset_buffer (pool, buffer);
 }
 
+/* See release_buffer(), which comes next. */
 static void
-gst_range_buffer_pool_init (GstRangeBufferPool *)
+gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
 {
+  if (!GST_RANGE_BUFFER_POOL (pool)->waits_for_memories)
+    reset_whole (pool, buffer);
+}
+
+/* A buffer whose memories went into another one (gst_range_buffer_append()) comes back by that
+ * one's GstParentBufferMeta, which GStreamer 1.22 frees before the memories: at that moment they
+ * are shared still, and the base class would throw the buffer away, each time. It waits for them
+ * instead. */
+static void
+gst_range_buffer_pool_release_buffer (GstBufferPool *pool, GstBuffer *buffer)
+{
+  auto self = GST_RANGE_BUFFER_POOL (pool);
+  if (self->waits_for_memories && !gst_buffer_is_all_memory_writable (buffer)) {
+    gst_atomic_queue_push (self->shared, buffer);
+    return;
+  }
+  if (self->waits_for_memories)
+    reset_whole (pool, buffer);
+  GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->release_buffer (pool, buffer);
+}
+
+/* Those that are shared even now go. */
+static void
+release_shared (GstBufferPool *pool)
+{
+  while (gpointer buffer = gst_atomic_queue_pop (GST_RANGE_BUFFER_POOL (pool)->shared)) {
+    reset_whole (pool, GST_BUFFER (buffer));
+    GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)
+        ->release_buffer (pool, GST_BUFFER (buffer));
+  }
+}
+
+static gboolean
+gst_range_buffer_pool_stop (GstBufferPool *pool)
+{
+  release_shared (pool);
+  return GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->stop (pool);
+}
+
+static GstFlowReturn
+gst_range_buffer_pool_acquire_buffer (
+    GstBufferPool *pool, GstBuffer **buffer, GstBufferPoolAcquireParams *params)
+{
+  release_shared (pool);
+  const GstFlowReturn flow = GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)
+                                 ->acquire_buffer (pool, buffer, params);
+  if (flow == GST_FLOW_OK)
+    empty_memories (*buffer);
+  return flow;
+}
+
+static void
+gst_range_buffer_pool_finalize (GObject *object)
+{
+  gst_atomic_queue_unref (GST_RANGE_BUFFER_POOL (object)->shared); /* empty since stop */
+  G_OBJECT_CLASS (gst_range_buffer_pool_parent_class)->finalize (object);
+}
+
+static void
+gst_range_buffer_pool_init (GstRangeBufferPool *self)
+{
+  self->shared = gst_atomic_queue_new (4);
 }
 
 static void
 gst_range_buffer_pool_class_init (GstRangeBufferPoolClass *klass)
 {
   auto pool_class = GST_BUFFER_POOL_CLASS (klass);
+  G_OBJECT_CLASS (klass)->finalize = gst_range_buffer_pool_finalize;
   pool_class->set_config = gst_range_buffer_pool_set_config;
   pool_class->alloc_buffer = gst_range_buffer_pool_alloc_buffer;
+  pool_class->release_buffer = gst_range_buffer_pool_release_buffer;
+  pool_class->stop = gst_range_buffer_pool_stop;
   pool_class->acquire_buffer = gst_range_buffer_pool_acquire_buffer;
   pool_class->reset_buffer = gst_range_buffer_pool_reset_buffer;
 }

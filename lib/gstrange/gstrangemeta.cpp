@@ -212,7 +212,8 @@ capture_time_reference ()
 /**
  * gst_range_buffer_set_capture_time:
  * @buffer: a writable buffer, raw or coded
- * @time: ns on the clock that the camera hosts share
+ * @time: ns on the clock that the camera hosts share; %GST_CLOCK_TIME_NONE (not known): nothing is
+ * set, and what was there goes
  *
  * Sets (or replaces) the buffer's #GstReferenceTimestampMeta with the reference
  * `timestamp/x-range-capture`.
@@ -221,9 +222,12 @@ void
 gst_range_buffer_set_capture_time (GstBuffer *buffer, GstClockTime time)
 {
   GstCaps *reference = capture_time_reference ();
-  if (auto meta = gst_buffer_get_reference_timestamp_meta (buffer, reference))
+  auto meta = gst_buffer_get_reference_timestamp_meta (buffer, reference);
+  if (meta && GST_CLOCK_TIME_IS_VALID (time))
     meta->timestamp = time;
-  else
+  else if (meta)
+    gst_buffer_remove_meta (buffer, GST_META_CAST (meta));
+  else if (GST_CLOCK_TIME_IS_VALID (time))
     gst_buffer_add_reference_timestamp_meta (buffer, reference, time, GST_CLOCK_TIME_NONE);
   gst_caps_unref (reference);
 }

@@ -76,11 +76,27 @@ behind_marker (std::string_view text, const Before &before)
   return tag || attribute ? kWord.size () : 0;
 }
 
+/* Behind a marker, where only what such a file has there may stand: at another sign OpenCV would
+ * look for data for ever. */
 bool
-has_header (std::string_view text, const std::string &header)
+has_header (std::string_view text, const std::string &header, bool json)
 {
-  const auto begin = text.find_first_not_of (" \r\n|>\"'");
-  return begin != std::string_view::npos && text.substr (begin).starts_with (header);
+  const auto skip = [&] (const char *signs) {
+    text.remove_prefix (std::min (text.find_first_not_of (signs), text.size ()));
+  };
+  const auto skip_one = [&] (const char *signs) {
+    if (!text.empty () && std::string_view (signs).find (text[0]) != std::string_view::npos)
+      text.remove_prefix (1);
+  };
+  if (!json) {
+    skip_one ("\"'"); /* XML's attribute, and the end of its tag or of YAML's */
+    skip (" ");
+    skip_one (">");
+    skip (" ");
+    skip_one ("|");
+    skip (" \r\n");
+  }
+  return text.starts_with (header);
 }
 
 bool
@@ -88,6 +104,69 @@ is_control (char c)
 {
   return std::iscntrl (static_cast<unsigned char> (c)) && c != '\n' && c != '\r' && c != '\t';
 }
+
+/* Whether a YAML file is one map of fields that begin their lines. OpenCV 4.6 takes what is left of
+ * a document whose collection ends before it does (a list, a flow collection, an indented map) for
+ * the end of that document, steps over three characters, and may then never end. Other formats
+ * pass. */
+class YamlShape {
+public:
+  /** @param rest  begins with the character to look at
+   *  @return what is wrong, or nothing */
+  std::string look_at (std::string_view rest)
+  {
+    const char c = rest[0];
+    if (part_ == Part::kFirst && static_cast<unsigned char> (c) < 0x80) /* else a byte order mark */
+      part_ = c == '%' ? Part::kDirectives : Part::kOther;
+    if (part_ == Part::kFirst || part_ == Part::kOther)
+      return {};
+    if (c == '\r' && rest.size () > 1 && rest[1] != '\n')
+      return "has a carriage return within a line";
+    if (c == '\n')
+      line_ = {};
+    std::string complaint;
+    if (std::isgraph (static_cast<unsigned char> (c)) && !line_.ignored)
+      complaint = look_at_sign (rest);
+    line_.column += c != '\n';
+    return complaint;
+  }
+
+private:
+  enum class Part { kFirst, kOther, kDirectives, kTop, kBody, kEnd };
+  struct Line {
+    int column = 0;
+    bool ignored = false; /* the rest of it */
+    bool marked = false;  /* begins with --- or ... */
+  };
+
+  std::string look_at_sign (std::string_view rest)
+  {
+    const bool begins = line_.column == 0, starts = begins && rest.starts_with ("---"),
+               ends = begins && rest.starts_with ("...");
+    if (line_.marked && line_.column < 3)
+      return {};
+    if (rest[0] == '#' || (part_ == Part::kDirectives && begins && rest[0] == '%')) {
+      line_.ignored = true;
+      return {};
+    }
+    if (line_.marked || part_ == Part::kEnd || (starts && part_ != Part::kDirectives))
+      return "has more than one document, or text behind the marks of its beginning or end";
+    if (starts || ends) {
+      line_.marked = true;
+      part_ = starts ? Part::kTop : Part::kEnd;
+      return {};
+    }
+    if (part_ != Part::kBody &&
+        !(begins && (std::isalnum (static_cast<unsigned char> (rest[0])) || rest[0] == '_')))
+      return "does not begin with a field at the beginning of a line";
+    part_ = Part::kBody;
+    line_.ignored = true;
+    return {};
+  }
+
+  Part part_ = Part::kFirst;
+  Line line_;
+};
 
 /* Text that comes in blocks. */
 class StorageScanner {
@@ -123,9 +202,9 @@ private:
     const std::size_t marker = behind_marker (rest, before_);
     if (marker && header_.empty ())
       return "has binary data";
-    if (marker && !has_header (rest.substr (marker), header_))
+    if (marker && !has_header (rest.substr (marker), header_, rest[0] == '$'))
       return "has binary data of another type than expected";
-    return {};
+    return yaml_.look_at (rest);
   }
 
   const StorageLimits limits_;
@@ -133,6 +212,7 @@ private:
   std::uint64_t bytes_ = 0;
   int signs_ = 0;
   Before before_;
+  YamlShape yaml_;
 };
 
 } // namespace

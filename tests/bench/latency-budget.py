@@ -4,8 +4,8 @@
 
 usage: latency-budget.py [--skip SECONDS] LOGS
 
-LOGS holds cameraN.trace, parent.trace and viewer.trace, as demo.sh --trace and latency-budget.sh
-leave them (rangecast-run --trace-latency). For each frame set that was drawn, each stage's time
+LOGS holds cameraN.trace, parent.trace and viewer.trace, as demo.sh --trace
+leaves them (rangecast-run --trace-latency). For each frame set that was drawn, each stage's time
 runs from the last thing that the stage waited for to when it handed its result on; where a stage
 has one frame set of several views, the view that comes last counts. Prints per stage the median,
 the 99th percentile and the longest, the mean of the slowest 1 %'s share of it, and the CPU time of

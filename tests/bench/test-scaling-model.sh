@@ -80,3 +80,8 @@ test_bad_input_is_named () {
 }
 export -f model
 export source_dir
+
+test_a_reader_that_has_enough_is_no_fault () {
+  { model 2>errors.txt; echo $? >status.txt; } | true
+  [ "$(cat status.txt)" = 0 ] && [ ! -s errors.txt ] || fail "status $(cat status.txt): $(cat errors.txt)"
+}

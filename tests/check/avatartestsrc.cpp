@@ -244,6 +244,53 @@ GST_START_TEST (test_same_seed_and_capture_time_give_the_same_picture)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_loop_goes_forwards_and_backwards_through_the_first_pictures)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48,framerate=10/1");
+  g_object_set (
+      h->element, "num-buffers", 9, "seed", 7, "loop-frames", 3, "empty-frames", 2, nullptr);
+  gst_harness_play (h);
+  std::string shown[9], drawn[3];
+  for (std::string &picture : shown)
+    picture = take_bytes (gst_harness_pull (h));
+  gst_harness_teardown (h);
+  for (int i = 0; i < 3; i++)
+    drawn[i] = take_bytes (nth_picture (i, 10, 7));
+  fail_if (shown[0] == shown[1] || shown[0] == drawn[0], "the empty room is not looped");
+  const int expected[] = {0, 1, 2, 1, 0, 1, 2, 1, 0};
+  for (int i = 2; i < 9; i++)
+    fail_unless (shown[i] == drawn[expected[i]], "picture %d is none of frame %d", i, expected[i]);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_loop_is_drawn_anew_for_another_size_and_rate)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=32,height=24,framerate=5/1");
+  g_object_set (h->element, "loop-frames", 2, "seed", 7, nullptr);
+  gst_harness_play (h);
+  gst_buffer_unref (gst_harness_pull (h));
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx,width=64,height=48,framerate=10/1");
+  const std::string first = take_bytes (nth_picture (0, 10, 7)),
+                    second = take_bytes (nth_picture (1, 10, 7));
+  std::string picture;
+  while (picture.size () != first.size ()) /* old ones wait */
+    picture = take_bytes (gst_harness_pull (h));
+  const std::string next = take_bytes (gst_harness_pull (h));
+  fail_unless ((picture == first && next == second) || (picture == second && next == first));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_loop_that_needs_too_much_memory_is_an_error_that_names_it)
+{
+  fail_unless (run ("avatartestsrc name=s loop-frames=5000000 s.left ! "
+                    "video/x-raw,width=64,height=48 ! fakesink")
+                   .find ("loop-frames 5000000") != std::string::npos);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_each_camera_pad_gives_its_own_cameras_picture)
 {
   SceneSettings settings;
@@ -526,6 +573,9 @@ avatartestsrc_suite ()
   tcase_add_test (tc, test_rig_is_exported_with_the_size_of_the_caps);
   tcase_add_test (tc, test_caps_change_mid_stream_changes_the_size);
   tcase_add_test (tc, test_same_seed_and_capture_time_give_the_same_picture);
+  tcase_add_test (tc, test_loop_goes_forwards_and_backwards_through_the_first_pictures);
+  tcase_add_test (tc, test_loop_is_drawn_anew_for_another_size_and_rate);
+  tcase_add_test (tc, test_loop_that_needs_too_much_memory_is_an_error_that_names_it);
   tcase_add_test (tc, test_each_camera_pad_gives_its_own_cameras_picture);
   tcase_add_test (tc, test_padded_strides_of_downstreams_pool_are_kept_to);
   tcase_add_test (tc, test_range_pool_of_downstream_is_used_and_others_are_not);

@@ -281,6 +281,36 @@ GST_START_TEST (test_views_of_64_buffers_are_where_they_were_after_append)
 }
 GST_END_TEST;
 
+/* By rangemux, or rangedemux. */
+GST_START_TEST (test_a_pool_gets_memories_back_that_went_into_another_buffer)
+{
+  GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (2, 32, 24), 30, 1));
+  GstBufferPool *pool = gst_range_buffer_pool_new ();
+  fail_unless (gst_range_buffer_pool_configure (pool, caps, 0, 0));
+  fail_unless (gst_buffer_pool_set_active (pool, TRUE));
+  GstMemory *first = nullptr;
+  for (int i = 0; i < 5; i++) {
+    GstBuffer *buffer = nullptr, *other = gst_buffer_new ();
+    fail_unless_equals_int (gst_buffer_pool_acquire_buffer (pool, &buffer, nullptr), GST_FLOW_OK);
+    const GstRangeMeta *meta = gst_range_buffer_add_view (buffer, 1, 0, 0, 32, 24, 7);
+    fail_unless (meta && gst_range_buffer_add_view (buffer, 0, 0, 0, 16, 24, 7));
+    first = first ? first : gst_buffer_peek_memory (buffer, 0);
+    fail_unless (gst_buffer_peek_memory (buffer, 0) == first);
+    if (i % 2) {
+      gst_buffer_unref (other);
+      other = gst_range_buffer_copy_view (buffer, meta);
+    } else {
+      fail_unless (gst_range_buffer_append (other, buffer));
+    }
+    gst_buffer_unref (buffer);
+    gst_buffer_unref (other);
+  }
+  gst_buffer_pool_set_active (pool, FALSE);
+  gst_object_unref (pool);
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_view_larger_than_the_caps_is_refused)
 {
   for (const guint views : {1u, 64u}) {
@@ -395,6 +425,7 @@ gstrange_suite ()
   tcase_add_test (tc, test_pool_recycles_buffers_with_any_roi);
   tcase_add_test (tc, test_pool_recycles_buffers_of_up_to_64_views_with_other_rois);
   tcase_add_test (tc, test_views_of_64_buffers_are_where_they_were_after_append);
+  tcase_add_test (tc, test_a_pool_gets_memories_back_that_went_into_another_buffer);
   tcase_add_test (tc, test_view_larger_than_the_caps_is_refused);
   tcase_add_test (tc, test_frame_set_beyond_the_limit_is_refused);
   tcase_add_test (tc, test_caps_beyond_the_limit_are_refused_by_name);

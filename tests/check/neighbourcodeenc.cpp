@@ -456,6 +456,20 @@ GST_START_TEST (test_a_request_waits_until_the_last_key_frame_set_is_old_enough)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_requests_for_the_far_future_do_not_keep_others_from_being_heard)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = encoder (rig, "temporal=true profile=packed");
+  fail_unless (kinds (h, rig, 0, 2) == "kd");
+  for (guint i = 0; i < 100; i++)
+    gst_harness_push_upstream_event (
+        h, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE - 1, FALSE, i));
+  ask_for_key (h);
+  fail_unless (kinds (h, rig, 2, 4) == "kd");
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_a_key_frame_set_that_comes_anyway_answers_those_who_wait)
 {
   const Rig rig = ring_rig (1);
@@ -623,6 +637,7 @@ neighbourcodeenc_suite ()
   tcase_add_test (tc, test_slices_come_one_a_buffer_with_the_times_of_their_frame_set);
   tcase_add_test (tc, test_only_the_first_slice_has_discont_and_only_the_last_the_marker);
   tcase_add_test (tc, test_a_request_waits_until_the_last_key_frame_set_is_old_enough);
+  tcase_add_test (tc, test_requests_for_the_far_future_do_not_keep_others_from_being_heard);
   tcase_add_test (tc, test_a_key_frame_set_that_comes_anyway_answers_those_who_wait);
   tcase_add_test (
       tc, test_all_headers_make_parser_and_payloader_repeat_the_rig_with_the_key_frame_set);

@@ -162,6 +162,38 @@ GST_START_TEST (test_clock_an_hour_off_is_left_out)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_of_recordings_one_that_begins_or_pauses_goes_on_later_and_none_loses_a_frame)
+{
+  constexpr GstClockTime kSeconds = GST_SECOND;
+  for (const int streams : {2, 3})
+    for (const int late : {0, streams - 1}) {
+      Mux mux (streams);
+      const int all = (1 << streams) - 1;
+      const auto push_others = [&] (GstClockTime time) {
+        for (int i = 0; i < streams; i++)
+          if (i != late)
+            mux.push (i, time, time);
+      };
+      mux.push (late, 5 * kSeconds, 5 * kSeconds); /* it begins */
+      for (const GstClockTime time : {0 * kSeconds, 2 * kSeconds, 4 * kSeconds}) {
+        push_others (time);
+        GstClockTime capture;
+        fail_unless_equals_int (mux.pull (&capture), all & ~(1 << late));
+        fail_unless_equals_uint64 (capture, time);
+      }
+      push_others (5 * kSeconds);
+      fail_unless_equals_int (mux.pull (), all);
+      mux.push (late, 10 * kSeconds, 10 * kSeconds); /* after a pause */
+      push_others (6 * kSeconds);
+      fail_unless_equals_int (mux.pull (), all & ~(1 << late));
+      push_others (10 * kSeconds);
+      fail_unless_equals_int (mux.pull (), all);
+      fail_unless_equals_uint64 (mux.stat ("out-of-step"), 0);
+      fail_unless_equals_uint64 (mux.stat ("dropped-late"), 0);
+    }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_two_pads_with_one_view_are_one_error_that_names_both)
 {
   Mux mux (2);
@@ -289,6 +321,8 @@ rangemux_suite ()
   tcase_add_test (tc, test_latency_query_adds_its_own);
   tcase_add_test (tc, test_stream_that_ends_is_left_out);
   tcase_add_test (tc, test_clock_an_hour_off_is_left_out);
+  tcase_add_test (
+      tc, test_of_recordings_one_that_begins_or_pauses_goes_on_later_and_none_loses_a_frame);
   tcase_add_test (tc, test_two_pads_with_one_view_are_one_error_that_names_both);
   tcase_add_test (tc, test_raw_and_coded_together_are_one_error);
   tcase_add_test (tc, test_coded_access_units_are_joined);

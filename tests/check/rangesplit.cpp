@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* before check.h, whose fail() is a macro */
+#include <atomic>
+#include <thread>
+
 #include "rangecast-check.hpp"
 
 #include <gst/video/video.h>
@@ -149,6 +153,64 @@ GST_START_TEST (test_unlinked_pad_does_not_stop_the_others)
 }
 GST_END_TEST;
 
+struct Pusher {
+  GstHarness *h;
+  const Rig &rig;
+  std::atomic<bool> ends = false;
+  GstFlowReturn flow = GST_FLOW_OK;
+
+  void push ()
+  {
+    for (GstClockTime t = 0; !ends && flow == GST_FLOW_OK; t += 33 * GST_MSECOND)
+      flow = gst_harness_push (h, make_frame_set (rig, t));
+  }
+};
+
+GST_START_TEST (test_pads_that_come_and_go_leave_the_others_running)
+{
+  const Rig rig = ring_rig (2, 16, 16);
+  GstHarness *h = split_harness (rig, "depth_0");
+  gst_harness_set_drop_buffers (h, TRUE);
+  Pusher pusher = {h, rig};
+  std::thread thread (&Pusher::push, &pusher);
+  for (int i = 0; i < 300; i++) {
+    GstElement *sink = gst_element_factory_make ("fakesink", nullptr);
+    g_object_set (sink, "async", FALSE, nullptr);
+    gst_element_set_state (sink, GST_STATE_PLAYING);
+    GstPad *pad = gst_element_request_pad_simple (h->element, "colour_1"),
+           *peer = gst_element_get_static_pad (sink, "sink");
+    fail_unless_equals_int (gst_pad_link (pad, peer), GST_PAD_LINK_OK);
+    g_usleep (500);
+    gst_element_release_request_pad (
+        h->element, pad); /* in the middle of a push, as often as not */
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+    gst_element_set_state (sink, GST_STATE_NULL);
+    gst_object_unref (sink);
+  }
+  pusher.ends = true;
+  thread.join ();
+  fail_unless_equals_int (pusher.flow, GST_FLOW_OK);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_frame_set_without_capture_time_gives_a_picture_without)
+{
+  const Rig rig = ring_rig (1, 16, 16);
+  GstHarness *h = split_harness (rig, "depth");
+  GstBuffer *input = make_frame_set (rig, 0);
+  gst_range_buffer_set_capture_time (input, GST_CLOCK_TIME_NONE);
+  gpointer state = nullptr;
+  while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (input, &state))
+    meta->capture_time = GST_CLOCK_TIME_NONE;
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  fail_unless (!gst_buffer_get_reference_timestamp_meta (output, nullptr));
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_plays_twice)
 {
   const Rig rig = ring_rig (1);
@@ -175,6 +237,8 @@ rangesplit_suite ()
   tcase_add_test (tc, test_new_caps_reach_the_video_pads);
   tcase_add_test (tc, test_flush_and_eos_reach_the_video_pads);
   tcase_add_test (tc, test_unlinked_pad_does_not_stop_the_others);
+  tcase_add_test (tc, test_pads_that_come_and_go_leave_the_others_running);
+  tcase_add_test (tc, test_frame_set_without_capture_time_gives_a_picture_without);
   tcase_add_test (tc, test_plays_twice);
   return suite;
 }

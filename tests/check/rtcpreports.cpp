@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rangecast-check.hpp"
 
+#include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
+
+#include <string>
 
 static constexpr guint32 kSender = 0x1234, kReceiver = 0x77;
 
@@ -34,13 +37,33 @@ struct Session {
     gst_rtp_buffer_unmap (&mapped);
     gst_buffer_unref (gst_harness_push_and_pull (rtp, packet));
   }
+  /* @return whether it got through, as it was */
+  bool offer (GstBuffer *packet, GstClockTime time = 0, const char *address = "10.0.0.7")
+  {
+    GstBuffer *before = gst_buffer_copy (packet);
+    if (address) {
+      GSocketAddress *from = g_inet_socket_address_new_from_string (address, 5000);
+      gst_buffer_add_net_address_meta (packet, from);
+      g_object_unref (from);
+    }
+    GST_BUFFER_PTS (packet) = GST_BUFFER_DTS (packet) = time;
+    fail_unless_equals_int (gst_harness_push (rtcp, packet), GST_FLOW_OK);
+    GstBuffer *out = gst_harness_try_pull (rtcp);
+    if (out) {
+      GstMapInfo map;
+      gst_buffer_map (out, &map, GST_MAP_READ);
+      fail_unless_equals_int (gst_buffer_get_size (before), map.size);
+      fail_unless_equals_int (gst_buffer_memcmp (before, 0, map.data, map.size), 0);
+      gst_buffer_unmap (out, &map);
+      gst_buffer_unref (out);
+    }
+    gst_buffer_unref (before);
+    return out != nullptr;
+  }
   /* @return the events that come of it, as structures to free */
   std::vector<GstStructure *> push_rtcp (GstBuffer *packet)
   {
-    const gsize size = gst_buffer_get_size (packet);
-    GstBuffer *out = gst_harness_push_and_pull (rtcp, packet);
-    fail_unless_equals_int (gst_buffer_get_size (out), size);
-    gst_buffer_unref (out);
+    offer (packet);
     std::vector<GstStructure *> reports;
     while (GstEvent *event = gst_harness_try_pull_upstream_event (rtp)) {
       const GstStructure *s = gst_event_get_structure (event);
@@ -49,6 +72,15 @@ struct Session {
       gst_event_unref (event);
     }
     return reports;
+  }
+  guint64 stat (const char *field)
+  {
+    GstStructure *stats;
+    guint64 value = G_MAXUINT64;
+    g_object_get (element, "stats", &stats, nullptr);
+    gst_structure_get_uint64 (stats, field, &value);
+    gst_structure_free (stats);
+    return value;
   }
 };
 
@@ -59,7 +91,8 @@ struct Report {
 };
 
 static GstBuffer *
-receiver_report (const std::vector<Report> &reports, bool of_sender = false)
+receiver_report (
+    const std::vector<Report> &reports, bool of_sender = false, guint32 receiver = kReceiver)
 {
   GstBuffer *buffer = gst_rtcp_buffer_new (1400);
   GstRTCPBuffer rtcp = GST_RTCP_BUFFER_INIT;
@@ -68,9 +101,9 @@ receiver_report (const std::vector<Report> &reports, bool of_sender = false)
   fail_unless (
       gst_rtcp_buffer_add_packet (&rtcp, of_sender ? GST_RTCP_TYPE_SR : GST_RTCP_TYPE_RR, &packet));
   if (of_sender)
-    gst_rtcp_packet_sr_set_sender_info (&packet, kReceiver, 0, 0, 0, 0);
+    gst_rtcp_packet_sr_set_sender_info (&packet, receiver, 0, 0, 0, 0);
   else
-    gst_rtcp_packet_rr_set_ssrc (&packet, kReceiver);
+    gst_rtcp_packet_rr_set_ssrc (&packet, receiver);
   for (const Report &r : reports)
     fail_unless (gst_rtcp_packet_add_rb (
         &packet, r.sender, r.lost, 5, r.highest, r.jitter, r.last_sr, r.delay));
@@ -157,7 +190,7 @@ GST_START_TEST (test_reports_about_other_streams_are_none)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_bytes_that_are_no_rtcp_go_on_and_tell_nothing)
+GST_START_TEST (test_bytes_that_are_no_rtcp_tell_nothing)
 {
   Session session;
   session.push_rtp ();
@@ -190,12 +223,178 @@ GST_START_TEST (test_events_of_one_stream_do_not_reach_the_other)
     gst_event_unref (event);
   while (GstEvent *event = gst_harness_try_pull_event (session.rtcp))
     gst_event_unref (event);
+  fail_unless (session.offer (receiver_report ({{}})));
   gst_harness_push_event (session.rtcp, gst_event_new_eos ());
   fail_unless (gst_harness_try_pull_event (session.rtp) == nullptr);
   GstEvent *eos = gst_harness_try_pull_event (session.rtcp);
   fail_unless (eos && GST_EVENT_TYPE (eos) == GST_EVENT_EOS);
   gst_event_unref (eos);
   session.push_rtp ();
+}
+GST_END_TEST;
+
+/* Adds a packet of that kind to a compound one. */
+static GstBuffer *
+with (GstBuffer *buffer, GstRTCPType type, guint32 ssrc, guint32 about = 0)
+{
+  GstRTCPBuffer rtcp = GST_RTCP_BUFFER_INIT;
+  GstRTCPPacket packet;
+  fail_unless (gst_rtcp_buffer_map (buffer, GST_MAP_READWRITE, &rtcp));
+  fail_unless (gst_rtcp_buffer_add_packet (&rtcp, type, &packet));
+  if (type == GST_RTCP_TYPE_SDES) {
+    gst_rtcp_packet_sdes_add_item (&packet, ssrc);
+    gst_rtcp_packet_sdes_add_entry (
+        &packet, GST_RTCP_SDES_CNAME, 1, reinterpret_cast<const guint8 *> ("x"));
+  } else if (type == GST_RTCP_TYPE_BYE) {
+    gst_rtcp_packet_bye_add_ssrc (&packet, ssrc);
+  } else {
+    gst_rtcp_packet_fb_set_type (&packet, GST_RTCP_PSFB_TYPE_PLI);
+    gst_rtcp_packet_fb_set_sender_ssrc (&packet, ssrc);
+    gst_rtcp_packet_fb_set_media_ssrc (&packet, about);
+  }
+  gst_rtcp_buffer_unmap (&rtcp);
+  return buffer;
+}
+
+GST_START_TEST (test_rtcp_that_is_not_about_the_stream_does_not_pass)
+{
+  Session session;
+  fail_if (session.offer (receiver_report ({{}}))); /* there is none yet */
+  session.push_rtp ();
+  fail_if (session.offer (receiver_report ({})));
+  fail_if (session.offer (receiver_report ({{.sender = 5}})));
+  fail_if (session.offer (with (receiver_report ({}), GST_RTCP_TYPE_SDES, kReceiver)));
+  fail_if (session.offer (with (receiver_report ({}), GST_RTCP_TYPE_BYE, kReceiver)));
+  fail_unless_equals_uint64 (session.stat ("receivers"), 0);
+  fail_unless_equals_uint64 (session.stat ("refused"), 5);
+  fail_unless (session.offer (receiver_report ({{}})));
+  fail_unless (session.offer (receiver_report ({}))); /* now it is known */
+  fail_unless (session.offer (with (receiver_report ({}), GST_RTCP_TYPE_BYE, kReceiver)));
+  fail_unless_equals_uint64 (session.stat ("receivers"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_request_about_the_stream_is_enough)
+{
+  Session session;
+  session.push_rtp ();
+  const auto request = [] (guint32 about) {
+    return with (gst_rtcp_buffer_new (1400), GST_RTCP_TYPE_PSFB, kReceiver, about);
+  };
+  fail_if (session.offer (request (kSender + 1)));
+  fail_unless (session.offer (request (kSender)));
+}
+GST_END_TEST;
+
+/* One packet would make up to 31 sources, or end those of others. */
+GST_START_TEST (test_who_speaks_for_others_or_as_the_sender_does_not_pass)
+{
+  Session session;
+  session.push_rtp ();
+  fail_if (session.offer (with (receiver_report ({{}}), GST_RTCP_TYPE_SDES, 5)));
+  fail_if (session.offer (with (receiver_report ({{}}), GST_RTCP_TYPE_BYE, 5)));
+  fail_if (session.offer (receiver_report ({{}}, false, kSender)));
+  fail_unless (session.offer (with (receiver_report ({{}}), GST_RTCP_TYPE_SDES, kReceiver)));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_one_who_is_known_does_not_pass_from_another_address)
+{
+  Session session;
+  session.push_rtp ();
+  fail_unless (session.offer (receiver_report ({{}}), 0, "10.0.0.7"));
+  fail_if (session.offer (receiver_report ({{}}), GST_SECOND, "10.0.0.8"));
+  fail_unless (session.offer (receiver_report ({{}}), 10 * GST_SECOND, "10.0.0.7"));
+  fail_unless (session.offer (receiver_report ({{}}), 60 * GST_SECOND, "10.0.0.8"));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_flood_of_receivers_that_know_the_stream_leaves_room_for_others)
+{
+  Session session;
+  session.push_rtp ();
+  g_object_set (session.element, "max-receivers", 40, nullptr);
+  fail_unless (session.offer (receiver_report ({{}}, false, 1), 0, "10.0.0.1"));
+  for (guint32 i = 0; i < 5000; i++)
+    session.offer (receiver_report ({{}}, false, 1000 + i), i * GST_MSECOND, "10.0.0.9");
+  fail_unless_equals_uint64 (session.stat ("receivers"), 11); /* a quarter, and who was there */
+  fail_unless (session.offer (receiver_report ({{}}, false, 1), 5 * GST_SECOND, "10.0.0.1"));
+  fail_unless (session.offer (receiver_report ({{}}, false, 2), 5 * GST_SECOND, "10.0.0.2"));
+  for (guint32 i = 0; i < 5000; i++) /* from everywhere */
+    session.offer (receiver_report ({{}}, false, 10000 + i), 6 * GST_SECOND,
+        ("10.1." + std::to_string (i / 250) + "." + std::to_string (i % 250 + 1)).c_str ());
+  fail_unless_equals_uint64 (session.stat ("receivers"), 40);
+  fail_unless (session.offer (receiver_report ({{}}, false, 1), 7 * GST_SECOND, "10.0.0.1"));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_who_is_silent_for_half_a_minute_makes_room)
+{
+  Session session;
+  session.push_rtp ();
+  g_object_set (session.element, "max-receivers", 1, nullptr);
+  fail_unless (session.offer (receiver_report ({{}}, false, 1), 0));
+  fail_if (session.offer (receiver_report ({{}}, false, 2), 29 * GST_SECOND));
+  fail_unless (session.offer (receiver_report ({{}}, false, 2), 31 * GST_SECOND));
+  fail_if (session.offer (receiver_report ({{}}, false, 1), 32 * GST_SECOND));
+}
+GST_END_TEST;
+
+static guint
+sources_of (GstElement *session)
+{
+  GstStructure *stats = nullptr;
+  g_object_get (session, "stats", &stats, nullptr);
+  const GValue *sources = gst_structure_get_value (stats, "source-stats");
+  const auto array = static_cast<const GValueArray *> (g_value_get_boxed (sources));
+  const guint count = array->n_values;
+  gst_structure_free (stats);
+  return count;
+}
+
+/* What it is all for: the session behind keeps a source for each SSRC. */
+GST_START_TEST (test_a_session_behind_keeps_few_sources_in_a_flood)
+{
+  GstElement *bin = gst_bin_new (nullptr);
+  GstElement *reports = gst_element_factory_make ("rtcpreports", nullptr);
+  GstElement *session = gst_element_factory_make ("rtpsession", nullptr);
+  gst_bin_add_many (GST_BIN (bin), reports, session, nullptr);
+  fail_unless (gst_element_link_pads (reports, "src", session, "send_rtp_sink"));
+  fail_unless (gst_element_link_pads (reports, "rtcp_src", session, "recv_rtcp_sink"));
+  GstPad *rtp_in = gst_element_get_static_pad (reports, "sink");
+  GstPad *rtcp_in = gst_element_get_static_pad (reports, "rtcp_sink");
+  GstPad *rtp_out = gst_element_get_static_pad (session, "send_rtp_src");
+  gst_element_add_pad (bin, gst_ghost_pad_new ("sink", rtp_in));
+  gst_element_add_pad (bin, gst_ghost_pad_new ("rtcp_sink", rtcp_in));
+  gst_element_add_pad (bin, gst_ghost_pad_new ("src", rtp_out));
+  for (GstPad *pad : {rtp_in, rtcp_in, rtp_out})
+    gst_object_unref (pad);
+  GstHarness *rtp = gst_harness_new_with_element (bin, "sink", "src");
+  GstHarness *rtcp = gst_harness_new_with_element (bin, "rtcp_sink", nullptr);
+  gst_harness_set_src_caps_str (
+      rtp, "application/x-rtp, media=application, clock-rate=90000, payload=96, ssrc=(uint)4660");
+  gst_harness_set_src_caps_str (rtcp, "application/x-rtcp");
+  GstBuffer *packet = gst_rtp_buffer_new_allocate (100, 0, 0);
+  GstRTPBuffer mapped = GST_RTP_BUFFER_INIT;
+  gst_rtp_buffer_map (packet, GST_MAP_WRITE, &mapped);
+  gst_rtp_buffer_set_ssrc (&mapped, kSender);
+  gst_rtp_buffer_unmap (&mapped);
+  GST_BUFFER_PTS (packet) = 0;
+  gst_harness_push (rtp, packet);
+  const guint before = sources_of (session);
+  for (guint32 i = 0; i < 3000; i++) {
+    const guint32 receiver = 100000 + i * 7919;
+    GstBuffer *flood = receiver_report ({{.sender = i % 2 ? kSender : i}}, false, receiver);
+    GSocketAddress *from = g_inet_socket_address_new_from_string ("10.0.0.9", guint16 (2000 + i));
+    gst_buffer_add_net_address_meta (flood, from);
+    g_object_unref (from);
+    gst_harness_push (rtcp, with (flood, GST_RTCP_TYPE_SDES, receiver));
+  }
+  fail_unless (sources_of (session) > before); /* they do get there */
+  fail_unless (sources_of (session) <= before + 64, "%u sources", sources_of (session));
+  gst_harness_teardown (rtcp);
+  gst_harness_teardown (rtp);
+  gst_object_unref (bin);
 }
 GST_END_TEST;
 
@@ -209,8 +408,15 @@ rtcpreports_suite ()
   tcase_add_test (tc, test_packets_are_those_since_the_report_before);
   tcase_add_test (tc, test_round_trip_is_now_less_the_last_report_less_the_delay);
   tcase_add_test (tc, test_reports_about_other_streams_are_none);
-  tcase_add_test (tc, test_bytes_that_are_no_rtcp_go_on_and_tell_nothing);
+  tcase_add_test (tc, test_bytes_that_are_no_rtcp_tell_nothing);
   tcase_add_test (tc, test_events_of_one_stream_do_not_reach_the_other);
+  tcase_add_test (tc, test_rtcp_that_is_not_about_the_stream_does_not_pass);
+  tcase_add_test (tc, test_a_request_about_the_stream_is_enough);
+  tcase_add_test (tc, test_who_speaks_for_others_or_as_the_sender_does_not_pass);
+  tcase_add_test (tc, test_one_who_is_known_does_not_pass_from_another_address);
+  tcase_add_test (tc, test_a_flood_of_receivers_that_know_the_stream_leaves_room_for_others);
+  tcase_add_test (tc, test_who_is_silent_for_half_a_minute_makes_room);
+  tcase_add_test (tc, test_a_session_behind_keeps_few_sources_in_a_flood);
   return suite;
 }
 

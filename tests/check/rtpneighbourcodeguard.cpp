@@ -296,6 +296,108 @@ GST_START_TEST (test_plays_twice_and_forgets_its_sender)
 }
 GST_END_TEST;
 
+/* As a rig of one picture in half a second, of whose packets the kernel lets a sample through. */
+GST_START_TEST (test_a_second_sender_of_few_packets_is_told_after_two_seconds)
+{
+  Guard guard;
+  Sender good, other = {.ssrc = 2, .address = "10.0.0.2"};
+  guard.send_many (good, 10);
+  for (int i = 0; i < 4; i++) {
+    fail_unless_equals_int (guard.warnings ("Two senders"), 0);
+    other.sequence = guint16 (other.sequence + 8);
+    fail_unless_equals_int (guard.send (other), 0);
+    guard.time += 240 * GST_MSECOND;
+    for (int k = 0; k < 3; k++, guard.time += 240 * GST_MSECOND)
+      fail_unless_equals_int (guard.send (good), 1);
+  }
+  fail_unless_equals_int (guard.send (other), 0);
+  fail_unless_equals_int (guard.warnings ("00000002 from 10.0.0.2:5000 are dropped, expected those "
+                                          "of 00000001 from 10.0.0.1:5000"),
+      1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_another_version_beside_a_sender_is_told_though_most_of_it_is_kept_out)
+{
+  Guard guard;
+  Sender good, newer = {.ssrc = 9, .address = "10.0.0.3"}, copy = {.address = "10.0.0.4"};
+  std::vector<guint8> unit = slice_unit ();
+  unit[0] = guint8 (2 << 4 | (unit[0] & 15));
+  guard.send_many (good, 10);
+  const auto play = [&] (Sender &sender) {
+    for (int i = 0; i < 60; i++, guard.time += 50 * GST_MSECOND) {
+      fail_unless_equals_int (guard.send (good), 1);
+      sender.sequence = guint16 (sender.sequence + 5);
+      fail_unless_equals_int (guard.send (sender, unit), 0);
+    }
+  };
+  play (copy); /* damaged copies of the good stream are no version, ... */
+  Sender other = {.ssrc = 77, .address = "10.0.0.5"};
+  for (int i = 0; i < 60; i++, guard.time += 50 * GST_MSECOND) { /* ... nor are those of another */
+    fail_unless_equals_int (guard.send (good), 1);
+    fail_unless_equals_int (guard.send (other, i % 2 ? unit : slice_unit ()), 0);
+  }
+  fail_unless_equals_int (guard.warnings ("version 2"), 0);
+  guard.time += 10 * GST_SECOND;
+  play (newer);
+  fail_unless_equals_int (guard.warnings ("version 2"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_packets_that_are_not_sound_are_told_once_with_how_many)
+{
+  Guard guard;
+  std::minstd_rand random (3);
+  Sender hidden = {.ssrc = 3, .address = "10.0.0.2"}, good;
+  const auto send = [&] (int packets) {
+    for (int i = 0; i < packets; i++, guard.time += 50 * GST_MSECOND) {
+      std::vector<guint8> bytes (200);
+      for (guint8 &byte : bytes)
+        byte = guint8 (random ());
+      bytes[0] = 0; /* of no version */
+      fail_unless_equals_int (guard.send (hidden, bytes), 0);
+    }
+  };
+  send (50); /* 2.5 s */
+  fail_unless_equals_int (guard.warnings ("--key"), 0);
+  send (50);
+  fail_unless_equals_int (guard.warnings ("60 packets came and none is sound"), 1);
+  send (500);
+  fail_unless_equals_int (guard.warnings ("--key"), 0);
+  guard.send_many (good, 10);
+  for (int i = 0; i < 200; i++) { /* beside a good stream they are no matter */
+    send (1);
+    fail_unless_equals_int (guard.send (good), 1);
+  }
+  fail_unless_equals_int (guard.warnings ("--key"), 0);
+}
+GST_END_TEST;
+
+/* What is no RTP has no SSRC: it is not that of a sender whose SSRC is 0. */
+GST_START_TEST (test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0)
+{
+  Guard guard;
+  Sender good = {.ssrc = 0, .address = nullptr};
+  guard.send_many (good, 10);
+  gst_harness_push (guard.h, gst_buffer_new_memdup ("no RTP", 6));
+  fail_unless_equals_int (gst_harness_buffers_received (guard.h), 10);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_senders)
+{
+  Guard guard;
+  Sender flood = {.ssrc = 1000, .address = "10.0.0.9"}, good;
+  int passed = 0;
+  for (int i = 0; i < 10; i++) {
+    for (int k = 0; k < 500; k++, flood.ssrc++)
+      fail_unless_equals_int (guard.send (flood), 0);
+    passed += guard.send (good);
+  }
+  fail_unless_equals_int (passed, 10);
+}
+GST_END_TEST;
+
 static Suite *
 rtpneighbourcodeguard_suite ()
 {
@@ -314,6 +416,11 @@ rtpneighbourcodeguard_suite ()
   tcase_add_test (tc, test_another_version_is_told_once_and_does_not_pass);
   tcase_add_test (tc, test_packets_that_do_not_say_where_they_come_from_are_told_apart_by_ssrc);
   tcase_add_test (tc, test_plays_twice_and_forgets_its_sender);
+  tcase_add_test (tc, test_a_second_sender_of_few_packets_is_told_after_two_seconds);
+  tcase_add_test (tc, test_another_version_beside_a_sender_is_told_though_most_of_it_is_kept_out);
+  tcase_add_test (tc, test_packets_that_are_not_sound_are_told_once_with_how_many);
+  tcase_add_test (tc, test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0);
+  tcase_add_test (tc, test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_senders);
   return suite;
 }
 

@@ -1,6 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The rangecast-stats messages of all elements: what they count, and when they come. striprender's:
  * striprenderflow. */
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <pthread.h>
+#include <utility>
+
 #include "coded-check.hpp"
 
 #include <map>
@@ -302,6 +308,27 @@ GST_START_TEST (test_mux_tells_of_each_stream_what_came_and_what_was_missed)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_demux_counts_frame_sets_and_the_views_that_they_lack)
+{
+  GstElement *element =
+      gst_parse_launch ((std::string ("rangedemux") + kAtTheEnd).c_str (), nullptr);
+  Watched demux (gst_harness_new_with_element (element, "sink", nullptr));
+  gst_object_unref (element);
+  const Rig rig = ring_rig (3, 64, 48);
+  gst_harness_set_src_caps (demux.h, range_caps (rig));
+  gst_harness_play (demux.h);
+  gst_harness_push (demux.h, make_frame_set (rig)); /* to nobody: it is counted all the same */
+  gst_harness_push (demux.h, make_frame_set ({{rig.views[1]}}, kFrame));
+  gst_harness_push_event (demux.h, gst_event_new_eos ()); /* nobody takes it either */
+  const auto all = demux.now ();
+  fail_unless_equals_int (all.size (), 1);
+  fail_unless (all[0].text ("element") == "rangedemux");
+  fail_unless (all[0].views () == "0 1 2 ");
+  fail_unless_equals_uint64 (all[0].count ("frames"), 2);
+  fail_unless_equals_uint64 (all[0].count ("lost"), 2);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_stereodepth_counts_pairs_and_pictures_without_partner)
 {
   GstElement *element = gst_parse_launch (
@@ -487,11 +514,81 @@ GST_START_TEST (test_elements_that_come_and_go_while_the_timer_runs_are_no_fault
 }
 GST_END_TEST;
 
+static std::string
+thread_name ()
+{
+  char name[16] = "";
+  pthread_getname_np (pthread_self (), name, sizeof name);
+  return name;
+}
+
+/* An element that goes while its message is handled: the timer's is the last reference. */
+struct LastReference {
+  std::mutex lock;
+  std::condition_variable changed;
+  bool posted = false, released = false;
+  std::string poster, finaliser; /* names of threads */
+
+  void wait_for (const bool &what)
+  {
+    std::unique_lock guard (lock);
+    fail_unless (changed.wait_for (guard, std::chrono::seconds (20), [&] { return what; }));
+  }
+  void note (bool &what)
+  {
+    std::lock_guard guard (lock);
+    what = true;
+    changed.notify_all ();
+  }
+};
+
+static GstBusSyncReply
+wait_until_released (GstBus *, GstMessage *message, gpointer data)
+{
+  auto &last = *static_cast<LastReference *> (data);
+  if (gst_message_has_name (message, "rangecast-stats") && !last.posted) {
+    last.poster = thread_name ();
+    last.note (last.posted);
+    last.wait_for (last.released);
+  }
+  gst_message_unref (message); /* it has a reference to the element */
+  return GST_BUS_DROP;
+}
+
+GST_START_TEST (test_the_thread_of_all_timers_neither_posts_nor_has_the_last_reference)
+{
+  LastReference last;
+  GstBus *bus = gst_bus_new ();
+  gst_bus_set_sync_handler (bus, wait_until_released, &last, nullptr);
+  GstElement *element = gst_element_factory_make ("neighbourcodedec", nullptr);
+  bool finalised = false;
+  const std::pair<LastReference *, bool *> noted (&last, &finalised);
+  const auto note_end = [] (gpointer data, GObject *) {
+    const auto &[to, end] = *static_cast<decltype (noted) *> (data);
+    to->finaliser = thread_name ();
+    to->note (*end);
+  };
+  g_object_weak_ref (
+      G_OBJECT (element), note_end, const_cast<void *> (static_cast<const void *> (&noted)));
+  gst_element_set_bus (element, bus);
+  g_object_set (element, "stats-interval", 1u, nullptr);
+  gst_element_set_state (element, GST_STATE_PLAYING);
+  last.wait_for (last.posted);
+  gst_element_set_state (element, GST_STATE_NULL);
+  gst_object_unref (element);
+  last.note (last.released);
+  last.wait_for (finalised);
+  fail_unless (!last.poster.starts_with ("GstSystemClock"), last.poster.c_str ());
+  fail_unless (!last.finaliser.starts_with ("GstSystemClock"), last.finaliser.c_str ());
+  gst_object_unref (bus);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_all_elements_have_the_property)
 {
-  for (const char *name :
-      {"stereodepth", "roiextract", "neighbourcodeenc", "neighbourcodedec", "rtpneighbourcodepay",
-          "rtpneighbourcodedepay", "rangemux", "cylinderfilter", "striprender", "stereocamsrc"}) {
+  for (const char *name : {"stereodepth", "roiextract", "neighbourcodeenc", "neighbourcodedec",
+           "rtpneighbourcodepay", "rtpneighbourcodedepay", "rangemux", "rangedemux",
+           "cylinderfilter", "striprender", "stereocamsrc"}) {
     GstElement *element = gst_element_factory_make (name, nullptr);
     if (!element && g_str_equal (name, "stereocamsrc"))
       continue; /* built without Aravis */
@@ -519,6 +616,7 @@ statistics_suite ()
   tcase_add_test (tc, test_packets_are_counted_on_both_sides_and_the_lost_ones);
   tcase_add_test (tc, test_filters_count_the_points_that_they_leave);
   tcase_add_test (tc, test_mux_tells_of_each_stream_what_came_and_what_was_missed);
+  tcase_add_test (tc, test_demux_counts_frame_sets_and_the_views_that_they_lack);
   tcase_add_test (tc, test_stereodepth_counts_pairs_and_pictures_without_partner);
   tcase_add_test (tc, test_latency_is_from_capture_to_now_on_the_elements_clock);
   tcase_add_test (tc, test_clocks_that_have_nothing_to_do_with_each_other_give_no_latency);
@@ -528,6 +626,7 @@ statistics_suite ()
   tcase_add_test (tc, test_counters_begin_anew_with_each_start);
   tcase_add_test (tc, test_flush_changes_no_count);
   tcase_add_test (tc, test_elements_that_come_and_go_while_the_timer_runs_are_no_fault);
+  tcase_add_test (tc, test_the_thread_of_all_timers_neither_posts_nor_has_the_last_reference);
   tcase_add_test (tc, test_all_elements_have_the_property);
   return suite;
 }

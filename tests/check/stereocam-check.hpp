@@ -31,6 +31,13 @@ camera_address (int camera)
          std::to_string (camera + 11);
 }
 
+/** Names that no other test program's cameras have: those would be found, too. */
+inline std::string
+camera_serial (int camera)
+{
+  return "c" + std::to_string (int (getpid ())) + "-" + std::to_string (camera);
+}
+
 /** What a picture has in its first bytes. */
 struct PictureMark {
   std::int64_t taken_ns = 0; ///< CLOCK_MONOTONIC
@@ -96,7 +103,7 @@ struct CamerasOnSockets {
   void plug (int i)
   {
     settings.address = camera_address (i);
-    settings.serial = "stereo" + std::to_string (i);
+    settings.serial = camera_serial (i);
     settings.seed = static_cast<std::uint32_t> (i + 1);
     GigeCamera::Scenery scenery;
     scenery.moment = [] (std::int64_t now_ns) { return now_ns; };

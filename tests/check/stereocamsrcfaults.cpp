@@ -117,7 +117,8 @@ GST_END_TEST;
 GST_START_TEST (test_one_camera_under_two_names_is_said_to_be_one)
 {
   TestCameras cameras;
-  const std::string names[][2] = {{camera_address (0), "stereo0"}, {"stereo0", camera_address (0)}};
+  const std::string names[][2] = {
+      {camera_address (0), camera_serial (0)}, {camera_serial (0), camera_address (0)}};
   for (const auto &name : names) {
     CameraPipeline p ("left=" + name[0] + " right=" + name[1], 2, "ANY", false);
     p.play ();

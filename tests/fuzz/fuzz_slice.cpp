@@ -113,8 +113,12 @@ make_slice (const SliceHeader &header, std::uint8_t length, std::span<const std:
   if (length == kLongest && !body.empty ()) {
     const std::size_t short_size = unit.size ();
     unit.resize (kMaxUnitSize);
-    for (std::size_t i = short_size; i < unit.size (); i++)
-      unit[i] = unit[i - body.size ()];
+    std::size_t filled = short_size;
+    for (std::size_t period = body.size (); filled < unit.size (); period *= 2) {
+      const std::size_t count = std::min (period, unit.size () - filled);
+      std::memcpy (unit.data () + filled, unit.data () + filled - period, count);
+      filled += count;
+    }
   }
   unit.shrink_to_fit (); /* or reading too far would not be seen */
   write_slice_header (header, unit.size (), unit.data ());

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "test-support.hpp"
 
+#include <opencv2/imgproc.hpp>
 #include <random>
+#include <rangecast/cpu.hpp>
 #include <rangecast/stereo/change_detector.hpp>
 
 using namespace rangecast;
@@ -73,4 +75,25 @@ TEST (ChangeDetector, without_memory_or_after_a_new_size_everything_has_changed)
   detector.look (picture (2));
   detector.forget ();
   EXPECT_TRUE (detector.changed_outside (kRoi));
+}
+
+/* Of a part of a larger picture: rows do not follow each other at once. */
+TEST (ChangeDetector, whole_blocks_are_those_that_opencv_makes)
+{
+  cv::Mat larger (128, 176, CV_8UC4);
+  cv::RNG random (3);
+  for (int most : {256, 4}) { /* few levels make many halves */
+    random.fill (larger, cv::RNG::UNIFORM, 0, most);
+    const cv::Mat part = larger (cv::Rect (5, 3, 168, 120));
+    const cv::Mat rows (60, 168, CV_8UC4, part.data, 2 * part.step);
+    cv::Mat expected;
+    cv::resize (rows, expected, {21, 15}, 0, 0, cv::INTER_AREA);
+    for (CpuLevel level : kCpuLevels) {
+      limit_cpu (level);
+      ChangeDetector detector;
+      detector.look (part);
+      ASSERT_EQ (detector.blocks ().size (), expected.size ());
+      EXPECT_EQ (cv::norm (detector.blocks (), expected, cv::NORM_INF), 0) << most << " levels";
+    }
+  }
 }

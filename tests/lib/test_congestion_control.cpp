@@ -3,6 +3,7 @@
  * means over many seconds, from when the stream has found its rate. */
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdio>
 
 #include "link-simulation.hpp"
@@ -254,6 +255,38 @@ TEST (CongestionControl, queue_of_one_of_50_receivers_is_seen)
       control.receiver_report (
           {receiver, 0, 100, 0, receiver == 30 && second > 2 ? 0.4 : 0.05}, 5e6, now += 20'000'000);
   EXPECT_LT (control.bits_per_s (), 5e6);
+}
+
+/* Each receiver reports of five seconds, so that after a decrease all others' reports are of
+ * before. */
+TEST (CongestionControl, congestion_that_eight_slow_receivers_report_does_not_become_usual_loss)
+{
+  constexpr double kCapacity = 5e6, kMost = 20e6, kStep_s = 0.05;
+  CongestionControl control;
+  control.configure ({100e3, kMost});
+  std::array<double, 8> sent = {}, lost = {};
+  std::array<double, 10> rates; /* what the encoder sends follows half a second later */
+  rates.fill (kMost);
+  double all_sent = 0, all_lost = 0;
+  for (std::size_t step = 1; step <= 4000; step++) {
+    const double limit = control.bits_per_s (), rate = rates[step % rates.size ()],
+                 excess = std::max (rate - kCapacity, 0.0);
+    rates[step % rates.size ()] = limit > 0 ? limit : kMost;
+    for (std::size_t i = 0; i < sent.size (); i++) {
+      sent[i] += rate * kStep_s / 9600, lost[i] += excess * kStep_s / 9600;
+      if ((step + 12 * i) % 100)
+        continue;
+      control.receiver_report (
+          {std::uint32_t (i), lost[i] / sent[i], std::uint32_t (sent[i]), 0, 0}, rate,
+          step * 50'000'000);
+      sent[i] = lost[i] = 0;
+    }
+    if (step > 1333)
+      all_sent += rate, all_lost += excess;
+  }
+  std::printf ("%g %g\n", all_lost / all_sent, all_sent / 2667);
+  EXPECT_LT (all_lost, 0.02 * all_sent);
+  EXPECT_GT (all_sent - all_lost, 0.7 * kCapacity * 2667);
 }
 
 TEST (CongestionControl, jitter_that_rises_keeps_receiver_reports_from_raising_the_rate)

@@ -99,3 +99,30 @@ TEST (FrameThinning, interval_of_0_keeps_all)
   FrameThinning thinning;
   EXPECT_TRUE (thinning.keep ({0, 0, 1, 1e9, 1}));
 }
+
+/* A stream of which nobody says how fast it is, or something wrong. */
+TEST (FrameThinning, rate_at_which_frame_sets_come_counts_where_the_stream_says_another)
+{
+  for (const int fps : {5, 15, 60}) {
+    FrameThinning thinning;
+    int kept = 0;
+    for (int i = 0; i < 20 * fps; i++) /* 1.5 times as many bits as there are */
+      kept += thinning.keep ({std::uint64_t (i) * 1'000'000'000 / unsigned (fps) + 3000, kInterval,
+                  1e5 * fps, 1.5e5, 1}) &&
+              i >= 10 * fps;
+    EXPECT_NEAR (kept, 5 * fps, 1) << fps;
+  }
+}
+
+TEST (FrameThinning, stream_that_lacks_every_fourth_frame_set_keeps_the_same_as_the_others)
+{
+  FrameThinning whole, with_gaps;
+  for (std::uint64_t i = 0; i < 1200; i++) {
+    const ThinningInput input = {i * kInterval + 3000, kInterval, 3e6, 1.5e5, 1};
+    const bool kept = whole.keep (input);
+    if (i % 4 != 3 && i > 100)
+      EXPECT_EQ (with_gaps.keep (input), kept) << i;
+    else if (i % 4 != 3)
+      (void)with_gaps.keep (input);
+  }
+}

@@ -3,6 +3,7 @@
 #include "test-support.hpp"
 
 #include <opencv2/core.hpp>
+#include <rangecast/cpu.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 
@@ -105,6 +106,31 @@ make_scene (double motion = 1, const std::string &model = {}, double distance_m 
 }
 
 } // namespace
+
+/* Whole pictures, parts of them, a third camera: loops that end beyond vectors, and refining. */
+TEST (StereoScene, every_rung_of_the_cpu_finds_the_same_depth)
+{
+  const auto scene = make_scene ();
+  const Roi roi = {61, 15, 201, 213};
+  StereoDepth plain, wide;
+  Depth of_plain, of_wide;
+  for (bool third : {false, true}) {
+    ASSERT_TRUE (plain.set (scene->rig ().views[0], {}, third).ok ());
+    ASSERT_TRUE (wide.set (scene->rig ().views[0], {}, third).ok ());
+    for (int i = 0; i < 3; i++) {
+      Shot shot (*scene, 0.04 * i, i == 0);
+      const Roi &part = i == 2 ? roi : kWhole;
+      limit_cpu (CpuLevel::kScalar);
+      ASSERT_TRUE (of_plain.match (plain, shot, part, third).ok ());
+      limit_cpu (CpuLevel::kAvx2);
+      ASSERT_TRUE (of_wide.match (wide, shot, part, third).ok ());
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++)
+          ASSERT_EQ (of_plain.depth.view ().at (x, y), of_wide.depth.view ().at (x, y))
+              << "picture " << i << " at " << x << ", " << y;
+    }
+  }
+}
 
 TEST (StereoScene, hardly_any_pixel_hangs_in_the_air)
 {

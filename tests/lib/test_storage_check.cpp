@@ -66,7 +66,7 @@ TEST (StorageCheck, collections_nested_without_end_are_refused)
 {
   constexpr int kDeep = 300000; /* of which each ends a process that reads it */
   const char *kinds[][3] = {{"a.yml", "%YAML:1.0\n---\na: ", "[\n "},
-      {"b.yml", "%YAML:1.0\n---\n", "- "}, {"c.yml", "%YAML:1.0\n---\n", "a:"},
+      {"b.yml", "%YAML:1.0\n---\na:\n   ", "- "}, {"c.yml", "%YAML:1.0\n---\n", "a:"},
       {"d.json", "{ \"a\": ", "[\n"}, {"e.json", "", "{ \"a\": "},
       {"f.xml", "<?xml version=\"1.0\"?>\n<opencv_storage>\n", "<a>\n"}};
   for (const auto &[name, begin, part] : kinds)
@@ -106,13 +106,50 @@ TEST (StorageCheck, binary_data_without_a_type_are_refused)
       "binary");
 }
 
+TEST (StorageCheck, signs_before_binary_data_are_refused)
+{
+  /* "8f", as OpenCV writes it before the data */
+  const std::string data = "OGYgICAgICAgICAgICAgICAgICAgICAgAAAgQQAAoEEAAPBBAACAPwAA";
+  for (const char *sign : {"'", "\"", ">", "|"}) {
+    expect_refused (
+        TestFile ("a.yml", "%YAML:1.0\n---\na: !!binary |\n    " + (sign + data) + "\n"), "binary");
+    expect_refused (
+        TestFile ("b.json", "{ \"a\": \"$base64$" + (sign + data) + "\" }\n"), "binary");
+  }
+  expect_refused (TestFile ("c.json", "{ \"a\": \"$base64$ " + data + "\" }\n"), "binary");
+}
+
 TEST (StorageCheck, control_characters_are_refused)
 {
   expect_refused (
-      TestFile ("a.yml", "%YAML:1.0\n---\n-$--\n" + std::string (40, '\0') + "a: 1\n"), "control");
+      TestFile ("a.yml", "%YAML:1.0\n---\na: -$--\n" + std::string (40, '\0') + "a: 1\n"),
+      "control");
   expect_refused (TestFile ("b.xml", "<?xml version=" + std::string (40, '\0')), "control");
-  const TestFile good ("c.yml", "%YAML:1.0\n---\n\ta: \"\xc3\xa9\"\r\n");
+  const TestFile good ("c.yml", "%YAML:1.0\n---\na:\t\"\xc3\xa9\"\r\n");
   EXPECT_TRUE (check_storage (good.path ()).ok ());
+}
+
+/* Of each of them OpenCV leaves a rest, at which it may never end. */
+TEST (StorageCheck, yaml_that_is_not_one_map_at_the_beginning_of_lines_is_refused)
+{
+  const std::string head = "%YAML:1.0\n---\n";
+  for (const std::string &text :
+      {head + " a: 1\ns:\n   - 1\n", head + "- 1\ns:\n   - 1\n", head + "{a: 1}\ns:\n   - 1\n",
+          head + "[1]\ns:\n   - 1\n", head + "!!str a\n", std::string ("%YAML:1.0\n ---\na: 1\n")})
+    expect_refused ({"shape.yml", text}, "does not begin with a field");
+  for (const std::string &text : {std::string ("%YAML:1.0\n--- a: 1\ns:\n   - 1\n"),
+           std::string ("\xef\xbb\xbf%YAML:1.0\n--- a: 1\ns:\n   -\n\n"),
+           head + "a: 1\n...\ns:\n   - 1\n", head + "a: 1\n... s\n", head + "a: 1\n---\nb: 2\n"})
+    expect_refused ({"shape.yml", text}, "more than one document");
+  expect_refused ({"shape.yml", head + "\ra: 1\ns:\n   - 1\n"}, "carriage return");
+}
+
+TEST (StorageCheck, yaml_with_comments_windows_lines_and_an_end_passes)
+{
+  const TestFile file ("shape.yml",
+      "\xef\xbb\xbf%YAML:1.0\r\n# of ours\r\n\r\n--- # begins\r\n\r\n"
+      "  # still to come\r\na: 1\r\nb:\r\n   - 2\r\n...\r\n# that was it\r\n");
+  EXPECT_TRUE (check_storage (file.path ()).ok ());
 }
 
 TEST (StorageCheck, xml_is_refused_where_it_is_not_expected)

@@ -42,7 +42,7 @@ need_data () { [ -e "$data/$1" ] || skip "no test data $1"; }
 ports=$((20000 + $$ % 48 * 250))
 
 file=$1
-source "$file"
+source "$file" || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 passed=0 failed=0 skipped=0
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do
   folder=$(mktemp -d)
@@ -59,5 +59,6 @@ for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do
   esac
   rm -rf "$folder"
 done
+[ $((passed + failed + skipped)) -gt 0 ] || { echo "not ok: no test_* in $file"; failed=1; }
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" = 0 ]

@@ -73,18 +73,32 @@ add (std::map<int, ViewReport> &reports, const FrameSet &frame_set)
   }
 }
 
+std::int64_t
+oldest_ms (const FrameSet &frame_set)
+{
+  std::int64_t oldest = INT64_MAX;
+  for (const auto &[id, view] : frame_set)
+    oldest = std::min (oldest, view.capture_ms);
+  return oldest;
+}
+
 /* One line a frame set: capture time of its oldest view, and a letter a view: its number if it is
  * whole, ! if slices are missing. */
 void
 print_frame_set (const FrameSet &frame_set)
 {
-  std::int64_t oldest = INT64_MAX;
   std::string views;
-  for (const auto &[id, view] : frame_set) {
-    oldest = std::min (oldest, view.capture_ms);
+  for (const auto &[id, view] : frame_set)
     views += view.covered == view.pixels ? std::to_string (id) + " " : "! ";
-  }
-  std::printf ("%" PRId64 " %s\n", oldest, views.c_str ());
+  std::printf ("%" PRId64 " %s\n", oldest_ms (frame_set), views.c_str ());
+}
+
+/* One line a view of each frame set: capture time of that, view, which of its encoder's frames. */
+void
+print_numbers (const FrameSet &frame_set)
+{
+  for (const auto &[id, view] : frame_set)
+    std::printf ("%" PRId64 " %d %" PRIu32 "\n", oldest_ms (frame_set), id, view.number);
 }
 
 } // namespace
@@ -93,14 +107,16 @@ int
 main (int argc, char **argv)
 {
   const bool list = argc == 3 && std::strcmp (argv[1], "--list") == 0;
-  if (argc != 2 && !list) {
+  const bool numbers = argc == 3 && std::strcmp (argv[1], "--numbers") == 0;
+  if (argc != 2 && !list && !numbers) {
     std::fprintf (stderr,
-        "usage: stream-report [--list] FILE.rcnc\n"
+        "usage: stream-report [--list | --numbers] FILE.rcnc\n"
         "For each view: frames, those missing between the first and the last by their numbers,\n"
         "those that lack slices, how often its encoder began again and which of its frames was "
         "the\n"
         "first to come since, and the longest time from one capture time to the next. --list: "
-        "capture time (ms) and views of each frame set.\n");
+        "capture time (ms) and views of each frame set. --numbers: capture time (ms) of each frame "
+        "set, a view of it, and which of its encoder's frames that is.\n");
     return 2;
   }
   std::ifstream file (argv[argc - 1], std::ios::binary);
@@ -116,13 +132,15 @@ main (int argc, char **argv)
       add (reports, frame_set);
       if (list && !frame_set.empty ())
         print_frame_set (frame_set);
+      if (numbers && !frame_set.empty ())
+        print_numbers (frame_set);
     }
     const std::size_t used = std::max (part.rubbish, part.length);
     if (used == 0)
       break;
     rest = rest.subspan (used);
   }
-  if (!list)
+  if (!list && !numbers)
     for (const auto &[id, r] : reports)
       std::printf ("view %d frames %" PRIu64 " missing %" PRIu64 " damaged %" PRIu64
                    " restarts %" PRIu64 " began %" PRIu32 " gap %" PRId64 " ms of %" PRId64 " ms\n",

@@ -48,6 +48,20 @@ test_demo_renders_a_scanned_head () {
   check_picture demo/avatar.png
 }
 
+# Few large packets, and cameras whose pictures were drawn ahead.
+test_demo_takes_loops_and_jumbo_frames () {
+  need_gl
+  local bytes packets
+  "$pipelines/demo.sh" --frames 20 --fps 8 --views 2 --loop 4 --threads 1 --mtu 8900 --no-film --out demo --port $((ports + 60))
+  check_picture demo/avatar.png
+  bytes=$(report demo/report.json "r['coded_bytes_per_frame_set'] * r['frames']")
+  packets=$(report demo/report.json "r['rtp_packets']")
+  [ "$(report demo/report.json "$bytes / $packets > 1200")" = True ] || fail "$packets packets for $bytes bytes"
+  expect_error "--mtu" "$pipelines/demo.sh" --mtu 100 --out demo
+  expect_error "--loop" "$pipelines/demo.sh" --loop 4 --input range --out demo
+  expect_error "--threads" "$pipelines/demo.sh" --threads 0 --out demo
+}
+
 test_demo_plays_recorded_pairs () {
   need_gl
   mkdir pairs

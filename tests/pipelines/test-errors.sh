@@ -74,7 +74,71 @@ s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", '$((por
   kill "$blocker"
 }
 
+# Until a process that was asked to end has done so.
+await_end () { # pid
+  timeout 30 tail --pid="$1" -f /dev/null || kill -KILL "$1"
+  wait "$1" 2>/dev/null || true
+}
+
+test_a_recording_to_which_nothing_came_says_so_and_leaves_no_file () {
+  local i recorder
+  "$pipelines/record.sh" none.rcnc --listen $((ports + 203)) >record.log 2>&1 &
+  recorder=$!
+  for ((i = 0; i < 150; i++)); do [ ! -e none.rcnc ] || break; sleep 0.2; done
+  [ -e none.rcnc ] || fail "it never began: $(cat record.log)"
+  kill -INT $recorder
+  await_end $recorder
+  for ((i = 0; i < 100; i++)); do ! grep -q 'nothing came' record.log || break; sleep 0.1; done
+  grep -q "nothing came to port $((ports + 203))" record.log || fail "it said: $(cat record.log)"
+  ! grep -q 'access unit' record.log || fail "it said more: $(cat record.log)"
+  [ ! -e none.rcnc ] || fail "an empty file is left"
+}
+
+test_a_film_of_what_is_no_recording_leaves_no_file () {
+  local i
+  echo "no recording" >bad.rcnc
+  expect_error "No access unit found" "$pipelines/play.sh" bad.rcnc --film film.webm
+  for ((i = 0; i < 100; i++)); do [ -e film.webm ] || break; sleep 0.1; done
+  [ ! -e film.webm ] || fail "an empty film is left"
+}
+
+test_ports_that_are_taken_twice_are_named () {
+  local parent=("$pipelines/parent-host.sh" --views 4 --listen 5000 --to 127.0.0.1:6000)
+  expect_error "--feedback: port 5002 is that of view 2" "${parent[@]}" --feedback 5002
+  expect_error "--clock-port: port 5003 is that of view 3" "${parent[@]}" --clock-port 5003
+  expect_error "--feedback: port 5100 is that of --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
+}
+
+# rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
+test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
+  local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  "$pipelines/parent-host.sh" --views 1 --listen 5000 --to 127.0.0.1:6000 --feedback 5100 >parent.txt
+  "${camera[@]}" --encoder profile=entropy >camera.txt
+  "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt
+  grep -q 'rtcpreports' parent.txt || fail "no launch string: $(cat parent.txt)"
+  ! grep -q 'transport-wide[^!]*! rtcpreports' parent.txt camera.txt || fail "for nothing: $(cat parent.txt camera.txt)"
+  grep -q 'transport-wide[^!]*! rtcpreports' adaptive.txt || fail "not where it is of use: $(cat adaptive.txt)"
+}
+
+test_udp_relay_names_what_is_missing () {
+  expect_error "--between lo,lo: expected two interfaces" udp-relay --between lo,lo
+  expect_error "--between lo: expected two interfaces" udp-relay --between lo
+  expect_error "--listen 20400: expected --to HOST:PORT" udp-relay --listen 20400
+  expect_error "--to 127.0.0.1:5: expected after a --listen" udp-relay --to 127.0.0.1:5
+  expect_error "--listen and --between" udp-relay --listen 20400 --to 127.0.0.1:5 --between a,b
+  [ "$(id -u)" != 0 ] || expect_error "lo: is no cable" udp-relay --between lo,eth0
+}
+
 test_scripts_name_the_bad_option () {
+  expect_error "--orbit" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --orbit x
+  touch empty.rcnc
+  expect_error "--orbit" "$pipelines/play.sh" empty.rcnc --film film.webm --orbit 4000
+  expect_error "--interface" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --interface lo
+  expect_error "--interface" "$pipelines/record.sh" none.rcnc --interface lo
+  expect_error "--interface" "$pipelines/parent-host.sh" --views 1 --listen $((ports + 201)) --to 127.0.0.1:1 --interface lo
+  expect_error "--multicast" "$pipelines/record.sh" none.rcnc --multicast 239.255.7.1
   expect_error "--to" "$pipelines/camera-host.sh" --view 0 --rig x --to nowhere
   expect_error "--view" "$pipelines/camera-host.sh" --view 99 --rig x --to 127.0.0.1:1
   expect_error "--listen" "$pipelines/parent-host.sh" --views 2 --listen x --to 127.0.0.1:1

@@ -34,3 +34,11 @@ test_elements_are_found_where_they_were_installed () {
     grep -q "^  $element: " inspect.txt || fail "no element $element: $(cat inspect.txt)"
   done
 }
+
+test_programs_have_names_that_say_whose_they_are () {
+  install_below_here
+  for program in rangecast-run rangecast-viewer; do
+    [ -x "$prefix/bin/$program" ] || fail "no $program in $(ls "$prefix/bin")"
+  done
+  [ ! -e "$prefix/bin/viewer" ] || fail "there is a program named viewer"
+}

@@ -57,6 +57,75 @@ test_password_lets_in_and_keeps_out () {
   stop_server
 }
 
+# Nothing comes from such a launch string; what waits for it would wait 20 seconds.
+test_ends_at_once_while_it_waits_for_its_first_frame_set () {
+  local way nothing="udpsrc port=$((ports + 240)) caps=application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE ! rtpneighbourcodedepay"
+  for way in --always "--linger 1"; do
+    # shellcheck disable=SC2086 # one or two words
+    serve $way -- "$nothing"
+    count "$url" >asks.txt 2>&1 &
+    asks=$!
+    sleep 2 # it has asked
+    kill -TERM "$server"
+    until_true 12 is_gone "$server"
+    wait "$server" || fail "exit status $?: $(tail -n 5 server.log)"
+    wait "$asks" || true
+  done
+}
+
+# However it is written, and whatever stands beside it.
+test_tcp_that_is_not_served_is_refused () {
+  serve --transports udp -- "$figure"
+  timeout 60 python3 - "$source_dir/tests/pipelines" "$url" <<'END' || fail "$(cat server.log)"
+import re, sys
+sys.path.insert(0, sys.argv[1])
+from rtsp_viewers import Viewer
+url = sys.argv[2]
+def setup(offers):
+    viewer = Viewer(url, True)
+    control = re.findall(r"a=control:(\S+)", viewer.describe())[-1]
+    try:
+        return viewer.ask("SETUP", f"{url}/{control}", f"Transport: {offers}")[0]["Transport"]
+    except RuntimeError as error:
+        return str(error)
+    finally:
+        viewer.control.close()
+tcp, udp = "RTP/AVPF/TCP;unicast;interleaved=0-1", "RTP/AVPF;unicast;client_port=40000-40001"
+for offers in (udp, f"{udp},{tcp}", udp.lower(), udp + ";destination=/TCP"):
+    assert "client_port=40000-40001" in setup(offers), (offers, setup(offers))
+for offers in (tcp, tcp.lower(), f"{tcp}, {tcp}", f"{tcp.lower()}, {udp}", f"{tcp};client_port=40000-40001"):
+    assert "461" in setup(offers), (offers, setup(offers))
+END
+  stop_server
+}
+
+# They would be file descriptors without end; and a viewer must get in beside them.
+test_crowd_of_connections_keeps_nobody_out () {
+  serve --max-viewers 10 -- "$figure"
+  timeout 100 python3 - "$url" <<'END' &
+import re, signal, socket, sys
+host, port = re.match(r"rtsp://([^:/]+):(\d+)", sys.argv[1]).groups()
+crowd = []
+for i in range(400):
+    try:
+        crowd.append(socket.create_connection((host, int(port)), timeout=10))
+    except OSError:
+        pass
+open("crowd.txt", "w").write(f"{len(crowd)}\n")
+signal.pause()
+END
+  crowd=$!
+  trap 'kill -KILL $server $crowd 2>/dev/null || true' EXIT
+  until_true 60 test -s crowd.txt
+  [ "$(cat crowd.txt)" -ge 100 ] || fail "only $(cat crowd.txt) connections"
+  few_open () { [ "$(find "/proc/$server/fd" -mindepth 1 | wc -l)" -lt 100 ]; } # 42 connections, and its own
+  until_true 10 few_open
+  count "$url" --viewers 3 >udp.txt || fail "$(cat udp.txt)"
+  count "$url" --viewers 3 --tcp >tcp.txt || fail "$(cat tcp.txt)"
+  kill "$crowd"
+  stop_server
+}
+
 make_certificate () {
   command -v openssl >/dev/null || skip "no openssl"
   openssl req -x509 -newkey rsa:2048 -nodes -keyout key.pem -out cert.pem -days 2 -subj /CN=localhost \
@@ -146,11 +215,18 @@ test_vanished_viewer_is_forgotten () {
 }
 
 test_nothing_leaks () {
+  local stalled
   export GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1
-  serve --linger 0 -- "$figure"
+  serve --linger 0 --stats 1 -- "$figure"
   unset GST_TRACERS GST_DEBUG
   count "$url" --viewers 2 >udp.txt
   count "$url" --viewers 2 --tcp >tcp.txt
+  timeout 100 python3 "$viewers" "$url" --viewers 2 --tcp --stall 60 >stalled.txt 2>&1 & # go while frame sets wait for them
+  stalled=$!
+  left_out () { grep -q 'left-out=[1-9]' server.log; }
+  until_true 50 left_out
+  kill -TERM "$stalled"
+  wait "$stalled" || true
   stop_server
   ! grep -q 'GST_TRACER :0:: object-alive' server.log || fail "$(grep 'GST_TRACER :0:: object-alive' server.log | cut -c1-300 | head -n 5)"
 }
@@ -167,6 +243,7 @@ test_wrong_usage_is_named () {
   : >empty.txt
   expect_error "found none" rtsp-server --users empty.txt -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 1.2.3.4:5000-5001 -- "$figure"
+  expect_error "--multicast" rtsp-server --multicast 239.1.2.9-239.1.2.3:5000-5001 -- "$figure"
   expect_error "--transports" rtsp-server --transports smoke -- "$figure"
   expect_error "--cert nowhere.pem" rtsp-server --cert nowhere.pem -- "$figure"
   expect_error "--key" rtsp-server --key nowhere.pem -- "$figure"

@@ -53,6 +53,39 @@ test_joiner_gets_a_key_frame_set_at_once () {
   stop_server
 }
 
+# A frame set that says what changed is of no use to who has not got the one before: it shows scraps.
+record_joiner () { # udp or tcp, number
+  timeout -k 5 60 gst-launch-1.0 -e rtspsrc "location=$url" "protocols=$1" latency=50 ! rtpneighbourcodedepay ! identity eos-after=12 \
+    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$1$2.rcnc" >"$1$2.log" 2>&1 || true
+}
+test_first_frame_set_of_joiners_is_whole () {
+  serve -- "$figure profile=entropy temporal=true refresh-period=0"
+  count "$url" --frame-sets 100000 >first.txt 2>&1 &
+  first=$!
+  trap 'kill -KILL $server $first 2>/dev/null || true' EXIT
+  until_true 30 grep -q playing first.txt
+  local protocol i file
+  for protocol in udp tcp; do
+    joiners=()
+    for i in 1 2 3 4 5; do
+      record_joiner $protocol $i &
+      joiners+=($!)
+      sleep 0.3 # not all with one key frame set
+    done
+    wait "${joiners[@]}"
+  done
+  for file in udp?.rcnc tcp?.rcnc; do
+    expect_file "$file" 1000
+    timeout 60 count-points "$file" | awk '
+      /^frame set/ { n++ }
+      / points/ { points[n] += $3; if (points[n] > most) most = points[n] }
+      END { print points[1], most; exit !(n >= 5 && points[1] > 0.9 * most) }' >points.txt ||
+      fail "$file: points of the first frame set, most of any: $(cat points.txt) $(tail -n 3 "${file%rcnc}log")"
+  done
+  kill "$first" 2>/dev/null || true
+  stop_server
+}
+
 test_loss_at_a_viewer_brings_a_key_frame_set () {
   serve --stats 1 -- "$figure profile=entropy temporal=true refresh-period=0"
   timeout -k 5 80 gst-launch-1.0 -e rtspsrc "location=$url" protocols=udp latency=50 ! rtpneighbourcodedepay \
@@ -92,6 +125,26 @@ test_recording_ends_for_viewers_and_begins_for_the_next () {
   grep -q 'Got EOS' player.log || fail "$(cat player.log)"
   play 5 "location=$url" || fail "$(tail -n 5 player.log)"
   stop_server
+}
+
+# When a stream ends all its viewers must be gone from it, or its elements are freed while they run.
+test_recordings_end_while_viewers_come_and_watch () {
+  gst-launch-1.0 -q -e avatartestsrc num-buffers=30 range-person-only=true ! video/x-range,width=160,height=120,framerate=20/1 \
+    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=short.rcnc
+  serve --linger 0 -- filesrc location=short.rcnc ! neighbourcodeparse
+  local i
+  watchers=()
+  for ((i = 0; i < 40; i++)); do
+    count "$url" --tcp --viewers 2 --frame-sets 100000 >"tcp$i.txt" 2>&1 & # until the stream ends
+    watchers+=($!)
+    [ $((i % 4)) != 0 ] || { count "$url" --frame-sets 100000 >"udp$i.txt" 2>&1 & watchers+=($!); }
+    sleep 0.3
+  done
+  wait "${watchers[@]}" || true
+  kill -0 "$server" 2>/dev/null || fail "it died: $(tail -n 5 server.log)"
+  [ "$(cat tcp*.txt | grep -c '^playing')" -ge 20 ] || fail "$(cat tcp*.txt server.log)"
+  stop_server
+  ! grep CRITICAL server.log || fail "criticals"
 }
 
 # Cameras by RTP, as parent-host.sh takes them; they run whether anybody watches or not.

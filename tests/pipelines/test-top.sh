@@ -87,6 +87,20 @@ test_messages_are_forwarded () {
   row far mux | head -n 1
 }
 
+test_once_without_statistics_is_an_error_that_names_the_file () {
+  printf 'neither JSON\nnor a message\n' >text.txt
+  expect_error "text.txt: no statistics in it" "$pipelines/top.sh" --once text.txt
+  expect_error "no statistics in it" "$pipelines/top.sh" --once - <text.txt
+}
+
+test_times_that_are_none_are_refused () {
+  local option
+  for option in '--seconds -1' '--seconds nan' '--interval 0' '--interval -1' '--interval 1e9'; do
+    # shellcheck disable=SC2086
+    expect_error "${option% *}: expected" timeout 20 "$pipelines/top.sh" $option udp://127.0.0.1:$((ports + 202))
+  done
+}
+
 test_wrong_addresses_are_named () {
   expect_error "expected udp://ADDRESS:PORT, got 'udp://here'" "$pipelines/top.sh" udp://here
   expect_error "no-such-file" "$pipelines/top.sh" --once no-such-file

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# pipelines/viewer and GStreamer's own players, on a display that nobody sees, with real events of mouse and keys.
+# rangecast-viewer and GStreamer's own players, on a display that nobody sees, with real events of mouse and keys.
 
 # Its helpers, not its tests.
 source "$source_dir/tests/pipelines/test-window.sh"
@@ -13,7 +13,7 @@ record_still () { # [frame sets]
 }
 
 open_viewer () { # arguments of the viewer
-  viewer "$@" >log.txt 2>&1 &
+  rangecast-viewer "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
   wait_for window_id
@@ -159,7 +159,7 @@ test_stream_is_shown () {
   in_display shows_a_stream
 }
 
-plays_once () { timeout 60 viewer --once still.rcnc; }
+plays_once () { timeout 60 rangecast-viewer --once still.rcnc; }
 
 test_file_ends_where_that_is_asked_for () {
   need_display
@@ -170,13 +170,13 @@ test_file_ends_where_that_is_asked_for () {
 complains () {
   echo "no recording" >text.rcnc
   gst-launch-1.0 -q videotestsrc num-buffers=1 ! pngenc ! filesink location=picture.png
-  expect_error "text.rcnc: expected range frame sets" viewer text.rcnc
-  expect_error "picture.png: expected range frame sets" viewer picture.png
+  expect_error "text.rcnc: expected range frame sets" rangecast-viewer text.rcnc
+  expect_error "picture.png: expected range frame sets" rangecast-viewer picture.png
   python3 -c 'import socket, time
 s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", '$((ports + 211))')); time.sleep(20)' &
   blocker=$!
   sleep 1
-  expect_error "port $((ports + 211)): " viewer --listen $((ports + 211))
+  expect_error "port $((ports + 211)): " rangecast-viewer --listen $((ports + 211))
   kill $blocker
 }
 
@@ -186,22 +186,22 @@ test_input_that_cannot_be_shown_is_named () {
 }
 
 test_wrong_usage_is_named () {
-  expect_error "expected one file" viewer
-  expect_error "nowhere.rcnc: no such file" viewer nowhere.rcnc
-  expect_error "is a folder" viewer .
-  expect_error "is no ordinary file" viewer /dev/null
-  expect_error "no plugin of GStreamer opens foo://" viewer foo://bar
-  expect_error "--listen" viewer --listen 99999
-  expect_error "--size" viewer --size 640 x.rcnc
-  expect_error "--mode" viewer --mode nice x.rcnc
-  expect_error "--background" viewer --background blue x.rcnc
-  expect_error "--out" viewer --out nowhere x.rcnc
+  expect_error "expected one file" rangecast-viewer
+  expect_error "nowhere.rcnc: no such file" rangecast-viewer nowhere.rcnc
+  expect_error "is a folder" rangecast-viewer .
+  expect_error "is no ordinary file" rangecast-viewer /dev/null
+  expect_error "no plugin of GStreamer opens foo://" rangecast-viewer foo://bar
+  expect_error "--listen" rangecast-viewer --listen 99999
+  expect_error "--size" rangecast-viewer --size 640 x.rcnc
+  expect_error "--mode" rangecast-viewer --mode nice x.rcnc
+  expect_error "--background" rangecast-viewer --background blue x.rcnc
+  expect_error "--out" rangecast-viewer --out nowhere x.rcnc
 }
 
 test_missing_display_is_named () {
   : >empty.rcnc
-  expect_error "no display" env -u DISPLAY -u WAYLAND_DISPLAY viewer empty.rcnc
-  expect_error "GST_GL_WINDOW" env DISPLAY=:99 GST_GL_WINDOW=egl-device viewer empty.rcnc
+  expect_error "no display" env -u DISPLAY -u WAYLAND_DISPLAY rangecast-viewer empty.rcnc
+  expect_error "GST_GL_WINDOW" env DISPLAY=:99 GST_GL_WINDOW=egl-device rangecast-viewer empty.rcnc
 }
 
 shows_and_turns () { # command...

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Tests of verdict.py on runs that are made up."""
 
+import os
 import random
 import tempfile
 import unittest
@@ -48,9 +49,12 @@ class Memory(unittest.TestCase):
         events = [{"seconds": "0.0", "clock_s": "100.0", "name": "parent", "what": "start", "status": ""}]
         with tempfile.TemporaryDirectory() as folder:
             for grows, found in ((0, 0), (1000, 1)):
-                lines = (f"{100 + 5 * i},{20000 + i % 7 + grows * i // 1440}\n" for i in range(1440))
-                (Path(folder) / "parent-0.memory").write_text("".join(lines))
+                for name in verdict.STEADY:
+                    lines = (f"{100 + 5 * i},{20000 + i % 7 + (name == 'parent') * grows * i // 1440}\n" for i in range(1440))
+                    (Path(folder) / f"{name}-0.memory").write_text("".join(lines))
                 self.assertEqual(len(bad(verdict.judge_heap(Path(folder), events, LIMITS))), found)
+            (Path(folder) / "viewer-0.memory").unlink()
+            self.assertIn("viewer: samples of the heap", bad(verdict.judge_heap(Path(folder), events, LIMITS))[-1])
 
     def test_process_without_samples_is_no_success(self) -> None:
         self.assertTrue(bad(verdict.judge_memory(process_samples()[:110], LIMITS)))
@@ -126,8 +130,14 @@ class Remains(unittest.TestCase):
         self.assertEqual(self.findings(), [])
 
     def test_thread_that_stays_is_seen(self) -> None:
-        (self.path / "parent-0.threads").write_text("gmain\nmux:src\n")
-        self.assertEqual(len(self.findings()), 1)
+        for name, threads in (("parent", "gmain\nmux:src\n"), ("viewer", "gmain\nudpsrc0:src\n")):
+            (self.path / f"{name}-0.threads").write_text(threads)
+            self.assertEqual(len(self.findings()), 1)
+            (self.path / f"{name}-0.threads").write_text("gmain\n")
+
+    def test_workers_of_OpenCV_may_stay(self) -> None:
+        (self.path / "viewer-0.threads").write_text("gmain\n" + "queue0:src\n" * ((os.cpu_count() or 1) - 1))
+        self.assertEqual(self.findings(), [])
 
 
 if __name__ == "__main__":

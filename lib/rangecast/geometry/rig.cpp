@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "size_text.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -12,12 +14,6 @@ Status
 bad_field (const View &view, const std::string &what)
 {
   return {StatusCode::kBadValue, "view " + std::to_string (view.id) + ": " + what};
-}
-
-std::string
-size_text (int width, int height)
-{
-  return std::to_string (width) + "x" + std::to_string (height);
 }
 
 bool

@@ -184,8 +184,11 @@ CongestionControl::count_losses (const PacketReport &packet)
 void
 CongestionControl::judge_loss (std::uint64_t now_ns)
 {
+  if (static_cast<std::int64_t> (last_sent_ns_ - losses_since_ns_) <
+      static_cast<std::int64_t> (kLossIntervalNs)) /* also where old reports come late */
+    return;
   const std::uint64_t span = last_sent_ns_ - losses_since_ns_;
-  if (span < kLossIntervalNs || !is_enough (counted_, counted_lost_, span))
+  if (!is_enough (counted_, counted_lost_, span))
     return;
   const double share = counted_lost_ / counted_;
   const bool congestion = loss_.judge (share, counted_, seconds (span));
@@ -210,7 +213,7 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
       first ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* silence is no calm */
   note_report (Source::kPackets, now_ns);
   if (static_cast<std::int64_t> (packets.front ().sent_ns - last_sent_ns_) < -1'000'000'000)
-    valid_sent_ns_ = 0; /* the sender's clock began anew */
+    valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock began anew */
   const bool was_decreased = decreased_;
   decreased_ = false;
   const bool has_losses = std::ranges::any_of (packets, &PacketReport::lost);
@@ -267,7 +270,8 @@ CongestionControl::receiver_report (
 }
 
 /* Loss of a receiver that has not reported since is still the worst, but no reason to send less
- * once more. */
+ * once more. What it counted before a decrease took effect tells nothing of whether that helped:
+ * taken for the answer, it would make loss by congestion the usual one. */
 CongestionControl::Worst
 CongestionControl::find_worst (std::uint64_t now_ns)
 {
@@ -275,7 +279,13 @@ CongestionControl::find_worst (std::uint64_t now_ns)
   for (Receiver &receiver : receivers_) {
     if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
       continue;
-    const bool is_judged = is_enough (receiver.packets, receiver.lost, now_ns - receiver.since_ns);
+    const bool is_old = decrease_ns_ > 0 && receiver.since_ns < decrease_ns_ + kReactionNs;
+    if (is_old && receiver.has_news) { /* the next report is of what comes from now on */
+      receiver.packets = receiver.lost = 0;
+      receiver.since_ns = now_ns;
+    }
+    const bool is_judged =
+        !is_old && is_enough (receiver.packets, receiver.lost, now_ns - receiver.since_ns);
     if (is_judged) {
       receiver.share = receiver.lost / receiver.packets;
       receiver.of = receiver.packets;
@@ -283,10 +293,11 @@ CongestionControl::find_worst (std::uint64_t now_ns)
       receiver.since_ns = now_ns;
     }
     if (receiver.share > worst.lost || (is_judged && receiver.share == worst.lost))
-      worst = {receiver.share, receiver.of, worst.queue_s, is_judged, worst.jitters};
+      worst = {receiver.share, receiver.of, worst.queue_s, is_judged, worst.jitters, worst.queues};
     if (receiver.has_news)
       worst.queue_s = std::max (worst.queue_s, receiver.queue_s);
     worst.jitters = worst.jitters || receiver.jitters;
+    worst.queues = worst.queues || receiver.queue_s > kRoundTripQueue;
     receiver.has_news = false;
   }
   return worst;
@@ -308,7 +319,7 @@ CongestionControl::judge_receivers (double sent_bits_per_s, std::uint64_t now_ns
     return;
   if (loses || queue_s_ > kRoundTripQueue)
     decrease (sent_bits_per_s * (1 - worst.lost), now_ns);
-  else if (!worst.jitters && !is_bad)
+  else if (!worst.jitters && !worst.queues && !is_bad)
     increase (sent_bits_per_s, elapsed);
 }
 

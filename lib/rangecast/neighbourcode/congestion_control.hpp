@@ -92,6 +92,7 @@ private:
   struct Worst {
     double lost = 0, packets = 0, queue_s = 0;
     bool is_new = false, jitters = false;
+    bool queues = false; /* also of a receiver that has not reported since */
   };
   Receiver &find_receiver (std::uint32_t id, std::uint64_t now_ns);
   Worst find_worst (std::uint64_t now_ns);

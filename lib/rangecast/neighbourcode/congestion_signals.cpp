@@ -111,7 +111,7 @@ RecentLeast::add (std::uint64_t time_ns, double value)
     known_ = true;
     since_ns_ = time_ns;
     older_ = newer_ = value;
-  } else if (time_ns - since_ns_ >= kHalfMemoryNs) {
+  } else if (time_ns > since_ns_ && time_ns - since_ns_ >= kHalfMemoryNs) {
     since_ns_ = time_ns;
     older_ = newer_;
     newer_ = value;

@@ -51,7 +51,6 @@ public:
   void reset () { *this = RecentLeast (); }
   /** @return the least, `value` included */
   double add (std::uint64_t time_ns, double value);
-  [[nodiscard]] bool is_known () const { return known_; }
 
 private:
   bool known_ = false;
@@ -100,8 +99,6 @@ private:
  *  is sent. What stays is the *usual* loss; only more than that is congestion. */
 class LossJudge {
 public:
-  void reset () { *this = LossJudge (); }
-
   /** @param share  of packets lost since the last call, 0 to 1
    *  @param packets  that it is of
    *  @param elapsed_s  since the last call

@@ -13,13 +13,35 @@ constexpr double kShort = 0.25, kEnough = 2;
  * it costs before there are more of them. */
 constexpr double kTooMuch = 1.03, kReserve = 1.2;
 constexpr int kMost = 1000;
+/* Intervals between frame sets: so many are measured, and longer ones (seconds) are pauses. */
+constexpr int kMeasured = 32;
+constexpr double kPause = 2;
 
 } // namespace
 
 void
+FrameThinning::measure (const ThinningInput &in, double elapsed_s)
+{
+  if (told_ns_ != in.interval_ns) {
+    told_ns_ = interval_ns_ = in.interval_ns;
+    measured_ = 0, measured_s_ = 0;
+  }
+  if (elapsed_s <= 0 || elapsed_s > kPause)
+    return;
+  measured_s_ += elapsed_s;
+  if (++measured_ < kMeasured)
+    return;
+  const double mean_s = measured_s_ / measured_;
+  measured_ = 0, measured_s_ = 0;
+  const double slower = mean_s / (1e-9 * static_cast<double> (told_ns_)), faster = 1 / slower;
+  interval_ns_ = slower >= 1 ? told_ns_ * static_cast<std::uint64_t> (std::round (slower))
+                             : told_ns_ / static_cast<std::uint64_t> (std::round (faster));
+}
+
+void
 FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
 {
-  const double fps = 1e9 / static_cast<double> (in.interval_ns);
+  const double fps = 1e9 / static_cast<double> (interval_ns_);
   const int most = in.least_fps > 0
                        ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMost)))
                        : kMost;
@@ -48,9 +70,10 @@ FrameThinning::keep (const ThinningInput &in)
                 : 0;
   has_time_ = true;
   time_ns_ = in.time_ns;
+  measure (in, elapsed);
   const int before = one_of_;
   adjust (in, std::clamp (elapsed, 0.0, 1.0));
-  const std::uint64_t number = (in.time_ns + in.interval_ns / 2) / in.interval_ns;
+  const std::uint64_t number = (in.time_ns + interval_ns_ / 2) / interval_ns_;
   const std::uint64_t slot = number / static_cast<std::uint64_t> (one_of_);
   const bool keeps = one_of_ == 1 || one_of_ != before || slot != kept_;
   kept_ = slot;

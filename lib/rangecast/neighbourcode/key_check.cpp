@@ -7,6 +7,9 @@
 namespace rangecast {
 namespace {
 
+/* Slices that memory is kept for: an access unit of far more is not what an encoder makes. */
+constexpr std::size_t kMostKept = 4096;
+
 /* By view, then place. */
 auto
 order_of (const SliceHeader &s)
@@ -21,6 +24,8 @@ KeyCheck::reset ()
 {
   all_key_ = true;
   slices_.clear ();
+  if (slices_.capacity () > kMostKept)
+    slices_.shrink_to_fit ();
 }
 
 void

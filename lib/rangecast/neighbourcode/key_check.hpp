@@ -9,7 +9,7 @@ namespace rangecast {
 
 /** Finds whether a decoder can begin at an access unit: every slice in it is a key one, and of
  *  every view that has slices none is missing. Of a view that is wholly missing it knows nothing.
- *  Keeps its memory. */
+ *  Keeps its memory, but for 4096 slices at most. */
 class KeyCheck {
 public:
   void reset ();

@@ -62,7 +62,6 @@ public:
   /** What the frame set of the latest next() came to. */
   void coded (const CodedFrame &frame);
 
-  [[nodiscard]] Thresholds thresholds () const { return thresholds_; }
   [[nodiscard]] double coarseness () const { return x_; }
 
   /** What the latest frame set would come to at the worst thresholds, bits; 0 before the first. */

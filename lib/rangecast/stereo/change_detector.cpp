@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "change_detector.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
+
+#include "../for_this_cpu.hpp"
 
 namespace rangecast {
 
@@ -11,11 +14,54 @@ constexpr int kDifference = 10; /* grey levels */
 constexpr int kSlight = 4;      /* the same, that may be something */
 constexpr int kEnough = 2;      /* blocks; one may be a reflection or a lamp */
 
+/* Sums of kRows rows, then of eight pixels beside each other: what begins a block has its sum.
+ * @param sums  of n channels, with kBlock * 4 to spare behind them */
+template <int kRows>
+static void
+sum_blocks (const std::uint8_t *row, std::ptrdiff_t step, int n, std::uint16_t *sums)
+{
+  std::fill_n (sums, n, std::uint16_t{0});
+  for (int k = 0; k < kRows; k++, row += step)
+    for (int i = 0; i < n; i++)
+      sums[i] = static_cast<std::uint16_t> (sums[i] + row[i]);
+  for (int reach : {4, 8, 16})
+    for (int i = 0; i < n; i++)
+      sums[i] = static_cast<std::uint16_t> (sums[i] + sums[i + reach]);
+}
+
+/* What cv::resize (INTER_AREA) gives for whole blocks of every second row, bit by bit: the mean,
+ * and halves go to the even side. It takes one number at a time, which made it a twentieth of all
+ * that stereo costs. */
+static void
+look_at_whole_blocks (const cv::Mat &picture, std::vector<std::uint16_t> &sums, cv::Mat &blocks)
+{
+  constexpr int kRows = kBlock / 2, kHalf = kRows * kBlock / 2;
+  const int n = 4 * picture.cols;
+  sums.assign (std::size_t (n + 4 * kBlock), 0);
+  for (int by = 0; by < blocks.rows; by++) {
+    sum_blocks<kRows> (picture.ptr<std::uint8_t> (by * kBlock),
+        static_cast<std::ptrdiff_t> (2 * picture.step), n, sums.data ());
+    auto to = blocks.ptr<std::uint8_t> (by);
+    for (int bx = 0; bx < blocks.cols; bx++)
+      for (int c = 0; c < 4; c++) {
+        const int sum = sums[std::size_t (4 * kBlock * bx + c)], mean = sum / (2 * kHalf),
+                  left = sum % (2 * kHalf);
+        to[4 * bx + c] =
+            static_cast<std::uint8_t> (mean + (left > kHalf || (left == kHalf && mean % 2 == 1)));
+      }
+  }
+}
+
 void
 ChangeDetector::look (const cv::Mat &picture)
 {
   const cv::Size size ((picture.cols + kBlock - 1) / kBlock, (picture.rows + kBlock - 1) / kBlock);
   /* Every second row: noise of half as many pixels is still far below what counts. */
+  if (picture.cols % kBlock == 0 && picture.rows % kBlock == 0) {
+    blocks_.create (size, CV_8UC4);
+    for_this_cpu ([&] { look_at_whole_blocks (picture, sums_, blocks_); });
+    return;
+  }
   const cv::Mat rows (
       (picture.rows + 1) / 2, picture.cols, picture.type (), picture.data, 2 * picture.step);
   cv::resize (rows, blocks_, size, 0, 0, cv::INTER_AREA);

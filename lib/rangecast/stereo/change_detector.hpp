@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "../geometry/range_image.hpp"
 
@@ -14,6 +16,8 @@ public:
   static constexpr int kBlock = 8; ///< pixels
   /** Takes the blocks of one camera's picture. @param picture  CV_8UC4, R G B x */
   void look (const cv::Mat &picture);
+  /** Means of the blocks, CV_8UC4: with every second row, halves rounded to the even number. */
+  [[nodiscard]] const cv::Mat &blocks () const { return blocks_; }
   /** What was looked at last is what later pictures are compared with. */
   void remember ();
   void forget () { remembered_.release (); }
@@ -29,6 +33,7 @@ public:
 
 private:
   cv::Mat blocks_, remembered_; /* CV_8UC4 */
+  std::vector<std::uint16_t> sums_;
 };
 
 } // namespace rangecast

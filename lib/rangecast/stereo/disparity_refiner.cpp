@@ -8,6 +8,8 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "../for_this_cpu.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -301,8 +303,9 @@ DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparit
     return;
   make_room (disparity.size (), pieces);
   const auto each = [&] (const auto &work) {
-    in_parallel (parts_.size (), pieces.n_threads (),
-        [&] (std::size_t i, std::size_t worker) { work (parts_[i], memory_.of (worker)); });
+    in_parallel (parts_.size (), pieces.n_threads (), [&] (std::size_t i, std::size_t worker) {
+      for_this_cpu ([&, &memory = memory_.of (worker)] { work (parts_[i], memory); });
+    });
   };
   each ([&] (cv::Rect &part, Memory &) { take (job, disparity, part); });
   std::erase_if (parts_, [] (const cv::Rect &part) { return part.empty (); });

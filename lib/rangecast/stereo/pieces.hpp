@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "../for_this_cpu.hpp"
 #include "../parallel.hpp"
 
 namespace rangecast {
@@ -42,11 +43,12 @@ public:
   [[nodiscard]] std::size_t workers () const { return workers_for (pieces_.size (), n_threads_); }
   [[nodiscard]] int n_threads () const { return n_threads_; }
 
-  /** Calls work (piece, worker) for each, some at a time. */
+  /** Calls work (piece, worker) for each, some at a time, in a version for this processor. */
   template <typename Work> void each (const Work &work) const
   {
-    in_parallel (pieces_.size (), n_threads_,
-        [&] (std::size_t i, std::size_t worker) { work (pieces_[i], worker); });
+    in_parallel (pieces_.size (), n_threads_, [&] (std::size_t i, std::size_t worker) {
+      for_this_cpu ([&] { work (pieces_[i], worker); });
+    });
   }
 
 private:

@@ -2,6 +2,7 @@
 /* Pictures of any RGB-D camera: colour as OpenCV reads it, depth of 16 bits, masks of 8. */
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
+#include <rangecast/geometry/size_text.hpp>
 
 #include "input.hpp"
 
@@ -9,12 +10,6 @@ using namespace rangecast;
 
 namespace bench {
 namespace {
-
-std::string
-size_text (const cv::Mat &m)
-{
-  return std::to_string (m.cols) + "x" + std::to_string (m.rows);
-}
 
 Status
 read_picture (const char *option, const std::string &path, int flags, cv::Mat &to)
@@ -36,8 +31,9 @@ expect_size (
 {
   if (is.size () == expected.size ())
     return {};
-  return {StatusCode::kBadSize, std::string (option) + " " + path + ": " + size_text (is) +
-                                    " pixels, expected " + size_text (expected) +
+  return {StatusCode::kBadSize, std::string (option) + " " + path + ": " +
+                                    rangecast::size_text (is.cols, is.rows) + " pixels, expected " +
+                                    rangecast::size_text (expected.cols, expected.rows) +
                                     " as --color has"};
 }
 

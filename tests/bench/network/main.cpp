@@ -38,11 +38,13 @@ print_json (const NetworkCase &c, const NetworkResult &r)
       "\"sent\": %d, \"received\": %d, \"points_share\": %.4f, \"whole_share\": %.4f, "
       "\"wrong_points\": %lld, \"freeze_ms\": %.1f, \"recovery_ms\": %.1f, "
       "\"latency_p50_ms\": %.1f, \"latency_p99_ms\": %.1f, \"media_kbit\": %.0f, "
-      "\"extra_share\": %.4f, \"packets\": %llu, \"lost\": %llu}\n",
+      "\"extra_share\": %.4f, \"packets\": %llu, \"lost\": %llu, \"twice\": %llu, \"held_back\": "
+      "%llu}\n",
       c.name.c_str (), c.encoder.c_str (), c.fec_percent, c.rtx ? "true" : "false",
       c.feedback ? "true" : "false", r.sent, r.received, r.points_share, r.whole_share,
       r.wrong_points, r.freeze_ms, r.recovery_ms, r.latency_p50_ms, r.latency_p99_ms, r.media_kbit,
-      r.extra_share, (unsigned long long)r.network.in, (unsigned long long)r.network.lost);
+      r.extra_share, (unsigned long long)r.network.in, (unsigned long long)r.network.lost,
+      (unsigned long long)r.network.duplicated, (unsigned long long)r.network.held_back);
   std::fflush (stdout);
 }
 

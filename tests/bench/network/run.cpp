@@ -122,12 +122,15 @@ private:
 struct Collected {
   std::mutex lock;
   std::map<int, std::pair<GstBuffer *, int64_t>> frame_sets;
+  std::vector<std::pair<int, GstBuffer *>> repeats; /* of numbers that had come before */
   GstClockTime interval = 0;
 
   ~Collected ()
   {
     for (auto &[number, frame_set] : frame_sets)
       gst_buffer_unref (frame_set.first);
+    for (auto &[number, buffer] : repeats)
+      gst_buffer_unref (buffer);
   }
   void collect (GstElement *sink)
   {
@@ -139,8 +142,9 @@ struct Collected {
         const GstClockTime capture = gst_range_buffer_get_capture_time (buffer);
         const int number = int ((capture + self->interval / 2) / self->interval);
         std::lock_guard guard (self->lock);
-        if (self->frame_sets.try_emplace (number, buffer, now_ns ()).second)
-          gst_buffer_ref (buffer);
+        gst_buffer_ref (buffer);
+        if (!self->frame_sets.try_emplace (number, buffer, now_ns ()).second)
+          self->repeats.emplace_back (number, buffer);
         gst_sample_unref (sample);
       }
       return GST_FLOW_OK;
@@ -293,13 +297,21 @@ pixel (const rangecast::RangeImage &view, int x, int y)
   return uint64_t (view.depth.at (x, y)) << 32 | colour;
 }
 
+long long
+points_of (const rangecast::RangeImage &view)
+{
+  long long points = 0;
+  for (int y = 0; y < view.roi.height; y++)
+    for (int x = 0; x < view.roi.width; x++)
+      points += view.depth.at (x, y) != 0;
+  return points;
+}
+
 Compared
 compare_view (const rangecast::RangeImage &sent, const rangecast::RangeImage *got)
 {
   Compared c;
-  for (int y = 0; y < sent.roi.height; y++)
-    for (int x = 0; x < sent.roi.width; x++)
-      c.expected += sent.depth.at (x, y) != 0;
+  c.expected = points_of (sent);
   if (!got)
     return c;
   for (int y = got->roi.y; y < got->roi.y + got->roi.height; y++)
@@ -307,6 +319,22 @@ compare_view (const rangecast::RangeImage &sent, const rangecast::RangeImage *go
       if (const uint64_t value = pixel (*got, x, y))
         (value == pixel (sent, x, y) ? c.right : c.wrong)++;
   return c;
+}
+
+/* Points of views that nobody sent are wrong; without `sent`, all. */
+long long
+stray_points (GstBuffer *sent, GstBuffer *got)
+{
+  std::unique_ptr<gstrange::RangeFrameMap> a;
+  if (sent)
+    a = std::make_unique<gstrange::RangeFrameMap> (sent, GST_MAP_READ);
+  const gstrange::RangeFrameMap b (got, GST_MAP_READ);
+  long long points = 0;
+  for (const auto &view : b.views ())
+    if (!a || std::ranges::none_of (
+                  a->views (), [&] (const auto &other) { return other.view_id == view.view_id; }))
+      points += points_of (view);
+  return points;
 }
 
 Compared
@@ -328,7 +356,27 @@ compare (GstBuffer *sent, GstBuffer *got)
     all.right += c.right;
     all.wrong += c.wrong;
   }
+  if (got)
+    all.wrong += stray_points (sent, got);
   return all;
+}
+
+/* Frame sets that came once more, or that nobody sent. */
+long long
+wrong_points_of_others (const Collected &sent, const Collected &got)
+{
+  long long wrong = 0;
+  const auto count = [&] (int number, GstBuffer *buffer) {
+    const auto original = sent.frame_sets.find (number);
+    wrong += original != sent.frame_sets.end () ? compare (original->second.first, buffer).wrong
+                                                : stray_points (nullptr, buffer);
+  };
+  for (const auto &[number, buffer] : got.repeats)
+    count (number, buffer);
+  for (const auto &[number, frame_set] : got.frame_sets)
+    if (!sent.frame_sets.contains (number))
+      count (number, frame_set.first);
+  return wrong;
 }
 
 double
@@ -349,6 +397,7 @@ judge (const NetworkCase &c, Collected &sent, Collected &got, const std::vector<
   int whole = 0, last_broken = -1;
   int64_t last_ns = 0;
   const int end_of_faults = c.frames - kRecoveryFrames;
+  result.wrong_points = wrong_points_of_others (sent, got);
   for (const auto &[number, frame_set] : sent.frame_sets) {
     const auto found = got.frame_sets.find (number);
     const bool came = found != got.frame_sets.end ();
@@ -372,6 +421,8 @@ judge (const NetworkCase &c, Collected &sent, Collected &got, const std::vector<
     if (came)
       latencies.push_back (double (found->second.second - pushed_ns[std::size_t (number)]) * 1e-6);
   }
+  if (last_ns) /* a stream that stopped for good stands still until its end */
+    result.freeze_ms = std::max (result.freeze_ms, double (pushed_ns.back () - last_ns) * 1e-6);
   result.points_share = expected ? double (right) / double (expected) : 0;
   result.whole_share = result.sent ? double (whole) / result.sent : 0;
   result.latency_p50_ms = percentile (latencies, 0.5);

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <string>
+
+namespace rangecast {
+
+/** "640x480", as error texts say it. Pixels. */
+inline std::string
+size_text (int width, int height)
+{
+  return std::to_string (width) + "x" + std::to_string (height);
+}
+
+} // namespace rangecast

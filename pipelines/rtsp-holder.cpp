@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rtsp-holder.hpp"
+
+static const char kReleasedKey[] = "rangecast-released"; /* of a media: is not held again */
+
+/* A transport that sends nothing to nobody. */
+static GstRTSPStreamTransport *
+make_dry_transport (GstRTSPStream *stream)
+{
+  GstRTSPTransport *transport = nullptr;
+  gst_rtsp_transport_new (&transport);
+  transport->trans = GST_RTSP_TRANS_RTP;
+  transport->profile = GST_RTSP_PROFILE_AVPF;
+  transport->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
+  transport->interleaved = {0, 1};
+  transport->destination = g_strdup ("nobody"); /* reports are compared with it */
+  GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
+  const auto swallow = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
+  const auto swallow_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
+  gst_rtsp_stream_transport_set_callbacks (dry, swallow, swallow, nullptr, nullptr);
+  gst_rtsp_stream_transport_set_list_callbacks (dry, swallow_list, swallow_list, nullptr, nullptr);
+  return dry;
+}
+
+static void
+deactivate (GPtrArray *transports)
+{
+  for (guint i = 0; i < transports->len; i++)
+    gst_rtsp_stream_transport_set_active (
+        GST_RTSP_STREAM_TRANSPORT (g_ptr_array_index (transports, i)), FALSE);
+}
+
+bool
+MediaHolder::hold (GstRTSPMedia *media)
+{
+  {
+    std::lock_guard guard (lock_);
+    if (media_ || g_object_get_data (G_OBJECT (media), kReleasedKey))
+      return media_ == media;
+    media_ = GST_RTSP_MEDIA (g_object_ref (media));
+    phase_ = Phase::kTaking;
+    unwanted_ = false;
+  }
+  GPtrArray *transports = nullptr;
+  if (gst_rtsp_media_prepare (media, nullptr)) {
+    transports = g_ptr_array_new_with_free_func (g_object_unref);
+    for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
+      g_ptr_array_add (transports, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
+    gst_rtsp_media_complete_pipeline (media, transports);
+  }
+  std::unique_lock guard (lock_);
+  transports_ = transports;
+  phase_ = Phase::kHeld;
+  if (transports && !unwanted_)
+    return true;
+  let_go (guard);
+  return false;
+}
+
+void
+MediaHolder::start (GstRTSPMedia *media)
+{
+  GPtrArray *transports = nullptr;
+  {
+    std::lock_guard guard (lock_);
+    if (media_ != media || phase_ != Phase::kHeld)
+      return;
+    phase_ = Phase::kStarted;
+    transports = g_ptr_array_ref (transports_);
+  }
+  gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports);
+  std::lock_guard guard (lock_);
+  if (media_ != media) /* released meanwhile: nothing may stay behind in its streams */
+    deactivate (transports);
+  g_ptr_array_unref (transports);
+}
+
+bool
+MediaHolder::has_started (GstRTSPMedia *media)
+{
+  std::lock_guard guard (lock_);
+  return media_ == media && phase_ == Phase::kStarted;
+}
+
+/* With the lock, which is not held while the media ends. */
+void
+MediaHolder::let_go (std::unique_lock<std::mutex> &guard)
+{
+  GstRTSPMedia *media = media_;
+  GPtrArray *transports = transports_;
+  media_ = nullptr;
+  transports_ = nullptr;
+  phase_ = Phase::kNone;
+  if (!media)
+    return;
+  releasing_++;
+  guard.unlock ();
+  if (transports) {
+    deactivate (transports);
+    gst_rtsp_media_unprepare (media);
+    g_ptr_array_unref (transports);
+  }
+  g_object_unref (media);
+  guard.lock ();
+  releasing_--;
+  changed_.notify_all ();
+}
+
+void
+MediaHolder::release (GstRTSPMedia *only)
+{
+  std::unique_lock guard (lock_);
+  if (only)
+    g_object_set_data (G_OBJECT (only), kReleasedKey, only);
+  if (only && media_ != only)
+    return;
+  if (phase_ == Phase::kTaking)
+    unwanted_ = true; /* who takes it lets it go */
+  else
+    let_go (guard);
+}
+
+void
+MediaHolder::release_unless_asked_since (gint64 monotonic_us)
+{
+  std::unique_lock guard (lock_);
+  if (asked_at_us_ < monotonic_us && phase_ != Phase::kTaking)
+    let_go (guard);
+}
+
+void
+MediaHolder::note_asking ()
+{
+  std::unique_lock guard (lock_);
+  asked_at_us_ = g_get_monotonic_time ();
+  changed_.wait (guard, [this] { return releasing_ == 0; });
+}
+
+bool
+MediaHolder::holds_any ()
+{
+  std::lock_guard guard (lock_);
+  return media_ != nullptr;
+}

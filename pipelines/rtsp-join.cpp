@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rtsp-join.hpp"
+
+#include <algorithm>
+
+static const char kGateKey[] = "rangecast-join-gate";
+static constexpr gsize kRtpHeader = 12; /* bytes */
+
+using Gate = std::shared_ptr<JoinGate>;
+
+static void
+delete_gate (gpointer gate)
+{
+  delete static_cast<Gate *> (gate);
+}
+
+static void
+delete_gate_of_signal (gpointer gate, GClosure *)
+{
+  delete_gate (gate);
+}
+
+static JoinGate &
+gate_of (gpointer gate)
+{
+  return **static_cast<Gate *> (gate);
+}
+
+/* ---- which packets begin a key frame set ---- */
+
+/* RFC 3550, 5.1. False for reports, whose packet types are 192 to 223 (RFC 5761, 4). */
+bool
+JoinGate::read_start (GstBuffer *packet, Start &start)
+{
+  guint8 header[kRtpHeader];
+  if (!packet || gst_buffer_extract (packet, 0, header, sizeof header) != sizeof header)
+    return false;
+  if (header[0] >> 6 != 2 || (header[1] >= 192 && header[1] <= 223))
+    return false;
+  start = {GST_READ_UINT32_BE (header + 4), GST_READ_UINT16_BE (header + 2)};
+  return true;
+}
+
+static GstBuffer *
+first_buffer (GstPadProbeInfo *info)
+{
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER)
+    return GST_PAD_PROBE_INFO_BUFFER (info);
+  GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+  return gst_buffer_list_length (list) > 0 ? gst_buffer_list_get (list, 0) : nullptr;
+}
+
+GstPadProbeReturn
+JoinGate::on_frame_set (GstPad *, GstPadProbeInfo *info, gpointer gate)
+{
+  if (GstBuffer *buffer = first_buffer (info))
+    gate_of (gate).is_key_ = !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  return GST_PAD_PROBE_OK;
+}
+
+GstPadProbeReturn
+JoinGate::on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+{
+  JoinGate &gate = gate_of (user_data);
+  Start start;
+  if (!read_start (first_buffer (info), start))
+    return GST_PAD_PROBE_OK;
+  const bool begins = !gate.has_last_ || start.timestamp != gate.last_timestamp_;
+  gate.has_last_ = true;
+  gate.last_timestamp_ = start.timestamp;
+  if (begins && gate.is_key_) {
+    std::lock_guard guard (gate.lock_);
+    gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = start;
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+bool
+JoinGate::begins_key_frame_set (GstBuffer *packet)
+{
+  Start start;
+  if (!read_start (packet, start))
+    return false;
+  std::lock_guard guard (lock_);
+  const auto end = starts_.begin () + gint (std::min (n_starts_, starts_.size ()));
+  return std::any_of (starts_.begin (), end, [&] (const Start &known) {
+    return known.timestamp == start.timestamp && known.sequence == start.sequence;
+  });
+}
+
+/* ---- viewers by UDP ---- */
+
+/* Those that wait at this sink, if a key frame set begins or they waited too long. */
+void
+JoinGate::let_in (GstElement *sink, bool is_key)
+{
+  const gint64 now = g_get_monotonic_time ();
+  std::vector<Joiner> ready;
+  {
+    std::lock_guard guard (lock_);
+    std::erase_if (joiners_, [&] (const Joiner &joiner) { /* whose PLAY failed */
+      return !joiner.parked && now >= joiner.until_us;
+    });
+    const auto waits = [&] (const Joiner &joiner) {
+      return joiner.parked != sink || (!is_key && now < joiner.until_us);
+    };
+    const auto first = std::stable_partition (joiners_.begin (), joiners_.end (), waits);
+    ready.assign (first, joiners_.end ());
+    entering_.insert (entering_.end (), first, joiners_.end ());
+    joiners_.erase (first, joiners_.end ());
+    waiting_ = int (joiners_.size ());
+  }
+  for (const Joiner &joiner : ready) {
+    gpointer transport = g_weak_ref_get (joiner.transport.get ());
+    if (transport)
+      g_signal_emit_by_name (sink, "add", joiner.host.c_str (), joiner.port);
+    if (has_left (joiner) && transport) /* between the two, and the library took nobody away */
+      g_signal_emit_by_name (sink, "remove", joiner.host.c_str (), joiner.port);
+    g_clear_object (&transport);
+  }
+}
+
+/* One of entering_ is in now. */
+bool
+JoinGate::has_left (const Joiner &entered)
+{
+  std::lock_guard guard (lock_);
+  const auto found = std::ranges::find (entering_, entered.transport, &Joiner::transport);
+  if (found == entering_.end ())
+    return false;
+  const bool left = found->left;
+  entering_.erase (found);
+  return left;
+}
+
+GstPadProbeReturn
+JoinGate::before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
+{
+  JoinGate &gate = gate_of (user_data);
+  if (gate.waiting_ > 0) {
+    GstElement *sink = gst_pad_get_parent_element (pad);
+    if (sink)
+      gate.let_in (sink, gate.begins_key_frame_set (first_buffer (info)));
+    gst_clear_object (&sink);
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+/* In the thread that puts it in, before the sink sends anything more, but for a few instructions.
+ */
+void
+JoinGate::on_client (GstElement *sink, gchar *host, gint port, gpointer user_data)
+{
+  JoinGate &gate = gate_of (user_data);
+  bool waits = false;
+  {
+    std::lock_guard guard (gate.lock_);
+    for (Joiner &joiner : gate.joiners_)
+      if (!joiner.parked && joiner.port == port && joiner.host == host) {
+        joiner.parked = sink;
+        waits = true;
+      }
+  }
+  if (waits)
+    g_signal_emit_by_name (sink, "remove", host, port);
+}
+
+void
+JoinGate::on_element (GstBin *, GstElement *element, gpointer user_data)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory || !g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
+    return;
+  const Gate &gate = *static_cast<Gate *> (user_data);
+  g_signal_connect_data (element, "client-added", G_CALLBACK (on_client), new Gate (gate),
+      delete_gate_of_signal, GConnectFlags (0));
+  GstPad *pad = gst_element_get_static_pad (element, "sink");
+  gst_pad_add_probe (pad,
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), before_sending,
+      new Gate (gate), delete_gate);
+  gst_object_unref (pad);
+}
+
+/* ---- what the server tells ---- */
+
+/* The transports of a session to one host alone. */
+static std::vector<GstRTSPStreamTransport *>
+udp_transports (GstRTSPSessionMedia *media)
+{
+  std::vector<GstRTSPStreamTransport *> found;
+  GPtrArray *transports = gst_rtsp_session_media_get_transports (media);
+  for (guint i = 0; i < transports->len; i++) {
+    auto transport = static_cast<GstRTSPStreamTransport *> (g_ptr_array_index (transports, i));
+    const GstRTSPTransport *to =
+        transport ? gst_rtsp_stream_transport_get_transport (transport) : nullptr;
+    if (to && to->lower_transport == GST_RTSP_LOWER_TRANS_UDP && to->destination)
+      found.push_back (GST_RTSP_STREAM_TRANSPORT (g_object_ref (transport)));
+  }
+  g_ptr_array_unref (transports);
+  return found;
+}
+
+void
+JoinGate::hold_back (GstRTSPSessionMedia *media)
+{
+  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
+    const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
+    const std::shared_ptr<GWeakRef> weak (new GWeakRef, [] (GWeakRef *ref) {
+      g_weak_ref_clear (ref);
+      delete ref;
+    });
+    g_weak_ref_init (weak.get (), transport);
+    std::lock_guard guard (lock_);
+    joiners_.push_back (
+        {weak, to->destination, to->client_port.min, g_get_monotonic_time () + kLongestHold_us});
+    waiting_ = int (joiners_.size ());
+    g_object_unref (transport);
+  }
+}
+
+static void
+read_address (GstRTSPStreamTransport *transport, std::string &host, int &port)
+{
+  const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
+  host = to->destination;
+  port = to->client_port.min;
+}
+
+void
+JoinGate::note_playing (GstRTSPSessionMedia *media)
+{
+  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
+    std::string host;
+    int port = 0;
+    read_address (transport, host, port);
+    std::lock_guard guard (lock_);
+    std::erase_if (joiners_, [&] (const Joiner &joiner) {
+      return !joiner.parked && joiner.port == port && joiner.host == host;
+    });
+    waiting_ = int (joiners_.size ());
+    g_object_unref (transport);
+  }
+}
+
+void
+JoinGate::forget (GstRTSPSessionMedia *media)
+{
+  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
+    std::string host;
+    int port = 0;
+    read_address (transport, host, port);
+    std::lock_guard guard (lock_);
+    const auto is_it = [&] (const Joiner &joiner) {
+      return joiner.port == port && joiner.host == host;
+    };
+    std::erase_if (joiners_, is_it);
+    for (Joiner &joiner : entering_)
+      joiner.left = joiner.left || is_it (joiner);
+    waiting_ = int (joiners_.size ());
+    g_object_unref (transport);
+  }
+}
+
+static void
+watch_pad (GstElement *element, const char *name, GstPadProbeCallback callback, const Gate &gate)
+{
+  GstPad *pad = gst_element_get_static_pad (element, name);
+  if (!pad)
+    return;
+  gst_pad_add_probe (pad,
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), callback,
+      new Gate (gate), delete_gate);
+  gst_object_unref (pad);
+}
+
+void
+JoinGate::install (GstRTSPMedia *media, GstElement *pipeline, GstElement *payloader)
+{
+  const auto gate = std::make_shared<JoinGate> ();
+  watch_pad (payloader, "sink", on_frame_set, gate);
+  watch_pad (payloader, "src", on_payload, gate);
+  g_signal_connect_data (pipeline, "element-added", G_CALLBACK (on_element), new Gate (gate),
+      delete_gate_of_signal, GConnectFlags (0));
+  g_object_set_data_full (G_OBJECT (media), kGateKey, new Gate (gate), delete_gate);
+}
+
+std::shared_ptr<JoinGate>
+JoinGate::of (GstRTSPMedia *media)
+{
+  auto gate = static_cast<Gate *> (g_object_get_data (G_OBJECT (media), kGateKey));
+  return gate ? *gate : nullptr;
+}

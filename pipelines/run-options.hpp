@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <glib.h>
+
+/** What rangecast-run is told; --help says what each one is. */
+struct RunOptions {
+  gint64 base_time = -1; ///< ns, < 0: the pipeline's own
+  gint frames = 0;
+  gint views = 1;
+  gboolean turn = FALSE;
+  gint timeout_s = 0;
+  gboolean progress = FALSE;
+  gchar *stats = nullptr, *trace = nullptr;
+  gchar *report = nullptr;
+  gchar *snapshot = nullptr;
+  gchar *frame_log = nullptr;
+  gchar *threads_left = nullptr;
+  gchar *memory_log = nullptr;
+  gchar *srtp_key = nullptr;
+  gchar **launch = nullptr;
+
+  RunOptions () = default;
+  ~RunOptions ();
+  RunOptions (const RunOptions &) = delete;
+  RunOptions &operator= (const RunOptions &) = delete;
+
+  /** Reads the command line, and initialises GStreamer.
+   *  @return false if there is something wrong with it, which has been said */
+  bool parse (int *argc, char ***argv);
+};
