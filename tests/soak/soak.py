@@ -22,8 +22,16 @@ ROOT = Path(__file__).resolve().parents[2]
 PIPELINES = ROOT / "pipelines"
 PATIENCE_S = 30  # for a process to end when told to
 GONE_S = 2  # that a camera stays away
-SAMPLE_FIELDS = ("seconds", "name", "pid", "rss_kb", "pss_kb", "anonymous_kb", "threads", "fds", "cpu_s", "load")
+SAMPLE_FIELDS = ("seconds", "name", "pid", "rss_kb", "pss_kb", "anonymous_kb", "threads", "pool_threads", "fds", "cpu_s", "load")
 EVENT_FIELDS = ("seconds", "clock_s", "name", "what", "status")
+
+
+def read_name(task: Path) -> str:
+    """A thread's name; of one that has just ended that of GLib's pool, whose threads come and go."""
+    try:
+        return (task / "comm").read_text().strip()
+    except OSError:
+        return "pool-"
 
 
 def read_sample(pid: int) -> dict[str, float]:
@@ -34,11 +42,14 @@ def read_sample(pid: int) -> dict[str, float]:
         memory[key.rstrip(":")] = int(value)
     # The name, in brackets, may hold anything.
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    threads = [read_name(task) for task in Path(f"/proc/{pid}/task").iterdir()]
+    in_pool = sum(name.startswith("pool-") for name in threads)
     return {
         "rss_kb": memory["Rss"],
         "pss_kb": memory["Pss"],
         "anonymous_kb": memory["Anonymous"],
-        "threads": int(fields[17]),
+        "threads": len(threads) - in_pool,
+        "pool_threads": in_pool,
         "fds": len(os.listdir(f"/proc/{pid}/fd")),
         "cpu_s": (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
     }

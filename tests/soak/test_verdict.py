@@ -14,7 +14,9 @@ LIMITS = verdict.Limits(warm_up_s=600)
 OBJECT = "0:{:02}:00.0 1 0x1 TRACE GST_TRACER :0:: object-alive, type-name=(string){}, address=(gpointer)0x1;\n"
 
 
-def process_samples(name: str = "parent", grows_kb: float = 0, jump_kb: float = 0, fds: int = 0, threads: int = 0) -> list[dict]:
+def process_samples(
+    name: str = "parent", grows_kb: float = 0, jump_kb: float = 0, fds: int = 0, threads: int = 0, hangs: int = 0
+) -> list[dict]:
     """Two hours in steps of five seconds: noise, and what shall be found."""
     noise = random.Random(1)
     rows = []
@@ -23,7 +25,8 @@ def process_samples(name: str = "parent", grows_kb: float = 0, jump_kb: float = 
         memory = 80000 + noise.randint(0, 400) + grows_kb * share + (jump_kb if share > 0.3 else 0)
         count = int(share > 0.5)
         row = {"seconds": i * 5, "name": name, "rss_kb": memory, "anonymous_kb": memory / 2, "cpu_s": i}
-        rows.append({**row, "fds": 20 + fds * count, "threads": 9 + threads * count})
+        pool = noise.randint(1, 4) + hangs * i // 1440
+        rows.append({**row, "fds": 20 + fds * count, "threads": 9 + threads * count, "pool_threads": pool})
     return [{key: str(value) for key, value in row.items()} for row in rows]
 
 
@@ -44,6 +47,10 @@ class Memory(unittest.TestCase):
     def test_one_descriptor_and_one_thread_more_are_seen(self) -> None:
         found = bad(verdict.judge_memory(process_samples(fds=1, threads=1), LIMITS))
         self.assertEqual(found, ["parent: fds in the last quarter", "parent: threads in the last quarter"])
+
+    def test_threads_of_the_pool_that_hang_are_seen(self) -> None:
+        found = bad(verdict.judge_memory(process_samples(hangs=10), LIMITS))
+        self.assertEqual(found, ["parent: fewest threads of GLib's pool in the last quarter"])
 
     def test_heap_that_fills_is_seen_though_the_process_does_not_grow(self) -> None:
         events = [{"seconds": "0.0", "clock_s": "100.0", "name": "parent", "what": "start", "status": ""}]

@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median, median_high, median_low
+from statistics import median
 
 STEADY = ("camera0", "parent", "viewer")  # these run from beginning to end
 BLOCKS = 48  # medians that the line goes through
@@ -102,11 +102,13 @@ def judge_process(name: str, rows: list[dict[str, str]], limits: Limits) -> list
         return [Finding(f"{name}: samples after the warm-up", len(times), "at least 4", False)]
     findings = []
     findings.append(judge_growth(f"{name}: resident memory", times, [float(row["rss_kb"]) for row in rows], limits))
+    quarter = max(1, len(rows) // 4)
     for field in ("fds", "threads"):
-        values = [int(row[field]) for row in rows]
-        quarter = max(1, len(values) // 4)
-        first, last = median_high(values[:quarter]), median_low(values[-quarter:])  # GLib's pools have one thread more now and then
+        first, last = (round(median(int(row[field]) for row in part)) for part in (rows[:quarter], rows[-quarter:]))
         findings.append(Finding(f"{name}: {field} in the last quarter", last, f"{first} as in the first", last <= first))
+    # GLib's pool has threads more for as long as something waits to be done; such that hang stay, and the fewest become more.
+    most, fewest = max(int(row["pool_threads"]) for row in rows[:quarter]), min(int(row["pool_threads"]) for row in rows[-quarter:])
+    findings.append(Finding(f"{name}: fewest threads of GLib's pool in the last quarter", fewest, f"{most}, the most in the first", fewest <= most))
     cpu = (float(rows[-1]["cpu_s"]) - float(rows[0]["cpu_s"])) / (times[-1] - times[0])
     findings.append(Finding(f"{name}: CPU, cores", round(cpu, 3), "shown", True))
     return findings
