@@ -179,7 +179,7 @@ static Status
 check_save_path (const std::string &path)
 {
   static constexpr std::string_view kExtensions[] = {
-      ".yml", ".yaml", ".json", ".xml", ".yml.gz", ".yaml.gz", ".json.gz", ".xml.gz"};
+      ".yml", ".yaml", ".json", ".yml.gz", ".yaml.gz", ".json.gz"};
   return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
 }
 

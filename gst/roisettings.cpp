@@ -117,7 +117,7 @@ install_background_settings (GObjectClass *object_class)
           kReady));
   g_object_class_install_property (object_class, PROP_SAVE_BACKGROUND,
       g_param_spec_string ("save-background", "Save background",
-          "Write the background to this file (.yml, .yaml, .json or .xml, with .gz if wanted) "
+          "Write the background to this file (.yml, .yaml or .json, with .gz if wanted) "
           "whenever one is learnt, and as it has become at EOS (default: none)",
           nullptr, kPlaying));
 }

@@ -69,7 +69,7 @@ open_storage (const std::string &path)
       return file;
   } catch (const cv::Exception &) {
   }
-  throw BadInput{path + ": cannot be read as YAML, XML or JSON"};
+  throw BadInput{path + ": cannot be read as YAML or JSON"};
 }
 
 /* The files of one calibration. */

@@ -12,8 +12,8 @@
 namespace rangecast {
 namespace {
 
-/* Signs that may begin a collection or an element: a rig of 64 views has 3,500 in XML, and each may
- * take some 300 bytes of stack. */
+/* Signs that may begin a collection or an element: a rig of 64 views has some
+ * 2,000, and each may take some 300 bytes of stack. */
 constexpr int kMaxSigns = 10000;
 /* What a rule looks at together: a marker, the spaces behind it, and the header of its data. */
 constexpr std::size_t kLookAhead = 512, kBlock = 65536;
@@ -48,19 +48,18 @@ is_sign (std::string_view text)
 /* What stands before a place: its last character, and the last one before that which is no space
  * and not of a byte order mark. */
 struct Before {
-  char last = '\n', solid = '\n', solid_before_last = '\n';
+  char last = '\n', solid = '\n';
 
   void add (char c)
   {
     last = c;
-    solid_before_last = solid;
     if (std::isgraph (static_cast<unsigned char> (c)))
       solid = c;
   }
 };
 
 /* Where data in base64 begin if `text` begins with a marker for them; else 0. The markers are
- * YAML's !!binary, XML's type_id="binary" and JSON's "$base64$. */
+ * YAML's !!binary and JSON's "$base64$. */
 std::size_t
 behind_marker (std::string_view text, const Before &before)
 {
@@ -69,11 +68,8 @@ behind_marker (std::string_view text, const Before &before)
     return kJson.size ();
   if (!text.starts_with (kWord))
     return 0;
-  const char next = text.size () > kWord.size () ? text[kWord.size ()] : '\n';
   const bool tag = before.last == '!' || before.last == '^' || before.last == ':';
-  const bool attribute = (before.last == '"' || before.last == '\'') && next == before.last &&
-                         before.solid_before_last == '=';
-  return tag || attribute ? kWord.size () : 0;
+  return tag ? kWord.size () : 0;
 }
 
 /* Behind a marker, where only what such a file has there may stand: at another sign OpenCV would
@@ -89,9 +85,7 @@ has_header (std::string_view text, const std::string &header, bool json)
       text.remove_prefix (1);
   };
   if (!json) {
-    skip_one ("\"'"); /* XML's attribute, and the end of its tag or of YAML's */
-    skip (" ");
-    skip_one (">");
+    skip_one (">"); /* end of a tag */
     skip (" ");
     skip_one ("|");
     skip (" \r\n");
@@ -195,8 +189,8 @@ private:
   {
     if (is_control (rest[0]))
       return "has control characters, which no text has";
-    if (rest[0] == '<' && before_.solid == '\n' && !limits_.xml)
-      return "is XML";
+    if (rest[0] == '<' && before_.solid == '\n')
+      return "is XML; expected YAML or JSON";
     if (is_sign (rest) && ++signs_ > kMaxSigns)
       return "has more than " + std::to_string (kMaxSigns) + " lists, maps or fields";
     const std::size_t marker = behind_marker (rest, before_);

@@ -167,22 +167,8 @@ def json_of(node: dict) -> str:
     return "{ " + ",\n".join(parts) + " }"
 
 
-def xml_of(node: dict) -> str:
-    parts = []
-    for key, value in node.items():
-        if isinstance(value, dict):
-            text = xml_of(value)
-        else:
-            text = "".join(f"<_>{xml_of(item)}</_>" for item in value) if isinstance(value, list) else value.strip("[ ]").replace(",", "")
-        kind = ' type_id="opencv-matrix"' if "dt" in value else ""
-        parts.append(f"<{key}{kind}>{text}</{key}>\n")
-    return "".join(parts)
-
-
 def texts_of(node: dict) -> list[bytes]:
-    """The three that OpenCV reads."""
-    texts = ["%YAML:1.0\n---\n" + yaml_of(node), json_of(node), f'<?xml version="1.0"?>\n<opencv_storage>\n{xml_of(node)}</opencv_storage>\n']
-    return [text.encode() for text in texts]
+    return [text.encode() for text in ("%YAML:1.0\n---\n" + yaml_of(node), json_of(node))]
 
 
 def rig_file_seeds() -> list[bytes]:
@@ -192,8 +178,7 @@ def rig_file_seeds() -> list[bytes]:
 
 def background_seeds() -> list[bytes]:
     datas = [PIXELS, {**PIXELS, "data": f'"$base64${BINARY}"'}, {**PIXELS, "data": f"!!binary |\n            {BINARY}"}]
-    texts = [text for pixels in datas for text in texts_of({"rangecast_background": "2", "views": [{"id": "0", "frames": "3", "pixels": pixels}]})]
-    return [text.replace(b'<data>"$base64$', b'<data type_id="binary">').replace(b'"</data>', b"</data>") for text in texts]
+    return [text for pixels in datas for text in texts_of({"rangecast_background": "2", "views": [{"id": "0", "frames": "3", "pixels": pixels}]})]
 
 
 def range_meta_seeds() -> list[bytes]:

@@ -232,7 +232,7 @@ load_rig (const std::string &path, Rig &rig)
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
   if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
     return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
-  if (Status s = check_storage (path, {.max_bytes = kMaxRigFileSize, .xml = false}); !s.ok ())
+  if (Status s = check_storage (path, {.max_bytes = kMaxRigFileSize}); !s.ok ())
     return {s.code (), s.message () + "; expected a rig file (YAML or JSON)"};
   Rig loaded;
   try {

@@ -162,7 +162,7 @@ save_backgrounds (
     file.release ();
   } catch (const std::exception &) {
     return {StatusCode::kBadValue,
-        path + ": cannot be written; expected a name that ends in .yml, .yaml, .json or .xml"};
+        path + ": cannot be written; expected a name that ends in .yml, .yaml or .json"};
   }
   return {};
 }

@@ -92,7 +92,7 @@ private:
 };
 
 /** @name The file form
- *  YAML, JSON or XML (with .gz if wanted) by the file's ending, as cv::FileStorage writes it: for
+ *  YAML or JSON (with .gz if wanted) by the file's ending, as cv::FileStorage writes it: for
  *  each view a matrix of width x height x 8 floats, the fields of BackgroundPixel in their order.
  *  A version 1 file had 7 floats and is refused. Messages begin with the path and say what was
  *  expected. @{ */
