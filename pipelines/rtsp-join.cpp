@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "rtsp-transports.hpp"
+
 static const char kGateKey[] = "rangecast-join-gate";
 static constexpr gsize kRtpHeader = 12; /* bytes */
 
@@ -183,82 +185,51 @@ JoinGate::on_element (GstBin *, GstElement *element, gpointer user_data)
 
 /* ---- what the server tells ---- */
 
-/* The transports of a session to one host alone. */
-static std::vector<GstRTSPStreamTransport *>
-udp_transports (GstRTSPSessionMedia *media)
+/* Under the lock, with each UDP viewer's address. */
+void
+JoinGate::for_each_address (GstRTSPSessionMedia *media, const UseAddress &use)
 {
-  std::vector<GstRTSPStreamTransport *> found;
-  GPtrArray *transports = gst_rtsp_session_media_get_transports (media);
-  for (guint i = 0; i < transports->len; i++) {
-    auto transport = static_cast<GstRTSPStreamTransport *> (g_ptr_array_index (transports, i));
-    const GstRTSPTransport *to =
-        transport ? gst_rtsp_stream_transport_get_transport (transport) : nullptr;
-    if (to && to->lower_transport == GST_RTSP_LOWER_TRANS_UDP && to->destination)
-      found.push_back (GST_RTSP_STREAM_TRANSPORT (g_object_ref (transport)));
+  for (const TransportRef &transport : transports_of (media, GST_RTSP_LOWER_TRANS_UDP)) {
+    const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport.get ());
+    if (!to->destination)
+      continue;
+    std::lock_guard guard (lock_);
+    use (*to, transport.get ());
+    waiting_ = int (joiners_.size ());
   }
-  g_ptr_array_unref (transports);
-  return found;
 }
 
 void
 JoinGate::hold_back (GstRTSPSessionMedia *media)
 {
-  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
-    const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
+  for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *transport) {
     const std::shared_ptr<GWeakRef> weak (new GWeakRef, [] (GWeakRef *ref) {
       g_weak_ref_clear (ref);
       delete ref;
     });
     g_weak_ref_init (weak.get (), transport);
-    std::lock_guard guard (lock_);
     joiners_.push_back (
-        {weak, to->destination, to->client_port.min, g_get_monotonic_time () + kLongestHold_us});
-    waiting_ = int (joiners_.size ());
-    g_object_unref (transport);
-  }
-}
-
-static void
-read_address (GstRTSPStreamTransport *transport, std::string &host, int &port)
-{
-  const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
-  host = to->destination;
-  port = to->client_port.min;
+        {weak, to.destination, to.client_port.min, g_get_monotonic_time () + kLongestHold_us});
+  });
 }
 
 void
 JoinGate::note_playing (GstRTSPSessionMedia *media)
 {
-  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
-    std::string host;
-    int port = 0;
-    read_address (transport, host, port);
-    std::lock_guard guard (lock_);
-    std::erase_if (joiners_, [&] (const Joiner &joiner) {
-      return !joiner.parked && joiner.port == port && joiner.host == host;
-    });
-    waiting_ = int (joiners_.size ());
-    g_object_unref (transport);
-  }
+  for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *) {
+    std::erase_if (
+        joiners_, [&] (const Joiner &joiner) { return !joiner.parked && joiner.is_to (to); });
+  });
 }
 
 void
 JoinGate::forget (GstRTSPSessionMedia *media)
 {
-  for (GstRTSPStreamTransport *transport : udp_transports (media)) {
-    std::string host;
-    int port = 0;
-    read_address (transport, host, port);
-    std::lock_guard guard (lock_);
-    const auto is_it = [&] (const Joiner &joiner) {
-      return joiner.port == port && joiner.host == host;
-    };
-    std::erase_if (joiners_, is_it);
+  for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *) {
+    std::erase_if (joiners_, [&] (const Joiner &joiner) { return joiner.is_to (to); });
     for (Joiner &joiner : entering_)
-      joiner.left = joiner.left || is_it (joiner);
-    waiting_ = int (joiners_.size ());
-    g_object_unref (transport);
-  }
+      joiner.left = joiner.left || joiner.is_to (to);
+  });
 }
 
 static void

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -52,6 +53,11 @@ private:
     gint64 until_us;              /* monotonic */
     GstElement *parked = nullptr; /* multiudpsink that it was taken out of; not owned */
     bool left = false;            /* while it was entering */
+
+    bool is_to (const GstRTSPTransport &to) const
+    {
+      return port == to.client_port.min && host == to.destination;
+    }
   };
   static bool read_start (GstBuffer *packet, Start &start);
   static GstPadProbeReturn on_frame_set (GstPad *, GstPadProbeInfo *info, gpointer gate);
@@ -59,6 +65,8 @@ private:
   static GstPadProbeReturn before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer gate);
   static void on_element (GstBin *, GstElement *element, gpointer gate);
   static void on_client (GstElement *sink, gchar *host, gint port, gpointer gate);
+  using UseAddress = std::function<void (const GstRTSPTransport &, GstRTSPStreamTransport *)>;
+  void for_each_address (GstRTSPSessionMedia *media, const UseAddress &use);
   void let_in (GstElement *sink, bool is_key);
   bool has_left (const Joiner &entered);
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rtsp-join.hpp"
+#include "rtsp-transports.hpp"
 
 static constexpr std::size_t kMostFrameSets = 4;
 /* Frame sets of many slices may come as one packet each; reports are few. */
@@ -440,23 +441,6 @@ tap_transport (GstRTSPStreamTransport *transport, GstRTSPMedia *media, GMainCont
   g_object_set_data_full (G_OBJECT (transport), kTapKey, tap, delete_tap);
 }
 
-/* The TCP transports of one media. */
-static std::vector<GstRTSPStreamTransport *>
-tcp_transports (GstRTSPSessionMedia *media)
-{
-  std::vector<GstRTSPStreamTransport *> found;
-  GPtrArray *transports = gst_rtsp_session_media_get_transports (media);
-  for (guint i = 0; i < transports->len; i++) {
-    auto transport = static_cast<GstRTSPStreamTransport *> (g_ptr_array_index (transports, i));
-    const GstRTSPTransport *to =
-        transport ? gst_rtsp_stream_transport_get_transport (transport) : nullptr;
-    if (to && to->lower_transport == GST_RTSP_LOWER_TRANS_TCP)
-      found.push_back (GST_RTSP_STREAM_TRANSPORT (g_object_ref (transport)));
-  }
-  g_ptr_array_unref (transports);
-  return found;
-}
-
 void
 queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out, bool holds_back)
 {
@@ -464,25 +448,25 @@ queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out
   if (!source)
     return;
   GstRTSPMedia *whole = gst_rtsp_session_media_get_media (media);
-  for (GstRTSPStreamTransport *transport : tcp_transports (media)) {
+  for (const TransportRef &ref : transports_of (media, GST_RTSP_LOWER_TRANS_TCP)) {
+    GstRTSPStreamTransport *transport = ref.get ();
     if (!g_object_get_data (G_OBJECT (transport), kTapKey))
       tap_transport (transport, whole, g_source_get_context (source), left_out,
           holds_back ? JoinGate::of (whole) : nullptr);
     else /* each PLAY puts it in again */
       gst_rtsp_stream_remove_transport (
           gst_rtsp_stream_transport_get_stream (transport), transport);
-    g_object_unref (transport);
   }
 }
 
 static GstRTSPFilterResult
 drop_media (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer)
 {
-  for (GstRTSPStreamTransport *transport : tcp_transports (media)) {
+  for (const TransportRef &ref : transports_of (media, GST_RTSP_LOWER_TRANS_TCP)) {
+    GstRTSPStreamTransport *transport = ref.get ();
     if (auto tap = static_cast<Tap *> (g_object_get_data (G_OBJECT (transport), kTapKey)))
       tap->queue->close ();
     g_object_set_data (G_OBJECT (transport), kTapKey, nullptr);
-    g_object_unref (transport);
   }
   return GST_RTSP_FILTER_KEEP;
 }
