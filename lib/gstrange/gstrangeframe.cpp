@@ -24,7 +24,8 @@ Status
 make_pool (GstCaps *caps, GstBufferPool *&pool)
 {
   pool = gst_range_buffer_pool_new ();
-  if (gst_range_buffer_pool_configure (pool, caps, 2, 0) && gst_buffer_pool_set_active (pool, TRUE))
+  /* None ahead: caps from a network may name sizes of which no frame set ever comes. */
+  if (gst_range_buffer_pool_configure (pool, caps, 0, 0) && gst_buffer_pool_set_active (pool, TRUE))
     return {};
   gst_clear_object (&pool);
   return no_memory ();
