@@ -27,8 +27,8 @@ AvatarPainter::start (const AvatarSettings &settings)
 void
 AvatarPainter::forget_loop ()
 {
-  for (auto &pictures : loop_)
-    std::vector<Rgbx> ().swap (pictures); /* gives the memory back */
+  for (Loop &loop : loops_)
+    loop = {};
 }
 
 Status
@@ -92,9 +92,8 @@ seconds (GstClockTime time)
   return static_cast<double> (time) / GST_SECOND;
 }
 
-/* The pictures of one camera's loop, one below the other. */
 Status
-AvatarPainter::draw_loop (SceneCamera camera, double period_s)
+AvatarPainter::make_loop (SceneCamera camera)
 {
   constexpr std::size_t kMostPixels = std::size_t{1} << 28; /* 1 GiB */
   const int width = settings_.scene.width, height = settings_.scene.height;
@@ -104,41 +103,51 @@ AvatarPainter::draw_loop (SceneCamera camera, double period_s)
         "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
             std::to_string (kMostPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
             std::to_string (height) + ", which take 1 GiB a camera"};
-  std::vector<Rgbx> &pictures = loop_[int (camera)];
   try {
-    pictures.resize (settings_.loop_frames * pixels);
+    Loop &loop = loops_[int (camera)];
+    loop.drawn.assign (settings_.loop_frames, false);
+    loop.pictures.resize (settings_.loop_frames * pixels);
   } catch (const std::bad_alloc &) {
     return {StatusCode::kNoSpace, "loop-frames: no memory left for so many pictures"};
   }
-  for (guint i = 0; i < settings_.loop_frames; i++)
-    if (Status s = scene_->render (MAX (settings_.view_id, 0), camera, i * period_s, false,
-            {pictures.data () + i * pixels, width, height,
-                static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width},
-            {}, {});
-        !s.ok ())
-      return s;
   return {};
 }
 
 /* Forwards, and back again without showing either end twice. */
-rangecast::ImageView<const Rgbx>
-AvatarPainter::looped (SceneCamera camera, guint64 tick) const
+Status
+AvatarPainter::find_looped (SceneCamera camera, const AvatarMoment &moment, double period_s,
+    rangecast::ImageView<const Rgbx> &found)
 {
+  Loop &loop = loops_[int (camera)];
+  if (loop.pictures.empty ())
+    if (Status s = make_loop (camera); !s.ok ())
+      return s;
   const int width = settings_.scene.width, height = settings_.scene.height;
-  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : tick % (2 * n - 2),
+  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : moment.tick % (2 * n - 2),
                 i = at < n ? at : 2 * n - 2 - at;
-  return {loop_[int (camera)].data () + i * std::size_t (width) * std::size_t (height), width,
-      height, static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+  const rangecast::ImageView<Rgbx> picture{
+      loop.pictures.data () + i * std::size_t (width) * std::size_t (height), width, height,
+      static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+  if (!loop.drawn[i])
+    if (Status s = scene_->render (
+            MAX (settings_.view_id, 0), camera, double (i) * period_s, false, picture, {}, {});
+        !s.ok ())
+      return s;
+  loop.drawn[i] = true;
+  found = picture;
+  return {};
 }
 
 Status
-AvatarPainter::render (
-    SceneCamera camera, const AvatarMoment &moment, rangecast::ImageView<Rgbx> picture)
+AvatarPainter::render (SceneCamera camera, const AvatarMoment &moment, double period_s,
+    rangecast::ImageView<Rgbx> picture)
 {
   if (settings_.loop_frames == 0 || empty_at (moment))
     return scene_->render (MAX (settings_.view_id, 0), camera, seconds (moment.capture_time),
         empty_at (moment), picture, {}, {});
-  const auto from = looped (camera, moment.tick);
+  rangecast::ImageView<const Rgbx> from;
+  if (Status s = find_looped (camera, moment, period_s, from); !s.ok ())
+    return s;
   for (int y = 0; y < picture.height; y++)
     std::copy_n (from.row (y), picture.width, picture.row (y));
   return {};
@@ -148,11 +157,6 @@ Status
 AvatarPainter::draw_raw (
     SceneCamera camera, const GstVideoInfo &video, const AvatarMoment &moment, GstBuffer *buffer)
 {
-  if (settings_.loop_frames > 0 && loop_[int (camera)].empty ())
-    if (Status s = draw_loop (
-            camera, double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video));
-        !s.ok ())
-      return s;
   GstVideoFrame frame;
   if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
     return {StatusCode::kNoSpace, "cannot map an output buffer"};
@@ -164,7 +168,8 @@ AvatarPainter::draw_raw (
   const rangecast::ImageView<Rgbx> picture{
       direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
       direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
-  const Status status = render (camera, moment, picture);
+  const double period_s = double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video);
+  const Status status = render (camera, moment, period_s, picture);
   if (status.ok () && !direct)
     rangecast::convert_pixels (picture, format, pixels, stride);
   gst_video_frame_unmap (&frame);

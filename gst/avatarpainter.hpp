@@ -17,7 +17,7 @@ public:
   void start (const AvatarSettings &settings);
   /** Makes the scene, if its size is another one, and writes its rig file. */
   rangecast::Status set_size (int width, int height);
-  /** Pictures that were drawn ahead are drawn again: for a new frame rate. */
+  /** Its pictures are drawn again: for a new frame rate. */
   void forget_loop ();
 
   /** Fixed but for the pixel format of raw pictures. */
@@ -30,11 +30,17 @@ public:
   rangecast::Status draw_range (const AvatarMoment &moment, GstBuffer *buffer);
 
 private:
+  /* What one camera shows again and again. */
+  struct Loop {
+    std::vector<rangecast::Rgbx> pictures; // one below the other; none before the first is shown
+    std::vector<bool> drawn;               // each when it is first shown
+  };
+
   rangecast::Status render (rangecast::SceneCamera camera, const AvatarMoment &moment,
-      rangecast::ImageView<rangecast::Rgbx> picture);
-  rangecast::Status draw_loop (rangecast::SceneCamera camera, double period_s);
-  [[nodiscard]] rangecast::ImageView<const rangecast::Rgbx> looped (
-      rangecast::SceneCamera camera, guint64 tick) const;
+      double period_s, rangecast::ImageView<rangecast::Rgbx> picture);
+  rangecast::Status make_loop (rangecast::SceneCamera camera);
+  rangecast::Status find_looped (rangecast::SceneCamera camera, const AvatarMoment &moment,
+      double period_s, rangecast::ImageView<const rangecast::Rgbx> &found);
   [[nodiscard]] bool empty_at (const AvatarMoment &moment) const
   {
     return moment.index < settings_.empty_frames;
@@ -43,5 +49,5 @@ private:
   AvatarSettings settings_;
   std::unique_ptr<rangecast::Scene> scene_;
   std::vector<rangecast::Rgbx> scratch_; ///< a picture before it gets its pixel format
-  std::vector<rangecast::Rgbx> loop_[3]; ///< by camera: all pictures of its loop, or none
+  Loop loops_[3];                        ///< by camera
 };

@@ -317,8 +317,9 @@ install_model_and_stream (const Installer &to)
   to.add_uint (PROP_EMPTY_FRAMES, "empty-frames", "Empty frames",
       "So many frames at first show the room without the figure (default: 0)", 0);
   to.add_uint (PROP_LOOP_FRAMES, "loop-frames", "Loop frames",
-      "Draw so many pictures of the figure once and show them forwards and backwards, as cameras "
-      "that cost no drawing; left, right and third only (0, the default: draw each picture)",
+      "Draw so many pictures of the figure once each, when first shown, and repeat them forwards "
+      "and backwards, as cameras that cost no drawing; left, right and third only, at most 1 GiB a "
+      "camera (0, the default: draw each picture)",
       0);
   to.add_int (PROP_NUM_BUFFERS, "num-buffers", "Number of buffers",
       "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);

@@ -15,8 +15,8 @@ usage: demo.sh [options]
   --input WHAT  avatar (default), avatar=MODEL.glb, range, a folder of recorded pairs with its rig.yaml
                 (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
                 shows, made on this machine's loopback network by fake-cameras
-  --loop N      the cameras' pictures of avatar are drawn ahead: N of them, shown forwards and
-                backwards, so that cameras cost next to no CPU, as real ones (default: each is drawn)
+  --loop N      the first N pictures of avatar's cameras are drawn and repeated forwards and backwards, so
+                that cameras then cost next to no CPU, as real ones (default: each is drawn)
   --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
   --size WxH    size of the camera pictures (default 320x240)
   --frames N    frame sets to render (default 150)
