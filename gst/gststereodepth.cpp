@@ -28,13 +28,14 @@
 
 #include "picturereader.hpp"
 #include "recycledbuffers.hpp"
+#include "roischedule.hpp"
 #include "statsreporter.hpp"
 #include "stereosettings.hpp"
 
 #include <gst/video/video.h>
 
+#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -71,13 +72,13 @@ struct WaitingPair {
 struct GstStereoDepthPrivate {
   std::mutex lock; /* guards what follows; never held across a push, event or message */
   StereoDepthSettings settings;
-  Roi wanted; /* of the last GstRangeRoi event; empty: everything */
   guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0, dropped_late = 0;
   GstClockTime match_time = 0;
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is older comes too late */
   double proportion = 1;                       /* of the last QOS event */
 
   StatsReporter reporter;                   /* has locks of its own */
+  RoiSchedule rois;                         /* so has this */
   std::atomic<bool> third_released = false; /* by any thread; the streaming thread clears it */
 
   /* streaming thread only */
@@ -99,7 +100,6 @@ struct GstStereoDepthPrivate {
   rangecast::StereoDepth core;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstBufferPool *pool = nullptr;
-  int since_refresh = 0;
 };
 
 struct _GstStereoDepth {
@@ -149,9 +149,9 @@ static StereoDepthSettings
 current_settings (GstStereoDepthPrivate *priv)
 {
   const View &before = priv->core.range_view ();
-  std::lock_guard guard (priv->lock);
   if (before.width != priv->info[0].width || before.height != priv->info[0].height)
-    priv->wanted = {};
+    priv->rois.forget ();
+  std::lock_guard guard (priv->lock);
   return priv->settings;
 }
 
@@ -192,7 +192,7 @@ negotiate (GstStereoDepth *self, bool third_is_there)
       gstrange::make_info ({{priv->core.range_view ()}}, priv->info[0].fps_n, priv->info[0].fps_d);
   GstCaps *caps = gstrange::make_range_caps (info);
   priv->frame_duration = info.frame_duration ();
-  priv->since_refresh = 0;
+  priv->rois.restart ();
   drop_pool (priv->pool);
   const Status pooled = gstrange::make_pool (caps, priv->pool);
   if (pooled.ok ())
@@ -252,20 +252,13 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
 }
 
 /* GstRangeRoi comes from whatever thread pushes it downstream. */
-static gboolean
+static bool
 take_roi_event (GstStereoDepthPrivate *priv, const GstStructure *s)
 {
-  guint view_id, x, y, width, height;
-  if (!gst_structure_get (s, "view-id", G_TYPE_UINT, &view_id, "x", G_TYPE_UINT, &x, "y",
-          G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr))
-    return FALSE;
-  const guint most = rangecast::kMaxImageSide;
-  std::lock_guard guard (priv->lock);
-  if (int (view_id) != priv->settings.view_id || x > most || y > most || width > most ||
-      height > most)
-    return FALSE;
-  priv->wanted = {int (x), int (y), int (width), int (height)};
-  return TRUE;
+  std::unique_lock guard (priv->lock);
+  const int view_id = priv->settings.view_id;
+  guard.unlock ();
+  return priv->rois.take_event (s, view_id);
 }
 
 /* From the sink's thread. Not live, more than is late already is given up, or the next frame would
@@ -303,43 +296,17 @@ gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
 
 /* ---- data ---- */
 
-/* What the counter of frames since a full picture begins with. Hosts of one rig that see something
- * new all match full pictures at that moment; so that they do not go on doing so together, and keep
- * each other waiting, views count from different numbers: the golden ratio's multiples keep any
- * number of them apart. View 0 counts from 0. */
-static int
-refresh_phase (int view_id, int interval)
-{
-  constexpr double kGolden = 0.6180339887498949;
-  const double turns = std::max (view_id, 0) * kGolden;
-  return static_cast<int> ((turns - std::floor (turns)) * interval);
-}
-
 /* What to match of the pair that was taken. */
 static Roi
 next_roi (GstStereoDepthPrivate *priv)
 {
-  const View &view = priv->core.range_view ();
-  const Roi full = {0, 0, view.width, view.height};
-  Roi roi;
-  int interval;
-  {
-    std::lock_guard guard (priv->lock);
-    interval = priv->settings.refresh_interval;
-    roi = priv->wanted;
-  }
-  roi.width = std::min (roi.width, full.width - roi.x);
-  roi.height = std::min (roi.height, full.height - roi.y);
-  if (interval == 0 || roi.empty () || priv->core.changed_outside (roi)) {
-    priv->since_refresh = refresh_phase (priv->core.range_view ().id, interval);
-    return full;
-  }
-  if (++priv->since_refresh >= interval) {
-    priv->since_refresh = 0;
-    return full;
-  }
-  std::lock_guard guard (priv->lock);
-  priv->restricted_frames++;
+  std::unique_lock guard (priv->lock);
+  const int interval = priv->settings.refresh_interval;
+  guard.unlock ();
+  bool restricted = false;
+  const Roi roi = priv->rois.next (priv->core, interval, restricted);
+  guard.lock ();
+  priv->restricted_frames += restricted;
   return roi;
 }
 
@@ -630,7 +597,7 @@ static GstFlowReturn
 gst_stereo_depth_flush (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  priv->since_refresh = 0;
+  priv->rois.restart ();
   priv->core.forget ();
   forget_pair (priv);
   priv->gaps.reset ();
@@ -687,12 +654,12 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   priv->dropped_before = priv->head_start = 0;
   priv->gaps.reset ();
   priv->matcher->reset ();
+  priv->rois.forget ();
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
   priv->dropped_late = priv->match_time = 0;
   priv->earliest = GST_CLOCK_TIME_NONE;
-  priv->wanted = {};
   return TRUE;
 }
 

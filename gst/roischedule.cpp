@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "roischedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+using rangecast::Roi;
+
+bool
+RoiSchedule::take_event (const GstStructure *event, int view_id)
+{
+  guint id, x, y, width, height;
+  if (!gst_structure_get (event, "view-id", G_TYPE_UINT, &id, "x", G_TYPE_UINT, &x, "y",
+          G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr))
+    return false;
+  const guint most = rangecast::kMaxImageSide;
+  if (int (id) != view_id || x > most || y > most || width > most || height > most)
+    return false;
+  std::lock_guard guard (lock_);
+  wanted_ = {int (x), int (y), int (width), int (height)};
+  return true;
+}
+
+void
+RoiSchedule::forget ()
+{
+  std::lock_guard guard (lock_);
+  wanted_ = {};
+}
+
+/* What the counter of frames since a full picture begins with. Hosts of one rig that see something
+ * new all match full pictures at that moment; so that they do not go on doing so together, and keep
+ * each other waiting, views count from different numbers: the golden ratio's multiples keep any
+ * number of them apart. View 0 counts from 0. */
+static int
+refresh_phase (int view_id, int interval)
+{
+  constexpr double kGolden = 0.6180339887498949;
+  const double turns = std::max (view_id, 0) * kGolden;
+  return static_cast<int> ((turns - std::floor (turns)) * interval);
+}
+
+Roi
+RoiSchedule::next (rangecast::StereoDepth &core, int interval, bool &restricted)
+{
+  const rangecast::View &view = core.range_view ();
+  const Roi full = {0, 0, view.width, view.height};
+  Roi roi;
+  {
+    std::lock_guard guard (lock_);
+    roi = wanted_;
+  }
+  roi.width = std::min (roi.width, full.width - roi.x);
+  roi.height = std::min (roi.height, full.height - roi.y);
+  restricted = false;
+  if (interval == 0 || roi.empty () || core.changed_outside (roi)) {
+    since_refresh_ = refresh_phase (view.id, interval);
+    return full;
+  }
+  if (++since_refresh_ >= interval) {
+    since_refresh_ = 0;
+    return full;
+  }
+  restricted = true;
+  return roi;
+}
