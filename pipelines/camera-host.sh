@@ -21,8 +21,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --views N       number of views in the rig, for avatar (default 4)
   --size WxH      picture size, for avatar and cameras (default 320x240)
   --fps N         frames per second, for avatar, cameras and image sequences (default 15)
-  --loop N        avatar's pictures are drawn ahead: N of them, shown forwards and backwards, so that
-                  the cameras cost next to no CPU, as real ones (default 0: each is drawn)
+  --loop N        avatar's first N pictures are drawn and repeated forwards and backwards, so that the
+                  cameras then cost next to no CPU, as real ones (default 0: each is drawn)
   --format WHAT   rgb (default), bayer or grey: pictures that the cameras send
   --trigger HOW   free-run, software (default), hardware or action, for cameras
   --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
@@ -94,7 +94,8 @@ if [ -n "$clock_server" ]; then
 fi
 [ "$loop" = 0 ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 rtp_check sender
-[[ ! "$encoder" =~ adaptive-bitrate=\"?(true|1|yes|TRUE|True) ]] || rtp_adaptive=yes
+# What GStreamer takes for true.
+[[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
 send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
