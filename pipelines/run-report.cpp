@@ -62,8 +62,11 @@ write_report (RunMeasure &measure, const char *path)
       per_frame (s.raw_bytes, s.coded_frames), per_frame (s.coded_bytes, s.coded_frames),
       measure.latency_ms (0.5), measure.latency_ms (0.99), s.rtp_packets, s.rtp_lost,
       cpu_seconds ());
-  std::fclose (file);
-  return true;
+  const bool failed = std::ferror (file) != 0;
+  if (std::fclose (file) == 0 && !failed)
+    return true;
+  g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return false;
 }
 
 /* ---- the last picture ---- */

@@ -3,7 +3,8 @@
 
 #include "run-measure.hpp"
 
-/* What rangecast-run writes. Each says what went wrong, if anything did, and gives false then. */
+/* What rangecast-run writes. Each write_...() says what went wrong, if anything did, and gives
+ * false then. */
 
 /** Prints a line: frames, rate, points, latency. */
 void print_progress (RunMeasure &measure);
@@ -12,7 +13,7 @@ bool write_report (RunMeasure &measure, const char *path);
 /** Writes the last picture of the sink named "snapshot" as a PNG. */
 bool write_snapshot (GstElement *pipeline, const char *path);
 /** Appends a line: seconds, KiB that the process holds of its heap, without what the allocator
- * keeps of what was given back. */
+ *  keeps of what was given back. */
 void log_memory (const char *path);
 /** Writes the names of the process's threads but for the first; those that end by themselves get a
  *  second for it. */
