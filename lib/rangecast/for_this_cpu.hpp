@@ -18,7 +18,8 @@ run_for_avx2 (const Work &work)
 
 /** Calls work (), in a version made for the processor that runs it: loops over pixels that the
  *  compiler makes vectors of get wider ones. Multiplication and addition stay apart in all versions
- *  (none has fused ones), so results are the same bit by bit. */
+ *  (meson.build says -ffp-contract=off, for builds that have fused ones), so results are the same
+ *  bit by bit. */
 template <typename Work>
 void
 for_this_cpu (const Work &work)
