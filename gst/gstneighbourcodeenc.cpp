@@ -644,6 +644,29 @@ gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
 }
 
 static void
+install_results (GObjectClass *object_class)
+{
+  const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
+      g_param_spec_double ("max-depth-error", "Maximum depth error",
+          "Metres by which a decoded depth differs from the one that came in at most, of any view, "
+          "with the settings of the latest frame set; 0 before the first",
+          0, G_MAXDOUBLE, 0, readable));
+  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
+      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
+          "Bits per second that receivers let the encoder have with adaptive-bitrate; 0: not known "
+          "(0 to 18446744073709551615, default 0)",
+          0, G_MAXUINT64, 0, readable));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, left-out, points, full-pixels, slices, delta-slices, "
+          "raw-bytes, coded-bytes; bitrate over the last 2 s; depth-threshold, colour-threshold of "
+          "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
+          "receiver-loss, receiver-queue",
+          GST_TYPE_STRUCTURE, readable));
+}
+
+static void
 install_properties (GObjectClass *object_class)
 {
   /* Those with which tables, references or threads begin anew are none for a controller, which may
@@ -651,7 +674,6 @@ install_properties (GObjectClass *object_class)
   const auto live =
       GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
   const auto steered = GParamFlags (live | GST_PARAM_CONTROLLABLE);
-  const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
   const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
                                int minimum, int maximum, int fallback, GParamFlags flags) {
     g_object_class_install_property (
@@ -715,23 +737,6 @@ install_properties (GObjectClass *object_class)
       "Pieces coded at the same time, of one view or of several; bytes do not depend on it (0 to "
       "64, default 0: as many as there are cores)",
       0, 64, 0, live);
-  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
-      g_param_spec_double ("max-depth-error", "Maximum depth error",
-          "Metres by which a decoded depth differs from the one that came in at most, of any view, "
-          "with the settings of the latest frame set; 0 before the first",
-          0, G_MAXDOUBLE, 0, readable));
-  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
-      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
-          "Bits per second that receivers let the encoder have with adaptive-bitrate; 0: not known "
-          "(0 to 18446744073709551615, default 0)",
-          0, G_MAXUINT64, 0, readable));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, left-out, points, full-pixels, slices, delta-slices, "
-          "raw-bytes, coded-bytes; bitrate over the last 2 s; depth-threshold, colour-threshold of "
-          "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
-          "receiver-loss, receiver-queue",
-          GST_TYPE_STRUCTURE, readable));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 }
 
@@ -746,6 +751,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   object_class->get_property = gst_neighbour_code_enc_get_property;
   object_class->finalize = gst_neighbour_code_enc_finalize;
   install_properties (object_class);
+  install_results (object_class);
   NeighbourCodeRateSettings::install (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

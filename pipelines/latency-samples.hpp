@@ -8,8 +8,9 @@
 #include <vector>
 
 /** Latencies of a run of any length, in bounded memory: all of them up to kMost, then as many,
- * chosen so that each one of the run is among them with the same probability (J. S. Vitter, "Random
- *  sampling with a reservoir", 1985, algorithm R). Half an hour at 30/s is exact. No locks. */
+ *  chosen so that each one of the run is among them with the same probability (J. S. Vitter,
+ *  "Random sampling with a reservoir", 1985, algorithm R). Half an hour at 30/s is exact. No
+ *  locks. */
 class LatencySamples {
 public:
   static constexpr std::size_t kMost = 65536;

@@ -12,7 +12,7 @@
 /** Notes when each buffer passes each source pad of a pipeline (and the sinks' pads), so that
  *  tests/bench/latency-budget.py can tell where the time goes. Costs about a microsecond a buffer
  *  and pad. Of a long run the first kMostPassages are kept: some 200 MB, ten minutes of four views
- * at 30/s; write() says so. */
+ *  at 30/s; write() says so. */
 class LatencyTrace {
 public:
   static constexpr std::size_t kMostPassages = 4000000;

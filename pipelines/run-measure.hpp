@@ -19,12 +19,11 @@ struct StreamStats {
 };
 
 /** Measures a pipeline by its elements named "rendered", "decoder" and "cylinder", by probes on
- * their source pads and by their statistics, and turns the one named "view". Memory does not grow.
- */
+ *  their source pads and by their statistics, and turns the one named "view". Its memory does not
+ *  grow. */
 class RunMeasure {
 public:
-  /** @param on_last  called on a streaming thread once the frames that were asked for have passed
-   */
+  /** @param on_last  called on a streaming thread once the frames asked for have passed */
   RunMeasure (GstElement *pipeline, const RunOptions &options, std::function<void ()> on_last);
   ~RunMeasure ();
   RunMeasure (const RunMeasure &) = delete;

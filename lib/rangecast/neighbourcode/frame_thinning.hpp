@@ -17,10 +17,9 @@ struct ThinningInput {
 /** Leaves out whole frame sets where the worst quality still takes more than there is: one of n is
  *  kept, evenly. Which ones goes by their time alone, so that encoders on hosts whose clocks agree
  *  keep the same ones. n rises within a quarter of a second, and falls where for two seconds there
- *  was a fifth more than it takes. Where frame sets come
- *  twice as fast or half as fast as the stream says, or more so, that whole multiple counts; one
- * that comes with gaps still goes by what the stream says, and keeps what others keep. Nothing is
- * allocated. */
+ *  was a fifth more than it takes. Where frame sets come twice as fast or half as fast as the
+ *  stream says, or more so, that whole multiple counts; one that comes with gaps still goes by what
+ *  the stream says, and keeps what others keep. Nothing is allocated. */
 class FrameThinning {
 public:
   void reset () { *this = FrameThinning (); }
