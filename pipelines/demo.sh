@@ -82,7 +82,7 @@ case "$input" in
   avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
   *) input=$(absolute "$input") ;;
 esac
-mkdir -p "$out/log" || die "--out: cannot make '$out'"
+mkdir -p "$out/log" 2>/dev/null || die "--out: cannot make '$out'"
 
 pids=()
 stop_hosts () {

@@ -33,6 +33,7 @@ rtp_option () {
         need_number "$3" --fec 1 100
         rtp_fec=$3
       else
+        [[ ! "$3" =~ ^[0-9]+$ ]] || die "--fec: takes no number here: the sender's counts"
         rtp_fec=yes taken=1
       fi ;;
     --mtu)

@@ -56,7 +56,7 @@ if [ -n "$window" ]; then
   sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink sync=false)
 fi
 if [ -n "$out" ]; then
-  mkdir -p "$out"
+  mkdir -p "$out" 2>/dev/null || die "--out: cannot make '$out'"
   sinks+=(picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8 target-bitrate=2000000
     keyframe-max-dist=60 ! webmmux ! filesink "location=$out/avatar.webm")
 fi
