@@ -37,11 +37,10 @@ struct Probation {
     stranger.packet.sequence++;
     stranger.packet.time = time;
     GstBuffer *buffer = gst_buffer_new ();
-    std::vector<GstBuffer *> stream;
+    SenderProbation::Stream stream;
     const bool is_sender = probation.add (stranger.packet, buffer, stream);
     passed += int (stream.size ());
-    for (GstBuffer *held : stream)
-      gst_buffer_unref (held);
+    stream.unref ();
     gst_buffer_unref (buffer);
     return is_sender;
   }
