@@ -73,7 +73,7 @@ RtcpReader::next (RtcpPacket &packet)
   constexpr guint kVersion = 2;
   if (rest_.size () < kHeader || rest_[0] >> 6 != kVersion)
     return false;
-  const std::size_t size = kHeader + 4 * std::size_t (GST_READ_UINT16_BE (rest_.data () + 2));
+  const std::size_t size = kHeader + 4u * (rest_[2] << 8 | rest_[3]);
   if (size > rest_.size () || (first_ && (rest_[1] & 0xf8) != GST_RTCP_TYPE_SR)) /* 200 to 207 */
     return false;
   packet.type = rest_[1];
@@ -115,7 +115,7 @@ take_sdes_chunk (Bytes &chunks, guint32 &ssrc)
       return false;
     at += kItem + chunks[at + 1];
   }
-  ssrc = GST_READ_UINT32_BE (chunks.data ());
+  ssrc = RtcpPacket{.body = chunks}.word (0);
   chunks = chunks.subspan (std::min (at / 4 * 4 + 4, chunks.size ()));
   return true;
 }

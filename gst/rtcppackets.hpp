@@ -14,7 +14,8 @@ struct RtcpPacket {
   /** The n-th 32 bits of the body, which are there. */
   [[nodiscard]] guint32 word (std::size_t n) const
   {
-    return GST_READ_UINT32_BE (body.data () + 4 * n);
+    const auto bytes = body.subspan (4 * n, 4); /* anywhere in memory */
+    return guint32 (bytes[0]) << 24 | guint32 (bytes[1]) << 16 | guint32 (bytes[2]) << 8 | bytes[3];
   }
 };
 
