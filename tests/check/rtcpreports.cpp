@@ -4,36 +4,12 @@
 #include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
 
-#include <cstdlib>
-#include <cstring>
-#include <new>
 #include <string>
 
 #include "../fuzz/guarded_bytes.hpp"
+#include "failing-memory.hpp"
 
-/* Memory that C++ takes in this program and in the plugin. */
-static std::size_t allocations = 0;
-
-void *
-operator new (std::size_t size)
-{
-  allocations++;
-  if (void *memory = std::malloc (size))
-    return memory;
-  throw std::bad_alloc ();
-}
-
-void
-operator delete (void *memory) noexcept
-{
-  std::free (memory);
-}
-
-void
-operator delete (void *memory, std::size_t) noexcept
-{
-  std::free (memory);
-}
+using namespace rangecast::testing;
 
 static constexpr guint32 kSender = 0x1234, kReceiver = 0x77;
 
@@ -520,13 +496,15 @@ about (guint32 stream, guint32 receiver)
 
 GST_START_TEST (test_a_flood_of_receivers_takes_no_memory)
 {
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
   Session session;
   session.push_rtp ();
   g_object_set (session.element, "max-receivers", 4096, nullptr);
-  const std::size_t before = allocations;
+  allocations_left = 0; /* else std::bad_alloc would cross the chain function */
   for (guint32 i = 0; i < 5000; i++)
     session.offer (about (kSender, 1000 + i), 0, nullptr);
-  fail_unless_equals_uint64 (allocations - before, 0);
+  allocations_left = INT_MAX;
   fail_unless_equals_uint64 (session.stat ("receivers"), 4096);
 }
 GST_END_TEST;
