@@ -27,7 +27,10 @@
 
 #include <mutex>
 #include <optional>
+#include <span>
 
+#include "netarrival.hpp"
+#include "rtcppackets.hpp"
 #include "rtcpreceivers.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtcp_reports_debug);
@@ -89,55 +92,40 @@ struct Compound {
 
 /* RFC 5104, 4.3.1: full intra requests name their streams apart. */
 static bool
-asks_full_picture (GstRTCPPacket *packet, guint32 ssrc)
+asks_full_picture (const RtcpPacket &packet, guint32 ssrc)
 {
-  const guint8 *fci = gst_rtcp_packet_fb_get_fci (packet);
-  const guint words = gst_rtcp_packet_fb_get_fci_length (packet);
-  for (guint i = 0; i + 1 < words; i += 2)
-    if (GST_READ_UINT32_BE (fci + 4 * i) == ssrc)
+  if (packet.type != GST_RTCP_TYPE_PSFB || packet.count != GST_RTCP_PSFB_TYPE_FIR)
+    return false;
+  for (std::size_t i = 2; i + 1 < packet.body.size () / 4; i += 2)
+    if (packet.word (i) == ssrc)
       return true;
   return false;
 }
 
 static void
-read_blocks (GstRTCPPacket *packet, guint32 ssrc, Compound &compound)
+read_speaker (const RtcpPacket &packet, guint32 ssrc, Compound &compound)
 {
-  for (guint i = 0; i < gst_rtcp_packet_get_rb_count (packet); i++) {
-    guint32 stream = 0;
-    gst_rtcp_packet_get_rb (
-        packet, i, &stream, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
-    compound.reports |= stream == ssrc;
-  }
-}
-
-static void
-read_speaker (GstRTCPPacket *packet, guint32 ssrc, Compound &compound)
-{
-  guint32 sender = 0;
-  switch (gst_rtcp_packet_get_type (packet)) {
+  std::span<const guint8> chunks = packet.body;
+  guint32 speaker = 0;
+  switch (packet.type) {
     case GST_RTCP_TYPE_RR:
-      compound.speaks (gst_rtcp_packet_rr_get_ssrc (packet));
-      return read_blocks (packet, ssrc, compound);
     case GST_RTCP_TYPE_SR:
-      gst_rtcp_packet_sr_get_sender_info (packet, &sender, nullptr, nullptr, nullptr, nullptr);
-      compound.speaks (sender);
-      return read_blocks (packet, ssrc, compound);
+      compound.speaks (packet.word (0));
+      for (guint i = 0; i < count_report_blocks (packet); i++)
+        compound.reports |= read_report_block (packet, i).stream == ssrc;
+      return;
     case GST_RTCP_TYPE_SDES:
-      for (gboolean more = gst_rtcp_packet_sdes_first_item (packet); more;
-           more = gst_rtcp_packet_sdes_next_item (packet))
-        compound.speaks (gst_rtcp_packet_sdes_get_ssrc (packet));
+      for (guint i = 0; i < packet.count && take_sdes_chunk (chunks, speaker); i++)
+        compound.speaks (speaker);
       return;
     case GST_RTCP_TYPE_BYE:
-      for (guint i = 0; i < gst_rtcp_packet_bye_get_ssrc_count (packet); i++)
-        compound.speaks (gst_rtcp_packet_bye_get_nth_ssrc (packet, i));
+      for (guint i = 0; i < packet.count; i++)
+        compound.speaks (packet.word (i));
       return;
     case GST_RTCP_TYPE_RTPFB:
     case GST_RTCP_TYPE_PSFB:
-      compound.asker = gst_rtcp_packet_fb_get_sender_ssrc (packet);
-      compound.reports |= gst_rtcp_packet_fb_get_media_ssrc (packet) == ssrc ||
-                          (gst_rtcp_packet_get_type (packet) == GST_RTCP_TYPE_PSFB &&
-                              gst_rtcp_packet_fb_get_type (packet) == GST_RTCP_PSFB_TYPE_FIR &&
-                              asks_full_picture (packet, ssrc));
+      compound.asker = packet.word (0);
+      compound.reports |= packet.word (1) == ssrc || asks_full_picture (packet, ssrc);
       return;
     default:
       return;
@@ -145,51 +133,37 @@ read_speaker (GstRTCPPacket *packet, guint32 ssrc, Compound &compound)
 }
 
 static Compound
-read_compound (GstRTCPBuffer *rtcp, guint32 ssrc)
+read_compound (std::span<const guint8> rtcp, guint32 ssrc)
 {
   Compound compound;
-  GstRTCPPacket packet;
-  for (gboolean more = gst_rtcp_buffer_get_first_packet (rtcp, &packet); more;
-       more = gst_rtcp_packet_move_to_next (&packet))
-    read_speaker (&packet, ssrc, compound);
+  RtcpReader reader (rtcp);
+  for (RtcpPacket packet; reader.next (packet);)
+    read_speaker (packet, ssrc, compound);
   return compound;
-}
-
-static GstClockTime
-time_of (GstBuffer *buffer)
-{
-  const GstClockTime time = GST_BUFFER_DTS_OR_PTS (buffer);
-  return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
 }
 
 /* @return nullptr: it is no receiver of ours */
 static RtcpReceivers::Receiver *
-admit (GstRtcpReportsPrivate *priv, GstBuffer *buffer, const Compound &compound, guint32 ssrc,
-    guint most)
+admit (GstRtcpReports *self, GstBuffer *buffer, const Compound &compound, guint32 ssrc, guint most)
 {
   const auto speaker = compound.speaker ? compound.speaker : compound.asker;
   if (!speaker || compound.of_several || *speaker == ssrc) /* our own: looped, or forged */
     return nullptr;
   const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer);
-  return priv->known.admit (
-      *speaker, meta ? meta->addr : nullptr, compound.reports, time_of (buffer), most);
+  return self->priv->known.admit (*speaker, meta ? meta->addr : nullptr, compound.reports,
+      arrival_time (GST_ELEMENT (self), buffer), most);
 }
 
 /* ---- reports ---- */
 
-struct ReportBlock {
-  guint32 sender = 0, highest = 0, jitter = 0, last_sr = 0, delay = 0;
-  guint8 fraction_lost = 0;
-};
-
 /* Packets since the receiver's last report; 0: not known. */
 static guint32
-count_packets (RtcpReceivers::Receiver &receiver, const ReportBlock &block)
+count_packets (RtcpReceivers::Receiver &receiver, const RtcpReportBlock &block)
 {
-  const bool is_new = !receiver.has_reported || receiver.stream != block.sender;
+  const bool is_new = !receiver.has_reported || receiver.stream != block.stream;
   const guint32 packets = is_new ? 0 : block.highest - receiver.highest;
   receiver.has_reported = true;
-  receiver.stream = block.sender;
+  receiver.stream = block.stream;
   receiver.highest = block.highest;
   return packets < (1u << 24) ? packets : 0;
 }
@@ -198,7 +172,7 @@ count_packets (RtcpReceivers::Receiver &receiver, const ReportBlock &block)
  * report went, all in units of 1/65536 s of NTP time, which rtpsession takes from the clock of the
  * day (ntp-time-source=ntp). 0 where that makes no sense. */
 static GstClockTime
-round_trip_time (const ReportBlock &block)
+round_trip_time (const RtcpReportBlock &block)
 {
   if (block.last_sr == 0)
     return 0;
@@ -210,7 +184,7 @@ round_trip_time (const ReportBlock &block)
 }
 
 static void
-send_report (GstRtcpReports *self, RtcpReceivers::Receiver &receiver, const ReportBlock &block,
+send_report (GstRtcpReports *self, RtcpReceivers::Receiver &receiver, const RtcpReportBlock &block,
     guint clock_rate)
 {
   GstStructure *report = gst_structure_new ("RangecastReceiverReport", "ssrc", G_TYPE_UINT,
@@ -223,24 +197,16 @@ send_report (GstRtcpReports *self, RtcpReceivers::Receiver &receiver, const Repo
 }
 
 static void
-send_reports (GstRtcpReports *self, GstRTCPBuffer *rtcp, RtcpReceivers::Receiver &receiver,
+send_reports (GstRtcpReports *self, std::span<const guint8> rtcp, RtcpReceivers::Receiver &receiver,
     const Stream &stream)
 {
-  GstRTCPPacket packet;
-  for (gboolean more = gst_rtcp_buffer_get_first_packet (rtcp, &packet); more;
-       more = gst_rtcp_packet_move_to_next (&packet)) {
-    const GstRTCPType type = gst_rtcp_packet_get_type (&packet);
-    if (type != GST_RTCP_TYPE_RR && type != GST_RTCP_TYPE_SR)
-      continue;
-    for (guint i = 0; i < gst_rtcp_packet_get_rb_count (&packet); i++) {
-      ReportBlock block;
-      gint32 lost_ever = 0;
-      gst_rtcp_packet_get_rb (&packet, i, &block.sender, &block.fraction_lost, &lost_ever,
-          &block.highest, &block.jitter, &block.last_sr, &block.delay);
-      if (block.sender == stream.ssrc)
+  RtcpReader reader (rtcp);
+  for (RtcpPacket packet; reader.next (packet);)
+    for (guint i = 0; i < count_report_blocks (packet); i++) {
+      const RtcpReportBlock block = read_report_block (packet, i);
+      if (block.stream == stream.ssrc)
         send_report (self, receiver, block, stream.clock_rate);
     }
-  }
 }
 
 static GstFlowReturn
@@ -256,16 +222,17 @@ gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
     if (priv->ssrc)
       stream = {*priv->ssrc, guint (priv->clock_rate)};
   }
-  GstRTCPBuffer rtcp = GST_RTCP_BUFFER_INIT;
+  GstMapInfo map = GST_MAP_INFO_INIT;
+  const bool mapped = gst_buffer_map (buffer, &map, GST_MAP_READ);
+  const std::span<const guint8> rtcp (map.data, map.size);
+  const bool sound = RtcpReader::is_sound (rtcp);
   RtcpReceivers::Receiver *receiver = nullptr;
-  const bool sound = gst_rtcp_buffer_validate_reduced (buffer) &&
-                     gst_rtcp_buffer_map (buffer, GST_MAP_READ, &rtcp);
   if (sound && stream)
-    receiver = admit (priv, buffer, read_compound (&rtcp, stream->ssrc), stream->ssrc, most);
+    receiver = admit (self, buffer, read_compound (rtcp, stream->ssrc), stream->ssrc, most);
   if (receiver)
-    send_reports (self, &rtcp, *receiver, *stream);
-  if (sound)
-    gst_rtcp_buffer_unmap (&rtcp);
+    send_reports (self, rtcp, *receiver, *stream);
+  if (mapped)
+    gst_buffer_unmap (buffer, &map);
   {
     std::lock_guard guard (priv->lock);
     priv->receivers = priv->known.size ();
@@ -438,7 +405,7 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
       g_param_spec_uint ("max-receivers", "Max receivers",
           "RTCP of so many receivers gets through at a time, and of a quarter of them from one "
           "address, 1 to 4096 (default 256)",
-          1, 4096, RtcpReceivers::kDefaultMost,
+          1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",

@@ -25,14 +25,13 @@
 #include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
 
-#include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <rangecast/neighbourcode/unit.hpp>
 #include <span>
-#include <string>
-#include <vector>
 
+#include "netarrival.hpp"
 #include "senderfilter.hpp"
 #include "senderprobation.hpp"
 #include "senderrivals.hpp"
@@ -93,11 +92,9 @@ GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST
 
 /* ---- packets ---- */
 
-/* The version of the neighbour code if the bytes are its units from the first to the last, with a
- * slice or a view of the rig among them: what no other codec's are, nor a FEC packet's. 0 if they
- * are not. */
+/* As version_of_units(), but that there may be no memory for what is wrong. */
 static int
-version_of_units (std::span<const guint8> payload)
+read_units (std::span<const guint8> payload)
 {
   using namespace rangecast;
   UnitReader reader (payload);
@@ -125,6 +122,19 @@ version_of_units (std::span<const guint8> payload)
     payload = payload.subspan (size);
   }
   return payload.empty () ? version : 0;
+}
+
+/* The version of the neighbour code if the bytes are its units from the first to the last, with a
+ * slice or a view of the rig among them: what no other codec's are, nor a FEC packet's. 0 if they
+ * are not. */
+static int
+version_of_units (std::span<const guint8> payload) noexcept
+{
+  try {
+    return read_units (payload);
+  } catch (const std::bad_alloc &) { /* the text of a Status */
+    return 0;
+  }
 }
 
 /* What of a packet the guard looks at. */
@@ -228,13 +238,6 @@ push_caps (GstRtpNeighbourCodeGuard *self)
   gst_caps_unref (caps);
 }
 
-static GstClockTime
-time_of (GstBuffer *buffer)
-{
-  const GstClockTime time = GST_BUFFER_DTS_OR_PTS (buffer);
-  return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
-}
-
 enum class Verdict { kPasses, kPassesAsFirst, kForeign, kUnsound, kRival, kOtherVersion };
 
 /* Under the lock: a packet of the sender, or one that was lost and comes again.
@@ -297,7 +300,7 @@ judge_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packe
 /* Under the lock. @param[out] stream  the packets that pass with kPassesAsFirst */
 static Verdict
 judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
-    GstBuffer *buffer, std::vector<GstBuffer *> &stream)
+    GstBuffer *buffer, SenderProbation::Stream &stream)
 {
   /* What rtprtxreceive put together again has no address; what comes from the network has. */
   const bool here = !packet.address || same_sender (packet.address, priv->address);
@@ -334,7 +337,7 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
 
 /* What came of the sender so far, in order; `stream` is empty afterwards. */
 static GstFlowReturn
-push_first (GstRtpNeighbourCodeGuard *self, std::vector<GstBuffer *> &stream)
+push_first (GstRtpNeighbourCodeGuard *self, SenderProbation::Stream &stream)
 {
   GST_INFO_OBJECT (self, "SSRC %08x passes", *self->priv->ssrc);
   start_filter (self);
@@ -353,19 +356,30 @@ push_first (GstRtpNeighbourCodeGuard *self, std::vector<GstBuffer *> &stream)
     first = false;
     flow = gst_pad_push (self->srcpad, buffer);
   }
-  stream.clear ();
+  stream.forget ();
   return flow;
 }
 
-static std::string
+/* (transfer full) */
+static gchar *
 text_of (GSocketAddress *address)
 {
-  if (!G_IS_INET_SOCKET_ADDRESS (address))
-    return "somewhere";
-  gchar *text = g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address));
-  const std::string copy = text;
-  g_free (text);
-  return copy;
+  return G_IS_INET_SOCKET_ADDRESS (address)
+             ? g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address))
+             : g_strdup ("somewhere");
+}
+
+static void
+warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
+{
+  gchar *rival = text_of (packet.address), *sender = text_of (self->priv->address);
+  GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
+      ("Two senders at one port: packets of SSRC %08x from %s are dropped, expected those of "
+       "%08x from %s",
+          packet.ssrc, rival, *self->priv->ssrc, sender),
+      (nullptr));
+  g_free (sender);
+  g_free (rival);
 }
 
 static void
@@ -378,18 +392,12 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
             unsound, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
-    GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-        ("Two senders at one port: packets of SSRC %08x from %s are dropped, expected those of "
-         "%08x from %s",
-            packet.ssrc, text_of (packet.address).c_str (), *self->priv->ssrc,
-            text_of (self->priv->address).c_str ()),
-        (nullptr));
+    warn_of_rival (self, packet);
   if (verdict == Verdict::kOtherVersion)
-    gst_range_post_warning (GST_ELEMENT (self),
-        {rangecast::StatusCode::kUnsupported,
-            "A sender's packets are of version " + std::to_string (packet.version) +
-                " of the neighbour code: dropped; expected version " +
-                std::to_string (rangecast::kBitstreamVersion)});
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("A sender's packets are of version %d of the neighbour code: dropped; expected version %d",
+            packet.version, rangecast::kBitstreamVersion),
+        (nullptr));
 }
 
 static GstFlowReturn
@@ -399,11 +407,12 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
   const Packet packet = read_packet (buffer);
   Verdict verdict = Verdict::kForeign;
-  std::vector<GstBuffer *> stream; /* empty, and so without memory, but when a sender begins */
+  SenderProbation::Stream stream; /* empty but when a sender begins */
+  const GstClockTime now = arrival_time (GST_ELEMENT (self), buffer);
   guint64 unsound = 0;
   {
     std::lock_guard guard (priv->lock);
-    verdict = judge (priv, packet, time_of (buffer), buffer, stream);
+    verdict = judge (priv, packet, now, buffer, stream);
     unsound = priv->unsound;
     priv->counters.passed += verdict == Verdict::kPasses          ? 1
                              : verdict == Verdict::kPassesAsFirst ? stream.size ()
@@ -420,8 +429,7 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
     return push_first (self, stream);
   }
   warn_of (self, verdict, packet, unsound);
-  for (GstBuffer *held : stream)
-    gst_buffer_unref (held);
+  stream.unref ();
   gst_buffer_unref (buffer);
   return GST_FLOW_OK;
 }

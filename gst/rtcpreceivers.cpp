@@ -3,19 +3,7 @@
 
 #include <algorithm>
 
-static GInetAddress *
-host_of (GSocketAddress *address)
-{
-  return address && G_IS_INET_SOCKET_ADDRESS (address)
-             ? g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (address))
-             : nullptr;
-}
-
-static bool
-same_host (GInetAddress *a, GInetAddress *b)
-{
-  return a == b || (a && b && g_inet_address_equal (a, b));
-}
+#include "netarrival.hpp"
 
 void
 RtcpReceivers::clear ()
@@ -45,7 +33,7 @@ RtcpReceivers::forget (GstClockTime now)
 bool
 RtcpReceivers::has_room (GInetAddress *host, guint most) const
 {
-  if (size () >= most)
+  if (size () >= std::min (most, kMost))
     return false;
   const auto neighbours = std::ranges::count_if (
       receivers_, [host] (const Receiver &receiver) { return same_host (receiver.host, host); });

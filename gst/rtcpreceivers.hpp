@@ -14,7 +14,7 @@
  *  silent for kForgotten makes room. */
 class RtcpReceivers {
 public:
-  static constexpr guint kDefaultMost = 256;
+  static constexpr guint kMost = 4096, kDefaultMost = 256;
   static constexpr GstClockTime kForgotten = 30 * GST_SECOND;
 
   struct Receiver {
@@ -26,7 +26,8 @@ public:
     bool has_reported = false;
   };
 
-  RtcpReceivers () = default;
+  /** Takes memory for kMost; none is taken later, while packets come. */
+  RtcpReceivers () { receivers_.reserve (kMost); }
   ~RtcpReceivers () { clear (); }
   RtcpReceivers (const RtcpReceivers &) = delete;
 

@@ -4,34 +4,36 @@
 #include <algorithm>
 #include <tuple>
 
+#include "netarrival.hpp"
+
+/* Whatever the ports. Unknown ones are nobody's. */
+static bool
+share_host (GSocketAddress *a, GSocketAddress *b)
+{
+  return host_of (a) && same_host (host_of (a), host_of (b));
+}
+
 bool
 same_sender (GSocketAddress *a, GSocketAddress *b)
 {
   if (a == b)
     return true;
-  if (!G_IS_INET_SOCKET_ADDRESS (a) || !G_IS_INET_SOCKET_ADDRESS (b))
-    return false;
-  auto x = G_INET_SOCKET_ADDRESS (a), y = G_INET_SOCKET_ADDRESS (b);
-  return g_inet_socket_address_get_port (x) == g_inet_socket_address_get_port (y) &&
-         g_inet_address_equal (
-             g_inet_socket_address_get_address (x), g_inet_socket_address_get_address (y));
+  return share_host (a, b) && g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (a)) ==
+                                  g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (b));
 }
 
-/* Whatever the ports. Unknown ones are nobody's. */
-static bool
-same_host (GSocketAddress *a, GSocketAddress *b)
+void
+SenderProbation::Stream::unref ()
 {
-  return G_IS_INET_SOCKET_ADDRESS (a) && G_IS_INET_SOCKET_ADDRESS (b) &&
-         g_inet_address_equal (g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (a)),
-             g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (b)));
+  for (GstBuffer *packet : *this)
+    gst_buffer_unref (packet);
+  forget ();
 }
 
 void
 SenderProbation::Candidate::clear ()
 {
-  for (GstBuffer *buffer : packets)
-    gst_buffer_unref (buffer);
-  packets.clear ();
+  packets.unref ();
   g_clear_object (&address);
   used = 0;
 }
@@ -47,7 +49,7 @@ SenderProbation::Candidate &
 SenderProbation::make_room (const Packet &packet)
 {
   const auto theirs = [&] (const Candidate &c) {
-    return c.used > 0 && same_host (c.address, packet.address);
+    return c.used > 0 && share_host (c.address, packet.address);
   };
   const bool only_theirs = std::ranges::count_if (candidates_, theirs) >= kPerHost;
   return *std::ranges::min_element (candidates_, {}, [&] (const Candidate &c) {
@@ -75,23 +77,21 @@ SenderProbation::find (const Packet &packet)
 }
 
 bool
-SenderProbation::add (const Packet &packet, GstBuffer *buffer, std::vector<GstBuffer *> &stream)
+SenderProbation::add (const Packet &packet, GstBuffer *buffer, Stream &stream)
 {
   Candidate &c = find (packet);
   c.used = ++uses_;
   c.heard = packet.time;
   if (!c.packets.empty () && packet.sequence == c.sequence)
     return false; /* the network doubled it */
-  if (!c.packets.empty () && packet.sequence != guint16 (c.sequence + 1)) {
-    for (GstBuffer *old : c.packets)
-      gst_buffer_unref (old);
-    c.packets.clear ();
-  }
-  c.packets.push_back (gst_buffer_ref (buffer));
+  if (!c.packets.empty () && packet.sequence != guint16 (c.sequence + 1))
+    c.packets.unref ();
+  c.packets.push (gst_buffer_ref (buffer));
   c.sequence = packet.sequence;
   if (c.packets.size () < kPackets)
     return false;
-  stream.swap (c.packets);
+  stream = c.packets;
+  c.packets.forget ();
   c.clear ();
   return true;
 }

@@ -5,7 +5,6 @@
 #include <gst/gst.h>
 
 #include <array>
-#include <vector>
 
 /** Whether both are the same address and port; unknown ones (null) are the same. */
 bool same_sender (GSocketAddress *a, GSocketAddress *b);
@@ -32,6 +31,25 @@ public:
     GstClockTime time;
   };
 
+  /** Packets in order, a reference of each. Whoever takes them unrefs them: it has no destructor.
+   */
+  class Stream {
+  public:
+    [[nodiscard]] std::size_t size () const { return size_; }
+    [[nodiscard]] bool empty () const { return size_ == 0; }
+    GstBuffer **begin () { return packets_.data (); }
+    GstBuffer **end () { return begin () + size_; }
+    /** There are fewer than kPackets. */
+    void push (GstBuffer *packet) { packets_[size_++] = packet; }
+    /** They are somebody else's now. */
+    void forget () { size_ = 0; }
+    void unref ();
+
+  private:
+    std::array<GstBuffer *, kPackets> packets_;
+    std::size_t size_ = 0;
+  };
+
   SenderProbation () = default;
   ~SenderProbation () { clear (); }
   SenderProbation (const SenderProbation &) = delete;
@@ -41,7 +59,7 @@ public:
    *  @param buffer  (transfer none)
    *  @param[out] stream  its packets so far, this one included, once it has passed: (transfer full)
    *  @return whether it has */
-  bool add (const Packet &packet, GstBuffer *buffer, std::vector<GstBuffer *> &stream);
+  bool add (const Packet &packet, GstBuffer *buffer, Stream &stream);
 
 private:
   struct Candidate {
@@ -51,7 +69,7 @@ private:
     int version = 0;
     GstClockTime heard = 0;
     guint64 used = 0; /* 0: nobody */
-    std::vector<GstBuffer *> packets;
+    Stream packets;
 
     void clear ();
   };

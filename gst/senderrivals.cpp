@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "senderrivals.hpp"
 
+#include <algorithm>
+
 void
 SenderRivals::clear ()
 {
@@ -9,32 +11,51 @@ SenderRivals::clear ()
   told_ = false;
 }
 
+static bool
+is_stale (GstClockTime since, GstClockTime now)
+{
+  return now < since || now - since >= SenderRivals::kStale;
+}
+
 /* @return whether the one that is looked at is a rival */
 bool
 SenderRivals::look (const SenderProbation::Packet &packet, GstClockTime sender_time)
 {
-  const bool same = packets_ > 0 && packet.ssrc == ssrc_ && packet.version == version_ &&
-                    same_sender (packet.address, address_);
-  if (!same && packets_ > 0 && packet.time >= heard_ && packet.time - heard_ < kStale)
+  const bool stale = packets_ == 0 || is_stale (heard_, packet.time);
+  const bool same =
+      packet.ssrc == ssrc_ && packet.version == version_ && same_sender (packet.address, address_);
+  if (!stale && !same)
     return false;
-  if (!same) {
+  if (stale) {
     g_set_object (&address_, packet.address);
     ssrc_ = packet.ssrc;
     version_ = packet.version;
     since_ = packet.time;
     packets_ = 0;
   }
-  packets_++;
+  packets_ = std::min (packets_ + 1, kPackets);
   heard_ = packet.time;
   /* The sender's own time: who comes because it is gone is no rival. */
-  return packets_ >= kPackets && sender_time >= since_ && sender_time - since_ >= kBeside;
+  return packets_ == kPackets && sender_time >= since_ && sender_time - since_ >= kBeside;
+}
+
+/* @return whether those of all together are rivals */
+bool
+SenderRivals::count (GstClockTime now)
+{
+  if (total_ == 0 || is_stale (all_since_, now)) {
+    all_since_ = now;
+    total_ = 0;
+  }
+  total_ = std::min (total_ + 1, kTotal);
+  return total_ == kTotal;
 }
 
 bool
 SenderRivals::add (const SenderProbation::Packet &packet, GstClockTime sender_time)
 {
-  const bool tell = look (packet, sender_time) || ++total_ >= kTotal;
-  const bool first = tell && !told_;
-  told_ |= tell;
+  const bool one = look (packet, sender_time), all = count (packet.time);
+  const bool first = (one || all) && !told_;
+  told_ |= first;
   return first;
 }

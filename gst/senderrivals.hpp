@@ -10,7 +10,7 @@ public:
   static constexpr guint kPackets = 4; ///< of one rival, if he has been there beside the sender ...
   static constexpr GstClockTime kBeside = 2 * GST_SECOND; ///< ... for so long
   static constexpr GstClockTime kStale = 10 * GST_SECOND; ///< then another one may be looked at
-  static constexpr guint kTotal = 100;                    ///< or so many of all, however fast
+  static constexpr guint kTotal = 100;                    ///< or so many of all within kStale
 
   SenderRivals () = default;
   ~SenderRivals () { clear (); }
@@ -28,12 +28,15 @@ public:
   }
 
 private:
+  bool look (const SenderProbation::Packet &packet, GstClockTime sender_time);
+  bool count (GstClockTime now);
+
   GSocketAddress *address_ = nullptr; /* a reference */
   guint32 ssrc_ = 0;
   int version_ = 0;
-  guint packets_ = 0, total_ = 0; /* of this one; of all, up to kTotal */
+  guint packets_ = 0; /* of this one */
   GstClockTime since_ = 0, heard_ = 0;
-
-  bool look (const SenderProbation::Packet &packet, GstClockTime sender_time);
+  guint total_ = 0; /* of all since all_since_, up to kTotal */
+  GstClockTime all_since_ = 0;
   bool told_ = false;
 };

@@ -28,17 +28,69 @@ launch () {
   )
 }
 
-# usage: drop_empty FILE [TEXT] before `launch`: when that has ended, a FILE without a byte goes. With TEXT that is said
-# then, and not that there is no access unit in what came.
+# usage: pass_messages FILE TEXT <messages of a launch: hands them on; at their end a FILE without a byte goes. Unless TEXT
+# is empty, that is said then if no error was, and not that there is no access unit in what came.
+pass_messages () {
+  local errors
+  trap '' INT TERM # it ends with what it reads
+  errors=$(sed -u -n "${2:+/No access unit found: /,/GstNeighbourCodeParse:/d;}w /dev/stderr
+    /^ERROR: /p")
+  if [ -f "$1" ] && [ ! -s "$1" ]; then
+    rm -f "$1"
+    [ -z "$2" ] || [ -n "$errors" ] || echo "$(basename "$0"): $2" >&2
+  fi
+}
+
+# usage: drop_empty FILE TEXT before `launch`, which takes this process: pass_messages ends a moment after it.
 drop_empty () {
-  exec 2> >(
-    trap '' INT TERM # it ends with what it reads
-    sed -u "${2:+/No access unit found: /,/GstNeighbourCodeParse:/d}" >&2
-    if [ -f "$1" ] && [ ! -s "$1" ]; then
-      rm -f "$1"
-      [ -z "${2:-}" ] || echo "$(basename "$0"): $2" >&2
-    fi
-  )
+  exec 2> >(pass_messages "$1" "$2")
+}
+
+# usage: hear_signals "$@" first in a script that uses launch_to: in the background of another script SIGINT is ignored,
+# which the launch takes back, but bash cannot.
+hear_signals () {
+  [[ "$(trap -p INT)" != *"''"* ]] || ! env --default-signal=INT true 2>/dev/null ||
+    exec env --default-signal=INT "$BASH" "$0" "$@"
+}
+
+# usage: launch_to FILE TEXT arguments of `launch`...: in a process of its own; returns as pass_messages has ended.
+launch_to () {
+  local file=$1 text=$2 messages reader child status signalled
+  shift 2
+  exec {messages}> >(pass_messages "$file" "$text")
+  reader=$!
+  (launch "$@") 2>&"$messages" {messages}>&- <&0 &
+  child=$!
+  exec {messages}>&-
+  trap 'signalled=1; hand_on "$child" INT' INT
+  trap 'signalled=1; hand_on "$child" TERM' TERM
+  while signalled='' status=0; wait "$child" || status=$?; [ -n "$signalled" ]; do :; done
+  trap '' INT TERM
+  wait "$reader" || true
+  return "$status"
+}
+
+# usage: hand_on PID SIGNAL, to a launch in the background, that may have it already: with Ctrl-C everybody gets it.
+# GLib's handlers serve once, and a second signal would end it before its file is whole. While it begins it ignores
+# SIGINT; gst-launch-1.0 has no handler of SIGTERM.
+hand_on () {
+  local i
+  sleep 0.3 # so that it is no longer at the first one
+  for ((i = 0; i < 30; i++)); do
+    kill -0 "$1" 2>/dev/null || return 0
+    ! has_signal "$1" SigCgt "$2" || { kill -"$2" "$1" || true; return 0; }
+    sleep 0.1
+  done
+  [ "$2" = INT ] && ! has_signal "$1" SigIgn INT || kill -TERM "$1" || true
+}
+
+# usage: has_signal PID SigCgt|SigIgn SIGNAL -> whether it catches, or ignores it
+has_signal () {
+  local name mask
+  while read -r name mask; do
+    [ "$name" != "$2:" ] || return $((~(16#$mask >> ($(kill -l "$3") - 1)) & 1))
+  done 2>/dev/null <"/proc/$1/status"
+  return 1
 }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }

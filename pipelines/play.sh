@@ -3,6 +3,7 @@
 # Plays a recording of coded frame sets: in a window, or to a film.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
+hear_signals "$@"
 
 usage () {
   cat <<'END'
@@ -39,8 +40,7 @@ picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
-  drop_empty "$film"
-  launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
+  launch_to "$film" "" "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else
   launch "${view[@]}" ! glimagesink
 fi

@@ -60,6 +60,6 @@ else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
 fi
-drop_empty "$file" ${listen:+"nothing came to port $listen (no coded frame set): $file is not written"}
+drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set): $file is not written}"
 launch "${source[@]}" ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
   ! filesink "location=$file"

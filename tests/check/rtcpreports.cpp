@@ -6,6 +6,11 @@
 
 #include <string>
 
+#include "../fuzz/guarded_bytes.hpp"
+#include "failing-memory.hpp"
+
+using namespace rangecast::testing;
+
 static constexpr guint32 kSender = 0x1234, kReceiver = 0x77;
 
 struct Session {
@@ -340,6 +345,184 @@ GST_START_TEST (test_who_is_silent_for_half_a_minute_makes_room)
 }
 GST_END_TEST;
 
+/* ---- bytes from a network ---- */
+
+using Bytes = std::vector<guint8>;
+
+/* In memory of exactly their size, and in such before memory that nobody may read: the first is for
+ * what watches memory, the second crashes without. @return whether they got through */
+static bool
+offer_bytes (Session &session, const Bytes &bytes)
+{
+  auto heap = static_cast<guint8 *> (g_malloc (std::max<gsize> (bytes.size (), 1)));
+  std::copy (bytes.begin (), bytes.end (), heap);
+  const bool passed = session.offer (gst_buffer_new_wrapped (heap, bytes.size ()));
+  GuardedBytes memory;
+  const auto copy = memory.copy (bytes);
+  GstBuffer *guarded = gst_buffer_new_wrapped_full (
+      GST_MEMORY_FLAG_READONLY, copy.data (), copy.size (), 0, copy.size (), nullptr, nullptr);
+  fail_unless_equals_int (session.offer (guarded), passed);
+  return passed;
+}
+
+static Bytes
+bytes_of (GstBuffer *buffer)
+{
+  Bytes bytes (gst_buffer_get_size (buffer));
+  gst_buffer_extract (buffer, 0, bytes.data (), bytes.size ());
+  gst_buffer_unref (buffer);
+  return bytes;
+}
+
+static constexpr guint8 kFrom = kReceiver;
+static const Bytes kReceiverReport = {0x80, 201, 0, 1, 0, 0, 0, kFrom};
+
+static Bytes
+operator+ (Bytes a, const Bytes &b)
+{
+  a.insert (a.end (), b.begin (), b.end ());
+  return a;
+}
+
+/* gst_rtcp_packet_sdes_first_item() of 1.22 says that there is a chunk. */
+GST_START_TEST (test_a_chunk_that_is_announced_but_not_there_is_not_read)
+{
+  Session session;
+  session.push_rtp ();
+  fail_if (offer_bytes (session, {0x80, 201, 0, 1, 0, 0, 0, 1, 0x81, 202, 0, 0}));
+  fail_unless_equals_uint64 (session.stat ("malformed"), 2);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_no_prefix_of_good_packets_is_read_beyond_its_end)
+{
+  Session session;
+  session.push_rtp ();
+  const auto report = [] (bool of_sender) {
+    return receiver_report ({{}, {.sender = 9}}, of_sender);
+  };
+  const auto with_more = [] (GstBuffer *buffer) {
+    return with (
+        with (with (buffer, GST_RTCP_TYPE_SDES, kReceiver), GST_RTCP_TYPE_PSFB, kReceiver, kSender),
+        GST_RTCP_TYPE_BYE, kReceiver);
+  };
+  for (const Bytes &whole :
+      {bytes_of (with_more (report (false))), bytes_of (with_more (report (true))),
+          bytes_of (with (gst_rtcp_buffer_new (1400), GST_RTCP_TYPE_PSFB, kReceiver, kSender))}) {
+    fail_unless (offer_bytes (session, whole));
+    for (std::size_t size = 1; size < whole.size (); size++)
+      offer_bytes (session, Bytes (whole.begin (), whole.begin () + std::ptrdiff_t (size)));
+    for (std::size_t i = 0; i < whole.size (); i++) /* and none that lies */
+      for (const guint8 value : {0, 1, 31, 127, 255}) {
+        Bytes wrong = whole;
+        wrong[i] = value;
+        offer_bytes (session, wrong);
+      }
+  }
+  fail_unless (offer_bytes (session, bytes_of (with_more (report (false)))));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_packets_that_lie_about_what_is_in_them_are_malformed)
+{
+  const Bytes lies[] = {
+      {0x81, 201, 0, 1, 0, 0, 0, kFrom},                                    /* a report block */
+      {0x80, 200, 0, 1, 0, 0, 0, kFrom},                                    /* a sender's report */
+      {0x80, 201, 0, 0},                                                    /* who reports */
+      {0x80, 201, 0, 2, 0, 0, 0, kFrom},                                    /* its size */
+      kReceiverReport + Bytes{0x82, 202, 0, 2, 0, 0, 0, kFrom, 0, 0, 0, 0}, /* a second chunk */
+      kReceiverReport + Bytes{0x81, 202, 0, 2, 0, 0, 0, kFrom, 1, 3, 'x', 0}, /* an item's size */
+      kReceiverReport +
+          Bytes{0x81, 202, 0, 2, 0, 0, 0, kFrom, 1, 1, 'x', 1}, /* an item without size */
+      kReceiverReport + Bytes{0x82, 203, 0, 1, 0, 0, 0, kFrom}, /* who else says good-bye */
+      kReceiverReport + Bytes{0x81, 206, 0, 1, 0, 0, 0, kFrom}, /* about whom */
+      kReceiverReport + Bytes{0xa0, 204, 0, 2, 0, 0, 0, kFrom, 0, 0, 0, 12}, /* its padding, ... */
+      kReceiverReport + Bytes{0xa0, 204, 0, 2, 0, 0, 0, kFrom, 0, 0, 0, 0},
+      kReceiverReport + Bytes{0xa1, 203, 0, 1, 0, 0, 0, 4}, /* ... which is all that it has */
+      kReceiverReport + Bytes{0x40, 203, 0, 0},             /* its version */
+      kReceiverReport + Bytes{0x80},
+      {},
+  };
+  for (const Bytes &lie : lies) {
+    Session session;
+    session.push_rtp ();
+    fail_unless (offer_bytes (session, bytes_of (receiver_report ({{}}))));
+    fail_if (offer_bytes (session, lie));
+    fail_unless_equals_uint64 (session.stat ("malformed"), 2);
+    fail_unless_equals_uint64 (session.stat ("refused"), 0);
+  }
+}
+GST_END_TEST;
+
+/* As FFmpeg sends it where the text ends with 32 bits; and what RFC 3550 leaves to others. */
+GST_START_TEST (test_packets_that_are_odd_but_whole_pass)
+{
+  Session session;
+  session.push_rtp ();
+  fail_unless (offer_bytes (session, bytes_of (receiver_report ({{}}))));
+  for (const Bytes &odd : {Bytes{0x81, 202, 0, 2, 0, 0, 0, kFrom, 1, 2, 'x', 'y'},
+           Bytes{0x81, 202, 0, 2, 0, 0, 0, kFrom, 0, 0, 0, 0}, Bytes{0x80, 202, 0, 0},
+           Bytes{0x80, 203, 0, 0}, Bytes{0x80, 210, 0, 0},
+           Bytes{0xa1, 203, 0, 2, 0, 0, 0, kFrom, 0, 0, 0, 4}})
+    fail_unless (offer_bytes (session, kReceiverReport + odd));
+  fail_unless_equals_uint64 (session.stat ("malformed"), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_chunk_says_who_speaks)
+{
+  Session session;
+  session.push_rtp ();
+  fail_unless (offer_bytes (session, bytes_of (receiver_report ({{}}))));
+  const auto chunks = [] (guint8 second) {
+    return kReceiverReport + Bytes{0x82, 202, 0, 5, 0, 0, 0, kFrom, 1, 1, 'x', 0, 0, 0, 0, second,
+                                 1, 4, 'x', 'y', 'z', 'z', 0, 0};
+  };
+  fail_unless_equals_int (chunks (0).size (), 32);
+  fail_unless (offer_bytes (session, chunks (kFrom)));
+  fail_if (offer_bytes (session, chunks (kFrom + 1)));
+  fail_unless_equals_uint64 (session.stat ("malformed"), 0);
+}
+GST_END_TEST;
+
+/* ---- memory, time ---- */
+
+/* A request about a stream, made without memory of C++'s. */
+static GstBuffer *
+about (guint32 stream, guint32 receiver)
+{
+  return with (gst_rtcp_buffer_new (100), GST_RTCP_TYPE_PSFB, receiver, stream);
+}
+
+GST_START_TEST (test_a_flood_of_receivers_takes_no_memory)
+{
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
+  Session session;
+  session.push_rtp ();
+  g_object_set (session.element, "max-receivers", 4096, nullptr);
+  allocations_left = 0; /* else std::bad_alloc would cross the chain function */
+  for (guint32 i = 0; i < 5000; i++)
+    session.offer (about (kSender, 1000 + i), 0, nullptr);
+  allocations_left = INT_MAX;
+  fail_unless_equals_uint64 (session.stat ("receivers"), 4096);
+}
+GST_END_TEST;
+
+/* Such a packet came now, not when the system's clock says: that is hours ahead. */
+GST_START_TEST (test_a_packet_without_a_time_makes_nobody_look_silent)
+{
+  Session session;
+  session.push_rtp ();
+  g_object_set (session.element, "max-receivers", 1, nullptr);
+  fail_unless (session.offer (receiver_report ({{}}, false, 1), 0));
+  fail_unless (gst_harness_set_time (session.rtcp, 20 * GST_SECOND));
+  fail_if (session.offer (receiver_report ({{}}, false, 2), GST_CLOCK_TIME_NONE));
+  fail_unless (gst_harness_set_time (session.rtcp, 40 * GST_SECOND));
+  fail_unless (session.offer (receiver_report ({{}}, false, 2), GST_CLOCK_TIME_NONE));
+}
+GST_END_TEST;
+
 static guint
 sources_of (GstElement *session)
 {
@@ -416,6 +599,13 @@ rtcpreports_suite ()
   tcase_add_test (tc, test_one_who_is_known_does_not_pass_from_another_address);
   tcase_add_test (tc, test_a_flood_of_receivers_that_know_the_stream_leaves_room_for_others);
   tcase_add_test (tc, test_who_is_silent_for_half_a_minute_makes_room);
+  tcase_add_test (tc, test_a_chunk_that_is_announced_but_not_there_is_not_read);
+  tcase_add_test (tc, test_no_prefix_of_good_packets_is_read_beyond_its_end);
+  tcase_add_test (tc, test_packets_that_lie_about_what_is_in_them_are_malformed);
+  tcase_add_test (tc, test_packets_that_are_odd_but_whole_pass);
+  tcase_add_test (tc, test_each_chunk_says_who_speaks);
+  tcase_add_test (tc, test_a_flood_of_receivers_takes_no_memory);
+  tcase_add_test (tc, test_a_packet_without_a_time_makes_nobody_look_silent);
   tcase_add_test (tc, test_a_session_behind_keeps_few_sources_in_a_flood);
   return suite;
 }

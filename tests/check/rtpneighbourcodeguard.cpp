@@ -6,6 +6,7 @@
 #include <rangecast/neighbourcode/unit.hpp>
 #include <vector>
 
+#include "failing-memory.hpp"
 #include "rangecast-check.hpp"
 
 using namespace rangecast;
@@ -398,6 +399,50 @@ GST_START_TEST (test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_sen
 }
 GST_END_TEST;
 
+/* As from an application's source: it came now, and not when the system's clock says, which is
+ * hours ahead of the sender. */
+GST_START_TEST (test_packets_without_a_time_do_not_take_over)
+{
+  Guard guard;
+  Sender good, other = {.ssrc = 2, .address = "10.0.0.2"};
+  fail_unless_equals_int (guard.send_many (good, 10), 10);
+  fail_unless (gst_harness_set_time (guard.h, guard.time));
+  for (int i = 0; i < 10; i++) {
+    other.sequence++;
+    gst_harness_push (guard.h, make_packet (other, slice_unit (), GST_CLOCK_TIME_NONE));
+  }
+  fail_unless_equals_int (gst_harness_buffers_received (guard.h), 10);
+  fail_unless_equals_int (guard.send_many (good, 10), 10);
+}
+GST_END_TEST;
+
+/* Else std::bad_alloc would cross the chain function. Payloads are made before. */
+GST_START_TEST (test_without_memory_the_sender_passes_and_strangers_do_not)
+{
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
+  Guard guard;
+  Sender good, other = {.ssrc = 2, .address = "10.0.0.2"}, foreign = {.ssrc = 3};
+  const std::vector<guint8> sound = slice_unit (), unsound (20, 0x80);
+  std::vector<guint8> damaged = slice_unit (), newer = slice_unit ();
+  damaged[6] = 255; /* depth bits */
+  newer[0] = 0x20 | (newer[0] & 15);
+  const std::vector<guint8> *payloads[] = {&sound, &unsound, &damaged, &newer};
+  int passed = 0;
+  allocations_left = 0;
+  for (int i = 0; i < 200; i++) {
+    passed += guard.send (good, sound);
+    for (const std::vector<guint8> *payload : payloads) {
+      guard.send (other, *payload);
+      guard.send (foreign, *payload);
+    }
+  }
+  allocations_left = INT_MAX;
+  fail_unless_equals_int (passed, 200);
+  fail_unless_equals_int (guard.warnings ("Two senders"), 1);
+}
+GST_END_TEST;
+
 static Suite *
 rtpneighbourcodeguard_suite ()
 {
@@ -421,6 +466,8 @@ rtpneighbourcodeguard_suite ()
   tcase_add_test (tc, test_packets_that_are_not_sound_are_told_once_with_how_many);
   tcase_add_test (tc, test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0);
   tcase_add_test (tc, test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_senders);
+  tcase_add_test (tc, test_packets_without_a_time_do_not_take_over);
+  tcase_add_test (tc, test_without_memory_the_sender_passes_and_strangers_do_not);
   return suite;
 }
 

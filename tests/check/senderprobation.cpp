@@ -37,11 +37,10 @@ struct Probation {
     stranger.packet.sequence++;
     stranger.packet.time = time;
     GstBuffer *buffer = gst_buffer_new ();
-    std::vector<GstBuffer *> stream;
+    SenderProbation::Stream stream;
     const bool is_sender = probation.add (stranger.packet, buffer, stream);
     passed += int (stream.size ());
-    for (GstBuffer *held : stream)
-      gst_buffer_unref (held);
+    stream.unref ();
     gst_buffer_unref (buffer);
     return is_sender;
   }
@@ -163,6 +162,24 @@ GST_START_TEST (test_a_hundred_packets_of_anybody_are_rivals_at_once)
 }
 GST_END_TEST;
 
+/* One from a stranger each quarter of an hour, and one from each of many strangers. */
+GST_START_TEST (test_stray_packets_over_weeks_are_no_rivals)
+{
+  SenderRivals rivals;
+  Stranger other ("192.168.0.2", 5000, 2);
+  for (guint64 i = 0; i < 2000; i++) {
+    Stranger stray ("192.168.0.3", 5000, 100 + guint32 (i));
+    const GstClockTime time = i * 900 * GST_SECOND;
+    fail_if (rival (rivals, other, time, time));
+    fail_if (rival (rivals, stray, time + 300 * GST_SECOND, time + 300 * GST_SECOND));
+  }
+  int told = 0; /* and it sees those that are */
+  for (guint32 i = 0; i < 1000; i++)
+    told += rival (rivals, other, i * GST_MSECOND, i * GST_MSECOND);
+  fail_unless_equals_int (told, 1);
+}
+GST_END_TEST;
+
 static Suite *
 senderprobation_suite ()
 {
@@ -176,6 +193,7 @@ senderprobation_suite ()
   tcase_add_test (tc, test_a_rival_of_few_packets_is_told_after_two_seconds_beside_the_sender);
   tcase_add_test (tc, test_who_comes_because_the_sender_is_gone_is_no_rival);
   tcase_add_test (tc, test_a_hundred_packets_of_anybody_are_rivals_at_once);
+  tcase_add_test (tc, test_stray_packets_over_weeks_are_no_rivals);
   return suite;
 }
 

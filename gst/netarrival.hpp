@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* When a packet came, and from which host. */
+#pragma once
+
+#include <gio/gio.h>
+#include <gst/gst.h>
+
+/** The running time at which udpsrc got a packet; for one that says none, the pipeline's. Only
+ * where there is no clock, and so no other time either that packets could have, is it the system's.
+ */
+inline GstClockTime
+arrival_time (GstElement *element, GstBuffer *buffer)
+{
+  GstClockTime time = GST_BUFFER_DTS_OR_PTS (buffer);
+  if (!GST_CLOCK_TIME_IS_VALID (time))
+    time = gst_element_get_current_running_time (element);
+  return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
+}
+
+/** The host of an address, whatever its port: (transfer none), or null. */
+inline GInetAddress *
+host_of (GSocketAddress *address)
+{
+  return address && G_IS_INET_SOCKET_ADDRESS (address)
+             ? g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (address))
+             : nullptr;
+}
+
+/** Whether both are the same host; two that are not known (null) are. */
+inline bool
+same_host (GInetAddress *a, GInetAddress *b)
+{
+  return a == b || (a && b && g_inet_address_equal (a, b));
+}
