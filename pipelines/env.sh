@@ -12,16 +12,16 @@ if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
   export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
 fi
 
-# What runs the launch strings; demo.sh replaces it by rangecast-run, which measures. With -q gst-launch-1.0 would say
-# nothing of warnings, and without it says them among much else on stdout.
+# What runs the launch strings: rangecast-run, where it is built or installed, and demo.sh has it measure. gst-launch-1.0 of
+# GStreamer 1.22 takes the same strings, but sends no statistics, and with -e may wait for ever after an error that comes
+# before the first picture. With -q it would say nothing of warnings, and without it says them among much else on stdout.
 launch () {
   local runner
   if [ -n "${RANGECAST_LAUNCH:-}" ]; then
     eval "runner=($RANGECAST_LAUNCH)" # a command line, quoted where it must be
     exec "${runner[@]}" "$@"
   fi
-  # It sends the elements' statistics there, for top.sh; gst-launch-1.0 does not.
-  [ -z "${RANGECAST_STATS:-}" ] || exec rangecast-run "$@"
+  ! command -v rangecast-run >/dev/null || exec rangecast-run "$@"
   LANGUAGE=en exec gst-launch-1.0 -e --no-position "$@" > >(
     trap '' INT TERM # it ends with what it reads
     exec grep --line-buffered '^WARNING: ' >&2
@@ -44,53 +44,6 @@ pass_messages () {
 # usage: drop_empty FILE TEXT before `launch`, which takes this process: pass_messages ends a moment after it.
 drop_empty () {
   exec 2> >(pass_messages "$1" "$2")
-}
-
-# usage: hear_signals "$@" first in a script that uses launch_to: in the background of another script SIGINT is ignored,
-# which the launch takes back, but bash cannot.
-hear_signals () {
-  [[ "$(trap -p INT)" != *"''"* ]] || ! env --default-signal=INT true 2>/dev/null ||
-    exec env --default-signal=INT "$BASH" "$0" "$@"
-}
-
-# usage: launch_to FILE TEXT arguments of `launch`...: in a process of its own; returns as pass_messages has ended.
-launch_to () {
-  local file=$1 text=$2 messages reader child status signalled
-  shift 2
-  exec {messages}> >(pass_messages "$file" "$text")
-  reader=$!
-  (launch "$@") 2>&"$messages" {messages}>&- <&0 &
-  child=$!
-  exec {messages}>&-
-  trap 'signalled=1; hand_on "$child" INT' INT
-  trap 'signalled=1; hand_on "$child" TERM' TERM
-  while signalled='' status=0; wait "$child" || status=$?; [ -n "$signalled" ]; do :; done
-  trap '' INT TERM
-  wait "$reader" || true
-  return "$status"
-}
-
-# usage: hand_on PID SIGNAL, to a launch in the background, that may have it already: with Ctrl-C everybody gets it.
-# GLib's handlers serve once, and a second signal would end it before its file is whole. While it begins it ignores
-# SIGINT; gst-launch-1.0 has no handler of SIGTERM.
-hand_on () {
-  local i
-  sleep 0.3 # so that it is no longer at the first one
-  for ((i = 0; i < 30; i++)); do
-    kill -0 "$1" 2>/dev/null || return 0
-    ! has_signal "$1" SigCgt "$2" || { kill -"$2" "$1" || true; return 0; }
-    sleep 0.1
-  done
-  [ "$2" = INT ] && ! has_signal "$1" SigIgn INT || kill -TERM "$1" || true
-}
-
-# usage: has_signal PID SigCgt|SigIgn SIGNAL -> whether it catches, or ignores it
-has_signal () {
-  local name mask
-  while read -r name mask; do
-    [ "$name" != "$2:" ] || return $((~(16#$mask >> ($(kill -l "$3") - 1)) & 1))
-  done 2>/dev/null <"/proc/$1/status"
-  return 1
 }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }

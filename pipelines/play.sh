@@ -3,7 +3,6 @@
 # Plays a recording of coded frame sets: in a window, or to a film.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
-hear_signals "$@"
 
 usage () {
   cat <<'END'
@@ -32,15 +31,12 @@ need_size "$size" --size
 need_degrees "$orbit" --orbit
 [ -n "$film" ] || has_display || die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
 
-# gst-launch-1.0 -e may wait for ever after an error that comes before the first picture.
-if [ -z "${RANGECAST_LAUNCH:-}" ] && command -v rangecast-run >/dev/null; then
-  RANGECAST_LAUNCH=rangecast-run
-fi
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
-  launch_to "$film" "" "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
+  drop_empty "$film" ""
+  launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else
   launch "${view[@]}" ! glimagesink
 fi
