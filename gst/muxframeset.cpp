@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "muxframeset.hpp"
 
-#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangeframe.hpp>
 #include <utility>
 
 /* So many are kept: a few are downstream, in queues. What is beyond is given back after use. */
@@ -61,31 +61,10 @@ FrameSetJoiner::begin (guint memories, bool coded)
   rest_.clear ();
 }
 
-/* As gst_range_buffer_append() does, for bytes that come `base` bytes behind the beginning. */
-static bool
-add_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
-{
-  gpointer state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
-      return false;
-  state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
-    auto added = reinterpret_cast<GstRangeMeta *> (
-        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
-    const GstMeta own = added->meta;
-    *added = *meta;
-    added->meta = own;
-    added->depth_offset += base;
-    added->colour_offset += base;
-  }
-  return true;
-}
-
 bool
 FrameSetJoiner::add (GstBuffer *buffer)
 {
-  if (!coded_ && !add_metas (frame_set_, buffer, size_))
+  if (!coded_ && !gstrange::append_metas (frame_set_, buffer, size_))
     return false;
   if (coded_ && GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
     GST_BUFFER_FLAG_SET (frame_set_, GST_BUFFER_FLAG_DELTA_UNIT);
