@@ -435,12 +435,11 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
   GstRangeMuxPrivate *priv = self->priv;
   GstClockTime running;
   const std::size_t matched = join_matching (self, waiting, first, tolerance, running);
-  GstBuffer *frame_set = priv->joiner.finish ();
-  if (!frame_set) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory to put %" G_GSIZE_FORMAT " streams together", matched));
-    return GST_FLOW_ERROR;
-  }
+  GstBuffer *frame_set = nullptr;
+  const Status status = priv->joiner.finish (frame_set);
+  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
+      flow != GST_FLOW_OK)
+    return flow;
   if (GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (priv->last_running))
     running = std::max (running, priv->last_running); /* never backwards */
   priv->last_running = running;
