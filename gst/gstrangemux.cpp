@@ -5,9 +5,12 @@
  *
  * Puts the views of several streams together, all raw or all coded, matched by capture time. In a
  * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
- * one that is gone, and takes it back when it returns. Of up to 16 streams no pixel is copied (as
- * many memories as a #GstBuffer holds); of more, those of the first 15 are shared, and those of the
- * others are copied once.
+ * one that is gone, and takes it back when it returns. Of up to 16 memories, as many as a
+ * #GstBuffer holds, no pixel is copied (a raw stream has one a view); of more, the first 15 are
+ * shared, and the others are copied once.
+ *
+ * Of recordings, the earlier one goes alone until the other one begins, and frame sets are as far
+ * apart as they were captured, wherever the PTS of each recording begin.
  *
  * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
  * at the same time.
@@ -33,6 +36,8 @@
 
 #include "clockpublisher.hpp"
 #include "muxframeset.hpp"
+#include "muxrecordings.hpp"
+#include "muxstats.hpp"
 #include "muxsteps.hpp"
 #include "muxstreams.hpp"
 #include "muxwaiting.hpp"
@@ -47,9 +52,6 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
 
 static constexpr GstClockTime kOutOfStep = MuxSteps::kOutOfStep;
-/* A recording may begin or pause so much later than most: it waits, and the others go without it.
- * What is further away has another clock. */
-static constexpr GstClockTime kOtherRecording = 60 * GST_SECOND;
 /* What lasts so long is told. Pictures that a host which stood still sends at once are not. */
 static constexpr GstClockTime kWorthTelling = GST_SECOND;
 static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
@@ -60,7 +62,7 @@ struct GstRangeMuxPrivate {
   MuxPads pads;
   GstClockTime max_skew = 0;
   std::string rig_file;
-  guint64 frames = 0, complete = 0;
+  MuxCounters sent;
 
   ClockPublisher clock;   /* has locks of its own */
   StatsReporter reporter; /* as well */
@@ -76,11 +78,10 @@ struct GstRangeMuxPrivate {
   FrameSetJoiner joiner;
   std::vector<MuxSteps::Stream> votes;
   std::vector<MuxPad *> voters;
-  std::vector<GstClockTime> captures;
+  MuxRecordings recordings;
   GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
-  GstClockTime last_capture = GST_CLOCK_TIME_NONE; /* of the last frame set */
-  GstClockTime last_running = GST_CLOCK_TIME_NONE;
+  FrameTimes last; /* of the last frame set */
 };
 
 struct _GstRangeMux {
@@ -125,22 +126,6 @@ private:
 
 /* ---- what becomes of each stream ---- */
 
-/* Tells a state to people, by a warning, and to applications. */
-static void
-tell_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTimeDiff offset)
-{
-  entry.said = state;
-  const std::string text = entry.title () + explain (entry, state, offset);
-  GST_INFO_OBJECT (self, "%s", text.c_str ());
-  if (state != MuxState::kIn)
-    gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadData, text});
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("rangemux-stream", "pad", G_TYPE_STRING, GST_PAD_NAME (entry.pad),
-              "view-id", G_TYPE_INT, entry.view_id (), "state", G_TYPE_STRING, name_of (state),
-              "offset", G_TYPE_INT64, gint64 (offset), nullptr)));
-}
-
 /* @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
 static void
 set_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTime running)
@@ -155,9 +140,14 @@ set_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTime runnin
     return;
   const bool lasts = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (entry.since) &&
                      running >= entry.since + kWorthTelling;
-  if (lasts || (state != MuxState::kLate && state != MuxState::kOutOfStep))
-    tell_state (self, entry, state,
-        entry.offset_known && priv->live ? entry.offset - priv->steps.reference () : 0);
+  if (!lasts && (state == MuxState::kLate || state == MuxState::kOutOfStep))
+    return;
+  GST_INFO_OBJECT (self, "%s is %s", entry.title ().c_str (), name_of (state));
+  if (!priv->live)
+    tell_state (GST_ELEMENT (self), entry, state, entry.ahead);
+  else
+    tell_state (GST_ELEMENT (self), entry, state,
+        entry.offset_known ? entry.offset - priv->steps.reference () : 0);
 }
 
 /* ---- caps: the union of the rigs of the streams that go together ---- */
@@ -234,12 +224,6 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
 /* ---- matching ---- */
 
 static GstClockTime
-distance (GstClockTime a, GstClockTime b)
-{
-  return a > b ? a - b : b - a;
-}
-
-static GstClockTime
 tolerance_of (GstRangeMuxPrivate *priv)
 {
   std::lock_guard guard (priv->lock);
@@ -303,30 +287,32 @@ judge_steps (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiti
       priv->voters.push_back (entry.get ());
     }
   if (priv->steps.judge (priv->votes))
-    priv->last_capture = GST_CLOCK_TIME_NONE; /* times of another clock */
+    priv->last.capture = GST_CLOCK_TIME_NONE; /* times of another clock */
   for (std::size_t i = 0; i < priv->voters.size (); i++)
     priv->voters[i]->in_step = priv->votes[i].in_step;
 }
 
-/* Not live: PTS may begin anywhere, and every stream that has not ended has a buffer here. Of two
- * that are apart nobody knows which one is wrong: the earlier one goes alone, the other one waits.
- */
 static void
-judge_recordings (GstRangeMuxPrivate *priv, const WaitingBuffers &waiting)
+judge_recordings (GstRangeMux *self, const WaitingBuffers &waiting)
 {
-  if (waiting.list.empty ())
-    return;
-  std::vector<GstClockTime> &captures = priv->captures;
-  captures.clear ();
-  for (const Waiting &w : waiting.list)
-    captures.push_back (w.capture);
-  std::ranges::nth_element (captures, captures.begin () + captures.size () / 2);
-  const GstClockTime median = captures[captures.size () / 2];
-  const bool can_vote = captures.size () >= 3;
-  for (const Waiting &w : waiting.list)
-    w.entry->in_step = !can_vote || distance (w.capture, median) <= kOtherRecording;
-  if (GST_CLOCK_TIME_IS_VALID (priv->last_capture) && median + kOutOfStep < priv->last_capture)
-    priv->last_capture = GST_CLOCK_TIME_NONE; /* all of them began again */
+  GstRangeMuxPrivate *priv = self->priv;
+  if (priv->recordings.judge (waiting.list, priv->last.capture))
+    priv->last.capture = GST_CLOCK_TIME_NONE;
+  if (const Waiting *apart = MuxRecordings::find_apart (waiting.list)) {
+    apart->entry->told_apart = true;
+    set_state (self, *apart->entry, MuxState::kApart, apart->running);
+  }
+}
+
+/* Not live: what has ended and might as well have been played alone. */
+static void
+tell_strangers (GstRangeMux *self, const MuxPads &pads)
+{
+  while (MuxPad *stranger = MuxRecordings::find_stranger (pads)) {
+    stranger->told_apart = true;
+    stranger->ahead = 0;
+    set_state (self, *stranger, MuxState::kApart, GST_CLOCK_TIME_NONE);
+  }
 }
 
 /* Whether a buffer can be part of a frame set to come, and why not. */
@@ -338,7 +324,7 @@ fate_of (const GstRangeMuxPrivate *priv, const Waiting &w, GstClockTime toleranc
   if (!w.entry->in_step)
     return MuxState::kOutOfStep;
   const bool late =
-      GST_CLOCK_TIME_IS_VALID (priv->last_capture) && w.capture <= priv->last_capture + tolerance;
+      GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
   return late ? MuxState::kLate : MuxState::kIn;
 }
 
@@ -366,25 +352,6 @@ drop_useless (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime tol
   return any;
 }
 
-/* A gap says that its pad has nothing for a while: nobody waits for that pad until another one's
- * frame is behind the gap. @return whether one went */
-static bool
-drop_past_gaps (const WaitingBuffers &waiting, GstClockTime tolerance, bool timeout)
-{
-  if (waiting.list.empty () && waiting.missing > 0 && !timeout)
-    return false;
-  GstClockTime first = GST_CLOCK_TIME_NONE;
-  for (const Waiting &w : waiting.list)
-    first = std::min (first, w.running);
-  bool any = false;
-  for (const Waiting &gap : waiting.gaps)
-    if (waiting.list.empty () || first > gstrange::gap_end (gap.running, gap.buffer, tolerance)) {
-      gst_aggregator_pad_drop_buffer (gap.entry->pad);
-      any = true;
-    }
-  return any;
-}
-
 static void
 report_clash (GstRangeMux *self, MuxPad &entry)
 {
@@ -396,36 +363,59 @@ report_clash (GstRangeMux *self, MuxPad &entry)
                                   ": its buffers have views that another pad has, too; dropped"});
 }
 
-/* Takes the buffers of one frame set from their pads.
- * @param[out] running  of the oldest of them
- * @return how many */
-static std::size_t
-join_matching (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
-    GstClockTime tolerance, GstClockTime &running)
+/* The buffers of one frame set. */
+struct Match {
+  std::size_t streams = 0;
+  FrameTimes times; /* running time: the least of them */
+  double rate = 1;  /* of that one's segment */
+};
+
+/* Takes the buffers of one frame set from their pads. */
+static Match
+join_matching (
+    GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first, GstClockTime tolerance)
 {
   GstRangeMuxPrivate *priv = self->priv;
   const auto matches = [&] (const Waiting &w) { return w.capture <= first + tolerance; };
   guint memories = 0;
+  Match match;
+  match.times.capture = first;
   for (const Waiting &w : waiting.list)
-    memories += matches (w) ? gst_buffer_n_memory (w.buffer) : 0;
+    if (matches (w)) {
+      memories += gst_buffer_n_memory (w.buffer);
+      match.streams++;
+    }
   priv->joiner.begin (memories, waiting.list.front ().entry->coded);
-  running = GST_CLOCK_TIME_NONE;
-  std::size_t matched = 0;
   for (const Waiting &w : waiting.list) {
     if (!matches (w))
       continue;
+    if (w.running < match.times.running) { /* NONE is the greatest number there is */
+      match.times.running = w.running;
+      match.rate = rate_of (w.entry->pad);
+    }
     gst_aggregator_pad_drop_buffer (w.entry->pad); /* we hold a reference */
     if (!priv->joiner.add (w.buffer))
       report_clash (self, *w.entry);
-    running = std::min (running, w.running); /* NONE is the greatest number there is */
-    matched++;
+    w.entry->met = w.entry->met || match.streams > 1;
     set_state (self, *w.entry, MuxState::kIn, w.running);
     std::lock_guard guard (priv->lock);
     w.entry->received++;
     w.entry->matched++;
     w.entry->last_skew = GST_CLOCK_DIFF (first, w.capture);
   }
-  return matched;
+  return match;
+}
+
+/* Live, streams' running times can be compared, and tell when frame sets are due. */
+static GstClockTime
+running_time_of (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
+{
+  if (!priv->live)
+    return running_time_after (priv->last, match.times, match.rate,
+        GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
+  if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
+    return std::max (match.times.running, priv->last.running); /* never backwards */
+  return match.times.running;
 }
 
 static GstFlowReturn
@@ -433,22 +423,19 @@ push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime f
     GstClockTime tolerance, std::size_t streams)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime running;
-  const std::size_t matched = join_matching (self, waiting, first, tolerance, running);
+  const Match match = join_matching (self, waiting, first, tolerance);
   GstBuffer *frame_set = nullptr;
   const Status status = priv->joiner.finish (frame_set);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  if (GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (priv->last_running))
-    running = std::max (running, priv->last_running); /* never backwards */
-  priv->last_running = running;
-  priv->last_capture = first;
-  gstrange::stamp (GST_AGGREGATOR (self), frame_set, running, priv->frame_duration, first);
+  priv->last = {first, running_time_of (priv, match, tolerance)};
+  gstrange::stamp (
+      GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
   {
     std::lock_guard guard (priv->lock);
-    priv->frames++;
-    priv->complete += matched == streams;
+    priv->sent.frames++;
+    priv->sent.complete += match.streams == streams;
   }
   priv->reporter.passed (GST_ELEMENT (self), frame_set);
   return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
@@ -459,6 +446,8 @@ aggregate_waiting (
     GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting, bool timeout)
 {
   GstRangeMuxPrivate *priv = self->priv;
+  if (!priv->live && waiting.ended > 0)
+    tell_strangers (self, pads);
   if (waiting.list.empty () && waiting.gaps.empty ()) {
     if (waiting.missing > 0 || waiting.ended == 0)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -474,9 +463,10 @@ aggregate_waiting (
   if (priv->live)
     judge_steps (self, pads, waiting);
   else
-    judge_recordings (priv, waiting);
+    judge_recordings (self, waiting);
   const GstClockTime tolerance = tolerance_of (priv);
-  if (drop_past_gaps (waiting, tolerance, timeout) || drop_useless (self, waiting, tolerance))
+  if (waiting.drop_past_gaps (priv->live, tolerance, timeout) ||
+      drop_useless (self, waiting, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
   if (waiting.list.empty () || (waiting.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -521,10 +511,11 @@ static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
+  priv->last = {};
+  priv->now = GST_CLOCK_TIME_NONE;
   priv->steps.reset ();
   for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
-    entry->offset_known = false;
+    entry->offset_known = entry->shift_known = false;
     entry->seen = GST_CLOCK_TIME_NONE;
   }
   return GST_FLOW_OK;
@@ -593,24 +584,12 @@ gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 
 /* ---- life ---- */
 
-/* A stream's frame sets that went without it count from the element's start. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (element)->priv;
   std::lock_guard guard (priv->lock);
-  std::vector<StatsRow> rows (1);
-  guint64 late = 0;
-  for (const auto &entry : priv->pads) {
-    late += entry->late + entry->out_of_step;
-    rows.push_back ({.pad = GST_PAD_NAME (entry->pad),
-        .counters = {.frames = entry->received,
-            .lost = priv->frames - std::min (priv->frames, entry->matched),
-            .late = entry->late + entry->out_of_step},
-        .views = entry->views});
-  }
-  rows[0].counters = {.frames = priv->frames, .lost = priv->frames - priv->complete, .late = late};
-  return rows;
+  return rows_of (priv->pads, priv->sent);
 }
 
 static gboolean
@@ -640,13 +619,14 @@ gst_range_mux_start (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->caps_dirty = true;
-  priv->frame_duration = priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
+  priv->frame_duration = priv->now = GST_CLOCK_TIME_NONE;
+  priv->last = {};
   priv->steps.reset ();
   if (!load_rig_file (GST_RANGE_MUX (aggregator)) || !publish_clock (GST_RANGE_MUX (aggregator)))
     return FALSE;
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
-  priv->frames = priv->complete = 0;
+  priv->sent = {};
   for (const auto &entry : priv->pads)
     entry->reset ();
   return TRUE;
@@ -674,31 +654,6 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
   }
 }
 
-static GstStructure *
-make_stats (const GstRangeMuxPrivate *priv)
-{
-  guint64 late = 0, out_of_step = 0, left_out = 0;
-  for (const auto &entry : priv->pads) {
-    late += entry->late;
-    left_out += entry->left_out;
-    out_of_step += entry->out_of_step;
-  }
-  GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
-      priv->frames, "complete", G_TYPE_UINT64, priv->complete, "incomplete", G_TYPE_UINT64,
-      priv->frames - priv->complete, "dropped-late", G_TYPE_UINT64, late, "out-of-step",
-      G_TYPE_UINT64, out_of_step, "left-out", G_TYPE_UINT64, left_out, nullptr);
-  for (const auto &entry : priv->pads) {
-    GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, entry->received,
-        "matched", G_TYPE_UINT64, entry->matched, "late", G_TYPE_UINT64, entry->late, "out-of-step",
-        G_TYPE_UINT64, entry->out_of_step, "left-out", G_TYPE_UINT64, entry->left_out, "skew",
-        G_TYPE_INT64, gint64 (entry->last_skew), "state", G_TYPE_STRING, name_of (entry->state),
-        "offset", G_TYPE_INT64, gint64 (entry->offset), nullptr);
-    gst_structure_set (stats, GST_PAD_NAME (entry->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
-    gst_structure_free (of_pad);
-  }
-  return stats;
-}
-
 static void
 gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
@@ -715,7 +670,7 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
       g_value_set_string (value, priv->rig_file.empty () ? nullptr : priv->rig_file.c_str ());
       break;
     case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
+      g_value_take_boxed (value, make_stats (priv->pads, priv->sent));
       break;
     case PROP_STATS_INTERVAL:
       g_value_set_uint (value, priv->reporter.interval ());
