@@ -26,68 +26,19 @@
 #include "gstrangemux.h"
 
 #include <algorithm>
-#include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <mutex>
-#include <vector>
 
-#include "clockpublisher.hpp"
-#include "muxframeset.hpp"
-#include "muxrecordings.hpp"
-#include "muxstats.hpp"
-#include "muxsteps.hpp"
-#include "muxstreams.hpp"
-#include "muxwaiting.hpp"
-#include "statsreporter.hpp"
+#include "rangemuxprivate.hpp"
 
 using rangecast::Status;
-using rangecast::StatusCode;
 
-GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
+GST_DEBUG_CATEGORY (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
 enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
-
-static constexpr GstClockTime kOutOfStep = MuxSteps::kOutOfStep;
-/* What lasts so long is told. Pictures that a host which stood still sends at once are not. */
-static constexpr GstClockTime kWorthTelling = GST_SECOND;
-static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
-
-struct GstRangeMuxPrivate {
-  std::mutex lock; /* guards pads (the vector), counters, max_skew and rig_file; never held across a
-                      push, message or call into the aggregator */
-  MuxPads pads;
-  GstClockTime max_skew = 0;
-  std::string rig_file;
-  MuxCounters sent;
-
-  ClockPublisher clock;   /* has locks of its own */
-  StatsReporter reporter; /* as well */
-
-  std::atomic<bool> caps_dirty = true; /* the streams have to be chosen again */
-
-  /* streaming thread only; vectors are kept for their memory */
-  bool live = false;
-  MuxPads pads_now;       /* while it works on them, see PadsNow */
-  WaitingBuffers waiting; /* the same */
-  rangecast::Rig rig;     /* of rig_file; empty: any */
-  MuxSteps steps;
-  FrameSetJoiner joiner;
-  std::vector<MuxSteps::Stream> votes;
-  std::vector<MuxPad *> voters;
-  MuxRecordings recordings;
-  GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
-  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
-  FrameTimes last; /* of the last frame set */
-};
-
-struct _GstRangeMux {
-  GstAggregator parent;
-  GstRangeMuxPrivate *priv;
-};
 
 #define MUX_CAPS                                                                                   \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
@@ -123,32 +74,6 @@ public:
 private:
   MuxPads &pads_;
 };
-
-/* ---- what becomes of each stream ---- */
-
-/* @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
-static void
-set_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTime running)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  if (state != entry.state) {
-    std::lock_guard guard (priv->lock);
-    entry.state = state;
-    entry.since = running;
-  }
-  if (state == entry.said)
-    return;
-  const bool lasts = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (entry.since) &&
-                     running >= entry.since + kWorthTelling;
-  if (!lasts && (state == MuxState::kLate || state == MuxState::kOutOfStep))
-    return;
-  GST_INFO_OBJECT (self, "%s is %s", entry.title ().c_str (), name_of (state));
-  if (!priv->live)
-    tell_state (GST_ELEMENT (self), entry, state, entry.ahead);
-  else
-    tell_state (GST_ELEMENT (self), entry, state,
-        entry.offset_known ? entry.offset - priv->steps.reference () : 0);
-}
 
 /* ---- caps: the union of the rigs of the streams that go together ---- */
 
@@ -221,225 +146,7 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
   return GST_AGGREGATOR_CLASS (gst_range_mux_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* ---- matching ---- */
-
-static GstClockTime
-tolerance_of (GstRangeMuxPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  if (priv->max_skew > 0)
-    return priv->max_skew;
-  return GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration / 2
-                                                        : kDefaultTolerance;
-}
-
-/* Notes who is there. Who has a buffer is; who has none is silent once the oldest one of the others
- * is much later than its last one: so a stream whose times jump silences nobody. Who was left out
- * for a clash may have its turn when somebody has gone. */
-static void
-note_arrivals (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime now = GST_CLOCK_TIME_NONE;
-  for (const auto &entry : pads)
-    entry->waits = false;
-  for (const auto *buffers : {&waiting.list, &waiting.gaps})
-    for (const Waiting &w : *buffers) {
-      w.entry->waits = true;
-      if (!GST_CLOCK_TIME_IS_VALID (w.running))
-        continue;
-      w.entry->seen = w.running;
-      now = std::min (now, w.running); /* NONE is the greatest number there is */
-    }
-  priv->now = now;
-  if (!GST_CLOCK_TIME_IS_VALID (now))
-    return;
-  for (const auto &entry : pads) {
-    if (!GST_CLOCK_TIME_IS_VALID (entry->seen))
-      entry->seen = now; /* it did not come so far */
-    const bool alive = entry->waits || now <= entry->seen || now - entry->seen <= kSilentAfter;
-    if (alive != entry->alive)
-      priv->caps_dirty = true;
-    entry->alive = alive;
-    if (!alive && priv->live && !gst_aggregator_pad_is_eos (entry->pad))
-      set_state (self, *entry, MuxState::kSilent, now);
-  }
-}
-
-/* Live: compares how far capture times are from the pipeline's clock, so that nobody has to wait
- * for the others. */
-static void
-judge_steps (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
-  for (const Waiting &w : waiting.list)
-    if (GST_CLOCK_TIME_IS_VALID (w.running)) {
-      std::lock_guard guard (priv->lock);
-      w.entry->offset = MuxSteps::offset_of (w.capture, base + w.running);
-      w.entry->offset_known = true;
-    }
-  priv->votes.clear ();
-  priv->voters.clear ();
-  for (const auto &entry : pads)
-    if (entry->chosen && entry->alive && entry->offset_known) {
-      priv->votes.push_back ({entry->offset});
-      priv->voters.push_back (entry.get ());
-    }
-  if (priv->steps.judge (priv->votes))
-    priv->last.capture = GST_CLOCK_TIME_NONE; /* times of another clock */
-  for (std::size_t i = 0; i < priv->voters.size (); i++)
-    priv->voters[i]->in_step = priv->votes[i].in_step;
-}
-
-static void
-judge_recordings (GstRangeMux *self, const WaitingBuffers &waiting)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  if (priv->recordings.judge (waiting.list, priv->last.capture))
-    priv->last.capture = GST_CLOCK_TIME_NONE;
-  if (const Waiting *apart = MuxRecordings::find_apart (waiting.list)) {
-    apart->entry->told_apart = true;
-    set_state (self, *apart->entry, MuxState::kApart, apart->running);
-  }
-}
-
-/* Not live: what has ended and might as well have been played alone. */
-static void
-tell_strangers (GstRangeMux *self, const MuxPads &pads)
-{
-  while (MuxPad *stranger = MuxRecordings::find_stranger (pads)) {
-    stranger->told_apart = true;
-    stranger->ahead = 0;
-    set_state (self, *stranger, MuxState::kApart, GST_CLOCK_TIME_NONE);
-  }
-}
-
-/* Whether a buffer can be part of a frame set to come, and why not. */
-static MuxState
-fate_of (const GstRangeMuxPrivate *priv, const Waiting &w, GstClockTime tolerance)
-{
-  if (!w.entry->chosen)
-    return w.entry->other_rig.ok () ? MuxState::kClash : MuxState::kOtherRig;
-  if (!w.entry->in_step)
-    return MuxState::kOutOfStep;
-  const bool late =
-      GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
-  return late ? MuxState::kLate : MuxState::kIn;
-}
-
-/* @return whether anything went */
-static bool
-drop_useless (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime tolerance)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  bool any = false;
-  for (const Waiting &w : waiting.list) {
-    const MuxState fate = fate_of (priv, w, tolerance);
-    if (fate == MuxState::kIn)
-      continue;
-    any = true;
-    gst_aggregator_pad_drop_buffer (w.entry->pad);
-    {
-      std::lock_guard guard (priv->lock);
-      w.entry->received++;
-      (fate == MuxState::kLate           ? w.entry->late
-          : fate == MuxState::kOutOfStep ? w.entry->out_of_step
-                                         : w.entry->left_out)++;
-    }
-    set_state (self, *w.entry, fate, w.running);
-  }
-  return any;
-}
-
-static void
-report_clash (GstRangeMux *self, MuxPad &entry)
-{
-  if (entry.clash_reported)
-    return;
-  entry.clash_reported = true;
-  gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (entry.pad)) +
-                                  ": its buffers have views that another pad has, too; dropped"});
-}
-
-/* The buffers of one frame set. */
-struct Match {
-  std::size_t streams = 0;
-  FrameTimes times; /* running time: the least of them */
-  double rate = 1;  /* of that one's segment */
-};
-
-/* Takes the buffers of one frame set from their pads. */
-static Match
-join_matching (
-    GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first, GstClockTime tolerance)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const auto matches = [&] (const Waiting &w) { return w.capture <= first + tolerance; };
-  guint memories = 0;
-  Match match;
-  match.times.capture = first;
-  for (const Waiting &w : waiting.list)
-    if (matches (w)) {
-      memories += gst_buffer_n_memory (w.buffer);
-      match.streams++;
-    }
-  priv->joiner.begin (memories, waiting.list.front ().entry->coded);
-  for (const Waiting &w : waiting.list) {
-    if (!matches (w))
-      continue;
-    if (w.running < match.times.running) { /* NONE is the greatest number there is */
-      match.times.running = w.running;
-      match.rate = rate_of (w.entry->pad);
-    }
-    gst_aggregator_pad_drop_buffer (w.entry->pad); /* we hold a reference */
-    if (!priv->joiner.add (w.buffer))
-      report_clash (self, *w.entry);
-    w.entry->met = w.entry->met || match.streams > 1;
-    set_state (self, *w.entry, MuxState::kIn, w.running);
-    std::lock_guard guard (priv->lock);
-    w.entry->received++;
-    w.entry->matched++;
-    w.entry->last_skew = GST_CLOCK_DIFF (first, w.capture);
-  }
-  return match;
-}
-
-/* Live, streams' running times can be compared, and tell when frame sets are due. */
-static GstClockTime
-running_time_of (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
-{
-  if (!priv->live)
-    return running_time_after (priv->last, match.times, match.rate,
-        GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
-  if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
-    return std::max (match.times.running, priv->last.running); /* never backwards */
-  return match.times.running;
-}
-
-static GstFlowReturn
-push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
-    GstClockTime tolerance, std::size_t streams)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const Match match = join_matching (self, waiting, first, tolerance);
-  GstBuffer *frame_set = nullptr;
-  const Status status = priv->joiner.finish (frame_set);
-  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
-      flow != GST_FLOW_OK)
-    return flow;
-  priv->last = {first, running_time_of (priv, match, tolerance)};
-  gstrange::stamp (
-      GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
-  {
-    std::lock_guard guard (priv->lock);
-    priv->sent.frames++;
-    priv->sent.complete += match.streams == streams;
-  }
-  priv->reporter.passed (GST_ELEMENT (self), frame_set);
-  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
-}
+/* ---- frame sets ---- */
 
 static GstFlowReturn
 aggregate_waiting (
@@ -464,7 +171,7 @@ aggregate_waiting (
     judge_steps (self, pads, waiting);
   else
     judge_recordings (self, waiting);
-  const GstClockTime tolerance = tolerance_of (priv);
+  const GstClockTime tolerance = matching_tolerance (priv);
   if (waiting.drop_past_gaps (priv->live, tolerance, timeout) ||
       drop_useless (self, waiting, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
