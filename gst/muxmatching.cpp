@@ -176,7 +176,7 @@ report_clash (GstRangeMux *self, MuxPad &entry)
 struct Match {
   std::size_t streams = 0;
   FrameTimes times; /* running time: the least of them */
-  double rate = 1;  /* of that one's segment */
+  double speed = 1; /* of that one, see speed_of() */
 };
 
 /* Takes the buffers of one frame set from their pads. */
@@ -200,7 +200,7 @@ join_matching (
       continue;
     if (w.running < match.times.running) { /* NONE is the greatest number there is */
       match.times.running = w.running;
-      match.rate = rate_of (w.entry->pad);
+      match.speed = speed_of (w);
     }
     gst_aggregator_pad_drop_buffer (w.entry->pad); /* we hold a reference */
     if (!priv->joiner.add (w.buffer))
@@ -220,7 +220,7 @@ static GstClockTime
 running_time_of (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
 {
   if (!priv->live)
-    return running_time_after (priv->last, match.times, match.rate,
+    return running_time_after (priv->last, match.times, match.speed,
         GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
   if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
     return std::max (match.times.running, priv->last.running); /* never backwards */

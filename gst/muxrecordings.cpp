@@ -2,7 +2,6 @@
 #include "muxrecordings.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "muxsteps.hpp"
 #include "muxwaiting.hpp"
@@ -59,14 +58,14 @@ MuxRecordings::find_stranger (const MuxPads &pads)
 
 GstClockTime
 running_time_after (
-    const FrameTimes &last, const FrameTimes &next, double rate, GstClockTime period)
+    const FrameTimes &last, const FrameTimes &next, double speed, GstClockTime period)
 {
   if (!GST_CLOCK_TIME_IS_VALID (last.running))
     return next.running;
   const bool follows = GST_CLOCK_TIME_IS_VALID (last.capture) && next.capture > last.capture &&
                        next.capture - last.capture <= MuxRecordings::kOtherRecording;
   const GstClockTime distance = follows ? next.capture - last.capture : period;
-  const GstClockTime running = last.running + GstClockTime (double (distance) / std::abs (rate));
+  const GstClockTime running = last.running + GstClockTime (double (distance) / speed);
   return follows || !GST_CLOCK_TIME_IS_VALID (next.running) ? running
                                                             : std::max (running, next.running);
 }

@@ -44,7 +44,7 @@ private:
  *  times are. Where those go back, or on by more than kOtherRecording, it is that of the stream
  *  itself, if later, or else one frame period on.
  *  @param next    what its oldest buffer says
- *  @param rate    of its segment, not 0
+ *  @param speed   how much faster than it was captured it is played, > 0
  *  @param period  ns */
 GstClockTime running_time_after (
-    const FrameTimes &last, const FrameTimes &next, double rate, GstClockTime period);
+    const FrameTimes &last, const FrameTimes &next, double speed, GstClockTime period);

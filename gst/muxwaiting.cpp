@@ -2,6 +2,8 @@
 #include "muxwaiting.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 
 /* A stranger's may be any number; sums of this one and a few seconds do not overflow. */
@@ -69,10 +71,13 @@ WaitingBuffers::drop_past_gaps (bool live, GstClockTime tolerance, bool timeout)
 }
 
 double
-rate_of (GstAggregatorPad *pad)
+speed_of (const Waiting &w)
 {
-  GST_OBJECT_LOCK (pad);
-  const double rate = pad->segment.rate;
-  GST_OBJECT_UNLOCK (pad);
-  return rate;
+  GST_OBJECT_LOCK (w.entry->pad);
+  const double rate = std::abs (w.entry->pad->segment.rate);
+  GST_OBJECT_UNLOCK (w.entry->pad);
+  /* A buffer that does not tell when it was captured has its running time instead. */
+  const bool told =
+      rate == 1 || GST_CLOCK_TIME_IS_VALID (gst_range_buffer_get_capture_time (w.buffer));
+  return told ? rate : 1;
 }

@@ -31,5 +31,5 @@ public:
   int missing = 0, ended = 0;
 };
 
-/* Of the segment of this pad's buffers, not 0. */
-double rate_of (GstAggregatorPad *pad);
+/* How much faster than it was captured it is played; not 0. */
+double speed_of (const Waiting &w);

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* rangemux with recordings: not live, each with PTS from 0, that begin, pause and end at different
  * times. */
-#include <gst/base/gstaggregator.h>
-
 #include <algorithm>
 
 #include "mux-check.hpp"
@@ -17,17 +15,19 @@ struct FrameSet {
   guint views;
 };
 
-/* One that was recorded: its capture times, one frame period after another. */
+/* One that was recorded: its capture times, one period after another. */
 struct Recording {
   GstClockTime begin;
   int frames;
-  GstClockTime capture (int frame) const { return begin + GstClockTime (frame) * kFrame; }
+  GstClockTime period = kFrame;
+  GstClockTime capture (int frame) const { return begin + pts (frame); }
+  GstClockTime pts (int frame) const { return GstClockTime (frame) * period; }
 };
 
 /* A rangemux that is given recordings. */
 struct Recordings : Mux {
-  explicit Recordings (std::vector<Recording> list, bool pts_of_its_own = true)
-      : Mux (int (list.size ())), list_ (std::move (list)), own_ (pts_of_its_own)
+  explicit Recordings (std::vector<Recording> list)
+      : Mux (int (list.size ())), list_ (std::move (list))
   {
   }
 
@@ -39,18 +39,16 @@ struct Recordings : Mux {
     std::size_t left = list_.size ();
     while (left > 0)
       for (std::size_t i = 0; i < list_.size (); i++) {
-        if (ended[i] || !takes (int (i)))
-          continue;
-        if (next[i] == list_[i].frames) {
-          gst_harness_push_event (in[i], gst_event_new_eos ());
-          ended[i] = true;
-          left--;
-          settle ();
-          continue;
+        if (!ended[i] && takes (int (i), next[i])) {
+          if (next[i] < list_[i].frames) {
+            push (int (i), list_[i].capture (next[i]), list_[i].pts (next[i]));
+            next[i]++;
+          } else {
+            gst_harness_push_event (in[i], gst_event_new_eos ());
+            ended[i] = true;
+            left--;
+          }
         }
-        const GstClockTime capture = list_[i].capture (next[i]);
-        push (int (i), capture, own_ ? GstClockTime (next[i]) * kFrame : capture);
-        next[i]++;
         settle ();
       }
     while (!ended_)
@@ -64,13 +62,18 @@ struct Recordings : Mux {
   int n_warnings = 0;
 
 private:
-  /* A buffer more would block. */
-  bool takes (int i)
+  /* Whether it has taken all so far: a buffer more would block. */
+  bool takes (int i, int pushed)
   {
-    GstPad *pad = gst_pad_get_peer (in[i]->srcpad);
-    const bool full = gst_aggregator_pad_has_buffer (GST_AGGREGATOR_PAD (pad));
-    gst_object_unref (pad);
-    return !full;
+    GstStructure *stats, *of_pad;
+    guint64 received = 0;
+    g_object_get (out->element, "stats", &stats, nullptr);
+    const std::string name = "sink_" + std::to_string (i);
+    gst_structure_get (stats, name.c_str (), GST_TYPE_STRUCTURE, &of_pad, nullptr);
+    gst_structure_get_uint64 (of_pad, "received", &received);
+    gst_structure_free (of_pad);
+    gst_structure_free (stats);
+    return received == guint64 (pushed);
   }
   /* The element's thread has its turn. */
   void settle ()
@@ -111,7 +114,6 @@ private:
   }
 
   std::vector<Recording> list_;
-  bool own_;
   std::vector<FrameSet> got_;
   bool ended_ = false;
 };
@@ -236,6 +238,63 @@ GST_START_TEST (test_twice_the_speed_is_half_the_running_time)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_without_capture_times_running_times_stay_at_any_speed)
+{
+  for (const double rate : {1.0, 1.25}) {
+    Mux mux (2);
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.rate = rate;
+    for (const int i : {0, 1})
+      gst_harness_push_event (mux.in[i], gst_event_new_segment (&segment));
+    for (int i = 0; i < 5; i++) {
+      for (const int stream : {0, 1})
+        mux.push (stream, GST_CLOCK_TIME_NONE, i * kFrame);
+      GstBuffer *buffer = gst_harness_pull (mux.out);
+      fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), GstClockTime (i * kFrame / rate));
+      gst_buffer_unref (buffer);
+    }
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_after_a_seek_for_another_speed_downstream_gets_the_same_running_times)
+{
+  for (const double rate : {0.5, 1.0, 2.0}) {
+    Mux mux (2);
+    GstEvent *seek = gst_event_new_seek (rate, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+        GST_SEEK_TYPE_SET, GST_SECOND, GST_SEEK_TYPE_NONE, 0);
+    const guint32 seqnum = gst_event_get_seqnum (seek);
+    fail_unless (gst_harness_push_upstream_event (mux.out, seek));
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.rate = rate;
+    segment.start = segment.time = segment.position = GST_SECOND;
+    GstEvent *const events[] = {gst_event_new_flush_start (), gst_event_new_flush_stop (TRUE),
+        gst_event_new_segment (&segment)};
+    for (GstEvent *event : events) {
+      gst_event_set_seqnum (event, seqnum);
+      for (const int stream : {0, 1})
+        gst_harness_push_event (mux.in[stream], gst_event_ref (event));
+      gst_event_unref (event);
+    }
+    for (int i = 0; i < 5; i++) {
+      for (const int stream : {0, 1})
+        mux.push (stream, kHour + i * kFrame, GST_SECOND + i * kFrame);
+      GstBuffer *buffer = gst_harness_pull (mux.out);
+      GstEvent *sent = gst_pad_get_sticky_event (mux.out->sinkpad, GST_EVENT_SEGMENT, 0);
+      const GstSegment *out;
+      gst_event_parse_segment (sent, &out);
+      fail_unless_equals_uint64 (
+          gst_segment_to_running_time (out, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)),
+          GstClockTime (i * kFrame / rate));
+      gst_event_unref (sent);
+      gst_buffer_unref (buffer);
+    }
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_after_a_flush_times_are_those_of_the_streams)
 {
   Mux mux (2);
@@ -283,6 +342,16 @@ GST_START_TEST (test_of_two_recordings_of_other_clocks_one_is_told_once)
   fail_unless_equals_int64 (mux.offsets[0], 4 * gint64 (kHour));
   fail_unless_equals_string (mux.states[1].c_str (), "sink_1 in"); /* when it goes alone */
   fail_unless_equals_uint64 (mux.stat ("out-of-step"), 0);
+  fail_unless_equals_uint64 (mux.stat ("dropped-late"), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_two_that_take_turns_of_minutes_are_told_once_each)
+{
+  constexpr GstClockTime kLong = 300 * GST_SECOND;
+  Recordings mux ({{kHour, 6, 2 * kLong}, {kHour + kLong, 6, 2 * kLong}});
+  fail_unless_equals_int (mux.play ().size (), 12);
+  fail_unless_equals_int (mux.n_warnings, 2);
   fail_unless_equals_uint64 (mux.stat ("dropped-late"), 0);
 }
 GST_END_TEST;
@@ -376,8 +445,11 @@ rangemuxrecordings_suite ()
   tcase_add_test (tc, test_a_pause_of_minutes_that_the_stream_itself_has_stays);
   tcase_add_test (tc, test_pts_rise_where_capture_times_begin_again);
   tcase_add_test (tc, test_twice_the_speed_is_half_the_running_time);
+  tcase_add_test (tc, test_without_capture_times_running_times_stay_at_any_speed);
+  tcase_add_test (tc, test_after_a_seek_for_another_speed_downstream_gets_the_same_running_times);
   tcase_add_test (tc, test_after_a_flush_times_are_those_of_the_streams);
   tcase_add_test (tc, test_of_two_recordings_of_other_clocks_one_is_told_once);
+  tcase_add_test (tc, test_two_that_take_turns_of_minutes_are_told_once_each);
   tcase_add_test (tc, test_a_recording_that_ends_before_the_other_begins_is_told_once);
   tcase_add_test (tc, test_the_one_of_three_that_never_matched_is_told_wherever_it_ends);
   tcase_add_test (tc, test_a_recording_alone_or_beside_an_empty_one_tells_nothing);
