@@ -5,9 +5,12 @@
  *
  * Puts the views of several streams together, all raw or all coded, matched by capture time. In a
  * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
- * one that is gone, and takes it back when it returns. Of up to 16 streams no pixel is copied (as
- * many memories as a #GstBuffer holds); of more, those of the first 15 are shared, and those of the
- * others are copied once.
+ * one that is gone, and takes it back when it returns. Of up to 16 memories, as many as a
+ * #GstBuffer holds, no pixel is copied (a raw stream has one a view); of more, the first 15 are
+ * shared, and the others are copied once.
+ *
+ * Of recordings, the earlier one goes alone until the other one begins, and frame sets are as far
+ * apart as they were captured, wherever the PTS of each recording begin.
  *
  * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
  * at the same time.
@@ -23,70 +26,19 @@
 #include "gstrangemux.h"
 
 #include <algorithm>
-#include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <mutex>
-#include <vector>
 
-#include "clockpublisher.hpp"
-#include "muxframeset.hpp"
-#include "muxsteps.hpp"
-#include "muxstreams.hpp"
-#include "muxwaiting.hpp"
-#include "statsreporter.hpp"
+#include "rangemuxprivate.hpp"
 
 using rangecast::Status;
-using rangecast::StatusCode;
 
-GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
+GST_DEBUG_CATEGORY (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
 enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
-
-static constexpr GstClockTime kOutOfStep = MuxSteps::kOutOfStep;
-/* A recording may begin or pause so much later than most: it waits, and the others go without it.
- * What is further away has another clock. */
-static constexpr GstClockTime kOtherRecording = 60 * GST_SECOND;
-/* What lasts so long is told. Pictures that a host which stood still sends at once are not. */
-static constexpr GstClockTime kWorthTelling = GST_SECOND;
-static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
-
-struct GstRangeMuxPrivate {
-  std::mutex lock; /* guards pads (the vector), counters, max_skew and rig_file; never held across a
-                      push, message or call into the aggregator */
-  MuxPads pads;
-  GstClockTime max_skew = 0;
-  std::string rig_file;
-  guint64 frames = 0, complete = 0;
-
-  ClockPublisher clock;   /* has locks of its own */
-  StatsReporter reporter; /* as well */
-
-  std::atomic<bool> caps_dirty = true; /* the streams have to be chosen again */
-
-  /* streaming thread only; vectors are kept for their memory */
-  bool live = false;
-  MuxPads pads_now;       /* while it works on them, see PadsNow */
-  WaitingBuffers waiting; /* the same */
-  rangecast::Rig rig;     /* of rig_file; empty: any */
-  MuxSteps steps;
-  FrameSetJoiner joiner;
-  std::vector<MuxSteps::Stream> votes;
-  std::vector<MuxPad *> voters;
-  std::vector<GstClockTime> captures;
-  GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
-  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
-  GstClockTime last_capture = GST_CLOCK_TIME_NONE; /* of the last frame set */
-  GstClockTime last_running = GST_CLOCK_TIME_NONE;
-};
-
-struct _GstRangeMux {
-  GstAggregator parent;
-  GstRangeMuxPrivate *priv;
-};
 
 #define MUX_CAPS                                                                                   \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
@@ -122,43 +74,6 @@ public:
 private:
   MuxPads &pads_;
 };
-
-/* ---- what becomes of each stream ---- */
-
-/* Tells a state to people, by a warning, and to applications. */
-static void
-tell_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTimeDiff offset)
-{
-  entry.said = state;
-  const std::string text = entry.title () + explain (entry, state, offset);
-  GST_INFO_OBJECT (self, "%s", text.c_str ());
-  if (state != MuxState::kIn)
-    gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadData, text});
-  gst_element_post_message (GST_ELEMENT (self),
-      gst_message_new_element (GST_OBJECT (self),
-          gst_structure_new ("rangemux-stream", "pad", G_TYPE_STRING, GST_PAD_NAME (entry.pad),
-              "view-id", G_TYPE_INT, entry.view_id (), "state", G_TYPE_STRING, name_of (state),
-              "offset", G_TYPE_INT64, gint64 (offset), nullptr)));
-}
-
-/* @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
-static void
-set_state (GstRangeMux *self, MuxPad &entry, MuxState state, GstClockTime running)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  if (state != entry.state) {
-    std::lock_guard guard (priv->lock);
-    entry.state = state;
-    entry.since = running;
-  }
-  if (state == entry.said)
-    return;
-  const bool lasts = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (entry.since) &&
-                     running >= entry.since + kWorthTelling;
-  if (lasts || (state != MuxState::kLate && state != MuxState::kOutOfStep))
-    tell_state (self, entry, state,
-        entry.offset_known && priv->live ? entry.offset - priv->steps.reference () : 0);
-}
 
 /* ---- caps: the union of the rigs of the streams that go together ---- */
 
@@ -231,235 +146,15 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
   return GST_AGGREGATOR_CLASS (gst_range_mux_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* ---- matching ---- */
-
-static GstClockTime
-distance (GstClockTime a, GstClockTime b)
-{
-  return a > b ? a - b : b - a;
-}
-
-static GstClockTime
-tolerance_of (GstRangeMuxPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  if (priv->max_skew > 0)
-    return priv->max_skew;
-  return GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration / 2
-                                                        : kDefaultTolerance;
-}
-
-/* Notes who is there. Who has a buffer is; who has none is silent once the oldest one of the others
- * is much later than its last one: so a stream whose times jump silences nobody. Who was left out
- * for a clash may have its turn when somebody has gone. */
-static void
-note_arrivals (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime now = GST_CLOCK_TIME_NONE;
-  for (const auto &entry : pads)
-    entry->waits = false;
-  for (const auto *buffers : {&waiting.list, &waiting.gaps})
-    for (const Waiting &w : *buffers) {
-      w.entry->waits = true;
-      if (!GST_CLOCK_TIME_IS_VALID (w.running))
-        continue;
-      w.entry->seen = w.running;
-      now = std::min (now, w.running); /* NONE is the greatest number there is */
-    }
-  priv->now = now;
-  if (!GST_CLOCK_TIME_IS_VALID (now))
-    return;
-  for (const auto &entry : pads) {
-    if (!GST_CLOCK_TIME_IS_VALID (entry->seen))
-      entry->seen = now; /* it did not come so far */
-    const bool alive = entry->waits || now <= entry->seen || now - entry->seen <= kSilentAfter;
-    if (alive != entry->alive)
-      priv->caps_dirty = true;
-    entry->alive = alive;
-    if (!alive && priv->live && !gst_aggregator_pad_is_eos (entry->pad))
-      set_state (self, *entry, MuxState::kSilent, now);
-  }
-}
-
-/* Live: compares how far capture times are from the pipeline's clock, so that nobody has to wait
- * for the others. */
-static void
-judge_steps (GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
-  for (const Waiting &w : waiting.list)
-    if (GST_CLOCK_TIME_IS_VALID (w.running)) {
-      std::lock_guard guard (priv->lock);
-      w.entry->offset = MuxSteps::offset_of (w.capture, base + w.running);
-      w.entry->offset_known = true;
-    }
-  priv->votes.clear ();
-  priv->voters.clear ();
-  for (const auto &entry : pads)
-    if (entry->chosen && entry->alive && entry->offset_known) {
-      priv->votes.push_back ({entry->offset});
-      priv->voters.push_back (entry.get ());
-    }
-  if (priv->steps.judge (priv->votes))
-    priv->last_capture = GST_CLOCK_TIME_NONE; /* times of another clock */
-  for (std::size_t i = 0; i < priv->voters.size (); i++)
-    priv->voters[i]->in_step = priv->votes[i].in_step;
-}
-
-/* Not live: PTS may begin anywhere, and every stream that has not ended has a buffer here. Of two
- * that are apart nobody knows which one is wrong: the earlier one goes alone, the other one waits.
- */
-static void
-judge_recordings (GstRangeMuxPrivate *priv, const WaitingBuffers &waiting)
-{
-  if (waiting.list.empty ())
-    return;
-  std::vector<GstClockTime> &captures = priv->captures;
-  captures.clear ();
-  for (const Waiting &w : waiting.list)
-    captures.push_back (w.capture);
-  std::ranges::nth_element (captures, captures.begin () + captures.size () / 2);
-  const GstClockTime median = captures[captures.size () / 2];
-  const bool can_vote = captures.size () >= 3;
-  for (const Waiting &w : waiting.list)
-    w.entry->in_step = !can_vote || distance (w.capture, median) <= kOtherRecording;
-  if (GST_CLOCK_TIME_IS_VALID (priv->last_capture) && median + kOutOfStep < priv->last_capture)
-    priv->last_capture = GST_CLOCK_TIME_NONE; /* all of them began again */
-}
-
-/* Whether a buffer can be part of a frame set to come, and why not. */
-static MuxState
-fate_of (const GstRangeMuxPrivate *priv, const Waiting &w, GstClockTime tolerance)
-{
-  if (!w.entry->chosen)
-    return w.entry->other_rig.ok () ? MuxState::kClash : MuxState::kOtherRig;
-  if (!w.entry->in_step)
-    return MuxState::kOutOfStep;
-  const bool late =
-      GST_CLOCK_TIME_IS_VALID (priv->last_capture) && w.capture <= priv->last_capture + tolerance;
-  return late ? MuxState::kLate : MuxState::kIn;
-}
-
-/* @return whether anything went */
-static bool
-drop_useless (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime tolerance)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  bool any = false;
-  for (const Waiting &w : waiting.list) {
-    const MuxState fate = fate_of (priv, w, tolerance);
-    if (fate == MuxState::kIn)
-      continue;
-    any = true;
-    gst_aggregator_pad_drop_buffer (w.entry->pad);
-    {
-      std::lock_guard guard (priv->lock);
-      w.entry->received++;
-      (fate == MuxState::kLate           ? w.entry->late
-          : fate == MuxState::kOutOfStep ? w.entry->out_of_step
-                                         : w.entry->left_out)++;
-    }
-    set_state (self, *w.entry, fate, w.running);
-  }
-  return any;
-}
-
-/* A gap says that its pad has nothing for a while: nobody waits for that pad until another one's
- * frame is behind the gap. @return whether one went */
-static bool
-drop_past_gaps (const WaitingBuffers &waiting, GstClockTime tolerance, bool timeout)
-{
-  if (waiting.list.empty () && waiting.missing > 0 && !timeout)
-    return false;
-  GstClockTime first = GST_CLOCK_TIME_NONE;
-  for (const Waiting &w : waiting.list)
-    first = std::min (first, w.running);
-  bool any = false;
-  for (const Waiting &gap : waiting.gaps)
-    if (waiting.list.empty () || first > gstrange::gap_end (gap.running, gap.buffer, tolerance)) {
-      gst_aggregator_pad_drop_buffer (gap.entry->pad);
-      any = true;
-    }
-  return any;
-}
-
-static void
-report_clash (GstRangeMux *self, MuxPad &entry)
-{
-  if (entry.clash_reported)
-    return;
-  entry.clash_reported = true;
-  gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (entry.pad)) +
-                                  ": its buffers have views that another pad has, too; dropped"});
-}
-
-/* Takes the buffers of one frame set from their pads.
- * @param[out] running  of the oldest of them
- * @return how many */
-static std::size_t
-join_matching (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
-    GstClockTime tolerance, GstClockTime &running)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const auto matches = [&] (const Waiting &w) { return w.capture <= first + tolerance; };
-  guint memories = 0;
-  for (const Waiting &w : waiting.list)
-    memories += matches (w) ? gst_buffer_n_memory (w.buffer) : 0;
-  priv->joiner.begin (memories, waiting.list.front ().entry->coded);
-  running = GST_CLOCK_TIME_NONE;
-  std::size_t matched = 0;
-  for (const Waiting &w : waiting.list) {
-    if (!matches (w))
-      continue;
-    gst_aggregator_pad_drop_buffer (w.entry->pad); /* we hold a reference */
-    if (!priv->joiner.add (w.buffer))
-      report_clash (self, *w.entry);
-    running = std::min (running, w.running); /* NONE is the greatest number there is */
-    matched++;
-    set_state (self, *w.entry, MuxState::kIn, w.running);
-    std::lock_guard guard (priv->lock);
-    w.entry->received++;
-    w.entry->matched++;
-    w.entry->last_skew = GST_CLOCK_DIFF (first, w.capture);
-  }
-  return matched;
-}
-
-static GstFlowReturn
-push_frame_set (GstRangeMux *self, const WaitingBuffers &waiting, GstClockTime first,
-    GstClockTime tolerance, std::size_t streams)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime running;
-  const std::size_t matched = join_matching (self, waiting, first, tolerance, running);
-  GstBuffer *frame_set = priv->joiner.finish ();
-  if (!frame_set) {
-    GST_ELEMENT_ERROR (self, RESOURCE, NO_SPACE_LEFT, (nullptr),
-        ("no memory to put %" G_GSIZE_FORMAT " streams together", matched));
-    return GST_FLOW_ERROR;
-  }
-  if (GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (priv->last_running))
-    running = std::max (running, priv->last_running); /* never backwards */
-  priv->last_running = running;
-  priv->last_capture = first;
-  gstrange::stamp (GST_AGGREGATOR (self), frame_set, running, priv->frame_duration, first);
-  {
-    std::lock_guard guard (priv->lock);
-    priv->frames++;
-    priv->complete += matched == streams;
-  }
-  priv->reporter.passed (GST_ELEMENT (self), frame_set);
-  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
-}
+/* ---- frame sets ---- */
 
 static GstFlowReturn
 aggregate_waiting (
     GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting, bool timeout)
 {
   GstRangeMuxPrivate *priv = self->priv;
+  if (!priv->live && waiting.ended > 0)
+    tell_strangers (self, pads);
   if (waiting.list.empty () && waiting.gaps.empty ()) {
     if (waiting.missing > 0 || waiting.ended == 0)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -475,9 +170,10 @@ aggregate_waiting (
   if (priv->live)
     judge_steps (self, pads, waiting);
   else
-    judge_recordings (priv, waiting);
-  const GstClockTime tolerance = tolerance_of (priv);
-  if (drop_past_gaps (waiting, tolerance, timeout) || drop_useless (self, waiting, tolerance))
+    judge_recordings (self, waiting);
+  const GstClockTime tolerance = matching_tolerance (priv);
+  if (waiting.drop_past_gaps (priv->live, tolerance, timeout) ||
+      drop_useless (self, waiting, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
   if (waiting.list.empty () || (waiting.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -522,10 +218,11 @@ static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
+  priv->last = {};
+  priv->now = GST_CLOCK_TIME_NONE;
   priv->steps.reset ();
   for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
-    entry->offset_known = false;
+    entry->offset_known = entry->shift_known = false;
     entry->seen = GST_CLOCK_TIME_NONE;
   }
   return GST_FLOW_OK;
@@ -594,24 +291,12 @@ gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 
 /* ---- life ---- */
 
-/* A stream's frame sets that went without it count from the element's start. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (element)->priv;
   std::lock_guard guard (priv->lock);
-  std::vector<StatsRow> rows (1);
-  guint64 late = 0;
-  for (const auto &entry : priv->pads) {
-    late += entry->late + entry->out_of_step;
-    rows.push_back ({.pad = GST_PAD_NAME (entry->pad),
-        .counters = {.frames = entry->received,
-            .lost = priv->frames - std::min (priv->frames, entry->matched),
-            .late = entry->late + entry->out_of_step},
-        .views = entry->views});
-  }
-  rows[0].counters = {.frames = priv->frames, .lost = priv->frames - priv->complete, .late = late};
-  return rows;
+  return rows_of (priv->pads, priv->sent);
 }
 
 static gboolean
@@ -641,13 +326,14 @@ gst_range_mux_start (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->caps_dirty = true;
-  priv->frame_duration = priv->last_capture = priv->last_running = priv->now = GST_CLOCK_TIME_NONE;
+  priv->frame_duration = priv->now = GST_CLOCK_TIME_NONE;
+  priv->last = {};
   priv->steps.reset ();
   if (!load_rig_file (GST_RANGE_MUX (aggregator)) || !publish_clock (GST_RANGE_MUX (aggregator)))
     return FALSE;
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
-  priv->frames = priv->complete = 0;
+  priv->sent = {};
   for (const auto &entry : priv->pads)
     entry->reset ();
   return TRUE;
@@ -675,31 +361,6 @@ gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GPar
   }
 }
 
-static GstStructure *
-make_stats (const GstRangeMuxPrivate *priv)
-{
-  guint64 late = 0, out_of_step = 0, left_out = 0;
-  for (const auto &entry : priv->pads) {
-    late += entry->late;
-    left_out += entry->left_out;
-    out_of_step += entry->out_of_step;
-  }
-  GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
-      priv->frames, "complete", G_TYPE_UINT64, priv->complete, "incomplete", G_TYPE_UINT64,
-      priv->frames - priv->complete, "dropped-late", G_TYPE_UINT64, late, "out-of-step",
-      G_TYPE_UINT64, out_of_step, "left-out", G_TYPE_UINT64, left_out, nullptr);
-  for (const auto &entry : priv->pads) {
-    GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, entry->received,
-        "matched", G_TYPE_UINT64, entry->matched, "late", G_TYPE_UINT64, entry->late, "out-of-step",
-        G_TYPE_UINT64, entry->out_of_step, "left-out", G_TYPE_UINT64, entry->left_out, "skew",
-        G_TYPE_INT64, gint64 (entry->last_skew), "state", G_TYPE_STRING, name_of (entry->state),
-        "offset", G_TYPE_INT64, gint64 (entry->offset), nullptr);
-    gst_structure_set (stats, GST_PAD_NAME (entry->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
-    gst_structure_free (of_pad);
-  }
-  return stats;
-}
-
 static void
 gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
@@ -716,7 +377,7 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
       g_value_set_string (value, priv->rig_file.empty () ? nullptr : priv->rig_file.c_str ());
       break;
     case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
+      g_value_take_boxed (value, make_stats (priv->pads, priv->sent));
       break;
     case PROP_STATS_INTERVAL:
       g_value_set_uint (value, priv->reporter.interval ());

@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "muxframeset.hpp"
 
-#include <gstrange/gstrangemeta.h>
+#include <algorithm>
+#include <gstrange/gstrangeframe.hpp>
+#include <string>
 #include <utility>
+
+using rangecast::Status;
+using rangecast::StatusCode;
 
 /* So many are kept: a few are downstream, in queues. What is beyond is given back after use. */
 static constexpr std::size_t kMostKept = 16;
@@ -61,31 +66,10 @@ FrameSetJoiner::begin (guint memories, bool coded)
   rest_.clear ();
 }
 
-/* As gst_range_buffer_append() does, for bytes that come `base` bytes behind the beginning. */
-static bool
-add_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
-{
-  gpointer state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
-      return false;
-  state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
-    auto added = reinterpret_cast<GstRangeMeta *> (
-        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
-    const GstMeta own = added->meta;
-    *added = *meta;
-    added->meta = own;
-    added->depth_offset += base;
-    added->colour_offset += base;
-  }
-  return true;
-}
-
 bool
 FrameSetJoiner::add (GstBuffer *buffer)
 {
-  if (!coded_ && !add_metas (frame_set_, buffer, size_))
+  if (!coded_ && !gstrange::append_metas (frame_set_, buffer, size_))
     return false;
   if (coded_ && GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
     GST_BUFFER_FLAG_SET (frame_set_, GST_BUFFER_FLAG_DELTA_UNIT);
@@ -103,28 +87,49 @@ FrameSetJoiner::add (GstBuffer *buffer)
   return true;
 }
 
-bool
+/* Not gst_buffer_extract(): of a buffer that cannot be mapped GStreamer 1.22 loses the memory. */
+static bool
+copy_bytes (GstBuffer *buffer, guint8 *&end)
+{
+  for (guint i = 0; i < gst_buffer_n_memory (buffer); i++) {
+    GstMemory *memory = gst_buffer_peek_memory (buffer, i);
+    GstMapInfo map;
+    if (!gst_memory_map (memory, &map, GST_MAP_READ))
+      return false;
+    end = std::copy_n (map.data, map.size, end);
+    gst_memory_unmap (memory, &map);
+  }
+  return true;
+}
+
+Status
 FrameSetJoiner::copy_rest ()
 {
   GstMemory *copy = copies_.acquire (rest_size_);
   GstMapInfo map;
   if (!copy)
-    return false;
-  gsize end = 0;
-  if (gst_memory_map (copy, &map, GST_MAP_WRITE)) {
+    return {StatusCode::kNoSpace, "no memory left for " + std::to_string (rest_size_) +
+                                      " bytes of " + std::to_string (rest_.size ()) + " streams"};
+  gst_buffer_append_memory (frame_set_, copy);
+  bool all = gst_memory_map (copy, &map, GST_MAP_WRITE);
+  if (all) {
+    guint8 *end = map.data;
     for (GstBuffer *buffer : rest_)
-      end += gst_buffer_extract (buffer, 0, map.data + end, map.size - end);
+      all = all && copy_bytes (buffer, end);
     gst_memory_unmap (copy, &map);
   }
-  gst_buffer_append_memory (frame_set_, copy);
-  return end == rest_size_;
+  return all ? Status{} : Status{StatusCode::kBadData, "cannot map an input buffer"};
 }
 
-GstBuffer *
-FrameSetJoiner::finish ()
+Status
+FrameSetJoiner::finish (GstBuffer *&frame_set)
 {
-  if (rest_size_ > 0 && !copy_rest ())
+  Status status;
+  if (rest_size_ > 0)
+    status = copy_rest ();
+  if (!status.ok ())
     gst_clear_buffer (&frame_set_);
   rest_.clear ();
-  return std::exchange (frame_set_, nullptr);
+  frame_set = std::exchange (frame_set_, nullptr);
+  return status;
 }

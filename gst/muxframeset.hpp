@@ -3,6 +3,7 @@
 
 #include <gst/gst.h>
 
+#include <rangecast/status.hpp>
 #include <vector>
 
 /** Memories that come back. A GstBufferPool would throw away each that left in another buffer: that
@@ -44,14 +45,15 @@ public:
    *  @param buffer  transfer none: the caller keeps it until finish()
    *  @return false, and nothing is added, if a raw one has a view that is there already */
   bool add (GstBuffer *buffer);
-  /** @return transfer full: the frame set, without times; nullptr where memory is short */
-  GstBuffer *finish ();
+  /** @param[out] frame_set  transfer full: without times; nullptr if it fails
+   *  @return kNoSpace where memory is short, kBadData if a buffer to be copied cannot be read */
+  rangecast::Status finish (GstBuffer *&frame_set);
 
   /** Gives back the memory that is kept. */
   void drop () { copies_.drop (); }
 
 private:
-  bool copy_rest ();
+  rangecast::Status copy_rest ();
 
   GstBuffer *frame_set_ = nullptr;
   bool coded_ = false;

@@ -10,34 +10,16 @@ using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
 
-const char *
-name_of (MuxState state)
-{
-  switch (state) {
-    case MuxState::kSilent:
-      return "silent";
-    case MuxState::kLate:
-      return "late";
-    case MuxState::kOutOfStep:
-      return "out-of-step";
-    case MuxState::kClash:
-      return "clash";
-    case MuxState::kOtherRig:
-      return "other-rig";
-    default:
-      return "in";
-  }
-}
-
 void
 MuxPad::reset ()
 {
-  has_caps = coded = chosen = alive = clash_reported = offset_known = false;
+  has_caps = coded = chosen = alive = clash_reported = offset_known = shift_known = met =
+      told_apart = false;
   other_rig = clash = {};
   seen = since = GST_CLOCK_TIME_NONE;
   said = state = MuxState::kIn;
   received = late = out_of_step = left_out = matched = views = 0;
-  last_skew = offset = 0;
+  last_skew = offset = shift = ahead = 0;
 }
 
 std::string
@@ -47,30 +29,6 @@ MuxPad::title () const
   if (has_caps)
     text += " (view " + std::to_string (view_id ()) + ")";
   return text;
-}
-
-std::string
-explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset)
-{
-  const std::string seconds = std::to_string (double (ABS (offset)) / GST_SECOND) + " s";
-  switch (state) {
-    case MuxState::kSilent:
-      return ": nothing came for " + std::to_string (kSilentAfter / GST_SECOND) +
-             " s; the others go on without it";
-    case MuxState::kLate:
-      return ": all that comes is too late, capture times are " + seconds +
-             " behind the others'; left out; expected a host and a network that keep up, a clock "
-             "in step, or a greater latency";
-    case MuxState::kOutOfStep:
-      return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
-             " the others': the host's clock is not in step; left out until it is";
-    case MuxState::kOtherRig:
-      return ": " + entry.other_rig.message () + "; left out";
-    case MuxState::kClash:
-      return ": " + entry.clash.message () + "; left out";
-    default:
-      return ": is back";
-  }
 }
 
 /* ---- which streams go together ---- */

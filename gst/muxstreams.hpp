@@ -8,19 +8,7 @@
 #include <string>
 #include <vector>
 
-/** Whether a stream's buffers become part of frame sets, and why not. */
-enum class MuxState {
-  kIn,
-  kSilent,    ///< nothing has come for a while
-  kLate,      ///< its buffers come after their frame sets
-  kOutOfStep, ///< its capture times are of another clock
-  kClash,     ///< other streams have its view-id, or another format
-  kOtherRig,  ///< the rig that was asked for has other cameras
-};
-
-/** Nick for statistics and messages: "in", "silent", "late", "out-of-step", "clash", "other-rig".
- */
-const char *name_of (MuxState state);
+#include "muxstates.hpp"
 
 /** A stream of which nothing came for so long is silent: it has no say any more. */
 inline constexpr GstClockTime kSilentAfter = 2 * GST_SECOND;
@@ -51,6 +39,11 @@ struct MuxPad {
   bool clash_reported = false;              ///< of buffers
   bool offset_known = false;                ///< `offset` is of its last buffer
   bool in_step = true;                      ///< its capture times are of the clock that most have
+  bool shift_known = false;                 ///< `shift` is of its last buffer
+  bool met = false;                         ///< was in a frame set with another stream
+  bool told_apart = false;                  ///< state `kApart` was told
+  GstClockTimeDiff shift = 0;               ///< from running time to capture time, ns
+  GstClockTimeDiff ahead = 0;               ///< of its capture times, of the others'; not live; ns
   GstClockTime seen = GST_CLOCK_TIME_NONE;  ///< running time of its last buffer
   GstClockTime since = GST_CLOCK_TIME_NONE; ///< running time from which it has its state
   MuxState said = MuxState::kIn;            ///< the state that was told last
@@ -62,9 +55,6 @@ struct MuxPad {
   GstClockTimeDiff last_skew = 0; ///< ns behind the oldest of its frame set
   GstClockTimeDiff offset = 0;    ///< ns, capture time ahead of the pipeline's clock as it came
 };
-/** What goes on with a stream, for people: follows its title().
- *  @param offset  of its capture times, ahead of the others', ns */
-std::string explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset);
 
 using MuxPads = std::vector<std::shared_ptr<MuxPad>>;
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <algorithm>
-#include <gstrange/gstrangepairing.hpp>
 #include <vector>
 
 #include "muxstreams.hpp"
@@ -22,38 +20,16 @@ public:
   ~WaitingBuffers () { release (); }
   WaitingBuffers (const WaitingBuffers &) = delete;
 
-  void take (const MuxPads &pads, bool live)
-  {
-    release ();
-    for (const auto &entry : pads) {
-      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
-      if (buffer)
-        (gstrange::is_gap (buffer) ? gaps : list)
-            .push_back ({entry.get (), buffer, capture_time (entry->pad, buffer, live),
-                gstrange::running_time_of (entry->pad, buffer)});
-      else if (!gst_aggregator_pad_is_eos (entry->pad))
-        missing++;
-      else
-        ended++;
-    }
-  }
-  void release ()
-  {
-    for (auto *waiting : {&list, &gaps}) {
-      for (const Waiting &w : *waiting)
-        gst_buffer_unref (w.buffer);
-      waiting->clear ();
-    }
-    missing = ended = 0;
-  }
+  void take (const MuxPads &pads, bool live);
+  void release ();
+
+  /* A gap says that its pad has nothing for a while: nobody waits for that pad until another one's
+   * frame is behind the gap. @return whether one went */
+  bool drop_past_gaps (bool live, GstClockTime tolerance, bool timeout) const;
 
   std::vector<Waiting> list, gaps;
   int missing = 0, ended = 0;
-
-private:
-  /* A stranger's may be any number; sums of this one and a few seconds do not overflow. */
-  static GstClockTime capture_time (GstAggregatorPad *pad, GstBuffer *buffer, bool live)
-  {
-    return std::min<GstClockTime> (gstrange::capture_time_of (pad, buffer, live), G_MAXINT64);
-  }
 };
+
+/* How much faster than it was captured it is played; not 0. */
+double speed_of (const Waiting &w);

@@ -21,6 +21,11 @@ GST_RANGE_API GstFlowReturn acquire (GstElement *element, GstBufferPool *pool, G
 GST_RANGE_API rangecast::Status add_view (
     GstBuffer *buffer, int view_id, const rangecast::Roi &roi, GstClockTime capture_time);
 
+/** Adds the metas of `views` to a frame set: what gst_range_buffer_append() does, but for the
+ * bytes, which shall lie `base` bytes behind the beginning.
+ *  @return false, and nothing is added, if both have a view of the same view-id */
+GST_RANGE_API bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
+
 /** Maps all views of a frame set, for as long as it lives. Lives on the stack, allocates nothing.
  *  After a failure views() is empty and status() says which view is at fault.
  *  crop() changes a view's ROI in its meta, without touching pixels. */

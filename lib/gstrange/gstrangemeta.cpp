@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <rangecast/geometry/range_image.hpp>
 
+#include "gstrangeframe.hpp"
+
 static void
 gst_range_meta_clear (GstRangeMeta *self)
 {
@@ -104,6 +106,24 @@ gst_buffer_n_range_metas (GstBuffer *buffer)
   return gst_buffer_get_n_meta (buffer, GST_RANGE_META_API_TYPE);
 }
 
+bool
+gstrange::append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
+{
+  gpointer state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
+    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
+      return false;
+  state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
+    auto added = reinterpret_cast<GstRangeMeta *> (
+        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
+    gst_range_meta_copy_fields (added, meta);
+    added->depth_offset += base;
+    added->colour_offset += base;
+  }
+  return true;
+}
+
 /**
  * gst_range_buffer_append:
  * @frame_set: a writable buffer
@@ -118,23 +138,10 @@ gst_buffer_n_range_metas (GstBuffer *buffer)
 gboolean
 gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)
 {
-  const gsize base = gst_buffer_get_size (frame_set);
-  gpointer state = nullptr;
-  GstRangeMeta *meta;
-  while ((meta = gst_buffer_iterate_range_meta (views, &state)))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
-      return FALSE;
-
+  if (!gstrange::append_metas (frame_set, views, gst_buffer_get_size (frame_set)))
+    return FALSE;
   gst_buffer_copy_into (frame_set, views, GST_BUFFER_COPY_MEMORY, 0, -1);
   gst_buffer_add_parent_buffer_meta (frame_set, views);
-  state = nullptr;
-  while ((meta = gst_buffer_iterate_range_meta (views, &state))) {
-    auto added = reinterpret_cast<GstRangeMeta *> (
-        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
-    gst_range_meta_copy_fields (added, meta);
-    added->depth_offset += base;
-    added->colour_offset += base;
-  }
   return TRUE;
 }
 

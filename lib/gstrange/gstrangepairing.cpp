@@ -2,6 +2,7 @@
 #include "gstrangepairing.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "gstrangemeta.h"
 
@@ -192,6 +193,15 @@ capture_time_of (GstAggregatorPad *pad, GstBuffer *buffer, bool live)
   return base + running;
 }
 
+/* In the output's segment, which has the rate of the last seek. */
+static GstClockTime
+position_of (const GstSegment &segment, GstClockTime running_time)
+{
+  const double rate = std::abs (segment.rate);
+  return segment.start +
+         (rate == 1 ? running_time : GstClockTime (std::round (double (running_time) * rate)));
+}
+
 void
 stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
     GstClockTime duration, GstClockTime capture_time)
@@ -199,7 +209,7 @@ stamp (GstAggregator *aggregator, GstBuffer *buffer, GstClockTime running_time,
   auto segment = &GST_AGGREGATOR_PAD (aggregator->srcpad)->segment;
   if (GST_CLOCK_TIME_IS_VALID (running_time)) {
     GST_OBJECT_LOCK (aggregator);
-    GST_BUFFER_PTS (buffer) = segment->start + running_time;
+    GST_BUFFER_PTS (buffer) = position_of (*segment, running_time);
     segment->position = GST_BUFFER_PTS (buffer);
     GST_OBJECT_UNLOCK (aggregator);
   }
@@ -246,7 +256,9 @@ GapSender::push (
     push_segment (aggregator, cause, segment);
   segment_sent_ = true;
   position_ = end;
-  gst_pad_push_event (aggregator->srcpad, gst_event_new_gap (segment.start + begin, end - begin));
+  begin = position_of (segment, begin);
+  gst_pad_push_event (
+      aggregator->srcpad, gst_event_new_gap (begin, position_of (segment, end) - begin));
 }
 
 } // namespace gstrange

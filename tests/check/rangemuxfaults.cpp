@@ -93,7 +93,7 @@ private:
   void read_bus ()
   {
     while (GstMessage *message = gst_bus_pop (bus)) {
-      if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ELEMENT) {
+      if (gst_message_has_name (message, "rangemux-stream")) {
         const GstStructure *s = gst_message_get_structure (message);
         Told one;
         one.pad = gst_structure_get_string (s, "pad");

@@ -205,6 +205,45 @@ GST_START_TEST (test_nothing_is_allocated_for_a_frame_set_but_its_buffer)
 }
 GST_END_TEST;
 
+/* Memory that nobody can map, as that of a device which is gone. */
+static GstMemory *
+unreadable_memory ()
+{
+  static const GType type = g_type_register_static_simple (
+      GST_TYPE_ALLOCATOR, "UnreadableAllocator", sizeof (GstAllocatorClass),
+      [] (gpointer klass, gpointer) {
+        GST_ALLOCATOR_CLASS (klass)->free = [] (GstAllocator *, GstMemory *m) { g_free (m); };
+      },
+      sizeof (GstAllocator), nullptr, GTypeFlags (0));
+  auto allocator = GST_ALLOCATOR (gst_object_ref_sink (g_object_new (type, nullptr)));
+  allocator->mem_type = "unreadable";
+  allocator->mem_map = [] (GstMemory *, gsize, GstMapFlags) -> gpointer { return nullptr; };
+  auto memory = g_new0 (GstMemory, 1);
+  gst_memory_init (memory, GST_MEMORY_FLAG_NO_SHARE, allocator, nullptr, 100, 0, 0, 100);
+  gst_object_unref (allocator); /* the memory has it */
+  return memory;
+}
+
+GST_START_TEST (test_a_buffer_that_cannot_be_read_is_no_lack_of_memory)
+{
+  Mux mux (17, true);
+  auto buffers = coded_buffers (mux, 0);
+  gst_buffer_remove_all_memory (buffers[15]);
+  gst_buffer_append_memory (buffers[15], unreadable_memory ());
+  for (std::size_t i = 0; i < buffers.size (); i++)
+    gst_harness_push (mux.in[i], buffers[i]);
+  GstMessage *message = gst_bus_timed_pop_filtered (mux.bus, 20 * GST_SECOND, GST_MESSAGE_ERROR);
+  fail_unless (message != nullptr);
+  GError *error = nullptr;
+  gst_message_parse_error (message, &error, nullptr);
+  fail_unless (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_DECODE), error->message);
+  fail_unless (strstr (error->message, "cannot map") != nullptr, error->message);
+  g_error_free (error);
+  gst_message_unref (message);
+  fail_unless_equals_int (count_errors (mux.bus), 0);
+}
+GST_END_TEST;
+
 static Suite *
 rangemuxmany_suite ()
 {
@@ -215,6 +254,7 @@ rangemuxmany_suite ()
   tcase_add_test (tc, test_raw_views_are_right_and_no_byte_is_copied_twice);
   tcase_add_test (tc, test_coded_views_are_right_and_no_byte_is_copied_twice);
   tcase_add_test (tc, test_a_view_that_two_of_64_buffers_have_is_added_once);
+  tcase_add_test (tc, test_a_buffer_that_cannot_be_read_is_no_lack_of_memory);
   tcase_add_test (tc, test_nothing_is_allocated_for_a_frame_set_but_its_buffer);
   return suite;
 }
