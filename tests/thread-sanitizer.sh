@@ -7,7 +7,7 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 build=${RANGECAST_BUILD_TSAN:-build-tsan}
 tests=("$@")
-[ ${#tests[@]} -gt 0 ] || tests=(rangemux rangemuxclock rangemuxfaults rangemuxmany rangedemux rangedemuxpads statistics
+[ ${#tests[@]} -gt 0 ] || tests=(rangemux rangemuxclock rangemuxfaults rangemuxmany rangemuxrecordings rangedemux rangedemuxpads statistics
   rtpneighbourcodeguard senderfilter rtcpreports adaptiverate stereodepth stereodepththird roiextract neighbourcodeenc neighbourcoderate
   neighbourcodedec concealment temporal rangecombine cylinderfilter cylindercolour rangesplit rtploss avatarstream
   avatartestsrc neighbourcodeparse neighbourcodeseek)
