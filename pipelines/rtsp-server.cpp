@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -37,6 +38,7 @@ static constexpr int kSlowestStart_s = 20;
 /* So long the last frame set may last, after which a stream is over. */
 static constexpr guint kSlowestEnd_ms = 2000;
 static constexpr guint kLastWords_ms = 500;
+static constexpr guint kLeave_ms = 100; /* its answer gets to who is sent away */
 
 struct Connection {
   gint64 since_us = 0;                 /* monotonic */
@@ -46,6 +48,16 @@ struct Connection {
 
 /* Of a media, under the lock of the server: it is over; its viewers were sent away. */
 static constexpr char kOverKey[] = "rangecast-over", kEndedKey[] = "rangecast-ended";
+
+struct StopTimer {
+  void operator() (GSource *timer) const
+  {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
+};
+/* One for each media. */
+using Timers = std::map<GstRTSPMedia *, std::unique_ptr<GSource, StopTimer>>;
 
 struct Server {
   RtspOptions options;
@@ -65,7 +77,8 @@ struct Server {
 
   std::mutex lock; /* guards what follows */
   std::map<GstRTSPClient *, Connection> connections;
-  std::map<GstRTSPMedia *, GSource *> ending; /* with the timer that calls end_stream() */
+  Timers ending;  /* call end_stream() */
+  Timers leaving; /* send those away who came when it had ended */
 };
 
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
@@ -416,15 +429,35 @@ send_viewers_away (Ending &ending)
       gst_rtsp_session_pool_filter (server.sessions, close_session, &ending), g_object_unref);
 }
 
+/* With the lock, and instead of the one that there was. */
+static void
+start_timer (Server &server, Timers &timers, GstRTSPMedia *media, guint ms, GSourceFunc callback)
+{
+  GSource *timer = g_timeout_source_new (ms);
+  g_source_set_callback (timer, callback, new Ending (server, media), delete_ending);
+  g_source_attach (timer, nullptr);
+  timers[media].reset (timer);
+}
+
+static gboolean
+leave_ended (gpointer user_data)
+{
+  auto &ending = *static_cast<Ending *> (user_data);
+  {
+    std::lock_guard guard (ending.server.lock);
+    ending.server.leaving.erase (ending.media);
+  }
+  send_viewers_away (ending);
+  return G_SOURCE_REMOVE;
+}
+
 /* Who got to a stream just when it had ended would see nothing for ever. */
 static void
 leave_ended_soon (Server &server, GstRTSPMedia *media)
 {
-  const auto leave = [] (gpointer ending) -> gboolean {
-    send_viewers_away (*static_cast<Ending *> (ending));
-    return G_SOURCE_REMOVE;
-  };
-  g_timeout_add_full (G_PRIORITY_DEFAULT, 100, leave, new Ending (server, media), delete_ending);
+  std::lock_guard guard (server.lock);
+  if (!server.stopping && server.leaving.count (media) == 0)
+    start_timer (server, server.leaving, media, kLeave_ms, leave_ended);
 }
 
 static gboolean
@@ -440,41 +473,18 @@ end_stream (gpointer user_data)
   server.holder.release (ending.media);
   server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
   std::lock_guard guard (server.lock);
-  const auto found = server.ending.find (ending.media);
-  if (found != server.ending.end ()) {
-    g_source_destroy (found->second); /* it may be a later one than this */
-    g_source_unref (found->second);
-    server.ending.erase (found);
-  }
+  server.ending.erase (ending.media); /* it may be a later one than this */
   return G_SOURCE_REMOVE;
 }
 
-/* With the lock. One timer for each media: what comes last says when. */
-static void
-end_stream_in (Server &server, GstRTSPMedia *media, guint ms)
-{
-  GSource *&timer = server.ending[media];
-  if (timer) {
-    g_source_destroy (timer);
-    g_source_unref (timer);
-  }
-  timer = g_timeout_source_new (ms);
-  g_source_set_callback (timer, end_stream, new Ending (server, media), delete_ending);
-  g_source_attach (timer, nullptr);
-}
-
+/* Each holds a reference of its media. */
 static void
 forget_endings (Server &server)
 {
-  std::map<GstRTSPMedia *, GSource *> ending;
-  {
-    std::lock_guard guard (server.lock);
-    ending.swap (server.ending);
-  }
-  for (const auto &[media, timer] : ending) {
-    g_source_destroy (timer);
-    g_source_unref (timer);
-  }
+  Timers ending, leaving; /* end without the lock */
+  std::lock_guard guard (server.lock);
+  ending.swap (server.ending);
+  leaving.swap (server.leaving);
 }
 
 /* Whoever comes next gets a new run of the launch string. */
@@ -493,7 +503,8 @@ on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::str
       begin_new_run (server.factory);
     /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
     if (!g_object_get_data (G_OBJECT (media), kEndedKey))
-      end_stream_in (server, media, is_over ? kLastWords_ms : kSlowestEnd_ms);
+      start_timer (
+          server, server.ending, media, is_over ? kLastWords_ms : kSlowestEnd_ms, end_stream);
   }
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
