@@ -126,6 +126,37 @@ END
   stop_server
 }
 
+# Anybody may name a session, of which one is asked for here: that makes no viewers.
+test_crowd_of_one_session_keeps_nobody_out () {
+  serve --max-viewers 10 -- "$figure"
+  timeout 100 python3 - "$source_dir/tests/pipelines" "$url" <<'END' &
+import re, signal, socket, sys
+sys.path.insert(0, sys.argv[1])
+from rtsp_viewers import Viewer
+url = sys.argv[2]
+first = Viewer(url, True)
+control = re.findall(r"a=control:(\S+)", first.describe())[-1]
+fields, _ = first.ask("SETUP", f"{url}/{control}", "Transport: RTP/AVPF/TCP;unicast;interleaved=0-1")
+crowd = []
+for i in range(60):
+    crowd.append(Viewer(url, True))
+    crowd[-1].session = fields["Session"].split(";")[0]
+    try:
+        crowd[-1].ask("OPTIONS", url)
+    except (OSError, EOFError, RuntimeError):
+        pass
+open("crowd.txt", "w").write(f"{len(crowd)}\n")
+signal.pause()
+END
+  crowd=$!
+  trap 'kill -KILL $server $crowd 2>/dev/null || true' EXIT
+  until_true 60 test -s crowd.txt
+  count "$url" --viewers 3 >udp.txt || fail "$(cat udp.txt)"
+  count "$url" --viewers 3 --tcp >tcp.txt || fail "$(cat tcp.txt)"
+  kill "$crowd"
+  stop_server
+}
+
 make_certificate () {
   command -v openssl >/dev/null || skip "no openssl"
   openssl req -x509 -newkey rsa:2048 -nodes -keyout key.pem -out cert.pem -days 2 -subj /CN=localhost \
