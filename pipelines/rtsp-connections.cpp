@@ -1,7 +1,60 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rtsp-connections.hpp"
 
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
+
+/* Connections that are no viewers: those that ask only, or have not got so far. */
+static constexpr rlim_t kSpare = 32, kLeastSpare = 8;
+/* Files that the server and its launch string have open. With one of avatartestsrc they are 25. */
+static constexpr rlim_t kOwnFiles = 256, kLeastOwnFiles = 40;
+/* Where a launch string has more than that: connections leave so many to it. */
+static constexpr int kKeptFiles = 16;
+/* Memory of those that were closed is freed by the threads that serve them, which may wait for a
+ * first frame set meanwhile. Each has 6 KB. */
+static constexpr std::size_t kMostClosing = 512;
+/* The socket stays readable where nobody can be taken. */
+static constexpr gulong kNoFiles_us = 20000;
+
+std::optional<std::size_t>
+fit_connections (int max_viewers)
+{
+  const auto viewers = rlim_t (max_viewers);
+  struct rlimit files = {};
+  if (getrlimit (RLIMIT_NOFILE, &files) != 0)
+    return viewers + kSpare;
+  const rlim_t wanted = viewers + kSpare + kOwnFiles;
+  if (files.rlim_cur < wanted) {
+    const rlim_t before = files.rlim_cur;
+    files.rlim_cur = std::min (wanted, files.rlim_max);
+    if (setrlimit (RLIMIT_NOFILE, &files) != 0)
+      files.rlim_cur = before;
+  }
+  const rlim_t most = files.rlim_cur - std::min (files.rlim_cur, kLeastSpare + kLeastOwnFiles);
+  if (viewers > most) {
+    g_printerr ("rtsp-server: --max-viewers: expected %d at most, since a process may have %d open "
+                "files here (ulimit -n), got '%d'\n",
+        int (most), int (files.rlim_cur), max_viewers);
+    return std::nullopt;
+  }
+  const rlim_t others = files.rlim_cur - std::min (files.rlim_cur, viewers + kOwnFiles);
+  return viewers + std::clamp (others, kLeastSpare, kSpare);
+}
+
+/* A new file gets the lowest number that is free, so connections never have the uppermost ones. */
+static bool
+are_files_short (GSocket *socket)
+{
+  struct rlimit files = {};
+  const int next = fcntl (g_socket_get_fd (socket), F_DUPFD_CLOEXEC, 0);
+  if (next < 0)
+    return true;
+  close (next);
+  return getrlimit (RLIMIT_NOFILE, &files) == 0 && rlim_t (next + kKeptFiles) >= files.rlim_cur;
+}
 
 /* ---- what each does; in threads that serve connections ---- */
 
@@ -57,6 +110,7 @@ void
 Connections::add (GstRTSPClient *client)
 {
   g_object_weak_ref (G_OBJECT (client), on_gone, this);
+  taken_++;
   std::lock_guard guard (lock_);
   connections_[client].since_us = g_get_monotonic_time ();
 }
@@ -103,11 +157,11 @@ Connections::close_idle (gint64 patience_us)
 }
 
 std::size_t
-Connections::count ()
+Connections::count (bool closing)
 {
   std::lock_guard guard (lock_);
   return std::size_t (std::count_if (connections_.begin (), connections_.end (),
-      [] (const auto &one) { return !one.second.is_closing; }));
+      [=] (const auto &one) { return one.second.is_closing == closing; }));
 }
 
 /* Of those that are no viewers.
@@ -141,14 +195,27 @@ Connections::close_oldest ()
 }
 
 /* Each connection is a file descriptor, whoever is behind it. A crowd that says nothing must not
- * keep others out. */
+ * keep others out, nor take the files that the stream needs. */
+bool
+Connections::make_room (GSocket *socket)
+{
+  if (count (true) >= kMostClosing)
+    return false;
+  if (count (false) < most_ && !are_files_short (socket))
+    return true;
+  return close_oldest () && !are_files_short (socket);
+}
+
 void
 Connections::take (GSocket *socket)
 {
-  if (count () < most_ || close_oldest ()) {
-    gst_rtsp_server_io_func (socket, G_IO_IN, server_);
-    return;
-  }
-  GSocket *refused = g_socket_accept (socket, nullptr, nullptr);
+  const guint64 before = taken_;
+  GSocket *refused = nullptr;
+  if (make_room (socket))
+    gst_rtsp_server_io_func (socket, G_IO_IN, server_); /* which calls add(), if it can */
+  else
+    refused = g_socket_accept (socket, nullptr, nullptr);
+  if (!refused && taken_ == before)
+    g_usleep (kNoFiles_us);
   g_clear_object (&refused);
 }

@@ -6,7 +6,14 @@
 
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
+
+/** How many connections there may be at a time, of which so many are viewers, beside the files that
+ *  the server itself and its launch string have open. Raises the limit of this process on open
+ *  files where it must and may.
+ *  @return nothing after saying that the limit is too low */
+[[nodiscard]] std::optional<std::size_t> fit_connections (int max_viewers);
 
 /** A viewer is a connection that sent SETUP or PLAY, of those with one session only the last one.
  *  Anybody can name a session, so that makes nobody a viewer. Others are closed to make room, the
@@ -43,11 +50,13 @@ private:
   };
   static void on_gone (gpointer connections, GObject *client);
   bool is_viewer (GstRTSPClient *client);
-  std::size_t count ();
+  std::size_t count (bool closing);
   bool close_oldest ();
+  bool make_room (GSocket *socket);
 
   GstRTSPServer *server_;
   const std::size_t most_;
-  std::mutex lock_; /* guards what follows; not held while anything is called */
+  guint64 taken_ = 0; /* ever; main loop */
+  std::mutex lock_;   /* guards what follows; not held while anything is called */
   std::map<GstRTSPClient *, Connection> connections_;
 };

@@ -31,8 +31,6 @@
 static constexpr guint kThreads = 4; /* that serve connections */
 /* Requests of RTSP have bodies of a few lines at most. */
 static constexpr guint kMostContent = 16384; /* bytes */
-/* Connections that are no viewers: those that ask only, or have not got so far. */
-static constexpr int kSpareConnections = 32;
 static constexpr int kBacklog = 64; /* connections that the kernel holds until they are taken */
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
@@ -555,12 +553,11 @@ check_launch (const RtspOptions &options)
 }
 
 static void
-set_up (Server &server)
+set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
   server.server = gst_rtsp_server_new ();
-  server.connections = std::make_unique<Connections> (
-      server.server, std::size_t (options.max_viewers + kSpareConnections));
+  server.connections = std::make_unique<Connections> (server.server, connections);
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
@@ -655,8 +652,9 @@ main (int argc, char **argv)
     Server server;
     if (!parse_arguments (argc, argv, server.options))
       return 2;
-    if (check_launch (server.options)) {
-      set_up (server);
+    const auto connections = fit_connections (server.options.max_viewers);
+    if (connections && check_launch (server.options)) {
+      set_up (server, *connections);
       GSource *source = set_auth (server) ? listen (server) : nullptr;
       if (source) {
         serve (server, source);
