@@ -52,7 +52,7 @@ are_files_short (GSocket *socket)
   const int next = fcntl (g_socket_get_fd (socket), F_DUPFD_CLOEXEC, 0);
   if (next < 0)
     return true;
-  close (next);
+  ::close (next);
   return getrlimit (RLIMIT_NOFILE, &files) == 0 && rlim_t (next + kKeptFiles) >= files.rlim_cur;
 }
 
@@ -111,8 +111,32 @@ Connections::add (GstRTSPClient *client)
 {
   g_object_weak_ref (G_OBJECT (client), on_gone, this);
   taken_++;
+  GstRTSPConnection *connection = gst_rtsp_client_get_connection (client);
   std::lock_guard guard (lock_);
-  connections_[client].since_us = g_get_monotonic_time ();
+  Connection &added = connections_[client];
+  added.since_us = g_get_monotonic_time ();
+  if (has_tls_ && connection)
+    added.socket.reset (G_SOCKET (g_object_ref (gst_rtsp_connection_get_read_socket (connection))));
+}
+
+/* With TLS the library (1.22) loses the descriptor and the memory of a connection that it closes
+ * before its handshake is over; but not of those that end by themselves. One that goes on is closed
+ * when it has been idle for so long again. */
+void
+Connections::close (GstRTSPClient *client)
+{
+  {
+    std::lock_guard guard (lock_);
+    Connection &connection = connections_[client];
+    const bool is_first_time = !connection.is_closing;
+    connection.is_closing = true;
+    if (connection.socket && is_first_time) {
+      connection.since_us = g_get_monotonic_time ();
+      g_socket_shutdown (connection.socket.get (), TRUE, TRUE, nullptr);
+      return;
+    }
+  }
+  gst_rtsp_client_close (client);
 }
 
 /* Of a session that there still is. */
@@ -151,7 +175,7 @@ Connections::close_idle (gint64 patience_us)
     const bool is_late = found != connections_.end () && found->second.since_us < until_us;
     guard.unlock ();
     if (is_late && !is_viewer (client))
-      gst_rtsp_client_close (client);
+      close (client);
   }
   g_list_free_full (clients, g_object_unref);
 }
@@ -184,12 +208,8 @@ Connections::close_oldest ()
     oldest = client;
     since_us = found->second.since_us;
   }
-  if (oldest) {
-    std::unique_lock guard (lock_);
-    connections_[oldest].is_closing = true;
-    guard.unlock ();
-    gst_rtsp_client_close (oldest);
-  }
+  if (oldest)
+    close (oldest);
   g_list_free_full (clients, g_object_unref);
   return oldest != nullptr;
 }

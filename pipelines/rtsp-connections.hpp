@@ -5,6 +5,7 @@
 #include <gst/rtsp-server/rtsp-server.h>
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -21,7 +22,10 @@
 class Connections {
 public:
   /** @param most  at a time, viewers and others */
-  Connections (GstRTSPServer *server, std::size_t most) : server_ (server), most_ (most) {}
+  Connections (GstRTSPServer *server, std::size_t most, bool has_tls)
+      : server_ (server), most_ (most), has_tls_ (has_tls)
+  {
+  }
   /** All connections must be gone. */
   ~Connections ();
   Connections (const Connections &) = delete;
@@ -42,20 +46,26 @@ public:
   void take (GSocket *socket);
 
 private:
+  struct Unref {
+    void operator() (GSocket *socket) const { g_object_unref (socket); }
+  };
   struct Connection {
     gint64 since_us = 0;                 /* monotonic */
     const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
     std::string session;                 /* that it is the viewer of; empty: none */
     bool is_closing = false;             /* its socket is closed; the rest follows */
+    std::unique_ptr<GSocket, Unref> socket = nullptr; /* with TLS */
   };
   static void on_gone (gpointer connections, GObject *client);
   bool is_viewer (GstRTSPClient *client);
   std::size_t count (bool closing);
+  void close (GstRTSPClient *client);
   bool close_oldest ();
   bool make_room (GSocket *socket);
 
   GstRTSPServer *server_;
   const std::size_t most_;
+  const bool has_tls_;
   guint64 taken_ = 0; /* ever; main loop */
   std::mutex lock_;   /* guards what follows; not held while anything is called */
   std::map<GstRTSPClient *, Connection> connections_;

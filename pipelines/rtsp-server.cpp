@@ -11,6 +11,7 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <clocale>
 #include <cstdio>
@@ -34,6 +35,8 @@ static constexpr guint kMostContent = 16384; /* bytes */
 static constexpr int kBacklog = 64; /* connections that the kernel holds until they are taken */
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
+/* Idle connections are closed here: gst-rtsp-server does it after 60 s, and not well, see there. */
+static constexpr int kMostPatience_s = 50;
 /* So long the last frame set may last, after which a stream is over. */
 static constexpr guint kSlowestEnd_ms = 2000;
 static constexpr guint kLastWords_ms = 500;
@@ -477,7 +480,8 @@ on_second (gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   gst_rtsp_session_pool_cleanup (server.sessions);
-  server.connections->close_idle ((server.options.timeout_s + kSlowestStart_s) * G_USEC_PER_SEC);
+  server.connections->close_idle (
+      std::min (server.options.timeout_s + kSlowestStart_s, kMostPatience_s) * G_USEC_PER_SEC);
   const gint64 now = g_get_monotonic_time ();
   if (gst_rtsp_session_pool_get_n_sessions (server.sessions) > 0)
     server.idle_since_us = 0;
@@ -557,7 +561,8 @@ set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
   server.server = gst_rtsp_server_new ();
-  server.connections = std::make_unique<Connections> (server.server, connections);
+  server.connections = std::make_unique<Connections> (
+      server.server, connections, !options.certificate_file.empty ());
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);

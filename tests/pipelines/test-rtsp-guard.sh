@@ -162,7 +162,7 @@ connect_idle () {
   rm -f crowd.txt
   timeout 100 python3 - "$url" "$1" <<'END' &
 import re, signal, socket, sys
-host, port = re.match(r"rtsp://([^:/]+):(\d+)", sys.argv[1]).groups()
+host, port = re.match(r"rtsps?://([^:/]+):(\d+)", sys.argv[1]).groups()
 crowd = [socket.create_connection((host, int(port)), timeout=10) for i in range(int(sys.argv[2]))]
 open("crowd.txt", "w").write(f"{len(crowd)}\n")
 signal.pause()
@@ -230,6 +230,19 @@ test_tls_encrypts_and_takes_passwords () {
   ! play 5 "location=$url" tls-validation-flags=0 user-id=anna user-pw=wrong || fail "a wrong password"
   ! play 5 "location=$url" user-id=anna user-pw=secret || fail "an unknown certificate"
   ! play 5 "location=rtsp${url#rtsps}" user-id=anna user-pw=secret || fail "without TLS"
+  stop_server
+}
+
+# The library by itself keeps the descriptors of those that it closes before their handshake.
+test_tls_crowd_leaves_no_descriptors_behind () {
+  make_certificate
+  serve --max-viewers 10 --cert cert.pem --key key.pem -- "$figure"
+  connect_idle 200
+  few_open () { [ "$(find "/proc/$server/fd" -mindepth 1 | wc -l)" -lt "$1" ]; }
+  until_true 20 few_open 100
+  kill "$crowd"
+  until_true 20 few_open 40
+  play 5 "location=$url" tls-validation-flags=0 || fail "$(tail -n 5 player.log)"
   stop_server
 }
 
