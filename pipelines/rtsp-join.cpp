@@ -208,8 +208,11 @@ JoinGate::hold_back (GstRTSPSessionMedia *media)
       delete ref;
     });
     g_weak_ref_init (weak.get (), transport);
-    joiners_.push_back (
-        {weak, to.destination, to.client_port.min, g_get_monotonic_time () + kLongestHold_us});
+    const gint64 now = g_get_monotonic_time ();
+    std::erase_if (joiners_, [&] (const Joiner &joiner) { /* whose PLAY failed */
+      return !joiner.parked && (now >= joiner.until_us || joiner.is_to (to));
+    });
+    joiners_.push_back ({weak, to.destination, to.client_port.min, now + kLongestHold_us});
   });
 }
 

@@ -12,14 +12,17 @@
 #include <netinet/tcp.h>
 
 #include <algorithm>
+#include <atomic>
 #include <clocale>
 #include <cstdio>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 
+#include "rtsp-connections.hpp"
 #include "rtsp-holder.hpp"
 #include "rtsp-join.hpp"
 #include "rtsp-media.hpp"
@@ -29,28 +32,34 @@
 static constexpr guint kThreads = 4; /* that serve connections */
 /* Requests of RTSP have bodies of a few lines at most. */
 static constexpr guint kMostContent = 16384; /* bytes */
-/* Connections that are no viewers: those that ask only, or have not got so far. */
-static constexpr int kSpareConnections = 32;
 static constexpr int kBacklog = 64; /* connections that the kernel holds until they are taken */
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
+/* Idle connections are closed here: gst-rtsp-server does it after 60 s, and not well, see there. */
+static constexpr int kMostPatience_s = 50;
 /* So long the last frame set may last, after which a stream is over. */
 static constexpr guint kSlowestEnd_ms = 2000;
 static constexpr guint kLastWords_ms = 500;
-
-struct Connection {
-  gint64 since_us = 0;                 /* monotonic */
-  const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
-  bool is_closing = false;             /* its socket is closed; the rest follows */
-};
+static constexpr guint kLeave_ms = 100; /* its answer gets to who is sent away */
 
 /* Of a media, under the lock of the server: it is over; its viewers were sent away. */
 static constexpr char kOverKey[] = "rangecast-over", kEndedKey[] = "rangecast-ended";
+
+struct StopTimer {
+  void operator() (GSource *timer) const
+  {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
+};
+/* One for each media. */
+using Timers = std::map<GstRTSPMedia *, std::unique_ptr<GSource, StopTimer>>;
 
 struct Server {
   RtspOptions options;
   StreamCounts counts;
   MediaHolder holder;
+  std::unique_ptr<Connections> connections;
   GMainLoop *loop = nullptr;
   GstRTSPServer *server = nullptr;
   GstRTSPMediaFactory *factory = nullptr;
@@ -64,8 +73,8 @@ struct Server {
   std::atomic<bool> stopping = false;
 
   std::mutex lock; /* guards what follows */
-  std::map<GstRTSPClient *, Connection> connections;
-  std::map<GstRTSPMedia *, GSource *> ending; /* with the timer that calls end_stream() */
+  Timers ending;   /* call end_stream() */
+  Timers leaving;  /* send those away who came when it had ended */
 };
 
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
@@ -111,18 +120,18 @@ on_describe_or_setup (GstRTSPClient *client, GstRTSPContext *context, gpointer u
   auto &server = *static_cast<Server *> (user_data);
   if (!context->media)
     return;
-  {
-    std::lock_guard guard (server.lock);
-    const auto found = server.connections.find (client);
-    if (found != server.connections.end ()) {
-      found->second.media = context->media;
-      found->second.since_us = g_get_monotonic_time (); /* it asks for something */
-    }
-  }
+  server.connections->note_media (client, context->media);
   if (has_ended (server, context->media)) /* it came when the others were sent away */
     leave_ended_soon (server, context->media);
   else /* or it would end with a viewer that leaves before it plays, and who asks then fails */
     server.holder.hold (context->media);
+}
+
+static void
+on_setup (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
+{
+  static_cast<Server *> (user_data)->connections->note_viewer (client, context->session);
+  on_describe_or_setup (client, context, user_data);
 }
 
 static GstRTSPStatusCode
@@ -188,9 +197,10 @@ before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
 }
 
 static void
-on_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
+on_play (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
+  server.connections->note_viewer (client, context->session);
   GstRTSPMedia *media = gst_rtsp_session_media_get_media (context->sessmedia);
   /* Whose viewer is the first gets what comes first, which is a key frame set. */
   queue_tcp_transports (
@@ -229,14 +239,6 @@ on_new_session (GstRTSPClient *, GstRTSPSession *session, gpointer user_data)
 }
 
 static void
-on_client_gone (gpointer user_data, GObject *client)
-{
-  auto &server = *static_cast<Server *> (user_data);
-  std::lock_guard guard (server.lock);
-  server.connections.erase (reinterpret_cast<GstRTSPClient *> (client));
-}
-
-static void
 on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
@@ -244,15 +246,13 @@ on_connected (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
   g_signal_connect (client, "pre-describe-request", G_CALLBACK (before_describe), &server);
   g_signal_connect (client, "pre-setup-request", G_CALLBACK (before_setup), &server);
   g_signal_connect (client, "describe-request", G_CALLBACK (on_describe_or_setup), &server);
-  g_signal_connect (client, "setup-request", G_CALLBACK (on_describe_or_setup), &server);
+  g_signal_connect (client, "setup-request", G_CALLBACK (on_setup), &server);
   g_signal_connect (client, "pre-play-request", G_CALLBACK (before_play), &server);
   g_signal_connect (client, "play-request", G_CALLBACK (on_play), &server);
   g_signal_connect (client, "pre-pause-request", G_CALLBACK (before_pause_or_teardown), &server);
   g_signal_connect (client, "pre-teardown-request", G_CALLBACK (before_pause_or_teardown), &server);
   g_signal_connect (client, "new-session", G_CALLBACK (on_new_session), &server);
-  g_object_weak_ref (G_OBJECT (client), on_client_gone, &server);
-  std::lock_guard guard (server.lock);
-  server.connections[client].since_us = g_get_monotonic_time ();
+  server.connections->add (client);
 }
 
 /* It comes before the library's own handler, which takes the connection away. */
@@ -262,89 +262,14 @@ on_session_removed (GstRTSPSessionPool *, GstRTSPSession *session, gpointer)
   forget_viewer (session);
 }
 
-/* ---- too many connections ---- */
-
-static bool
-has_session (GstRTSPClient *client)
-{
-  GList *sessions = gst_rtsp_client_session_filter (client, nullptr, nullptr);
-  const bool has = sessions != nullptr;
-  g_list_free_full (sessions, g_object_unref);
-  return has;
-}
-
-/* Those that connected and then asked for nothing. */
-static void
-close_idle_connections (Server &server)
-{
-  const gint64 now = g_get_monotonic_time ();
-  const gint64 patience = (server.options.timeout_s + kSlowestStart_s) * G_USEC_PER_SEC;
-  GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
-  for (GList *item = clients; item; item = item->next) {
-    auto client = GST_RTSP_CLIENT (item->data);
-    std::unique_lock guard (server.lock);
-    const auto found = server.connections.find (client);
-    const bool is_late =
-        found != server.connections.end () && now - found->second.since_us > patience;
-    guard.unlock ();
-    if (is_late && !has_session (client))
-      gst_rtsp_client_close (client);
-  }
-  g_list_free_full (clients, g_object_unref);
-}
-
-static std::size_t
-count_connections (Server &server)
-{
-  std::lock_guard guard (server.lock);
-  return std::size_t (std::count_if (server.connections.begin (), server.connections.end (),
-      [] (const auto &one) { return !one.second.is_closing; }));
-}
-
-/* Of those that are no viewers.
- * @return whether there was one */
-static bool
-close_oldest_connection (Server &server)
-{
-  GstRTSPClient *oldest = nullptr;
-  gint64 since_us = G_MAXINT64;
-  GList *clients = gst_rtsp_server_client_filter (server.server, nullptr, nullptr);
-  for (GList *item = clients; item; item = item->next) {
-    auto client = GST_RTSP_CLIENT (item->data);
-    if (has_session (client))
-      continue;
-    std::lock_guard guard (server.lock);
-    const auto found = server.connections.find (client);
-    if (found == server.connections.end () || found->second.is_closing ||
-        found->second.since_us >= since_us)
-      continue;
-    oldest = client;
-    since_us = found->second.since_us;
-  }
-  if (oldest) {
-    std::unique_lock guard (server.lock);
-    server.connections[oldest].is_closing = true;
-    guard.unlock ();
-    gst_rtsp_client_close (oldest);
-  }
-  g_list_free_full (clients, g_object_unref);
-  return oldest != nullptr;
-}
-
-/* Each connection is a file descriptor, whoever is behind it. The oldest that is no viewer makes
- * room, so that a crowd that says nothing cannot keep others out. */
 static gboolean
 on_incoming (GSocket *socket, GIOCondition condition, gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
-  const auto most = std::size_t (server.options.max_viewers + kSpareConnections);
-  if ((condition & G_IO_IN) && count_connections (server) >= most &&
-      !close_oldest_connection (server)) {
-    GSocket *refused = g_socket_accept (socket, nullptr, nullptr);
-    g_clear_object (&refused);
-    return G_SOURCE_CONTINUE;
-  }
-  return gst_rtsp_server_io_func (socket, condition, server.server);
+  if (!(condition & G_IO_IN))
+    return gst_rtsp_server_io_func (socket, condition, server.server);
+  server.connections->take (socket);
+  return G_SOURCE_CONTINUE;
 }
 
 /* ---- the stream ---- */
@@ -384,11 +309,8 @@ static GstRTSPFilterResult
 close_viewer (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
 {
   const auto &ending = *static_cast<Ending *> (user_data);
-  std::lock_guard guard (ending.server.lock);
-  const auto found = ending.server.connections.find (client);
-  return found != ending.server.connections.end () && found->second.media == ending.media
-             ? GST_RTSP_FILTER_REMOVE
-             : GST_RTSP_FILTER_KEEP;
+  return ending.server.connections->was_told_of (client, ending.media) ? GST_RTSP_FILTER_REMOVE
+                                                                       : GST_RTSP_FILTER_KEEP;
 }
 
 /* Those of UDP viewers outlive their connections. */
@@ -416,15 +338,35 @@ send_viewers_away (Ending &ending)
       gst_rtsp_session_pool_filter (server.sessions, close_session, &ending), g_object_unref);
 }
 
+/* With the lock, and instead of the one that there was. */
+static void
+start_timer (Server &server, Timers &timers, GstRTSPMedia *media, guint ms, GSourceFunc callback)
+{
+  GSource *timer = g_timeout_source_new (ms);
+  g_source_set_callback (timer, callback, new Ending (server, media), delete_ending);
+  g_source_attach (timer, nullptr);
+  timers[media].reset (timer);
+}
+
+static gboolean
+leave_ended (gpointer user_data)
+{
+  auto &ending = *static_cast<Ending *> (user_data);
+  {
+    std::lock_guard guard (ending.server.lock);
+    ending.server.leaving.erase (ending.media);
+  }
+  send_viewers_away (ending);
+  return G_SOURCE_REMOVE;
+}
+
 /* Who got to a stream just when it had ended would see nothing for ever. */
 static void
 leave_ended_soon (Server &server, GstRTSPMedia *media)
 {
-  const auto leave = [] (gpointer ending) -> gboolean {
-    send_viewers_away (*static_cast<Ending *> (ending));
-    return G_SOURCE_REMOVE;
-  };
-  g_timeout_add_full (G_PRIORITY_DEFAULT, 100, leave, new Ending (server, media), delete_ending);
+  std::lock_guard guard (server.lock);
+  if (!server.stopping && server.leaving.count (media) == 0)
+    start_timer (server, server.leaving, media, kLeave_ms, leave_ended);
 }
 
 static gboolean
@@ -440,41 +382,18 @@ end_stream (gpointer user_data)
   server.holder.release (ending.media);
   server.start_at_us = g_get_monotonic_time () + G_USEC_PER_SEC; /* it might fail again at once */
   std::lock_guard guard (server.lock);
-  const auto found = server.ending.find (ending.media);
-  if (found != server.ending.end ()) {
-    g_source_destroy (found->second); /* it may be a later one than this */
-    g_source_unref (found->second);
-    server.ending.erase (found);
-  }
+  server.ending.erase (ending.media); /* it may be a later one than this */
   return G_SOURCE_REMOVE;
 }
 
-/* With the lock. One timer for each media: what comes last says when. */
-static void
-end_stream_in (Server &server, GstRTSPMedia *media, guint ms)
-{
-  GSource *&timer = server.ending[media];
-  if (timer) {
-    g_source_destroy (timer);
-    g_source_unref (timer);
-  }
-  timer = g_timeout_source_new (ms);
-  g_source_set_callback (timer, end_stream, new Ending (server, media), delete_ending);
-  g_source_attach (timer, nullptr);
-}
-
+/* Each holds a reference of its media. */
 static void
 forget_endings (Server &server)
 {
-  std::map<GstRTSPMedia *, GSource *> ending;
-  {
-    std::lock_guard guard (server.lock);
-    ending.swap (server.ending);
-  }
-  for (const auto &[media, timer] : ending) {
-    g_source_destroy (timer);
-    g_source_unref (timer);
-  }
+  Timers ending, leaving; /* end without the lock */
+  std::lock_guard guard (server.lock);
+  ending.swap (server.ending);
+  leaving.swap (server.leaving);
 }
 
 /* Whoever comes next gets a new run of the launch string. */
@@ -493,7 +412,8 @@ on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::str
       begin_new_run (server.factory);
     /* Before that EOS goes to the viewers, or the answer to who asked for what cannot run. */
     if (!g_object_get_data (G_OBJECT (media), kEndedKey))
-      end_stream_in (server, media, is_over ? kLastWords_ms : kSlowestEnd_ms);
+      start_timer (
+          server, server.ending, media, is_over ? kLastWords_ms : kSlowestEnd_ms, end_stream);
   }
   if (!why.empty ())
     g_printerr ("rtsp-server: %s\n", why.c_str ());
@@ -560,7 +480,8 @@ on_second (gpointer user_data)
 {
   auto &server = *static_cast<Server *> (user_data);
   gst_rtsp_session_pool_cleanup (server.sessions);
-  close_idle_connections (server);
+  server.connections->close_idle (
+      std::min (server.options.timeout_s + kSlowestStart_s, kMostPatience_s) * G_USEC_PER_SEC);
   const gint64 now = g_get_monotonic_time ();
   if (gst_rtsp_session_pool_get_n_sessions (server.sessions) > 0)
     server.idle_since_us = 0;
@@ -636,10 +557,12 @@ check_launch (const RtspOptions &options)
 }
 
 static void
-set_up (Server &server)
+set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
   server.server = gst_rtsp_server_new ();
+  server.connections = std::make_unique<Connections> (
+      server.server, connections, !options.certificate_file.empty ());
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
@@ -734,8 +657,9 @@ main (int argc, char **argv)
     Server server;
     if (!parse_arguments (argc, argv, server.options))
       return 2;
-    if (check_launch (server.options)) {
-      set_up (server);
+    const auto connections = fit_connections (server.options.max_viewers);
+    if (connections && check_launch (server.options)) {
+      set_up (server, *connections);
       GSource *source = set_auth (server) ? listen (server) : nullptr;
       if (source) {
         serve (server, source);
@@ -746,8 +670,7 @@ main (int argc, char **argv)
       g_object_unref (server.sessions);
       g_object_unref (server.server);
       gst_rtsp_thread_pool_cleanup ();
-      std::lock_guard guard (server.lock); /* with which the threads wrote to it */
-      server.connections.clear ();
+      server.connections.reset ();
     }
   }
   gst_deinit ();

@@ -50,9 +50,10 @@ struct Gate {
   guint64 uses = 0;
 };
 
-/* What is known of a packet's sender before it goes in. */
+/* What is known of a packet's sender before it goes in. RTCP of one that is known by RTP alone may
+ * go in, too: the srtpdec checks it. */
 struct Before {
-  bool known = false;  /* has shown that it has the key, by a packet of this kind */
+  bool known = false;  /* has shown that it has the key; where it is RTP, by RTP */
   bool old = false;    /* the packet may be a replay */
   bool closed = false; /* its packets do not open any longer */
   bool gone = false;   /* for so long that it may have begun anew */

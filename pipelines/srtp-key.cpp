@@ -98,7 +98,8 @@ give_srtp_key (GstElement *pipeline, const char *path)
   GstBuffer *key = read_key (path);
   if (!key)
     return false;
-  for (GList *item = GST_BIN_CHILDREN (pipeline); item; item = item->next) {
+  bool good = true;
+  for (GList *item = GST_BIN_CHILDREN (pipeline); item && good; item = item->next) {
     GstElement *element = GST_ELEMENT (item->data);
     GstElementFactory *factory = gst_element_get_factory (element);
     const gchar *name = factory ? GST_OBJECT_NAME (factory) : "";
@@ -106,9 +107,12 @@ give_srtp_key (GstElement *pipeline, const char *path)
       g_object_set (element, "key", key, nullptr);
     } else if (g_str_equal (name, "srtpdec")) {
       watch (element, path); /* before the gate: it sees what that drops */
-      add_srtp_gate (element, key);
+      good = add_srtp_gate (element, key);
     }
   }
   gst_buffer_unref (key);
-  return true;
+  if (!good)
+    g_printerr ("rangecast-run: --srtp-key: expected another srtpdec, to try packets with, but "
+                "there is none\n");
+  return good;
 }

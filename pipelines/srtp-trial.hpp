@@ -25,9 +25,9 @@ private:
 /** Tells genuine packets from others, by a srtpdec of its own that keeps nothing.
  *
  *  A packet of RTP does not say how often its sender's sequence numbers have begun anew, and opens
- * only with that number. Each SSRC that goes on sending has one number after the other tried, 16
- * from its first one, then 256, then 4096, and again: 400 a second in all, in equal parts for all
- * such SSRCs. A flood with an SSRC for each packet has no part in it. */
+ *  only with that number. Each SSRC that goes on sending has one number after the other tried, 16
+ *  from its first one, then 256, then 4096, and again: 400 a second in all, in equal parts for all
+ *  such SSRCs. A flood with an SSRC for each packet has no part in it. */
 class SrtpTrial {
 public:
   static constexpr guint kMostRollOvers = 4096;
@@ -48,7 +48,7 @@ public:
    *  @param first  tried before larger ones
    *  @param from_zero  look from 0 on, too, every other time
    *  @return that which it opened with; nothing while it is being looked for, or if it is not
-   * genuine */
+   *  genuine */
   std::optional<guint> roll_over_of (
       GstBuffer *buffer, guint32 ssrc, guint first = 0, bool from_zero = false);
 

@@ -126,6 +126,95 @@ END
   stop_server
 }
 
+# Anybody may name a session, of which one is asked for here: that makes no viewers.
+test_crowd_of_one_session_keeps_nobody_out () {
+  serve --max-viewers 10 -- "$figure"
+  timeout 100 python3 - "$source_dir/tests/pipelines" "$url" <<'END' &
+import re, signal, socket, sys
+sys.path.insert(0, sys.argv[1])
+from rtsp_viewers import Viewer
+url = sys.argv[2]
+first = Viewer(url, True)
+control = re.findall(r"a=control:(\S+)", first.describe())[-1]
+fields, _ = first.ask("SETUP", f"{url}/{control}", "Transport: RTP/AVPF/TCP;unicast;interleaved=0-1")
+crowd = []
+for i in range(60):
+    crowd.append(Viewer(url, True))
+    crowd[-1].session = fields["Session"].split(";")[0]
+    try:
+        crowd[-1].ask("OPTIONS", url)
+    except (OSError, EOFError, RuntimeError):
+        pass
+open("crowd.txt", "w").write(f"{len(crowd)}\n")
+signal.pause()
+END
+  crowd=$!
+  trap 'kill -KILL $server $crowd 2>/dev/null || true' EXIT
+  until_true 60 test -s crowd.txt
+  count "$url" --viewers 3 >udp.txt || fail "$(cat udp.txt)"
+  count "$url" --viewers 3 --tcp >tcp.txt || fail "$(cat tcp.txt)"
+  kill "$crowd"
+  stop_server
+}
+
+# usage: connect_idle N -> sets $crowd, which says nothing
+connect_idle () {
+  rm -f crowd.txt
+  timeout 100 python3 - "$url" "$1" <<'END' &
+import re, signal, socket, sys
+host, port = re.match(r"rtsps?://([^:/]+):(\d+)", sys.argv[1]).groups()
+crowd = [socket.create_connection((host, int(port)), timeout=10) for i in range(int(sys.argv[2]))]
+open("crowd.txt", "w").write(f"{len(crowd)}\n")
+signal.pause()
+END
+  crowd=$!
+  trap 'kill -KILL $server $crowd 2>/dev/null || true' EXIT
+  until_true 60 test -s crowd.txt
+}
+cpu_ticks () { sed 's/.*) //' "/proc/$server/stat" | awk '{ print $12 + $13 }'; } # 100 a second
+
+# Where it must not have more, connections leave descriptors to the stream.
+test_crowd_with_few_descriptors_keeps_nobody_out () {
+  rtsp-server () { ulimit -n 64; exec rtsp-server "$@"; }
+  serve --max-viewers 10 -- "$figure"
+  connect_idle 80
+  count "$url" --viewers 3 >udp.txt || fail "$(cat udp.txt)"
+  count "$url" --viewers 3 --tcp >tcp.txt || fail "$(cat tcp.txt)"
+  kill "$crowd"
+  stop_server
+}
+
+# The launch string has most of them, which nobody can know before. Who cannot be taken must not wake the server all the time.
+test_descriptors_that_a_launch_string_has_are_no_connections () {
+  local more="" i before after
+  for ((i = 0; i < 20; i++)); do more+="udpsrc port=0 ! fakesink async=false "; done
+  rtsp-server () { ulimit -n 128; exec rtsp-server "$@"; }
+  serve --max-viewers 32 --always --stats 1 -- "$more ${figure/15/2}"
+  runs_alone () { [ "$(stat_of frame-sets)" -gt 2 ]; }
+  until_true 30 runs_alone
+  connect_idle 90
+  sleep 1
+  before=$(cpu_ticks)
+  sleep 3
+  after=$(cpu_ticks)
+  [ $((after - before)) -lt 45 ] || fail "$((after - before)) hundredths of a second of CPU time in three seconds"
+  [ "$(find "/proc/$server/fd" -mindepth 1 | wc -l)" -lt 120 ] || fail "$(find "/proc/$server/fd" -mindepth 1 | wc -l) of 128"
+  count "$url" --tcp --viewers 3 --frame-sets 4 >tcp.txt || fail "$(cat tcp.txt)"
+  kill "$crowd"
+  stop_server
+}
+
+test_descriptors_are_for_all_viewers () {
+  [ "$(ulimit -Hn)" = unlimited ] || [ "$(ulimit -Hn)" -ge 2000 ] || skip "no more than $(ulimit -Hn) open files"
+  rtsp-server () { ulimit -Sn 64; exec rtsp-server "$@"; }
+  serve --max-viewers 1000 -- "$figure"
+  [ "$(awk '/^Max open files/ { print $4 }' "/proc/$server/limits")" -ge 1200 ] || fail "$(grep files "/proc/$server/limits")"
+  count "$url" --tcp --viewers 20 >tcp.txt || fail "$(cat tcp.txt)"
+  stop_server
+  # shellcheck disable=SC2016 # of the shell in which it counts
+  expect_error "256 open files" bash -c 'ulimit -n 256; exec rtsp-server "$@"' limited --max-viewers 300 -- "$figure"
+}
+
 make_certificate () {
   command -v openssl >/dev/null || skip "no openssl"
   openssl req -x509 -newkey rsa:2048 -nodes -keyout key.pem -out cert.pem -days 2 -subj /CN=localhost \
@@ -141,6 +230,19 @@ test_tls_encrypts_and_takes_passwords () {
   ! play 5 "location=$url" tls-validation-flags=0 user-id=anna user-pw=wrong || fail "a wrong password"
   ! play 5 "location=$url" user-id=anna user-pw=secret || fail "an unknown certificate"
   ! play 5 "location=rtsp${url#rtsps}" user-id=anna user-pw=secret || fail "without TLS"
+  stop_server
+}
+
+# The library by itself keeps the descriptors of those that it closes before their handshake.
+test_tls_crowd_leaves_no_descriptors_behind () {
+  make_certificate
+  serve --max-viewers 10 --cert cert.pem --key key.pem -- "$figure"
+  connect_idle 200
+  few_open () { [ "$(find "/proc/$server/fd" -mindepth 1 | wc -l)" -lt "$1" ]; }
+  until_true 20 few_open 100
+  kill "$crowd"
+  until_true 20 few_open 40
+  play 5 "location=$url" tls-validation-flags=0 || fail "$(tail -n 5 player.log)"
   stop_server
 }
 
