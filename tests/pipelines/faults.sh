@@ -42,7 +42,9 @@ start_job () { # port [views...]
     for view in $view; do start_camera "$view"; done
   done
 }
+# The recorder ends first, and at once: a camera host may end within a frame set, which the parent hands on as it is.
 end_job () {
+  kill -KILL "$viewer" 2>/dev/null || true
   local pids=("${camera[@]}" "${first_camera[@]}" "$parent" "$viewer") pid
   for pid in "${pids[@]}"; do [ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null || true; done
   for pid in "${pids[@]}"; do [ -z "$pid" ] || timeout 20 tail --pid="$pid" -f /dev/null || kill -KILL "$pid"; done
