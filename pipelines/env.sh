@@ -48,11 +48,18 @@ drop_empty () {
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 
+is_ipv4 () { # 192.0.2.1
+  [[ "$1" =~ ^([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})$ ]] &&
+    [ "$((10#${BASH_REMATCH[1]}))" -le 255 ] && [ "$((10#${BASH_REMATCH[2]}))" -le 255 ] &&
+    [ "$((10#${BASH_REMATCH[3]}))" -le 255 ] && [ "$((10#${BASH_REMATCH[4]}))" -le 255 ]
+}
+
 # usage: split_address HOST:PORT option -> sets $host and $port
 split_address () {
   host=${1%:*} port=${1##*:}
   [[ "$1" == *:* && -n "$host" && "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1 ] && [ "$port" -le 65535 ] ||
     die "$2: expected HOST:PORT, got '$1'"
+  ! [[ "$host" =~ ^[0-9.]+$ ]] || is_ipv4 "$host" || die "$2: expected four numbers up to 255, got '$host'"
   [[ "$host" =~ ^[0-9.]+$ || "$host" == *:* ]] || getent ahosts "$host" >/dev/null || # udpsink would say nothing
     die "$2: no host is called '$host'"
 }

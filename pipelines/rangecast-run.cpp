@@ -80,6 +80,19 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
+/* Where the pipeline does not start. Some elements fail without a message. */
+static void
+tell_failure (Runner &runner, GstBus *bus)
+{
+  runner.failed = true;
+  if (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
+    on_message (bus, message, &runner);
+    gst_message_unref (message);
+  } else {
+    g_printerr ("ERROR: the pipeline does not start, and no element says why; GST_DEBUG=2 may\n");
+  }
+}
+
 static gboolean
 on_timeout (gpointer user_data)
 {
@@ -144,8 +157,9 @@ play (Runner &runner)
     runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
-    runner.failed = true; /* the reason is on the bus; on_message() prints it and quits */
-  g_main_loop_run (runner.loop);
+    tell_failure (runner, bus);
+  else
+    g_main_loop_run (runner.loop);
   finish (runner);
   gst_bus_remove_watch (bus);
   gst_object_unref (bus);

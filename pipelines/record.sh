@@ -49,6 +49,7 @@ need_size "$size" --size
 
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 [ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
+[ -z "$group" ] || need_group "$group"
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535

@@ -45,6 +45,11 @@ rtp_option () {
   esac
 }
 
+need_group () { # GROUP of --multicast
+  { is_ipv4 "$1" && [[ "$1" =~ ^2(2[4-9]|3[0-9])\. ]]; } ||
+    die "--multicast: expected a group from 224.0.0.0 to 239.255.255.255, got '$1'"
+}
+
 # After all options: whether they go together.
 rtp_check () { # sender|receiver
   if [ -n "$rtp_feedback" ]; then
@@ -52,6 +57,8 @@ rtp_check () { # sender|receiver
   fi
   [ -z "$rtp_rtx" ] || [ -n "$rtp_feedback" ] || die "--rtx: expected --feedback, too"
   [ -z "$rtp_mtu" ] || need_number "$rtp_mtu" --mtu 256 65000
+  # Of one that there is not the elements say nothing, and take another.
+  [ -z "$rtp_interface" ] || [ -e "/sys/class/net/$rtp_interface" ] || die "--interface: there is none of the name '$rtp_interface'"
   [ -n "$rtp_key" ] || return 0
   # gst-launch-1.0 takes a key on its command line only, where everybody on the machine reads it.
   [[ "$(cat "$rtp_key" 2>/dev/null)" =~ ^[0-9a-fA-F]{60}$ ]] || die "--key: expected a file of 60 hexadecimal digits, got '$rtp_key'"

@@ -45,7 +45,7 @@ need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
 need_size "$size" --size
 need_degrees "$orbit" --orbit
-[[ -z "$group" || "$group" =~ ^2(2[4-9]|3[0-9])(\.[0-9]{1,3}){3}$ ]] || die "--multicast: expected a group from 224.0.0.0 to 239.255.255.255, got '$group'"
+[ -z "$group" ] || need_group "$group"
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 rtp_check receiver
 receive_rtp 0 "$listen" "$jitter" 4194304 "$group"

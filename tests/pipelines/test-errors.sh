@@ -115,6 +115,16 @@ test_a_film_of_what_is_no_recording_leaves_no_file () {
   [ ! -e film.webm ] || fail "an empty film is left"
 }
 
+test_an_element_that_fails_without_a_word_ends_the_run () {
+  expect_error "does not start" rangecast-run udpsrc address=239.255.7.999 port=$((ports + 206)) ! fakesink
+}
+
+test_addresses_and_interfaces_that_there_are_not_are_named () {
+  expect_error "239.255.7.300" "$pipelines/parent-host.sh" --views 1 --listen $((ports + 207)) --to 239.255.7.300:$((ports + 208))
+  expect_error "239.255.7.999" "$pipelines/viewer-host.sh" --listen $((ports + 208)) --multicast 239.255.7.999
+  expect_error "nosuch0" "$pipelines/viewer-host.sh" --listen $((ports + 208)) --multicast 239.255.7.1 --interface nosuch0
+}
+
 test_ports_that_are_taken_twice_are_named () {
   local parent=("$pipelines/parent-host.sh" --views 4 --listen 5000 --to 127.0.0.1:6000)
   expect_error "--feedback: port 5002 is that of view 2" "${parent[@]}" --feedback 5002
