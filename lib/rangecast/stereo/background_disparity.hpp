@@ -36,8 +36,8 @@ public:
 
   /** Gives what has no disparity, but is beside the background in its row, the farthest one there
    *  is, `least`: one camera does not see it. */
-  void extend (const cv::Point &at, int least, int far, const Pieces &pieces,
-      cv::Mat &disparity) const;
+  void extend (
+      const cv::Point &at, int least, int far, const Pieces &pieces, cv::Mat &disparity) const;
 
 private:
   /* What one thread needs for one piece: pixels, and sums over the patches around them. */
