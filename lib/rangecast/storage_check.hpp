@@ -19,8 +19,8 @@ struct StorageLimits {
  * call themselves once for each level of nesting, so that a short file ends the process; never end
  * at binary data whose header names no type, or at YAML with something behind its first collection;
  * and read beyond lines that hold a 0. Refuses XML, files with more collections than any of ours
- * has, binary data with another header, control characters, and YAML that is not one map of fields at
- * the beginning of lines. Reads the file once, in blocks (also .gz).
+ * has, binary data with another header, control characters, and YAML that is not one map of fields
+ * at the beginning of lines. Reads the file once, in blocks (also .gz).
  *  @return kBadData that begins with the path; kOk too if the file cannot be opened */
 Status check_storage (const std::string &path, const StorageLimits &limits = {});
 
