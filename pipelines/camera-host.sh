@@ -33,13 +33,14 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --threads N     cores that this host's pictures may be worked on by at a time (default: all); where
                   several hosts share one machine, fewer take less of it
   --learn N       frames from which the background is learnt (default 20)
+  --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which takes less time
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true"
 END
   rtp_usage_sender
 }
 
 view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= action_send= reconnect=false encoder= loop=0 threads=
+format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder= loop=0 threads=
 while [ $# -gt 0 ]; do
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
@@ -47,6 +48,7 @@ while [ $# -gt 0 ]; do
     continue
   fi
   case "$1" in
+    --depth) depth=${2:-}; shift ;;
     --encoder) encoder=${2:-}; shift ;;
     --view) view=${2:-}; shift ;;
     --to) to=${2:-}; shift ;;
@@ -93,6 +95,7 @@ if [ -n "$clock_server" ]; then
   [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs fire by this machine's clock"
 fi
 [ "$loop" = 0 ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
+[ -z "$depth" ] || [ "$input" != range ] || die "--depth: expected with cameras; --input range has no stereodepth"
 rtp_check sender
 # What GStreamer takes for true.
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
@@ -143,7 +146,8 @@ read_cameras () {
   done
 }
 
-depth=(stereodepth name=depth "rig=$rig" "view-id=$view" !)
+read -ra depth <<<"$depth"
+depth=(stereodepth name=depth "rig=$rig" "view-id=$view" "${depth[@]}" !)
 case "$input" in
   range)
     depth=()

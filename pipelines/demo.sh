@@ -32,17 +32,19 @@ usage: demo.sh [options]
                 be larger, which costs less CPU time
   --threads N   cores that each camera host may use at a time (default: this machine's, divided by the
                 number of views, at least 1: all of them work on the same moment's pictures)
+  --depth WHAT  properties of stereodepth, e.g. "algorithm=bm refine=0"
   --latency MS  how long the parent waits for a late view (default: its own)
 With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts' statistics go there, for top.sh.
 END
 }
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency= loop= threads= mtu=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
 while [ $# -gt 0 ]; do
   case "$1" in
     --input) input=${2:-}; shift ;;
     --threads) threads=${2:-}; shift ;;
     --mtu) mtu=${2:-}; shift ;;
+    --depth) depth=${2:-}; shift ;;
     --loop) loop=${2:-}; shift ;;
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
@@ -75,6 +77,7 @@ need_number "$port" --port 1024 65000
 [ -z "$threads" ] || need_number "$threads" --threads 1 1024
 [ -z "$loop" ] || need_number "$loop" --loop 0 100000
 [ -z "$loop" ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
+[ -z "$depth" ] || [ "$input" != range ] || die "--depth: expected with cameras; --input range has no stereodepth"
 [ -n "$out" ] || die "--out: expected a folder"
 out=$(absolute "$out")
 case "$input" in
@@ -156,7 +159,7 @@ echo "$views stereo cameras at $size, $fps frame sets/s: $views camera hosts, pa
 for ((i = 0; i < views; i++)); do
   start "camera$i" pipelines/camera-host.sh --view "$i" --views "$views" --rig "$rig" --input "$input" \
     --size "$size" --fps "$fps" --to "127.0.0.1:$((parent_port + i))" ${loop:+--loop "$loop"} --threads "$threads" \
-    ${mtu:+--mtu "$mtu"}
+    ${mtu:+--mtu "$mtu"} ${depth:+--depth "$depth"}
 done
 run_options=
 start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port" \
