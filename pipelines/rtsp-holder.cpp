@@ -3,15 +3,56 @@
 
 static const char kReleasedKey[] = "rangecast-released"; /* of a media: is not held again */
 
-/* A transport that sends nothing to nobody. */
-static GstRTSPStreamTransport *
-make_dry_transport (GstRTSPStream *stream)
+static GstRTSPTransport *
+make_transport (GstRTSPLowerTrans lower)
 {
   GstRTSPTransport *transport = nullptr;
   gst_rtsp_transport_new (&transport);
   transport->trans = GST_RTSP_TRANS_RTP;
   transport->profile = GST_RTSP_PROFILE_AVPF;
-  transport->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
+  transport->lower_transport = lower;
+  return transport;
+}
+
+/* A stream's sinks for UDP, so that they need not be made when the first such viewer joins. */
+static void
+make_sinks (GstRTSPStream *stream, GstRTSPLowerTrans lower)
+{
+  GstRTSPTransport *transport = make_transport (lower);
+  bool has_sockets = false;
+  for (GSocketFamily family : {G_SOCKET_FAMILY_IPV4, G_SOCKET_FAMILY_IPV6}) {
+    if (!gst_rtsp_stream_allocate_udp_sockets (stream, family, transport, FALSE))
+      continue; /* no such addresses here */
+    has_sockets = true;
+    if (lower == GST_RTSP_LOWER_TRANS_UDP_MCAST)
+      if (GstRTSPAddress *group = gst_rtsp_stream_get_multicast_address (stream, family)) {
+        transport->ttl = group->ttl;
+        gst_rtsp_address_free (group);
+      }
+  }
+  if (has_sockets)
+    gst_rtsp_stream_complete_stream (stream, transport);
+  gst_rtsp_transport_free (transport);
+}
+
+/* The library would make what a transport needs when its first viewer joins, in the midst of what
+ * runs: of more than two transports it links a queue before it starts it, and a packet that comes
+ * in between ends the stream for all viewers, in silence. */
+static void
+make_all_sinks (GstRTSPMedia *media)
+{
+  const GstRTSPLowerTrans served = gst_rtsp_media_get_protocols (media);
+  for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
+    for (GstRTSPLowerTrans lower : {GST_RTSP_LOWER_TRANS_UDP, GST_RTSP_LOWER_TRANS_UDP_MCAST})
+      if (served & lower)
+        make_sinks (gst_rtsp_media_get_stream (media, i), lower);
+}
+
+/* A transport that sends nothing to nobody. */
+static GstRTSPStreamTransport *
+make_dry_transport (GstRTSPStream *stream)
+{
+  GstRTSPTransport *transport = make_transport (GST_RTSP_LOWER_TRANS_TCP);
   transport->interleaved = {0, 1};
   transport->destination = g_strdup ("nobody"); /* reports are compared with it */
   GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
@@ -46,6 +87,7 @@ MediaHolder::hold (GstRTSPMedia *media)
     transports = g_ptr_array_new_with_free_func (g_object_unref);
     for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
       g_ptr_array_add (transports, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
+    make_all_sinks (media);
     gst_rtsp_media_complete_pipeline (media, transports);
   }
   std::unique_lock guard (lock_);
