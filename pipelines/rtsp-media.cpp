@@ -202,22 +202,63 @@ payload_pad (GstRTSPMedia *media)
 }
 
 static const char kPreparedKey[] = "rangecast-prepared"; /* of a media: has its first frame set */
+static const char kLiveKey[] = "rangecast-live"; /* of a media: gives frame sets as they come */
 
-/* Live frame sets go out as soon as they are there: they carry their times, and the viewer's jitter
- * buffer goes by them. Others (files) must be held back to their times. */
+static bool
+is_live (GstRTSPMedia *media)
+{
+  GstQuery *query = gst_query_new_latency ();
+  gboolean live = FALSE;
+  if (GstPad *pad = payload_pad (media)) {
+    if (gst_pad_query (pad, query))
+      gst_query_parse_latency (query, &live, nullptr, nullptr);
+    gst_object_unref (pad);
+  }
+  gst_query_unref (query);
+  return live;
+}
+
 static void
 on_prepared (GstRTSPMedia *media, gpointer)
 {
   g_object_set_data (G_OBJECT (media), kPreparedKey, media);
-  GstQuery *query = gst_query_new_latency ();
-  gboolean is_live = FALSE;
-  if (GstPad *pad = payload_pad (media)) {
-    if (gst_pad_query (pad, query))
-      gst_query_parse_latency (query, &is_live, nullptr, nullptr);
-    gst_object_unref (pad);
+  g_object_set_data (G_OBJECT (media), kLiveKey, is_live (media) ? media : nullptr);
+  send_as_they_come (media);
+}
+
+/* Of which the library's switch says nothing. */
+static void
+free_udp_sinks (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GstIterator *sinks =
+        gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "multiudpsink");
+    const auto free_sink = [] (const GValue *sink, gpointer) {
+      g_object_set (g_value_get_object (sink), "sync", FALSE, nullptr);
+    };
+    while (gst_iterator_foreach (sinks, free_sink, nullptr) == GST_ITERATOR_RESYNC)
+      gst_iterator_resync (sinks);
+    gst_iterator_free (sinks);
+    gst_object_unref (pipeline);
   }
-  gst_rtsp_media_set_rate_control (media, !is_live);
-  gst_query_unref (query);
+  gst_object_unref (bin);
+}
+
+void
+send_as_they_come (GstRTSPMedia *media)
+{
+  if (!g_object_get_data (G_OBJECT (media), kLiveKey))
+    return;
+  gst_rtsp_media_set_rate_control (media, FALSE);
+  free_udp_sinks (media);
+  for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++) {
+    GObject *session = gst_rtsp_stream_get_rtpsession (gst_rtsp_media_get_stream (media, i));
+    if (!session)
+      continue;
+    g_object_set (session, "disable-sr-timestamp", FALSE, nullptr); /* the library set it */
+    g_object_unref (session);
+  }
 }
 
 void

@@ -207,6 +207,7 @@ on_play (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
       context->sessmedia, server.counts.left_out, server.holder.has_started (media));
   if (const auto gate = JoinGate::of (media))
     gate->note_playing (context->sessmedia);
+  send_as_they_come (media);
   server.holder.start (media);
   request_key_frame_set (media);
 }
