@@ -16,6 +16,8 @@ static constexpr int kKeptFiles = 16;
 /* Memory of those that were closed is freed by the threads that serve them, which may wait for a
  * first frame set meanwhile. Each has 6 KB. */
 static constexpr std::size_t kMostClosing = 512;
+/* A thread that serves them may be at work for one. */
+static constexpr gint64 kLongestEnd_us = 3 * G_USEC_PER_SEC;
 /* The socket stays readable where nobody can be taken. */
 static constexpr gulong kNoFiles_us = 20000;
 
@@ -115,28 +117,54 @@ Connections::add (GstRTSPClient *client)
   std::lock_guard guard (lock_);
   Connection &added = connections_[client];
   added.since_us = g_get_monotonic_time ();
-  if (has_tls_ && connection)
+  if (connection)
     added.socket.reset (G_SOCKET (g_object_ref (gst_rtsp_connection_get_read_socket (connection))));
 }
 
-/* With TLS the library (1.22) loses the descriptor and the memory of a connection that it closes
- * before its handshake is over; but not of those that end by themselves. One that goes on is closed
- * when it has been idle for so long again. */
+/* The library (1.22) can close a connection only in the thread that serves it: else that one may
+ * read from it for ever, and with TLS, before the handshake is over, descriptor and memory are
+ * lost. Those whose socket is shut down end by themselves, there. One that goes on is closed when
+ * it has been idle for so long again. */
 void
 Connections::close (GstRTSPClient *client)
 {
   {
     std::lock_guard guard (lock_);
-    Connection &connection = connections_[client];
-    const bool is_first_time = !connection.is_closing;
+    const auto found = connections_.find (client);
+    if (found == connections_.end ())
+      return;
+    Connection &connection = found->second;
     connection.is_closing = true;
-    if (connection.socket && is_first_time) {
+    if (const auto socket = std::move (connection.socket)) {
       connection.since_us = g_get_monotonic_time ();
-      g_socket_shutdown (connection.socket.get (), TRUE, TRUE, nullptr);
+      g_socket_shutdown (socket.get (), TRUE, TRUE, nullptr);
       return;
     }
   }
   gst_rtsp_client_close (client);
+}
+
+/* All that are of this one, or just all. */
+void
+Connections::close_all (const GstRTSPMedia *media)
+{
+  GList *clients = gst_rtsp_server_client_filter (server_, nullptr, nullptr);
+  for (GList *item = clients; item; item = item->next) {
+    auto client = GST_RTSP_CLIENT (item->data);
+    if (!media || was_told_of (client, media))
+      close (client);
+  }
+  g_list_free_full (clients, g_object_unref);
+}
+
+void
+Connections::end ()
+{
+  const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
+  close_all (nullptr);
+  while (count (true) > 0 && g_get_monotonic_time () < until_us)
+    g_usleep (10000);
+  close_all (nullptr);
 }
 
 /* Of a session that there still is. */

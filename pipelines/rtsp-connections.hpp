@@ -22,10 +22,7 @@
 class Connections {
 public:
   /** @param most  at a time, viewers and others */
-  Connections (GstRTSPServer *server, std::size_t most, bool has_tls)
-      : server_ (server), most_ (most), has_tls_ (has_tls)
-  {
-  }
+  Connections (GstRTSPServer *server, std::size_t most) : server_ (server), most_ (most) {}
   /** All connections must be gone. */
   ~Connections ();
   Connections (const Connections &) = delete;
@@ -41,6 +38,10 @@ public:
 
   /** Main loop. Closes those that are no viewers and have not asked for anything for so long. */
   void close_idle (gint64 patience_us);
+  /** Main loop. Closes those that were told of the media last, or all. */
+  void close_all (const GstRTSPMedia *media);
+  /** Main loop. Closes all, and waits until they are gone, some seconds at most. */
+  void end ();
   /** Main loop. Takes the connection that waits, and closes the oldest that is no viewer where
    *  there would be too many. Where there is none it is refused. */
   void take (GSocket *socket);
@@ -53,8 +54,8 @@ private:
     gint64 since_us = 0;                 /* monotonic */
     const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
     std::string session;                 /* that it is the viewer of; empty: none */
-    bool is_closing = false;             /* its socket is closed; the rest follows */
-    std::unique_ptr<GSocket, Unref> socket = nullptr; /* with TLS */
+    bool is_closing = false;             /* its socket is shut down; the rest follows */
+    std::unique_ptr<GSocket, Unref> socket = nullptr; /* until it is shut down */
   };
   static void on_gone (gpointer connections, GObject *client);
   bool is_viewer (GstRTSPClient *client);
@@ -65,7 +66,6 @@ private:
 
   GstRTSPServer *server_;
   const std::size_t most_;
-  const bool has_tls_;
   guint64 taken_ = 0; /* ever; main loop */
   std::mutex lock_;   /* guards what follows; not held while anything is called */
   std::map<GstRTSPClient *, Connection> connections_;

@@ -42,9 +42,9 @@ void begin_new_run (GstRTSPMediaFactory *factory);
  *  thread. */
 void end_waiting (GstRTSPMediaFactory *factory);
 
-/** Live frame sets go out as soon as they are there: they carry their times, and the viewer's jitter
- *  buffer goes by them. Others (files) are held back to their times. The library holds all of them
- *  back anew at each PLAY: call this after it. Any thread. */
+/** Live frame sets go out as soon as they are there: they carry their times, and the viewer's
+ * jitter buffer goes by them. Others (files) are held back to their times. The library holds all of
+ * them back anew at each PLAY: call this after it. Any thread. */
 void send_as_they_come (GstRTSPMedia *media);
 
 /** Lets every payloader of the media ask its encoder for a key frame set, with the rig. */

@@ -275,17 +275,10 @@ on_incoming (GSocket *socket, GIOCondition condition, gpointer user_data)
 
 /* ---- the stream ---- */
 
-static GstRTSPFilterResult
-remove_client (GstRTSPServer *, GstRTSPClient *, gpointer)
-{
-  return GST_RTSP_FILTER_REMOVE;
-}
-
 static void
 close_all (Server &server)
 {
-  g_list_free_full (
-      gst_rtsp_server_client_filter (server.server, remove_client, nullptr), g_object_unref);
+  server.connections->end ();
   server.holder.release ();
 }
 
@@ -304,14 +297,6 @@ static void
 delete_ending (gpointer ending)
 {
   delete static_cast<Ending *> (ending);
-}
-
-static GstRTSPFilterResult
-close_viewer (GstRTSPServer *, GstRTSPClient *client, gpointer user_data)
-{
-  const auto &ending = *static_cast<Ending *> (user_data);
-  return ending.server.connections->was_told_of (client, ending.media) ? GST_RTSP_FILTER_REMOVE
-                                                                       : GST_RTSP_FILTER_KEEP;
 }
 
 /* Those of UDP viewers outlive their connections. */
@@ -333,8 +318,7 @@ static void
 send_viewers_away (Ending &ending)
 {
   Server &server = ending.server;
-  g_list_free_full (
-      gst_rtsp_server_client_filter (server.server, close_viewer, &ending), g_object_unref);
+  server.connections->close_all (ending.media);
   g_list_free_full (
       gst_rtsp_session_pool_filter (server.sessions, close_session, &ending), g_object_unref);
 }
@@ -562,8 +546,7 @@ set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
   server.server = gst_rtsp_server_new ();
-  server.connections = std::make_unique<Connections> (
-      server.server, connections, !options.certificate_file.empty ());
+  server.connections = std::make_unique<Connections> (server.server, connections);
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
