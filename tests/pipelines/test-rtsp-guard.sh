@@ -344,6 +344,16 @@ test_wrong_usage_is_named () {
   expect_error "--users" rtsp-server --users nowhere -- "$figure"
   : >empty.txt
   expect_error "found none" rtsp-server --users empty.txt -- "$figure"
+  printf '# who\n\nanna:first-secret\nbert\n' >users.txt
+  expect_error "--users: users.txt:4: expected NAME:PASSWORD, got no colon" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\n:second-secret\n' >users.txt
+  expect_error "--users: users.txt:2: expected NAME:PASSWORD, got no name" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\nbert:\n' >users.txt
+  expect_error "--users: users.txt:2: expected NAME:PASSWORD, got no password for 'bert'" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\nbert:x\nanna:second-secret\n' >users.txt
+  expect_error "--users: users.txt:3: expected each name once, got 'anna' again" rtsp-server --users users.txt -- "$figure"
+  expect_error "--user: expected each name once, got 'bert' again" rtsp-server --user bert:x --user bert:y -- "$figure"
+  ! rtsp-server --users users.txt -- "$figure" 2>&1 | grep secret || fail "it shows passwords"
   expect_error "--multicast" rtsp-server --multicast 1.2.3.4:5000-5001 -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 239.1.2.9-239.1.2.3:5000-5001 -- "$figure"
   expect_error "--transports" rtsp-server --transports smoke -- "$figure"
