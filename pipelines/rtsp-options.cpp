@@ -150,19 +150,23 @@ static bool
 parse_transports (const char *text, RtspOptions &options)
 {
   gchar **names = g_strsplit (text, ",", -1);
-  bool good = *names != nullptr;
+  bool good = *names != nullptr, multicast = false;
   options.udp = options.tcp = false;
   for (gchar **name = names; *name && good; name++) {
     if (g_str_equal (*name, "udp"))
       options.udp = true;
     else if (g_str_equal (*name, "tcp"))
       options.tcp = true;
-    else if (!g_str_equal (*name, "multicast") || options.multicast.first.empty ())
+    else if (g_str_equal (*name, "multicast"))
+      multicast = true;
+    else
       good = false;
   }
   g_strfreev (names);
-  return good || bad_option ("--transports",
-                     "udp, tcp, multicast (with --multicast), or several with commas", text);
+  if (!good)
+    return bad_option ("--transports", "udp, tcp, multicast, or several with commas", text);
+  return !multicast || !options.multicast.first.empty () ||
+         bad_option ("--transports", "--multicast ADDRESS:PORT-PORT with multicast", text);
 }
 
 /* ---- all of them ---- */

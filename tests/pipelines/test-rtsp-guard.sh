@@ -354,6 +354,7 @@ test_wrong_usage_is_named () {
   expect_error "--users: users.txt:3: expected each name once, got 'anna' again" rtsp-server --users users.txt -- "$figure"
   expect_error "--user: expected each name once, got 'bert' again" rtsp-server --user bert:x --user bert:y -- "$figure"
   ! rtsp-server --users users.txt -- "$figure" 2>&1 | grep secret || fail "it shows passwords"
+  expect_error "--transports: expected --multicast ADDRESS" rtsp-server --transports udp,multicast -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 1.2.3.4:5000-5001 -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 239.1.2.9-239.1.2.3:5000-5001 -- "$figure"
   expect_error "--transports" rtsp-server --transports smoke -- "$figure"
