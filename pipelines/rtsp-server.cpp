@@ -77,8 +77,10 @@ struct Server {
   Timers leaving;  /* send those away who came when it had ended */
 };
 
+/* G_USEC_PER_SEC is an int, and a day is too long for one. */
+static constexpr gint64 kSecond_us = G_USEC_PER_SEC;
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
-static constexpr gint64 kSetup_us = 2 * G_USEC_PER_SEC;
+static constexpr gint64 kSetup_us = 2 * kSecond_us;
 
 static bool
 is_ending (Server &server)
@@ -490,7 +492,7 @@ on_second (gpointer user_data)
   if (server.options.always)
     keep_running (server);
   else if (server.idle_since_us > 0 && !is_ending (server) &&
-           now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
+           now - server.idle_since_us >= server.options.linger_s * kSecond_us)
     server.holder.release_unless_asked_since (now - kSetup_us);
   print_stats (server);
   return G_SOURCE_CONTINUE;

@@ -333,6 +333,16 @@ test_nothing_leaks () {
   ! grep -q 'GST_TRACER :0:: object-alive' server.log || fail "$(grep 'GST_TRACER :0:: object-alive' server.log | cut -c1-300 | head -n 5)"
 }
 
+more_frame_sets_than () { [ "$(stat_of frame-sets)" -gt "$1" ]; }
+
+test_long_linger_goes_on_without_viewers () {
+  serve --stats 1 --linger 3600 -- "$figure"
+  count "$url" --frame-sets 10 >count.txt
+  until_true 20 grep -q '^viewers=0 frame-sets=[1-9]' server.log
+  until_true 20 more_frame_sets_than $(($(stat_of frame-sets) + 60))
+  stop_server
+}
+
 test_wrong_usage_is_named () {
   expect_error "expected a launch string" rtsp-server
   expect_error "no element \"nonsense\"" rtsp-server -- nonsense
