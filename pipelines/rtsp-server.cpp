@@ -64,11 +64,11 @@ struct Server {
   GstRTSPServer *server = nullptr;
   GstRTSPMediaFactory *factory = nullptr;
   GstRTSPSessionPool *sessions = nullptr;
-  bool failed = false;
   gint64 idle_since_us = 0; /* monotonic; since when there has been no viewer; 0: there is one */
   gint64 start_at_us = 0;   /* of --always: not before */
-  gint64 stats_at_us = 0;
-  std::thread starter; /* of --always: waits until the launch string runs */
+  gint64 stats_at_us = 0;   /* monotonic; when the next line of --stats is due */
+  guint stats_timer = 0;    /* 0: none */
+  std::thread starter;      /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
   std::atomic<bool> stopping = false;
 
@@ -465,16 +465,28 @@ keep_running (Server &server)
 static void
 print_stats (Server &server)
 {
-  const gint64 now = g_get_monotonic_time ();
-  if (server.options.stats_s == 0 || now < server.stats_at_us)
-    return;
-  server.stats_at_us = now + server.options.stats_s * G_USEC_PER_SEC;
   const StreamCounts &counts = server.counts;
   std::printf ("viewers=%u frame-sets=%" G_GUINT64_FORMAT " bytes=%" G_GUINT64_FORMAT
                " left-out=%" G_GUINT64_FORMAT " key-requests=%" G_GUINT64_FORMAT "\n",
       gst_rtsp_session_pool_get_n_sessions (server.sessions), counts.frame_sets.load (),
       counts.bytes.load (), counts.left_out.load (), counts.key_requests.load ());
   std::fflush (stdout);
+}
+
+/* A timer for each line: those of a repeated one would come a little later each time.
+ * @param last_us  monotonic; when the line before was due */
+static void
+wait_for_stats (Server &server, gint64 last_us)
+{
+  const auto on_stats = [] (gpointer user_data) -> gboolean {
+    auto &server = *static_cast<Server *> (user_data);
+    print_stats (server);
+    wait_for_stats (server, server.stats_at_us);
+    return G_SOURCE_REMOVE;
+  };
+  const gint64 now = g_get_monotonic_time ();
+  server.stats_at_us = std::max (last_us + server.options.stats_s * kSecond_us, now);
+  server.stats_timer = g_timeout_add (guint ((server.stats_at_us - now) / 1000), on_stats, &server);
 }
 
 static gboolean
@@ -494,7 +506,6 @@ on_second (gpointer user_data)
   else if (server.idle_since_us > 0 && !is_ending (server) &&
            now - server.idle_since_us >= server.options.linger_s * kSecond_us)
     server.holder.release_unless_asked_since (now - kSetup_us);
-  print_stats (server);
   return G_SOURCE_CONTINUE;
 }
 
@@ -633,9 +644,15 @@ serve (Server &server, GSource *source)
   const guint interrupt = g_unix_signal_add (SIGINT, on_signal, &server);
   const guint terminate = g_unix_signal_add (SIGTERM, on_signal, &server);
   const guint timer = g_timeout_add_seconds (1, on_second, &server);
+  if (server.options.stats_s > 0)
+    wait_for_stats (server, g_get_monotonic_time ());
   if (server.options.always)
     keep_running (server);
   g_main_loop_run (server.loop);
+  if (server.stats_timer > 0) {
+    g_source_remove (server.stats_timer);
+    print_stats (server);
+  }
   server.stopping = true;
   g_source_remove (timer);
   g_source_remove (interrupt);

@@ -343,6 +343,23 @@ test_long_linger_goes_on_without_viewers () {
   stop_server
 }
 
+lines_of_stats () { [ "$(grep -c '^viewers=' server.log)" -ge "$1" ]; }
+
+test_no_line_of_statistics_is_left_out () {
+  local began lines
+  serve --stats 1 -- "$figure"
+  began=$SECONDS
+  until_true 30 lines_of_stats 15
+  [ $((SECONDS - began)) -le 16 ] || fail "$((SECONDS - began)) s for 15 lines, one a second"
+  stop_server
+  serve --stats 3600 -- "$figure"
+  count "$url" --frame-sets 10 >count.txt
+  stop_server
+  lines=$(grep -c '^viewers=' server.log)
+  [ "$lines" = 1 ] || fail "$lines lines, expected one at the end: $(tail -n 5 server.log)"
+  [ "$(stat_of frame-sets)" -ge 10 ] || fail "$(cat server.log)"
+}
+
 test_wrong_usage_is_named () {
   expect_error "expected a launch string" rtsp-server
   expect_error "no element \"nonsense\"" rtsp-server -- nonsense
