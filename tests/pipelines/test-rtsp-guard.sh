@@ -333,6 +333,28 @@ test_nothing_leaks () {
   ! grep -q 'GST_TRACER :0:: object-alive' server.log || fail "$(grep 'GST_TRACER :0:: object-alive' server.log | cut -c1-300 | head -n 5)"
 }
 
+runs_again () { grep -q 'runs again' server.log; }
+
+test_failure_of_every_run_is_told_once_and_when_it_is_over () {
+  gst-launch-1.0 -q -e avatartestsrc num-buffers=20 range-person-only=true ! video/x-range,width=160,height=120,framerate=2/1 \
+    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=good.rcnc
+  serve --always -- filesrc location=late.rcnc ! neighbourcodeparse
+  until_true 30 grep -q 'late.rcnc' server.log
+  sleep 4
+  [ "$(grep -c 'Resource not found' server.log)" = 1 ] || fail "$(cat server.log)"
+  ! runs_again || fail "too soon: $(cat server.log)"
+  echo "no recording" >text.rcnc
+  mv text.rcnc late.rcnc # another failure
+  until_true 30 grep -q 'No access unit found' server.log
+  sleep 4
+  [ "$(grep -c 'No access unit found' server.log)" = 1 ] || fail "$(cat server.log)"
+  mv good.rcnc late.rcnc
+  until_true 30 runs_again
+  rm late.rcnc
+  until_true 30 eval '[ "$(grep -c "Resource not found" server.log)" = 2 ]'
+  stop_server
+}
+
 more_frame_sets_than () { [ "$(stat_of frame-sets)" -gt "$1" ]; }
 
 test_long_linger_goes_on_without_viewers () {
