@@ -127,7 +127,7 @@ read_cameras () {
     cameras+=("rig=$rig" "view-id=$view")
   else
     IFS=, read -ra names <<<"${input#cameras=}"
-    [ ${#names[@]} -ge 2 ] && [ ${#names[@]} -le 3 ] ||
+    [[ ",${input#cameras=}," != *,,* ]] && [ ${#names[@]} -ge 2 ] && [ ${#names[@]} -le 3 ] ||
       die "--input: expected cameras=LEFT,RIGHT or cameras=LEFT,RIGHT,THIRD, got '$input'"
     for side in left right third; do
       [ ${#names[@]} = 0 ] || cameras+=("$side=${names[0]}")

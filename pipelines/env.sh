@@ -64,13 +64,12 @@ split_address () {
     die "$2: no host is called '$host'"
 }
 
-# usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets $addresses for multiudpsink
+# usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets the array `addresses`
 split_addresses () {
-  local list one
-  IFS=, read -ra list <<<"$1"
-  [ ${#list[@]} -ge 1 ] || die "$2: expected HOST:PORT, got '$1'"
-  for one in "${list[@]}"; do split_address "$one" "$2"; done
-  addresses=$1
+  local one
+  [[ ",$1," != *,,* ]] || die "$2: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$1'"
+  IFS=, read -ra addresses <<<"$1"
+  for one in "${addresses[@]}"; do split_address "$one" "$2"; done
 }
 
 # usage: has_display -> false where a window would show nothing to anybody

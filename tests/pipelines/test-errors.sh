@@ -132,6 +132,22 @@ test_ports_that_are_taken_twice_are_named () {
   expect_error "--feedback: port 5100 is that of --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
 }
 
+test_a_comma_too_many_is_named () {
+  local list parent=("$pipelines/parent-host.sh" --views 2 --listen 5000) camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  for list in 127.0.0.1:6000, 127.0.0.1:6000,127.0.0.1:6001, 127.0.0.1:6000,,127.0.0.1:6001 ,127.0.0.1:6000 ,; do
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${parent[@]}" --to "$list"
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${camera[@]}" --to "$list"
+  done
+  expect_error "--to: expected HOST:PORT" "${camera[@]}"
+  expect_error "--cameras: expected HOST:PORT[,HOST:PORT...] and no comma more" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1,127.0.0.1:2,
+  expect_error "--cameras: expected 2 addresses" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1
+  expect_error "--input: expected cameras=LEFT,RIGHT" "${camera[@]}" --to 127.0.0.1:6000 --input cameras=a,b,
+  "${parent[@]}" --to 127.0.0.1:6000,127.0.0.1:6001 --cameras 127.0.0.1:7000,127.0.0.1:7001 >parent.txt
+  grep -q 'clients=127.0.0.1:6000,127.0.0.1:6001 .*port=7000 .*port=7001 ' parent.txt || fail "$(cat parent.txt)"
+}
+
 # rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)
