@@ -29,7 +29,11 @@ done
 [ -f "$file" ] || die "no file '$file'"
 need_size "$size" --size
 need_degrees "$orbit" --orbit
-[ -n "$film" ] || has_display || die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+if [ -z "$film" ] && ! has_display; then
+  ! command -v rangecast-run >/dev/null || rangecast-run filesrc "location=$file" ! neighbourcodeparse ! fakesink num-buffers=1 ||
+    die "'$file' is no recording"
+  die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+fi
 
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter

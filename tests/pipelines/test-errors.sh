@@ -115,6 +115,15 @@ test_a_film_of_what_is_no_recording_leaves_no_file () {
   [ ! -e film.webm ] || fail "an empty film is left"
 }
 
+test_without_a_display_what_is_wrong_with_the_file_comes_first () {
+  unset DISPLAY WAYLAND_DISPLAY
+  echo "no recording" >bad.rcnc
+  "$pipelines/record.sh" good.rcnc --frames 2 --size 160x120 --views 1
+  expect_error "'bad.rcnc' is no recording" "$pipelines/play.sh" bad.rcnc
+  expect_error "there is no display" "$pipelines/play.sh" good.rcnc
+  ! "$pipelines/play.sh" good.rcnc 2>&1 | grep 'no recording' || fail "it is one"
+}
+
 test_an_element_that_fails_without_a_word_ends_the_run () {
   expect_error "does not start" rangecast-run udpsrc address=239.255.7.999 port=$((ports + 206)) ! fakesink
 }
