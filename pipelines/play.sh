@@ -39,6 +39,7 @@ picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
+  need_place "$film"
   drop_empty "$film" ""
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else

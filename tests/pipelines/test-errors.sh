@@ -87,11 +87,30 @@ test_a_recording_to_which_nothing_came_says_so_and_leaves_no_file () {
   for ((i = 0; i < 150; i++)); do [ ! -e none.rcnc ] || break; sleep 0.2; done
   [ -e none.rcnc ] || fail "it never began: $(cat record.log)"
   kill -INT $recorder
-  await_end $recorder
+  wait $recorder || true # nothing came: an error
+  [ ! -e none.rcnc ] || fail "an empty file is left for a while"
   for ((i = 0; i < 100; i++)); do ! grep -q 'nothing came' record.log || break; sleep 0.1; done
   grep -q "nothing came to port $((ports + 203))" record.log || fail "it said: $(cat record.log)"
   ! grep -q 'access unit' record.log || fail "it said more: $(cat record.log)"
-  [ ! -e none.rcnc ] || fail "an empty file is left"
+}
+
+test_an_empty_file_is_removed_and_nothing_else_is () {
+  run --drop-empty none.bin videotestsrc num-buffers=0 ! filesink location=none.bin
+  [ ! -e none.bin ] || fail "the empty file is left"
+  run --drop-empty one.bin videotestsrc num-buffers=1 ! filesink location=one.bin
+  expect_file one.bin 1
+  mkfifo pipe
+  cat pipe >got.txt &
+  run --drop-empty pipe videotestsrc num-buffers=0 ! filesink location=pipe
+  [ -p pipe ] || fail "the pipe is gone"
+}
+
+test_folders_that_there_are_not_are_named () {
+  expect_error "record.sh: nowhere/new.rcnc: there is no folder 'nowhere'" "$pipelines/record.sh" nowhere/new.rcnc
+  mkdir folder
+  expect_error "record.sh: folder: is a folder" "$pipelines/record.sh" folder
+  touch some.rcnc
+  expect_error "play.sh: nowhere/new.webm: there is no folder 'nowhere'" "$pipelines/play.sh" some.rcnc --film nowhere/new.webm
 }
 
 test_a_recording_from_a_port_that_is_taken_gives_one_cause () {
