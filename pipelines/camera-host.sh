@@ -99,6 +99,8 @@ fi
 rtp_check sender
 # What GStreamer takes for true.
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
+[ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
+  echo "camera-host.sh: --encoder: adaptive-bitrate adapts to nothing without --feedback, by which receivers report" >&2
 send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 

@@ -183,10 +183,21 @@ test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   export RANGECAST_LAUNCH=echo
   "$pipelines/parent-host.sh" --views 1 --listen 5000 --to 127.0.0.1:6000 --feedback 5100 >parent.txt
   "${camera[@]}" --encoder profile=entropy >camera.txt
-  "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt
+  "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt 2>said.txt
+  [ ! -s said.txt ] || fail "it said: $(cat said.txt)"
   grep -q 'rtcpreports' parent.txt || fail "no launch string: $(cat parent.txt)"
   ! grep -q 'transport-wide[^!]*! rtcpreports' parent.txt camera.txt || fail "for nothing: $(cat parent.txt camera.txt)"
   grep -q 'transport-wide[^!]*! rtcpreports' adaptive.txt || fail "not where it is of use: $(cat adaptive.txt)"
+}
+
+test_hosts_that_cannot_adapt_say_so () {
+  local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  "${camera[@]}" --encoder "adaptive-bitrate=true" 2>adaptive.txt | grep -q 'adaptive-bitrate=true' || fail "it does not begin"
+  [ "$(grep -c -- '--feedback' adaptive.txt)" = 1 ] || fail "it said: $(cat adaptive.txt)"
+  "${camera[@]}" --encoder "adaptive-bitrate=false" 2>fixed.txt
+  [ ! -s fixed.txt ] || fail "it said: $(cat fixed.txt)"
 }
 
 test_udp_relay_names_what_is_missing () {
