@@ -99,6 +99,8 @@ fi
 rtp_check sender
 # What GStreamer takes for true.
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
+[ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
+  echo "camera-host.sh: --encoder: adaptive-bitrate adapts to nothing without --feedback, by which receivers report" >&2
 send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 
@@ -127,7 +129,7 @@ read_cameras () {
     cameras+=("rig=$rig" "view-id=$view")
   else
     IFS=, read -ra names <<<"${input#cameras=}"
-    [ ${#names[@]} -ge 2 ] && [ ${#names[@]} -le 3 ] ||
+    [[ ",${input#cameras=}," != *,,* ]] && [ ${#names[@]} -ge 2 ] && [ ${#names[@]} -le 3 ] ||
       die "--input: expected cameras=LEFT,RIGHT or cameras=LEFT,RIGHT,THIRD, got '$input'"
     for side in left right third; do
       [ ${#names[@]} = 0 ] || cameras+=("$side=${names[0]}")

@@ -35,15 +35,26 @@ pass_messages () {
   trap '' INT TERM # it ends with what it reads
   errors=$(sed -u -n "${2:+/No access unit found: /,/GstNeighbourCodeParse:/d;}w /dev/stderr
     /^ERROR: /p")
-  if [ -f "$1" ] && [ ! -s "$1" ]; then
+  if [ ! -s "$1" ] && { [ -f "$1" ] || [ ! -e "$1" ]; }; then
     rm -f "$1"
     [ -z "$2" ] || [ -n "$errors" ] || echo "$(basename "$0"): $2" >&2
   fi
 }
 
-# usage: drop_empty FILE TEXT before `launch`, which takes this process: pass_messages ends a moment after it.
+# usage: drop_empty FILE TEXT before `launch`, which takes this process: pass_messages ends a moment after it. So rangecast-run
+# takes the file away itself, and pass_messages where that was killed or is not there.
 drop_empty () {
   exec 2> >(pass_messages "$1" "$2")
+  [ -n "${RANGECAST_LAUNCH:-}" ] || ! command -v rangecast-run >/dev/null || RANGECAST_LAUNCH=rangecast-run
+  [[ "${RANGECAST_LAUNCH:-}" != rangecast-run* ]] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$1")"
+}
+
+# usage: need_place FILE: that it can be written, as far as folders go
+need_place () {
+  local folder
+  folder=$(dirname -- "$1")
+  [ -d "$folder" ] || die "$1: there is no folder '$folder'; expected one that there is"
+  [ ! -d "$1" ] || die "$1: is a folder; expected a file to write"
 }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
@@ -64,13 +75,12 @@ split_address () {
     die "$2: no host is called '$host'"
 }
 
-# usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets $addresses for multiudpsink
+# usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets the array `addresses`
 split_addresses () {
-  local list one
-  IFS=, read -ra list <<<"$1"
-  [ ${#list[@]} -ge 1 ] || die "$2: expected HOST:PORT, got '$1'"
-  for one in "${list[@]}"; do split_address "$one" "$2"; done
-  addresses=$1
+  local one
+  [[ ",$1," != *,,* ]] || die "$2: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$1'"
+  IFS=, read -ra addresses <<<"$1"
+  for one in "${addresses[@]}"; do split_address "$one" "$2"; done
 }
 
 # usage: has_display -> false where a window would show nothing to anybody

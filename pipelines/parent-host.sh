@@ -64,8 +64,12 @@ need_own_port () {
   [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is that of view $(($1 - listen)) (--listen $listen)"
 }
 [ -z "$clock_port" ] || need_own_port "$clock_port" --clock-port
-IFS=, read -ra feedbacks <<<"$cameras_feedback"
-[ ${#feedbacks[@]} = 0 ] || [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
+feedbacks=()
+if [ -n "$cameras_feedback" ]; then
+  split_addresses "$cameras_feedback" --cameras
+  feedbacks=("${addresses[@]}")
+  [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
+fi
 [ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: expected --cameras, too"
 [ -z "$rig" ] || [ -f "$rig" ] || die "--rig: no file '$rig'"
 rtp_check sender
@@ -80,7 +84,6 @@ rtp_fec=$camera_fec rtp_rtx=$camera_rtx rtp_interface=
 cameras=()
 for ((i = 0; i < views; i++)); do
   rtp_feedback=${feedbacks[i]:-}
-  [ -z "$rtp_feedback" ] || split_address "$rtp_feedback" --cameras
   receive_rtp "$i" $((listen + i)) "$jitter" 1048576
   cameras+=("${rtp[@]}" ! mux.)
 done

@@ -29,12 +29,17 @@ done
 [ -f "$file" ] || die "no file '$file'"
 need_size "$size" --size
 need_degrees "$orbit" --orbit
-[ -n "$film" ] || has_display || die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+if [ -z "$film" ] && ! has_display; then
+  ! command -v rangecast-run >/dev/null || rangecast-run filesrc "location=$file" ! neighbourcodeparse ! fakesink num-buffers=1 ||
+    die "'$file' is no recording"
+  die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+fi
 
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
+  need_place "$film"
   drop_empty "$film" ""
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else

@@ -7,6 +7,7 @@
  * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "view" (a striprender), "snapshot"
  * (a sink whose last sample becomes a PNG); every rtpjitterbuffer, whatever its name. */
 #include <glib-unix.h>
+#include <glib/gstdio.h>
 #include <gst/gst.h>
 
 #include <clocale>
@@ -125,6 +126,14 @@ add_sources (Runner &runner)
     g_timeout_add_seconds (5, memory, &runner);
 }
 
+static void
+remove_empty (const char *path)
+{
+  GStatBuf file;
+  if (g_stat (path, &file) == 0 && S_ISREG (file.st_mode) && file.st_size == 0)
+    g_remove (path);
+}
+
 /* After the loop: what was asked for, from a pipeline that still has it, and its end. */
 static void
 finish (Runner &runner)
@@ -135,6 +144,8 @@ finish (Runner &runner)
   if (!runner.failed && options.snapshot)
     runner.failed = !write_snapshot (runner.pipeline, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
+  if (options.drop_empty)
+    remove_empty (options.drop_empty);
   if (runner.trace && !runner.trace->write (options.trace)) {
     g_printerr ("rangecast-run: %s: cannot be written\n", options.trace);
     runner.failed = true;

@@ -43,6 +43,7 @@ while [ $# -gt 0 ]; do
   shift || { echo "record.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to write"; }
+need_place "$file"
 need_number "$views" --views 1 64
 need_number "$frames" --frames 1 1000000
 need_size "$size" --size

@@ -86,7 +86,7 @@ send_rtp () {
   [ -z "$rtp_rtx" ] || rtp+=(! rtprtxsend max-size-time=500 "payload-type-map=$rtx_map")
   [ -z "$rtp_feedback" ] || rtp+=(! session.send_rtp_sink session.send_rtp_src)
   [ -z "$rtp_key" ] || rtp+=(! encrypt.rtp_sink_0 srtpenc name=encrypt encrypt.rtp_src_0)
-  rtp+=(! multiudpsink "clients=$addresses" sync=false async=false "ttl-mc=$rtp_ttl")
+  rtp+=(! multiudpsink "clients=$1" sync=false async=false "ttl-mc=$rtp_ttl")
   [ -z "$rtp_interface" ] || rtp+=("multicast-iface=$rtp_interface")
   [ -n "$rtp_feedback" ] || return 0
   rtp+=(rtpsession name=session rtp-profile=avpf)

@@ -137,6 +137,7 @@ on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &listener = *static_cast<Listener *> (user_data);
   GError *error = nullptr;
+  gchar *details = nullptr;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
     if (GST_IS_PIPELINE (message->src))
       listener.tell (true, "");
@@ -144,14 +145,15 @@ on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
   }
   const bool is_error = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR;
   if (is_error)
-    gst_message_parse_error (message, &error, nullptr);
+    gst_message_parse_error (message, &error, &details);
   else
     gst_message_parse_warning (message, &error, nullptr);
   const std::string text = std::string (GST_OBJECT_NAME (message->src)) + ": " + error->message;
   if (is_error)
-    listener.tell (true, text);
+    listener.tell (true, details ? text + "\n" + details : text);
   else
     g_printerr ("rtsp-server: warning: %s\n", text.c_str ());
+  g_free (details);
   g_error_free (error);
 }
 

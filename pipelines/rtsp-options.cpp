@@ -16,15 +16,35 @@ bad_option (const char *option, const char *expected, const std::string &got)
 
 /* ---- who may watch ---- */
 
+/* What it has instead of NAME:PASSWORD; never shows what may be a password. */
+static std::string
+fault_of_user (const std::string &text)
+{
+  const auto colon = text.find (':');
+  if (colon == text.npos)
+    return "no colon";
+  return colon == 0 ? "no name before the colon"
+                    : "no password for '" + text.substr (0, colon) + "'";
+}
+
+/* @param place  the option or its line, for messages */
 static bool
-add_user (const std::string &text, const char *option, RtspOptions &options)
+add_user (const std::string &text, const std::string &place, RtspOptions &options)
 {
   const auto colon = text.find (':');
   if (colon == 0 || colon == text.npos || colon + 1 == text.size ()) {
-    g_printerr ("rtsp-server: %s: expected NAME:PASSWORD\n", option); /* it may be the password */
+    g_printerr ("rtsp-server: %s: expected NAME:PASSWORD, got %s\n", place.c_str (),
+        fault_of_user (text).c_str ());
     return false;
   }
-  options.users.push_back ({text.substr (0, colon), text.substr (colon + 1)});
+  const std::string name = text.substr (0, colon);
+  for (const RtspUser &user : options.users)
+    if (user.name == name) {
+      g_printerr ("rtsp-server: %s: expected each name once, got '%s' again\n", place.c_str (),
+          name.c_str ());
+      return false;
+    }
+  options.users.push_back ({name, text.substr (colon + 1)});
   return true;
 }
 
@@ -40,12 +60,13 @@ read_users (const char *path, RtspOptions &options)
     return false;
   }
   const std::size_t before = options.users.size ();
+  const std::string file = std::string ("--users: ") + path + ":";
   bool good = true;
   gchar **lines = g_strsplit (text, "\n", -1);
-  for (gchar **line = lines; *line && good; line++) {
-    g_strchomp (*line);
-    if (**line && **line != '#')
-      good = add_user (*line, "--users", options);
+  for (int i = 0; lines[i] && good; i++) {
+    g_strchomp (lines[i]);
+    if (*lines[i] && *lines[i] != '#')
+      good = add_user (lines[i], file + std::to_string (i + 1), options);
   }
   g_strfreev (lines);
   g_free (text);
@@ -129,19 +150,23 @@ static bool
 parse_transports (const char *text, RtspOptions &options)
 {
   gchar **names = g_strsplit (text, ",", -1);
-  bool good = *names != nullptr;
+  bool good = *names != nullptr, multicast = false;
   options.udp = options.tcp = false;
   for (gchar **name = names; *name && good; name++) {
     if (g_str_equal (*name, "udp"))
       options.udp = true;
     else if (g_str_equal (*name, "tcp"))
       options.tcp = true;
-    else if (!g_str_equal (*name, "multicast") || options.multicast.first.empty ())
+    else if (g_str_equal (*name, "multicast"))
+      multicast = true;
+    else
       good = false;
   }
   g_strfreev (names);
-  return good || bad_option ("--transports",
-                     "udp, tcp, multicast (with --multicast), or several with commas", text);
+  if (!good)
+    return bad_option ("--transports", "udp, tcp, multicast, or several with commas", text);
+  return !multicast || !options.multicast.first.empty () ||
+         bad_option ("--transports", "--multicast ADDRESS:PORT-PORT with multicast", text);
 }
 
 /* ---- all of them ---- */

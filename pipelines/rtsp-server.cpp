@@ -64,21 +64,28 @@ struct Server {
   GstRTSPServer *server = nullptr;
   GstRTSPMediaFactory *factory = nullptr;
   GstRTSPSessionPool *sessions = nullptr;
-  bool failed = false;
-  gint64 idle_since_us = 0; /* monotonic; since when there has been no viewer; 0: there is one */
-  gint64 start_at_us = 0;   /* of --always: not before */
-  gint64 stats_at_us = 0;
-  std::thread starter; /* of --always: waits until the launch string runs */
+  gint64 idle_since_us = 0;    /* monotonic; since when there has been no viewer; 0: there is one */
+  gint64 start_at_us = 0;      /* of --always: not before */
+  gint64 stats_at_us = 0;      /* monotonic; when the next line of --stats is due */
+  guint stats_timer = 0;       /* 0: none */
+  guint64 seen_frame_sets = 0; /* a second ago */
+  std::thread starter;         /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
   std::atomic<bool> stopping = false;
 
-  std::mutex lock; /* guards what follows */
-  Timers ending;   /* call end_stream() */
-  Timers leaving;  /* send those away who came when it had ended */
+  std::mutex lock;         /* guards what follows */
+  Timers ending;           /* call end_stream() */
+  Timers leaving;          /* send those away who came when it had ended */
+  std::string failure;     /* the last that was told, without digits; empty: it is over */
+  gint64 failed_at_us = 0; /* monotonic; when it last came */
 };
 
+/* G_USEC_PER_SEC is an int, and a day is too long for one. */
+static constexpr gint64 kSecond_us = G_USEC_PER_SEC;
+/* Who has run so long has not only begun again after a failure. */
+static constexpr gint64 kRecovery_us = 5 * kSecond_us;
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
-static constexpr gint64 kSetup_us = 2 * G_USEC_PER_SEC;
+static constexpr gint64 kSetup_us = 2 * kSecond_us;
 
 static bool
 is_ending (Server &server)
@@ -381,6 +388,41 @@ forget_endings (Server &server)
   leaving.swap (server.leaving);
 }
 
+/* Each failure once, not for every run that ends so. Elements that have no name of their own are
+ * numbered on from run to run, so digits do not count. */
+static void
+tell_failure (Server &server, const std::string &why)
+{
+  std::string failure;
+  for (const char c : why)
+    if (!g_ascii_isdigit (c))
+      failure += c;
+  {
+    std::lock_guard guard (server.lock);
+    server.failed_at_us = g_get_monotonic_time ();
+    if (failure == server.failure)
+      return;
+    server.failure = failure;
+  }
+  g_printerr ("rtsp-server: %s\n", why.c_str ());
+}
+
+static void
+tell_recovery (Server &server)
+{
+  const guint64 frame_sets = server.counts.frame_sets;
+  const bool runs = frame_sets != server.seen_frame_sets;
+  server.seen_frame_sets = frame_sets;
+  {
+    std::lock_guard guard (server.lock);
+    if (!runs || server.failure.empty () ||
+        g_get_monotonic_time () - server.failed_at_us < kRecovery_us)
+      return;
+    server.failure.clear ();
+  }
+  g_printerr ("rtsp-server: the stream runs again\n");
+}
+
 /* Whoever comes next gets a new run of the launch string. */
 static void
 on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::string &why)
@@ -401,7 +443,7 @@ on_stream_end (Server &server, GstRTSPMedia *media, bool is_over, const std::str
           server, server.ending, media, is_over ? kLastWords_ms : kSlowestEnd_ms, end_stream);
   }
   if (!why.empty ())
-    g_printerr ("rtsp-server: %s\n", why.c_str ());
+    tell_failure (server, why);
 }
 
 /* Runs the launch string before anybody asks for it. It takes as long as it waits for its first
@@ -448,16 +490,28 @@ keep_running (Server &server)
 static void
 print_stats (Server &server)
 {
-  const gint64 now = g_get_monotonic_time ();
-  if (server.options.stats_s == 0 || now < server.stats_at_us)
-    return;
-  server.stats_at_us = now + server.options.stats_s * G_USEC_PER_SEC;
   const StreamCounts &counts = server.counts;
   std::printf ("viewers=%u frame-sets=%" G_GUINT64_FORMAT " bytes=%" G_GUINT64_FORMAT
                " left-out=%" G_GUINT64_FORMAT " key-requests=%" G_GUINT64_FORMAT "\n",
       gst_rtsp_session_pool_get_n_sessions (server.sessions), counts.frame_sets.load (),
       counts.bytes.load (), counts.left_out.load (), counts.key_requests.load ());
   std::fflush (stdout);
+}
+
+/* A timer for each line: those of a repeated one would come a little later each time.
+ * @param last_us  monotonic; when the line before was due */
+static void
+wait_for_stats (Server &server, gint64 last_us)
+{
+  const auto on_stats = [] (gpointer user_data) -> gboolean {
+    auto &server = *static_cast<Server *> (user_data);
+    print_stats (server);
+    wait_for_stats (server, server.stats_at_us);
+    return G_SOURCE_REMOVE;
+  };
+  const gint64 now = g_get_monotonic_time ();
+  server.stats_at_us = std::max (last_us + server.options.stats_s * kSecond_us, now);
+  server.stats_timer = g_timeout_add (guint ((server.stats_at_us - now) / 1000), on_stats, &server);
 }
 
 static gboolean
@@ -475,9 +529,9 @@ on_second (gpointer user_data)
   if (server.options.always)
     keep_running (server);
   else if (server.idle_since_us > 0 && !is_ending (server) &&
-           now - server.idle_since_us >= server.options.linger_s * G_USEC_PER_SEC)
+           now - server.idle_since_us >= server.options.linger_s * kSecond_us)
     server.holder.release_unless_asked_since (now - kSetup_us);
-  print_stats (server);
+  tell_recovery (server);
   return G_SOURCE_CONTINUE;
 }
 
@@ -615,9 +669,15 @@ serve (Server &server, GSource *source)
   const guint interrupt = g_unix_signal_add (SIGINT, on_signal, &server);
   const guint terminate = g_unix_signal_add (SIGTERM, on_signal, &server);
   const guint timer = g_timeout_add_seconds (1, on_second, &server);
+  if (server.options.stats_s > 0)
+    wait_for_stats (server, g_get_monotonic_time ());
   if (server.options.always)
     keep_running (server);
   g_main_loop_run (server.loop);
+  if (server.stats_timer > 0) {
+    g_source_remove (server.stats_timer);
+    print_stats (server);
+  }
   server.stopping = true;
   g_source_remove (timer);
   g_source_remove (interrupt);

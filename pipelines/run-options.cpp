@@ -8,7 +8,7 @@
 RunOptions::~RunOptions ()
 {
   for (gchar *text :
-      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key})
+      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key, drop_empty})
     g_free (text);
   g_strfreev (launch);
 }
@@ -45,6 +45,8 @@ RunOptions::parse (int *argc, char ***argv)
           "Write the names of threads that still run when the pipeline is gone", "FILE"},
       {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &srtp_key,
           "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
+      {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME, &drop_empty,
+          "Remove this file at the end if nothing was written to it", "FILE"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");

@@ -87,11 +87,30 @@ test_a_recording_to_which_nothing_came_says_so_and_leaves_no_file () {
   for ((i = 0; i < 150; i++)); do [ ! -e none.rcnc ] || break; sleep 0.2; done
   [ -e none.rcnc ] || fail "it never began: $(cat record.log)"
   kill -INT $recorder
-  await_end $recorder
+  wait $recorder || true # nothing came: an error
+  [ ! -e none.rcnc ] || fail "an empty file is left for a while"
   for ((i = 0; i < 100; i++)); do ! grep -q 'nothing came' record.log || break; sleep 0.1; done
   grep -q "nothing came to port $((ports + 203))" record.log || fail "it said: $(cat record.log)"
   ! grep -q 'access unit' record.log || fail "it said more: $(cat record.log)"
-  [ ! -e none.rcnc ] || fail "an empty file is left"
+}
+
+test_an_empty_file_is_removed_and_nothing_else_is () {
+  run --drop-empty none.bin videotestsrc num-buffers=0 ! filesink location=none.bin
+  [ ! -e none.bin ] || fail "the empty file is left"
+  run --drop-empty one.bin videotestsrc num-buffers=1 ! filesink location=one.bin
+  expect_file one.bin 1
+  mkfifo pipe
+  cat pipe >got.txt &
+  run --drop-empty pipe videotestsrc num-buffers=0 ! filesink location=pipe
+  [ -p pipe ] || fail "the pipe is gone"
+}
+
+test_folders_that_there_are_not_are_named () {
+  expect_error "record.sh: nowhere/new.rcnc: there is no folder 'nowhere'" "$pipelines/record.sh" nowhere/new.rcnc
+  mkdir folder
+  expect_error "record.sh: folder: is a folder" "$pipelines/record.sh" folder
+  touch some.rcnc
+  expect_error "play.sh: nowhere/new.webm: there is no folder 'nowhere'" "$pipelines/play.sh" some.rcnc --film nowhere/new.webm
 }
 
 test_a_recording_from_a_port_that_is_taken_gives_one_cause () {
@@ -115,6 +134,15 @@ test_a_film_of_what_is_no_recording_leaves_no_file () {
   [ ! -e film.webm ] || fail "an empty film is left"
 }
 
+test_without_a_display_what_is_wrong_with_the_file_comes_first () {
+  unset DISPLAY WAYLAND_DISPLAY
+  echo "no recording" >bad.rcnc
+  "$pipelines/record.sh" good.rcnc --frames 2 --size 160x120 --views 1
+  expect_error "'bad.rcnc' is no recording" "$pipelines/play.sh" bad.rcnc
+  expect_error "there is no display" "$pipelines/play.sh" good.rcnc
+  ! "$pipelines/play.sh" good.rcnc 2>&1 | grep 'no recording' || fail "it is one"
+}
+
 test_an_element_that_fails_without_a_word_ends_the_run () {
   expect_error "does not start" rangecast-run udpsrc address=239.255.7.999 port=$((ports + 206)) ! fakesink
 }
@@ -132,6 +160,22 @@ test_ports_that_are_taken_twice_are_named () {
   expect_error "--feedback: port 5100 is that of --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
 }
 
+test_a_comma_too_many_is_named () {
+  local list parent=("$pipelines/parent-host.sh" --views 2 --listen 5000) camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  for list in 127.0.0.1:6000, 127.0.0.1:6000,127.0.0.1:6001, 127.0.0.1:6000,,127.0.0.1:6001 ,127.0.0.1:6000 ,; do
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${parent[@]}" --to "$list"
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${camera[@]}" --to "$list"
+  done
+  expect_error "--to: expected HOST:PORT" "${camera[@]}"
+  expect_error "--cameras: expected HOST:PORT[,HOST:PORT...] and no comma more" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1,127.0.0.1:2,
+  expect_error "--cameras: expected 2 addresses" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1
+  expect_error "--input: expected cameras=LEFT,RIGHT" "${camera[@]}" --to 127.0.0.1:6000 --input cameras=a,b,
+  "${parent[@]}" --to 127.0.0.1:6000,127.0.0.1:6001 --cameras 127.0.0.1:7000,127.0.0.1:7001 >parent.txt
+  grep -q 'clients=127.0.0.1:6000,127.0.0.1:6001 .*port=7000 .*port=7001 ' parent.txt || fail "$(cat parent.txt)"
+}
+
 # rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)
@@ -139,10 +183,21 @@ test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   export RANGECAST_LAUNCH=echo
   "$pipelines/parent-host.sh" --views 1 --listen 5000 --to 127.0.0.1:6000 --feedback 5100 >parent.txt
   "${camera[@]}" --encoder profile=entropy >camera.txt
-  "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt
+  "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt 2>said.txt
+  [ ! -s said.txt ] || fail "it said: $(cat said.txt)"
   grep -q 'rtcpreports' parent.txt || fail "no launch string: $(cat parent.txt)"
   ! grep -q 'transport-wide[^!]*! rtcpreports' parent.txt camera.txt || fail "for nothing: $(cat parent.txt camera.txt)"
   grep -q 'transport-wide[^!]*! rtcpreports' adaptive.txt || fail "not where it is of use: $(cat adaptive.txt)"
+}
+
+test_hosts_that_cannot_adapt_say_so () {
+  local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  "${camera[@]}" --encoder "adaptive-bitrate=true" 2>adaptive.txt | grep -q 'adaptive-bitrate=true' || fail "it does not begin"
+  [ "$(grep -c -- '--feedback' adaptive.txt)" = 1 ] || fail "it said: $(cat adaptive.txt)"
+  "${camera[@]}" --encoder "adaptive-bitrate=false" 2>fixed.txt
+  [ ! -s fixed.txt ] || fail "it said: $(cat fixed.txt)"
 }
 
 test_udp_relay_names_what_is_missing () {

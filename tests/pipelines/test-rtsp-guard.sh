@@ -333,6 +333,55 @@ test_nothing_leaks () {
   ! grep -q 'GST_TRACER :0:: object-alive' server.log || fail "$(grep 'GST_TRACER :0:: object-alive' server.log | cut -c1-300 | head -n 5)"
 }
 
+runs_again () { grep -q 'runs again' server.log; }
+
+test_failure_of_every_run_is_told_once_and_when_it_is_over () {
+  gst-launch-1.0 -q -e avatartestsrc num-buffers=20 range-person-only=true ! video/x-range,width=160,height=120,framerate=2/1 \
+    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=good.rcnc
+  serve --always -- filesrc location=late.rcnc ! neighbourcodeparse
+  until_true 30 grep -q 'late.rcnc' server.log
+  sleep 4
+  [ "$(grep -c 'Resource not found' server.log)" = 1 ] || fail "$(cat server.log)"
+  ! runs_again || fail "too soon: $(cat server.log)"
+  echo "no recording" >text.rcnc
+  mv text.rcnc late.rcnc # another failure
+  until_true 30 grep -q 'No access unit found' server.log
+  sleep 4
+  [ "$(grep -c 'No access unit found' server.log)" = 1 ] || fail "$(cat server.log)"
+  mv good.rcnc late.rcnc
+  until_true 30 runs_again
+  rm late.rcnc
+  until_true 30 eval '[ "$(grep -c "Resource not found" server.log)" = 2 ]'
+  stop_server
+}
+
+more_frame_sets_than () { [ "$(stat_of frame-sets)" -gt "$1" ]; }
+
+test_long_linger_goes_on_without_viewers () {
+  serve --stats 1 --linger 3600 -- "$figure"
+  count "$url" --frame-sets 10 >count.txt
+  until_true 20 grep -q '^viewers=0 frame-sets=[1-9]' server.log
+  until_true 20 more_frame_sets_than $(($(stat_of frame-sets) + 60))
+  stop_server
+}
+
+lines_of_stats () { [ "$(grep -c '^viewers=' server.log)" -ge "$1" ]; }
+
+test_no_line_of_statistics_is_left_out () {
+  local began lines
+  serve --stats 1 -- "$figure"
+  began=$SECONDS
+  until_true 30 lines_of_stats 15
+  [ $((SECONDS - began)) -le 16 ] || fail "$((SECONDS - began)) s for 15 lines, one a second"
+  stop_server
+  serve --stats 3600 -- "$figure"
+  count "$url" --frame-sets 10 >count.txt
+  stop_server
+  lines=$(grep -c '^viewers=' server.log)
+  [ "$lines" = 1 ] || fail "$lines lines, expected one at the end: $(tail -n 5 server.log)"
+  [ "$(stat_of frame-sets)" -ge 10 ] || fail "$(cat server.log)"
+}
+
 test_wrong_usage_is_named () {
   expect_error "expected a launch string" rtsp-server
   expect_error "no element \"nonsense\"" rtsp-server -- nonsense
@@ -344,6 +393,17 @@ test_wrong_usage_is_named () {
   expect_error "--users" rtsp-server --users nowhere -- "$figure"
   : >empty.txt
   expect_error "found none" rtsp-server --users empty.txt -- "$figure"
+  printf '# who\n\nanna:first-secret\nbert\n' >users.txt
+  expect_error "--users: users.txt:4: expected NAME:PASSWORD, got no colon" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\n:second-secret\n' >users.txt
+  expect_error "--users: users.txt:2: expected NAME:PASSWORD, got no name" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\nbert:\n' >users.txt
+  expect_error "--users: users.txt:2: expected NAME:PASSWORD, got no password for 'bert'" rtsp-server --users users.txt -- "$figure"
+  printf 'anna:first-secret\nbert:x\nanna:second-secret\n' >users.txt
+  expect_error "--users: users.txt:3: expected each name once, got 'anna' again" rtsp-server --users users.txt -- "$figure"
+  expect_error "--user: expected each name once, got 'bert' again" rtsp-server --user bert:x --user bert:y -- "$figure"
+  ! rtsp-server --users users.txt -- "$figure" 2>&1 | grep secret || fail "it shows passwords"
+  expect_error "--transports: expected --multicast ADDRESS" rtsp-server --transports udp,multicast -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 1.2.3.4:5000-5001 -- "$figure"
   expect_error "--multicast" rtsp-server --multicast 239.1.2.9-239.1.2.3:5000-5001 -- "$figure"
   expect_error "--transports" rtsp-server --transports smoke -- "$figure"
