@@ -117,31 +117,47 @@ Connections::add (GstRTSPClient *client)
   std::lock_guard guard (lock_);
   Connection &added = connections_[client];
   added.since_us = g_get_monotonic_time ();
-  if (connection)
+  if (has_tls_ && connection)
     added.socket.reset (G_SOCKET (g_object_ref (gst_rtsp_connection_get_read_socket (connection))));
 }
 
+void
+Connections::note_thread (GstRTSPClient *client, GMainContext *thread)
+{
+  std::lock_guard guard (lock_);
+  connections_[client].thread.reset (g_main_context_ref (thread));
+}
+
+static gboolean
+close_client (gpointer client)
+{
+  gst_rtsp_client_close (GST_RTSP_CLIENT (client));
+  return G_SOURCE_REMOVE;
+}
+
 /* The library (1.22) can close a connection only in the thread that serves it: else that one may
- * read from it for ever, and with TLS, before the handshake is over, descriptor and memory are
- * lost. Those whose socket is shut down end by themselves, there. One that goes on is closed when
- * it has been idle for so long again. */
+ * read from it for ever. With TLS it loses the descriptor and the memory of a connection that it
+ * closes before its handshake is over; but not of those that end by themselves. One that goes on
+ * is closed when it has been idle for so long again. */
 void
 Connections::close (GstRTSPClient *client)
 {
-  {
-    std::lock_guard guard (lock_);
-    const auto found = connections_.find (client);
-    if (found == connections_.end ())
-      return;
-    Connection &connection = found->second;
-    connection.is_closing = true;
-    if (const auto socket = std::move (connection.socket)) {
-      connection.since_us = g_get_monotonic_time ();
-      g_socket_shutdown (socket.get (), TRUE, TRUE, nullptr);
-      return;
-    }
+  std::lock_guard guard (lock_);
+  const auto found = connections_.find (client);
+  if (found == connections_.end ())
+    return;
+  Connection &connection = found->second;
+  connection.is_closing = true;
+  connection.since_us = g_get_monotonic_time ();
+  if (const auto socket = std::move (connection.socket)) {
+    g_socket_shutdown (socket.get (), TRUE, TRUE, nullptr);
+    return;
   }
-  gst_rtsp_client_close (client);
+  GSource *source = g_idle_source_new ();
+  g_source_set_priority (source, G_PRIORITY_HIGH); /* before what it still asks for */
+  g_source_set_callback (source, close_client, g_object_ref (client), g_object_unref);
+  g_source_attach (source, connection.thread.get ());
+  g_source_unref (source);
 }
 
 /* All that are of this one, or just all. */
@@ -161,10 +177,10 @@ void
 Connections::end ()
 {
   const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
-  close_all (nullptr);
-  while (count (true) > 0 && g_get_monotonic_time () < until_us)
+  while (count (false) + count (true) > 0 && g_get_monotonic_time () < until_us) {
+    close_all (nullptr);
     g_usleep (10000);
-  close_all (nullptr);
+  }
 }
 
 /* Of a session that there still is. */

@@ -22,13 +22,18 @@
 class Connections {
 public:
   /** @param most  at a time, viewers and others */
-  Connections (GstRTSPServer *server, std::size_t most) : server_ (server), most_ (most) {}
+  Connections (GstRTSPServer *server, std::size_t most, bool has_tls)
+      : server_ (server), most_ (most), has_tls_ (has_tls)
+  {
+  }
   /** All connections must be gone. */
   ~Connections ();
   Connections (const Connections &) = delete;
 
   /** Forgets it by itself when it is gone. Main loop, as what says so below. */
   void add (GstRTSPClient *client);
+  /** It is served by that thread. */
+  void note_thread (GstRTSPClient *client, GMainContext *thread);
   /** It asks for something. */
   void note_media (GstRTSPClient *client, const GstRTSPMedia *media);
   /** It is the viewer of a session from now on. */
@@ -49,13 +54,15 @@ public:
 private:
   struct Unref {
     void operator() (GSocket *socket) const { g_object_unref (socket); }
+    void operator() (GMainContext *context) const { g_main_context_unref (context); }
   };
   struct Connection {
     gint64 since_us = 0;                 /* monotonic */
     const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
     std::string session;                 /* that it is the viewer of; empty: none */
-    bool is_closing = false;             /* its socket is shut down; the rest follows */
-    std::unique_ptr<GSocket, Unref> socket = nullptr; /* until it is shut down */
+    bool is_closing = false;             /* soon, in its thread */
+    std::unique_ptr<GMainContext, Unref> thread = nullptr; /* that serves it */
+    std::unique_ptr<GSocket, Unref> socket = nullptr;      /* with TLS, until it is shut down */
   };
   static void on_gone (gpointer connections, GObject *client);
   bool is_viewer (GstRTSPClient *client);
@@ -66,6 +73,7 @@ private:
 
   GstRTSPServer *server_;
   const std::size_t most_;
+  const bool has_tls_;
   guint64 taken_ = 0; /* ever; main loop */
   std::mutex lock_;   /* guards what follows; not held while anything is called */
   std::map<GstRTSPClient *, Connection> connections_;

@@ -7,6 +7,10 @@
 #include "rtsp-tcp-viewer.hpp"
 
 static const char kCodedType[] = "application/x-neighbour-code";
+static const char kLiveKey[] = "rangecast-live"; /* of a media: gives frame sets as they come */
+/* EOS waits so long for the last frame set's time, and then for it to be sent. */
+static constexpr gint64 kLongestEnd_us = 2 * G_USEC_PER_SEC;
+static constexpr GstClockTime kSending = 100 * GST_MSECOND;
 
 /* ---- the launch string ---- */
 
@@ -109,21 +113,24 @@ struct Listener {
     g_object_unref (media);
   }
 
+  /* Of a media that has its first frame set. */
+  bool is_live ()
+  {
+    auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
+    const bool live = media && g_object_get_data (G_OBJECT (media), kLiveKey);
+    g_clear_object (&media);
+    return live;
+  }
+
 private:
   GWeakRef media_;
   StreamEnd on_end_;
 };
 
 static void
-delete_listener (gpointer listener)
-{
-  delete static_cast<Listener *> (listener);
-}
-
-static void
 delete_listener_of_signal (gpointer listener, GClosure *)
 {
-  delete_listener (listener);
+  delete static_cast<Listener *> (listener);
 }
 
 static void
@@ -181,16 +188,6 @@ on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   return GST_PAD_PROBE_OK;
 }
 
-/* Viewers are told of the end when the payloader has passed it; the sinks, and so the bus, come to
- * it only when the last frame set's time is over. */
-static GstPadProbeReturn
-on_payload_event (GstPad *, GstPadProbeInfo *info, gpointer user_data)
-{
-  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS)
-    static_cast<Listener *> (user_data)->tell (false, "");
-  return GST_PAD_PROBE_OK;
-}
-
 /* The one pay0, or the first of several. */
 static GstPad *
 payload_pad (GstRTSPMedia *media)
@@ -204,7 +201,6 @@ payload_pad (GstRTSPMedia *media)
 }
 
 static const char kPreparedKey[] = "rangecast-prepared"; /* of a media: has its first frame set */
-static const char kLiveKey[] = "rangecast-live"; /* of a media: gives frame sets as they come */
 
 static bool
 is_live (GstRTSPMedia *media)
@@ -271,6 +267,74 @@ request_key_frame_set (GstRTSPMedia *media)
         pad, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
     gst_object_unref (pad);
   }
+}
+
+/* ---- the end of the stream ---- */
+
+struct EndWatch {
+  Listener listener;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* streaming thread */
+};
+
+static void
+delete_end_watch (gpointer watch)
+{
+  delete static_cast<EndWatch *> (watch);
+}
+
+/* Of the pad's element; NONE where there is none. */
+static GstClockTime
+clock_time_of (GstPad *pad, GstElement *element, GstClockTime pts)
+{
+  GstClockTime running_time = GST_CLOCK_TIME_NONE;
+  if (GstEvent *event = gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0)) {
+    const GstSegment *segment = nullptr;
+    gst_event_parse_segment (event, &segment);
+    running_time = gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
+    gst_event_unref (event);
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (running_time))
+    return GST_CLOCK_TIME_NONE;
+  return gst_element_get_base_time (element) + running_time;
+}
+
+/* The RTP session says goodbye to the viewers as soon as it has EOS, when the last frame sets still
+ * wait in the sinks for their time; and players end there. So EOS waits for them. */
+static void
+wait_for_sinks (GstPad *pad, GstClockTime last_pts)
+{
+  GstElement *element = gst_pad_get_parent_element (pad);
+  GstClock *clock = element ? gst_element_get_clock (element) : nullptr;
+  if (clock && GST_CLOCK_TIME_IS_VALID (last_pts)) {
+    const GstClockTime due = clock_time_of (pad, element, last_pts);
+    const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
+    while (GST_CLOCK_TIME_IS_VALID (due) && gst_clock_get_time (clock) < due + kSending &&
+           !GST_PAD_IS_FLUSHING (pad) && g_get_monotonic_time () < until_us)
+      g_usleep (10000);
+  }
+  gst_clear_object (&clock);
+  gst_clear_object (&element);
+}
+
+/* Viewers are told of the end when the payloader has passed it; the sinks, and so the bus, come to
+ * it only when the last frame set's time is over. */
+static GstPadProbeReturn
+on_payload_end (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
+{
+  auto &watch = *static_cast<EndWatch *> (user_data);
+  const GstPadProbeType type = GST_PAD_PROBE_INFO_TYPE (info);
+  if (type & GST_PAD_PROBE_TYPE_BUFFER) {
+    watch.last_pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
+  } else if (type & GST_PAD_PROBE_TYPE_BUFFER_LIST) {
+    GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+    if (gst_buffer_list_length (list) > 0)
+      watch.last_pts = GST_BUFFER_PTS (gst_buffer_list_get (list, 0));
+  } else if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS) {
+    watch.listener.tell (false, "");
+    if (!watch.listener.is_live ())
+      wait_for_sinks (pad, watch.last_pts);
+  }
+  return GST_PAD_PROBE_OK;
 }
 
 /* ---- the factory ---- */
@@ -392,8 +456,8 @@ on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer 
                          GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
         on_payload, stage->counts, nullptr);
     if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
-      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_payload_event,
-          new Listener (media, stage->on_end), delete_listener);
+      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, on_payload_end,
+          new EndWatch{{media, stage->on_end}}, delete_end_watch);
     gst_object_unref (pad);
   }
   g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);

@@ -28,6 +28,7 @@
 #include "rtsp-media.hpp"
 #include "rtsp-options.hpp"
 #include "rtsp-tcp-viewer.hpp"
+#include "rtsp-threads.hpp"
 
 static constexpr guint kThreads = 4; /* that serve connections */
 /* Requests of RTSP have bodies of a few lines at most. */
@@ -600,13 +601,17 @@ set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
   server.server = gst_rtsp_server_new ();
-  server.connections = std::make_unique<Connections> (server.server, connections);
+  server.connections = std::make_unique<Connections> (
+      server.server, connections, !options.certificate_file.empty ());
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
   gst_rtsp_server_set_backlog (server.server, kBacklog);
-  GstRTSPThreadPool *threads = gst_rtsp_server_get_thread_pool (server.server);
-  gst_rtsp_thread_pool_set_max_threads (threads, kThreads);
+  GstRTSPThreadPool *threads =
+      make_thread_pool (kThreads, [&server] (GstRTSPClient *client, GMainContext *thread) {
+        server.connections->note_thread (client, thread);
+      });
+  gst_rtsp_server_set_thread_pool (server.server, threads);
   g_object_unref (threads);
   server.sessions = gst_rtsp_server_get_session_pool (server.server);
   gst_rtsp_session_pool_set_max_sessions (server.sessions, guint (options.max_viewers));

@@ -414,3 +414,41 @@ test_wrong_usage_is_named () {
   expect_error "port ${port%/*}" rtsp-server --address 127.0.0.1 --port "${port%/*}" -- "$figure"
   stop_server
 }
+
+# They ask for more than it answers, so each of its threads is at work for one when it ends.
+ask_without_end () { # url connections
+  python3 - "$@" <<'END'
+import socket, sys, threading
+from urllib.parse import urlparse
+url, connections = urlparse(sys.argv[1]), int(sys.argv[2])
+def ask(control):
+    try:
+        while True:
+            control.sendall(b"OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\n" * 20)
+            if not control.recv(65536):
+                return
+    except OSError:
+        pass
+controls = [socket.create_connection((url.hostname, url.port), timeout=60) for _ in range(connections)]
+threads = [threading.Thread(target=ask, args=(control,)) for control in controls]
+for thread in threads: thread.start()
+print("asking", flush=True)
+for thread in threads: thread.join()
+END
+}
+test_it_ends_while_everybody_asks () {
+  local i
+  for i in 1 2 3; do
+    : >server.log
+    : >asking.txt
+    serve -- "$figure"
+    ask_without_end "$url" 8 >asking.txt &
+    asking=$!
+    trap 'kill -KILL $server $asking 2>/dev/null || true' EXIT
+    until_true 60 grep -q asking asking.txt
+    sleep 0.3
+    stop_server
+    wait "$asking"
+    ! grep CRITICAL server.log || fail "$(head -n 5 server.log)"
+  done
+}

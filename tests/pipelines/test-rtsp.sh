@@ -244,3 +244,70 @@ test_players_show_a_stream_in_a_window () {
   in_display player_shows
   stop_server
 }
+
+# The library links what a transport needs to what runs, and starts it later: what comes in between ended
+# the stream for everybody. Here that takes long (tests/pipelines/slow_plugging.c).
+join_by_multicast () { # url seconds
+  python3 - "$viewers" "$@" <<'END'
+import pathlib, re, sys, time
+sys.path.insert(0, str(pathlib.Path(sys.argv[1]).parent))
+from rtsp_viewers import Viewer
+viewer = Viewer(sys.argv[2], False)
+control = re.findall(r"a=control:(\S+)", viewer.describe())[-1]
+fields, _ = viewer.ask("SETUP", f"{viewer.url}/{control}", "Transport: RTP/AVPF;multicast")
+assert "multicast" in fields["Transport"], fields
+viewer.session = fields["Session"].split(";")[0]
+viewer.ask("PLAY", viewer.url)
+time.sleep(float(sys.argv[3]))
+END
+}
+test_stream_goes_on_when_each_transport_is_joined () {
+  LD_PRELOAD=${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/libslow-plugging.so \
+    ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0" \
+    serve --multicast 239.7.7.7:5000-5001 --stats 1 -- "$figure"
+  local transport before
+  for transport in tcp udp multicast; do
+    case $transport in
+      tcp) count "$url" --tcp --frame-sets 3 >tcp.txt ;;
+      udp) count "$url" --frame-sets 3 >udp.txt ;;
+      multicast) join_by_multicast "$url" 2 ;;
+    esac
+    before=$(stat_of frame-sets)
+    has_more () { [ "$(stat_of frame-sets)" -gt $((before + 5)) ]; }
+    until_true 20 has_more
+  done
+  stop_server
+}
+
+# The library holds all frame sets back to their times, which are later by what a live source says that
+# it may need: here four seconds that it does not need.
+test_live_frame_sets_are_not_held_back () {
+  serve -- "avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
+    ! rangemux latency=4000000000 ! neighbourcodeenc"
+  local protocol
+  for protocol in tcp udp; do
+    rangecast-run --timeout 60 --frames 20 --report $protocol.json rtspsrc "location=$url" protocols=$protocol latency=0 \
+      ! rtpneighbourcodedepay ! neighbourcodedec ! identity name=rendered ! fakesink sync=false >$protocol.log 2>&1 ||
+      fail "$(tail -n 5 $protocol.log)"
+    python3 - $protocol.json <<'END' || fail "$protocol: $(cat $protocol.json)"
+import json, sys
+assert 0 < json.load(open(sys.argv[1]))["latency_ms"]["p50"] < 3000
+END
+  done
+  stop_server
+}
+
+# The RTP session says goodbye when it gets EOS, and players end there.
+test_recording_arrives_to_its_last_frame_set () {
+  gst-launch-1.0 -q avatartestsrc num-buffers=40 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
+    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=recording.rcnc
+  serve -- "filesrc location=$PWD/recording.rcnc ! neighbourcodeparse"
+  local protocol n
+  for protocol in tcp udp; do
+    timeout -k 5 60 gst-launch-1.0 -v rtspsrc "location=$url" "protocols=$protocol" latency=50 ! rtpneighbourcodedepay \
+      ! identity silent=false ! fakesink >$protocol.log 2>&1 || fail "$(tail -n 5 $protocol.log)"
+    n=$(grep -c 'last-message = chain' $protocol.log || true)
+    [ "$n" = 40 ] || fail "$protocol: $n of 40 frame sets"
+  done
+  stop_server
+}
