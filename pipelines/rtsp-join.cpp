@@ -2,6 +2,7 @@
 #include "rtsp-join.hpp"
 
 #include <algorithm>
+#include <chrono>
 
 #include "rtsp-transports.hpp"
 
@@ -26,6 +27,50 @@ static JoinGate &
 gate_of (gpointer gate)
 {
   return **static_cast<Gate *> (gate);
+}
+
+/* ---- while a viewer by TCP is put in ---- */
+
+static constexpr gint64 kLongestPause_us = 50000;
+static constexpr gulong kUnderWay_us = 5000; /* from the payloader to the viewers */
+
+void
+ShortPause::begin ()
+{
+  {
+    std::lock_guard guard (lock_);
+    const gint64 now = g_get_monotonic_time ();
+    n_ = now < until_us_ ? n_ + 1 : 1;
+    until_us_ = now + kLongestPause_us;
+  }
+  g_usleep (kUnderWay_us);
+}
+
+void
+ShortPause::end ()
+{
+  std::lock_guard guard (lock_);
+  n_ = std::max (n_ - 1, 0);
+  changed_.notify_all ();
+}
+
+void
+ShortPause::wait ()
+{
+  std::unique_lock guard (lock_);
+  const gint64 until_us = g_get_monotonic_time () + kLongestPause_us;
+  while (n_ > 0) {
+    const gint64 left_us = std::min (until_us, until_us_) - g_get_monotonic_time ();
+    if (left_us <= 0)
+      return;
+    changed_.wait_for (guard, std::chrono::microseconds (left_us));
+  }
+}
+
+static bool
+has_tcp_viewer (GstRTSPSessionMedia *media)
+{
+  return !transports_of (media, GST_RTSP_LOWER_TRANS_TCP).empty ();
 }
 
 /* ---- which packets begin a key frame set ---- */
@@ -70,6 +115,8 @@ JoinGate::on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   const bool begins = !gate.has_last_ || start.timestamp != gate.last_timestamp_;
   gate.has_last_ = true;
   gate.last_timestamp_ = start.timestamp;
+  if (begins)
+    gate.pause_.wait ();
   if (begins && gate.is_key_) {
     std::lock_guard guard (gate.lock_);
     gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = start;
@@ -214,6 +261,8 @@ JoinGate::hold_back (GstRTSPSessionMedia *media)
     });
     joiners_.push_back ({weak, to.destination, to.client_port.min, now + kLongestHold_us});
   });
+  if (has_tcp_viewer (media))
+    pause_.begin ();
 }
 
 void
@@ -223,6 +272,8 @@ JoinGate::note_playing (GstRTSPSessionMedia *media)
     std::erase_if (
         joiners_, [&] (const Joiner &joiner) { return !joiner.parked && joiner.is_to (to); });
   });
+  if (has_tcp_viewer (media))
+    pause_.end ();
 }
 
 void

@@ -5,13 +5,15 @@
  * How: a viewer by UDP is one client of a multiudpsink that all share. It is taken out in the
  * moment that it is put in, and put in again by the thread that sends, just before the first packet
  * of a key frame set. A viewer by TCP has a queue of its own (rtsp-tcp-viewer), which asks
- * begins_key_frame_set(). Multicast is shared: who joins takes what comes. */
+ * begins_key_frame_set(); until the library has put it in and that has taken its place, no frame
+ * set begins. Multicast is shared: who joins takes what comes. */
 #pragma once
 
 #include <gst/rtsp-server/rtsp-server.h>
 
 #include <array>
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -20,6 +22,22 @@
 
 /* So long a viewer waits at most: sources that make no key frame set when asked (recordings). */
 inline constexpr gint64 kLongestHold_us = 2 * G_USEC_PER_SEC;
+
+/** Nothing passes while somebody is at work that takes some milliseconds. Any thread. */
+class ShortPause {
+public:
+  /** Returns when what has passed before has got to the viewers, if the machine is not too busy. */
+  void begin ();
+  void end ();
+  /** Waits for the end, 50 ms at most: who began may have failed, or begin again and again. */
+  void wait ();
+
+private:
+  std::mutex lock_; /* guards what follows */
+  std::condition_variable changed_;
+  int n_ = 0;           /* at work */
+  gint64 until_us_ = 0; /* monotonic */
+};
 
 /** Of one media with one stream. Any thread. */
 class JoinGate {
@@ -34,9 +52,10 @@ public:
   /** @param packet  of RTP */
   bool begins_key_frame_set (GstBuffer *packet);
 
-  /** The UDP viewers of a session that is about to play wait from now on. */
+  /** A session is about to play. Its UDP viewers wait from now on. */
   void hold_back (GstRTSPSessionMedia *media);
-  /** It plays: those that were let in before need not wait. */
+  /** It plays, and its TCP viewers have their queues. Those that were let in before need not wait.
+   */
   void note_playing (GstRTSPSessionMedia *media);
   /** It left. To be called before the library takes it away. */
   void forget (GstRTSPSessionMedia *media);
@@ -74,6 +93,7 @@ private:
   guint32 last_timestamp_ = 0;      /* thread of the payloader */
   bool has_last_ = false;
   std::atomic<int> waiting_ = 0; /* joiners */
+  ShortPause pause_;             /* before a frame set begins */
 
   std::mutex lock_; /* guards what follows; not held while anything is called */
   std::array<Start, 8> starts_ = {};
