@@ -16,6 +16,7 @@ until_true () { # seconds command...
 
 # usage: serve arguments of rtsp-server -> sets $url, and $server, which ends with the test
 serve () {
+  : >server.log # maybe of another one before
   rtsp-server --address 127.0.0.1 --port 0 "$@" >server.log 2>&1 &
   server=$!
   trap 'kill -KILL $server 2>/dev/null || true' EXIT
