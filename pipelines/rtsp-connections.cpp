@@ -18,6 +18,9 @@ static constexpr int kKeptFiles = 16;
 static constexpr std::size_t kMostClosing = 512;
 /* A thread that serves them may be at work for one. */
 static constexpr gint64 kLongestEnd_us = 3 * G_USEC_PER_SEC;
+/* Its file is free when its thread has closed it, which is at once unless that is at work. */
+static constexpr int kClosingTurns = 5;
+static constexpr gulong kClosing_us = 2000;
 /* The socket stays readable where nobody can be taken. */
 static constexpr gulong kNoFiles_us = 20000;
 
@@ -267,7 +270,11 @@ Connections::make_room (GSocket *socket)
     return false;
   if (count (false) < most_ && !are_files_short (socket))
     return true;
-  return close_oldest () && !are_files_short (socket);
+  if (!close_oldest ())
+    return false;
+  for (int i = 0; i < kClosingTurns && are_files_short (socket); i++)
+    g_usleep (kClosing_us);
+  return !are_files_short (socket);
 }
 
 void
