@@ -28,6 +28,7 @@
 
 #include "controlledvalues.hpp"
 #include "statsreporter.hpp"
+#include "streamlock.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
@@ -312,6 +313,7 @@ static gboolean
 gst_cylinder_filter_stop (GstBaseTransform *base)
 {
   GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
+  const StreamLock lock (base);
   /* With the stream its memory goes too. */
   GST_CYLINDER_FILTER (base)->priv->core = {};
   GST_CYLINDER_FILTER (base)->priv->colours = {};

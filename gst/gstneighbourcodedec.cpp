@@ -39,6 +39,7 @@
 #include "concealment.hpp"
 #include "recycledbuffers.hpp"
 #include "statsreporter.hpp"
+#include "streamlock.hpp"
 
 using rangecast::DecoderResult;
 using rangecast::Status;
@@ -449,6 +450,7 @@ gst_neighbour_code_dec_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   priv->reporter.stop ();
+  const StreamLock lock (base);
   forget_stream (priv);
   drop_pool (priv->pool);
   return TRUE;

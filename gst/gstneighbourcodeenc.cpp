@@ -39,6 +39,7 @@
 #include "neighbourcoderate.hpp"
 #include "recycledbuffers.hpp"
 #include "statsreporter.hpp"
+#include "streamlock.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -487,6 +488,7 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->reporter.stop ();
+  const StreamLock lock (base);
   priv->is_configured = false;
   forget_input (priv);
   priv->buffers.drop ();

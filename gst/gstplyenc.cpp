@@ -24,6 +24,8 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/guarded.hpp>
 
+#include "streamlock.hpp"
+
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 #define GST_CAT_DEFAULT gst_ply_enc_debug
 
@@ -165,6 +167,7 @@ static gboolean
 gst_ply_enc_stop (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
+  const StreamLock lock (base);
   priv->started = false;
   priv->info = {};
   return TRUE;

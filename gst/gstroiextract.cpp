@@ -37,6 +37,7 @@
 #include "controlledvalues.hpp"
 #include "roisettings.hpp"
 #include "statsreporter.hpp"
+#include "streamlock.hpp"
 
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
@@ -463,6 +464,7 @@ gst_roi_extract_stop (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
   priv->reporter.stop ();
+  const StreamLock lock (base);
   priv->info = {};
   priv->relearn = false;
   for (auto &state : priv->views)

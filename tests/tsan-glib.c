@@ -139,3 +139,43 @@ g_source_set_callback (GSource *source, GSourceFunc func, gpointer data, GDestro
   __tsan_release (callback);
   glibs (source, call, callback, forget);
 }
+
+/* What a thread of GStreamer's pool is to call, to which GLib hands it. Declared here, to need no
+ * headers of GStreamer's. */
+typedef void (*ElementFunc) (gpointer element, gpointer data);
+void gst_element_call_async (
+    gpointer element, ElementFunc func, gpointer data, GDestroyNotify notify);
+
+struct ElementCall {
+  ElementFunc func;
+  gpointer data;
+  GDestroyNotify notify;
+};
+
+static void
+call_element (gpointer element, gpointer user_data)
+{
+  struct ElementCall *element_call = user_data;
+  __tsan_acquire (element_call);
+  element_call->func (element, element_call->data);
+}
+
+static void
+forget_element_call (gpointer user_data)
+{
+  struct ElementCall *element_call = user_data;
+  __tsan_acquire (element_call);
+  if (element_call->notify)
+    element_call->notify (element_call->data);
+  g_free (element_call);
+}
+
+void
+gst_element_call_async (gpointer element, ElementFunc func, gpointer data, GDestroyNotify notify)
+{
+  GLIBS (gst_element_call_async);
+  struct ElementCall *element_call = g_new (struct ElementCall, 1);
+  *element_call = (struct ElementCall){func, data, notify};
+  __tsan_release (element_call);
+  glibs (element, call_element, element_call, forget_element_call);
+}

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Seeks, durations and times of files in neighbourcodeparse. */
+#include <cstring>
+
 #include "parse-check.hpp"
 #include "scene-check.hpp"
 
@@ -71,8 +73,10 @@ static std::vector<guint8>
 with_times_from (const Recording &recording, guint64 first)
 {
   auto bytes = recording.bytes;
-  for (gsize i = 0; i < recording.offsets.size (); i++)
-    GST_WRITE_UINT64_LE (&bytes[recording.offsets[i] + 4 + 8], first + i * kFrame);
+  for (gsize i = 0; i < recording.offsets.size (); i++) {
+    const guint64 time = GUINT64_TO_LE (first + i * kFrame);
+    std::memcpy (&bytes[recording.offsets[i] + 4 + 8], &time, sizeof time);
+  }
   return bytes;
 }
 
