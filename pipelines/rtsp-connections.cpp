@@ -13,11 +13,12 @@ static constexpr rlim_t kSpare = 32, kLeastSpare = 8;
 static constexpr rlim_t kOwnFiles = 256, kLeastOwnFiles = 40;
 /* Where a launch string has more than that: connections leave so many to it. */
 static constexpr int kKeptFiles = 16;
-/* Memory of those that were closed is freed by the threads that serve them, which may wait for a
- * first frame set meanwhile. Each has 6 KB. */
-static constexpr std::size_t kMostClosing = 512;
+/* Those that were closed are freed, files and all, by the threads that serve them, which may wait
+ * for a first frame set meanwhile. Of kOwnFiles. */
+static constexpr std::size_t kMostClosing = 128;
 /* A thread that serves them may be at work for one. */
-static constexpr gint64 kLongestEnd_us = 3 * G_USEC_PER_SEC;
+static constexpr gulong kEndTurn_us = 10000;
+static constexpr int kEndTurns = 300, kTurnsPerClosing = 50;
 /* Its file is free when its thread has closed it, which is at once unless that is at work. */
 static constexpr int kClosingTurns = 5;
 static constexpr gulong kClosing_us = 2000;
@@ -67,8 +68,9 @@ void
 Connections::on_gone (gpointer connections, GObject *client)
 {
   auto self = static_cast<Connections *> (connections);
-  std::lock_guard guard (self->lock_);
-  self->connections_.erase (reinterpret_cast<GstRTSPClient *> (client));
+  std::unique_lock guard (self->lock_);
+  const auto gone = self->connections_.extract (reinterpret_cast<GstRTSPClient *> (client));
+  guard.unlock (); /* before its socket and its thread go */
 }
 
 void
@@ -125,17 +127,46 @@ Connections::add (GstRTSPClient *client)
 }
 
 void
-Connections::note_thread (GstRTSPClient *client, GMainContext *thread)
+Connections::note_thread (GstRTSPClient *client, GstRTSPThread *thread)
 {
   std::lock_guard guard (lock_);
-  connections_[client].thread.reset (g_main_context_ref (thread));
+  connections_[client].thread.reset (gst_rtsp_thread_ref (thread));
 }
 
+struct Closing {
+  GstRTSPClient *client;
+  GstRTSPThread *thread;
+};
+
 static gboolean
-close_client (gpointer client)
+close_client (gpointer closing)
 {
-  gst_rtsp_client_close (GST_RTSP_CLIENT (client));
+  gst_rtsp_client_close (static_cast<Closing *> (closing)->client);
   return G_SOURCE_REMOVE;
+}
+
+static void
+delete_closing (gpointer user_data)
+{
+  auto closing = static_cast<Closing *> (user_data);
+  g_object_unref (closing->client);
+  gst_rtsp_thread_stop (closing->thread);
+  delete closing;
+}
+
+/* In its thread, unless that ends, and the connection with it. */
+static void
+close_in_its_thread (GstRTSPClient *client, GstRTSPThread *thread)
+{
+  if (!gst_rtsp_thread_reuse (thread))
+    return;
+  GSource *source = g_idle_source_new ();
+  g_source_set_priority (source, G_PRIORITY_HIGH); /* before what it still asks for */
+  g_source_set_callback (source, close_client,
+      new Closing{GST_RTSP_CLIENT (g_object_ref (client)), gst_rtsp_thread_ref (thread)},
+      delete_closing);
+  g_source_attach (source, thread->context);
+  g_source_unref (source);
 }
 
 /* The library (1.22) can close a connection only in the thread that serves it: else that one may
@@ -145,22 +176,24 @@ close_client (gpointer client)
 void
 Connections::close (GstRTSPClient *client)
 {
-  std::lock_guard guard (lock_);
-  const auto found = connections_.find (client);
-  if (found == connections_.end ())
-    return;
-  Connection &connection = found->second;
-  connection.is_closing = true;
-  connection.since_us = g_get_monotonic_time ();
-  if (const auto socket = std::move (connection.socket)) {
-    g_socket_shutdown (socket.get (), TRUE, TRUE, nullptr);
-    return;
+  SocketRef socket;
+  ThreadRef thread;
+  {
+    std::lock_guard guard (lock_);
+    const auto found = connections_.find (client);
+    if (found == connections_.end ())
+      return;
+    Connection &connection = found->second;
+    connection.is_closing = true;
+    connection.since_us = g_get_monotonic_time ();
+    socket = std::move (connection.socket);
+    if (!socket && connection.thread)
+      thread.reset (gst_rtsp_thread_ref (connection.thread.get ()));
   }
-  GSource *source = g_idle_source_new ();
-  g_source_set_priority (source, G_PRIORITY_HIGH); /* before what it still asks for */
-  g_source_set_callback (source, close_client, g_object_ref (client), g_object_unref);
-  g_source_attach (source, connection.thread.get ());
-  g_source_unref (source);
+  if (socket)
+    g_socket_shutdown (socket.get (), TRUE, TRUE, nullptr);
+  else if (thread)
+    close_in_its_thread (client, thread.get ());
 }
 
 /* All that are of this one, or just all. */
@@ -179,10 +212,10 @@ Connections::close_all (const GstRTSPMedia *media)
 void
 Connections::end ()
 {
-  const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
-  while (count (false) + count (true) > 0 && g_get_monotonic_time () < until_us) {
-    close_all (nullptr);
-    g_usleep (10000);
+  for (int turn = 0; turn < kEndTurns && count (false) + count (true) > 0; turn++) {
+    if (turn % kTurnsPerClosing == 0) /* with TLS, who goes on after the first time */
+      close_all (nullptr);
+    g_usleep (kEndTurn_us);
   }
 }
 

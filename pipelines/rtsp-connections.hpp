@@ -33,7 +33,7 @@ public:
   /** Forgets it by itself when it is gone. Main loop, as what says so below. */
   void add (GstRTSPClient *client);
   /** It is served by that thread. */
-  void note_thread (GstRTSPClient *client, GMainContext *thread);
+  void note_thread (GstRTSPClient *client, GstRTSPThread *thread);
   /** It asks for something. */
   void note_media (GstRTSPClient *client, const GstRTSPMedia *media);
   /** It is the viewer of a session from now on. */
@@ -54,15 +54,17 @@ public:
 private:
   struct Unref {
     void operator() (GSocket *socket) const { g_object_unref (socket); }
-    void operator() (GMainContext *context) const { g_main_context_unref (context); }
+    void operator() (GstRTSPThread *thread) const { gst_rtsp_thread_unref (thread); }
   };
+  using SocketRef = std::unique_ptr<GSocket, Unref>;
+  using ThreadRef = std::unique_ptr<GstRTSPThread, Unref>;
   struct Connection {
     gint64 since_us = 0;                 /* monotonic */
     const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
     std::string session;                 /* that it is the viewer of; empty: none */
     bool is_closing = false;             /* soon, in its thread */
-    std::unique_ptr<GMainContext, Unref> thread = nullptr; /* that serves it */
-    std::unique_ptr<GSocket, Unref> socket = nullptr;      /* with TLS, until it is shut down */
+    ThreadRef thread = nullptr;          /* that serves it */
+    SocketRef socket = nullptr;          /* with TLS, until it is shut down */
   };
   static void on_gone (gpointer connections, GObject *client);
   bool is_viewer (GstRTSPClient *client);
@@ -75,6 +77,6 @@ private:
   const std::size_t most_;
   const bool has_tls_;
   guint64 taken_ = 0; /* ever; main loop */
-  std::mutex lock_;   /* guards what follows; not held while anything is called */
+  std::mutex lock_; /* guards what follows; not held while anything is called; after the server's */
   std::map<GstRTSPClient *, Connection> connections_;
 };

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rtsp-holder.hpp"
 
+#include <chrono>
+
+#include "rtsp-media.hpp"
+
 static const char kReleasedKey[] = "rangecast-released"; /* of a media: is not held again */
 
 static GstRTSPTransport *
@@ -32,6 +36,10 @@ make_sinks (GstRTSPStream *stream, GstRTSPLowerTrans lower)
   }
   if (has_sockets)
     gst_rtsp_stream_complete_stream (stream, transport);
+  else
+    g_printerr ("rtsp-server: warning: there are no sockets for %s; who joins by it may stop the "
+                "stream\n",
+        lower == GST_RTSP_LOWER_TRANS_UDP ? "UDP" : "multicast");
   gst_rtsp_transport_free (transport);
 }
 
@@ -75,7 +83,10 @@ bool
 MediaHolder::hold (GstRTSPMedia *media)
 {
   {
-    std::lock_guard guard (lock_);
+    std::unique_lock guard (lock_);
+    /* Who plays before it has its sinks would have them made in the midst. */
+    changed_.wait_for (guard, std::chrono::seconds (1),
+        [&] { return media_ != media || phase_ != Phase::kTaking; });
     if (media_ || g_object_get_data (G_OBJECT (media), kReleasedKey))
       return media_ == media;
     media_ = GST_RTSP_MEDIA (g_object_ref (media));
@@ -88,11 +99,13 @@ MediaHolder::hold (GstRTSPMedia *media)
     for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
       g_ptr_array_add (transports, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
     make_all_sinks (media);
+    send_as_they_come (media);
     gst_rtsp_media_complete_pipeline (media, transports);
   }
   std::unique_lock guard (lock_);
   transports_ = transports;
   phase_ = Phase::kHeld;
+  changed_.notify_all ();
   if (transports && !unwanted_)
     return true;
   let_go (guard);

@@ -32,6 +32,7 @@ gate_of (gpointer gate)
 /* ---- while a viewer by TCP is put in ---- */
 
 static constexpr gint64 kLongestPause_us = 50000;
+static constexpr gint64 kBetweenPauses_us = 100000;
 static constexpr gulong kUnderWay_us = 5000; /* from the payloader to the viewers */
 
 void
@@ -40,6 +41,9 @@ ShortPause::begin ()
   {
     std::lock_guard guard (lock_);
     const gint64 now = g_get_monotonic_time ();
+    if (now < since_us_ + kBetweenPauses_us)
+      return;
+    since_us_ = now;
     n_ = now < until_us_ ? n_ + 1 : 1;
     until_us_ = now + kLongestPause_us;
   }
@@ -247,7 +251,7 @@ JoinGate::for_each_address (GstRTSPSessionMedia *media, const UseAddress &use)
 }
 
 void
-JoinGate::hold_back (GstRTSPSessionMedia *media)
+JoinGate::hold_back (GstRTSPSessionMedia *media, bool pauses)
 {
   for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *transport) {
     const std::shared_ptr<GWeakRef> weak (new GWeakRef, [] (GWeakRef *ref) {
@@ -261,7 +265,7 @@ JoinGate::hold_back (GstRTSPSessionMedia *media)
     });
     joiners_.push_back ({weak, to.destination, to.client_port.min, now + kLongestHold_us});
   });
-  if (has_tcp_viewer (media))
+  if (pauses && has_tcp_viewer (media))
     pause_.begin ();
 }
 

@@ -26,7 +26,8 @@ inline constexpr gint64 kLongestHold_us = 2 * G_USEC_PER_SEC;
 /** Nothing passes while somebody is at work that takes some milliseconds. Any thread. */
 class ShortPause {
 public:
-  /** Returns when what has passed before has got to the viewers, if the machine is not too busy. */
+  /** Returns when what has passed before has got to the viewers, if the machine is not too busy.
+   *  Does nothing where the last one is not long ago: who joins must not slow the others down. */
   void begin ();
   void end ();
   /** Waits for the end, 50 ms at most: who began may have failed, or begin again and again. */
@@ -36,6 +37,7 @@ private:
   std::mutex lock_; /* guards what follows */
   std::condition_variable changed_;
   int n_ = 0;           /* at work */
+  gint64 since_us_ = 0; /* monotonic; when the last one began */
   gint64 until_us_ = 0; /* monotonic */
 };
 
@@ -52,8 +54,9 @@ public:
   /** @param packet  of RTP */
   bool begins_key_frame_set (GstBuffer *packet);
 
-  /** A session is about to play. Its UDP viewers wait from now on. */
-  void hold_back (GstRTSPSessionMedia *media);
+  /** A session is about to play. Its UDP viewers wait from now on.
+   *  @param pauses  TCP viewers have no queues yet, and frame sets come */
+  void hold_back (GstRTSPSessionMedia *media, bool pauses);
   /** It plays, and its TCP viewers have their queues. Those that were let in before need not wait.
    */
   void note_playing (GstRTSPSessionMedia *media);

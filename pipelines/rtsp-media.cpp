@@ -231,9 +231,12 @@ free_udp_sinks (GstRTSPMedia *media)
   GstElement *bin = gst_rtsp_media_get_element (media);
   if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
     GstIterator *sinks =
-        gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "multiudpsink");
+        gst_bin_iterate_elements (GST_BIN (pipeline)); /* not those of the launch string */
     const auto free_sink = [] (const GValue *sink, gpointer) {
-      g_object_set (g_value_get_object (sink), "sync", FALSE, nullptr);
+      auto element = GST_ELEMENT (g_value_get_object (sink));
+      GstElementFactory *factory = gst_element_get_factory (element);
+      if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
+        g_object_set (element, "sync", FALSE, nullptr);
     };
     while (gst_iterator_foreach (sinks, free_sink, nullptr) == GST_ITERATOR_RESYNC)
       gst_iterator_resync (sinks);
@@ -257,6 +260,24 @@ send_as_they_come (GstRTSPMedia *media)
     g_object_set (session, "disable-sr-timestamp", FALSE, nullptr); /* the library set it */
     g_object_unref (session);
   }
+}
+
+/* The library's class has none of its own. */
+static GstRTSPStatusCode
+adjust_play_mode (GstRTSPClient *, GstRTSPContext *context, GstRTSPTimeRange **, GstSeekFlags *,
+    gdouble *, GstClockTime *, gboolean *enable_rate_control)
+{
+  if (context->media && g_object_get_data (G_OBJECT (context->media), kLiveKey))
+    *enable_rate_control = FALSE;
+  return GST_RTSP_STS_OK;
+}
+
+void
+let_live_media_play ()
+{
+  auto klass = static_cast<GstRTSPClientClass *> (g_type_class_ref (GST_TYPE_RTSP_CLIENT));
+  if (!klass->adjust_play_mode)
+    klass->adjust_play_mode = adjust_play_mode;
 }
 
 void

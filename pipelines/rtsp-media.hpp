@@ -42,6 +42,10 @@ void begin_new_run (GstRTSPMediaFactory *factory);
  *  thread. */
 void end_waiting (GstRTSPMediaFactory *factory);
 
+/** To be called once, before the server has clients. Else the library has live frame sets, too,
+ * wait for their times at each PLAY, for all viewers, until send_as_they_come(). */
+void let_live_media_play ();
+
 /** Live frame sets go out as soon as they are there: they carry their times, and the viewer's
  * jitter buffer goes by them. Others (files) are held back to their times. The library holds all of
  * them back anew at each PLAY: call this after it. Any thread. */

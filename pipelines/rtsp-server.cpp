@@ -19,6 +19,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -39,7 +40,7 @@ static constexpr int kSlowestStart_s = 20;
 /* Idle connections are closed here: gst-rtsp-server does it after 60 s, and not well, see there. */
 static constexpr int kMostPatience_s = 50;
 /* So long the last frame set may last, after which a stream is over. */
-static constexpr guint kSlowestEnd_ms = 2000;
+static constexpr guint kSlowestEnd_ms = 3000;
 static constexpr guint kLastWords_ms = 500;
 static constexpr guint kLeave_ms = 100; /* its answer gets to who is sent away */
 
@@ -70,21 +71,23 @@ struct Server {
   gint64 stats_at_us = 0;      /* monotonic; when the next line of --stats is due */
   guint stats_timer = 0;       /* 0: none */
   guint64 seen_frame_sets = 0; /* a second ago */
+  gint64 runs_since_us = 0;    /* monotonic; frame sets came in each second since; 0: none did */
   std::thread starter;         /* of --always: waits until the launch string runs */
   std::atomic<bool> starting = false;
   std::atomic<bool> stopping = false;
 
-  std::mutex lock;         /* guards what follows */
-  Timers ending;           /* call end_stream() */
-  Timers leaving;          /* send those away who came when it had ended */
-  std::string failure;     /* the last that was told, without digits; empty: it is over */
-  gint64 failed_at_us = 0; /* monotonic; when it last came */
+  std::mutex lock;                /* guards what follows */
+  Timers ending;                  /* call end_stream() */
+  Timers leaving;                 /* send those away who came when it had ended */
+  std::set<std::string> failures; /* that were told, without digits, since it last ran well */
+  gint64 failed_at_us = 0;        /* monotonic; when it last came */
 };
 
 /* G_USEC_PER_SEC is an int, and a day is too long for one. */
 static constexpr gint64 kSecond_us = G_USEC_PER_SEC;
 /* Who has run so long has not only begun again after a failure. */
 static constexpr gint64 kRecovery_us = 5 * kSecond_us;
+static constexpr std::size_t kMostFailures = 16;
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
 static constexpr gint64 kSetup_us = 2 * kSecond_us;
 
@@ -200,7 +203,8 @@ before_play (GstRTSPClient *, GstRTSPContext *context, gpointer user_data)
     gst_rtsp_message_remove_header (context->request, field, -1);
   server.holder.hold (media);
   if (const auto gate = JoinGate::of (media))
-    gate->hold_back (context->sessmedia);
+    gate->hold_back (context->sessmedia,
+        server.holder.has_started (media) && !has_tcp_queues (context->sessmedia));
   return GST_RTSP_STS_OK;
 }
 
@@ -213,9 +217,9 @@ on_play (GstRTSPClient *client, GstRTSPContext *context, gpointer user_data)
   /* Whose viewer is the first gets what comes first, which is a key frame set. */
   queue_tcp_transports (
       context->sessmedia, server.counts.left_out, server.holder.has_started (media));
+  send_as_they_come (media);
   if (const auto gate = JoinGate::of (media))
     gate->note_playing (context->sessmedia);
-  send_as_they_come (media);
   server.holder.start (media);
   request_key_frame_set (media);
 }
@@ -401,9 +405,8 @@ tell_failure (Server &server, const std::string &why)
   {
     std::lock_guard guard (server.lock);
     server.failed_at_us = g_get_monotonic_time ();
-    if (failure == server.failure)
+    if (server.failures.size () >= kMostFailures || !server.failures.insert (failure).second)
       return;
-    server.failure = failure;
   }
   g_printerr ("rtsp-server: %s\n", why.c_str ());
 }
@@ -416,10 +419,15 @@ tell_recovery (Server &server)
   server.seen_frame_sets = frame_sets;
   {
     std::lock_guard guard (server.lock);
-    if (!runs || server.failure.empty () ||
-        g_get_monotonic_time () - server.failed_at_us < kRecovery_us)
+    const gint64 now = g_get_monotonic_time ();
+    if (!runs)
+      server.runs_since_us = 0;
+    else if (server.runs_since_us == 0)
+      server.runs_since_us = now;
+    if (!runs || server.failures.empty () ||
+        now - std::max (server.failed_at_us, server.runs_since_us) < kRecovery_us)
       return;
-    server.failure.clear ();
+    server.failures.clear ();
   }
   g_printerr ("rtsp-server: the stream runs again\n");
 }
@@ -505,9 +513,9 @@ static void
 wait_for_stats (Server &server, gint64 last_us)
 {
   const auto on_stats = [] (gpointer user_data) -> gboolean {
-    auto &server = *static_cast<Server *> (user_data);
-    print_stats (server);
-    wait_for_stats (server, server.stats_at_us);
+    auto &self = *static_cast<Server *> (user_data);
+    print_stats (self);
+    wait_for_stats (self, self.stats_at_us);
     return G_SOURCE_REMOVE;
   };
   const gint64 now = g_get_monotonic_time ();
@@ -600,6 +608,7 @@ static void
 set_up (Server &server, std::size_t connections)
 {
   const RtspOptions &options = server.options;
+  let_live_media_play ();
   server.server = gst_rtsp_server_new ();
   server.connections = std::make_unique<Connections> (
       server.server, connections, !options.certificate_file.empty ());
@@ -608,7 +617,7 @@ set_up (Server &server, std::size_t connections)
   gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
   gst_rtsp_server_set_backlog (server.server, kBacklog);
   GstRTSPThreadPool *threads =
-      make_thread_pool (kThreads, [&server] (GstRTSPClient *client, GMainContext *thread) {
+      make_thread_pool (kThreads, [&server] (GstRTSPClient *client, GstRTSPThread *thread) {
         server.connections->note_thread (client, thread);
       });
   gst_rtsp_server_set_thread_pool (server.server, threads);
@@ -718,7 +727,7 @@ main (int argc, char **argv)
       g_object_unref (server.factory);
       g_object_unref (server.sessions);
       g_object_unref (server.server);
-      gst_rtsp_thread_pool_cleanup ();
+      end_threads ();
       server.connections.reset ();
     }
   }

@@ -459,6 +459,15 @@ queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out
   }
 }
 
+bool
+has_tcp_queues (GstRTSPSessionMedia *media)
+{
+  const auto has = [] (const TransportRef &ref) {
+    return g_object_get_data (G_OBJECT (ref.get ()), kTapKey) != nullptr;
+  };
+  return std::ranges::any_of (transports_of (media, GST_RTSP_LOWER_TRANS_TCP), has);
+}
+
 static GstRTSPFilterResult
 drop_media (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer)
 {

@@ -16,6 +16,9 @@
 /** To be called when a media is made, before queue_tcp_transports() for it. */
 void prepare_tcp_queues (GstRTSPMedia *media);
 
+/** @return whether the TCP transports of a viewer have their queues */
+bool has_tcp_queues (GstRTSPSessionMedia *media);
+
 /** Puts such a queue between the TCP transports of a viewer and their streams. Call it when the
  *  viewer's PLAY was answered, from the thread that serves its connection.
  *  @param left_out    counts the frame sets that are left out; must outlive the session

@@ -19,7 +19,7 @@ serving_threads_get_thread (
   GstRTSPThread *thread =
       GST_RTSP_THREAD_POOL_CLASS (serving_threads_parent_class)->get_thread (pool, type, context);
   if (thread && type == GST_RTSP_THREAD_TYPE_CLIENT && context && context->client)
-    (*reinterpret_cast<ServingThreads *> (pool)->on_client) (context->client, thread->context);
+    (*reinterpret_cast<ServingThreads *> (pool)->on_client) (context->client, thread);
   return thread;
 }
 
@@ -41,6 +41,18 @@ serving_threads_class_init (ServingThreadsClass *klass)
 {
   G_OBJECT_CLASS (klass)->finalize = serving_threads_finalize;
   GST_RTSP_THREAD_POOL_CLASS (klass)->get_thread = serving_threads_get_thread;
+}
+
+void
+end_threads ()
+{
+  auto klass =
+      static_cast<GstRTSPThreadPoolClass *> (g_type_class_peek (serving_threads_get_type ()));
+  GThreadPool *threads = klass ? klass->pool : nullptr;
+  if (!threads)
+    return;
+  klass->pool = nullptr;
+  g_thread_pool_free (threads, FALSE, TRUE);
 }
 
 GstRTSPThreadPool *

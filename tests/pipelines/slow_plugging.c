@@ -31,7 +31,9 @@ gboolean
 gst_element_sync_state_with_parent (GstElement *element)
 {
   gboolean (*sync) (GstElement *) = dlsym (RTLD_NEXT, "gst_element_sync_state_with_parent");
-  if (is_made_by (element, "queue"))
+  if (is_made_by (element, "queue")) {
+    g_printerr ("slow-plugging: %s\n", GST_OBJECT_NAME (element));
     g_usleep (400000);
+  }
   return sync (element);
 }

@@ -450,3 +450,34 @@ test_it_ends_while_everybody_asks () {
     ! grep CRITICAL server.log || fail "$(head -n 5 server.log)"
   done
 }
+
+# Each thread has somebody's media when it ends: some ask only, some watch.
+test_it_ends_while_viewers_watch () {
+  local i
+  for i in 1 2 3; do
+    serve -- "$figure"
+    watching=()
+    for transport in "" --tcp; do
+      count "$url" $transport --viewers 4 --frame-sets 100000 >"watch$transport.txt" 2>&1 &
+      watching+=($!)
+    done
+    python3 - "$viewers" "$url" >asking.txt <<'END' &
+import pathlib, sys, time
+sys.path.insert(0, str(pathlib.Path(sys.argv[1]).parent))
+from rtsp_viewers import Viewer
+viewers = [Viewer(sys.argv[2], False) for _ in range(4)]
+for viewer in viewers: viewer.describe()
+print("asked", flush=True)
+time.sleep(60)
+END
+    watching+=($!)
+    trap 'kill -KILL $server "${watching[@]}" 2>/dev/null || true' EXIT
+    until_true 60 grep -q asked asking.txt
+    until_true 60 grep -q playing watch.txt
+    until_true 60 grep -q playing watch--tcp.txt
+    stop_server
+    kill "${watching[@]}" 2>/dev/null || true
+    wait "${watching[@]}" || true
+    ! grep -i "critical\|warning" server.log || fail "$(head -n 5 server.log)"
+  done
+}

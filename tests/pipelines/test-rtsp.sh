@@ -264,8 +264,9 @@ END
 test_stream_goes_on_when_each_transport_is_joined () {
   LD_PRELOAD=${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/libslow-plugging.so \
     ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0" \
-    serve --multicast 239.7.7.7:5000-5001 --stats 1 -- "$figure"
+    serve --always --multicast 239.7.7.7:5000-5001 --stats 1 -- "$figure"
   local transport before
+  until_true 20 grep -q '^slow-plugging' server.log
   for transport in tcp udp multicast; do
     case $transport in
       tcp) count "$url" --tcp --frame-sets 3 >tcp.txt ;;
@@ -282,8 +283,10 @@ test_stream_goes_on_when_each_transport_is_joined () {
 # The library holds all frame sets back to their times, which are later by what a live source says that
 # it may need: here four seconds that it does not need.
 test_live_frame_sets_are_not_held_back () {
-  serve -- "avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
+  serve --always --stats 1 -- "avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
     ! rangemux latency=4000000000 ! neighbourcodeenc"
+  has_forty () { [ "$(stat_of frame-sets)" -ge 40 ]; } # without viewers: ten such waits
+  until_true 25 has_forty
   local protocol
   for protocol in tcp udp; do
     rangecast-run --timeout 60 --frames 20 --report $protocol.json rtspsrc "location=$url" protocols=$protocol latency=0 \
