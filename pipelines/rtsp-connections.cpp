@@ -9,7 +9,8 @@
 
 /* Connections that are no viewers: those that ask only, or have not got so far. */
 static constexpr rlim_t kSpare = 32, kLeastSpare = 8;
-/* Files that the server and its launch string have open. With one of avatartestsrc they are 25. */
+/* Files that the server and its launch string have open. With one of avatartestsrc they are 27,
+ * with multicast 34. */
 static constexpr rlim_t kOwnFiles = 256, kLeastOwnFiles = 40;
 /* Where a launch string has more than that: connections leave so many to it. */
 static constexpr int kKeptFiles = 16;

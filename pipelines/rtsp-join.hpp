@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A viewer that joins gets its first packets when a key frame set begins: what differs from frame
- * sets that it never had would show scraps. Nobody else waits for that.
+ * sets that it never had would show scraps. Nobody else waits for that key frame set.
  *
  * How: a viewer by UDP is one client of a multiudpsink that all share. It is taken out in the
  * moment that it is put in, and put in again by the thread that sends, just before the first packet
