@@ -88,7 +88,7 @@ has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
 
 # usage: need_number VALUE option minimum maximum
 need_number () {
-  [[ "$1" =~ ^[0-9]+$ ]] && [ "$1" -ge "$3" ] && [ "$1" -le "$4" ] ||
+  [[ "$1" =~ ^(0|[1-9][0-9]{0,17})$ ]] && [ "$1" -ge "$3" ] && [ "$1" -le "$4" ] ||
     die "$2: expected a whole number from $3 to $4, got '$1'"
 }
 
@@ -98,8 +98,15 @@ need_degrees () {
     die "$2: expected degrees per second, less than 3600, e.g. 30 or -7.5, got '$1'"
 }
 
+# usage: need_picture VALUE option: a size that OpenGL draws
+need_picture () {
+  need_size "$1" "$2"
+  [ "${1%x*}" -ge 16 ] && [ "${1#*x}" -ge 16 ] && [ "${1%x*}" -le 8192 ] && [ "${1#*x}" -le 8192 ] ||
+    die "$2: expected 16x16 to 8192x8192, got '$1'"
+}
+
 need_size () {
-  [[ "$1" =~ ^[1-9][0-9]*x[1-9][0-9]*$ ]] || die "$2: expected WIDTHxHEIGHT, e.g. 320x240, got '$1'"
+  [[ "$1" =~ ^[1-9][0-9]{0,5}x[1-9][0-9]{0,5}$ ]] || die "$2: expected WIDTHxHEIGHT, e.g. 320x240, got '$1'"
 }
 
 rtp_fields='media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'

@@ -21,18 +21,19 @@ while [ $# -gt 0 ]; do
     --size) size=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; die "unknown option '$1'" ;;
-    *) file=$1 ;;
+    *) [ -z "$file" ] || die "expected one file, got '$file' and '$1'"; file=$1 ;;
   esac
   shift || { echo "play.sh: the last option lacks its value" >&2; exit 2; }
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to play"; }
 [ -f "$file" ] || die "no file '$file'"
-need_size "$size" --size
+need_picture "$size" --size
 need_degrees "$orbit" --orbit
-if [ -z "$film" ] && ! has_display; then
+if [ -n "$film" ] || ! has_display; then
   ! command -v rangecast-run >/dev/null || rangecast-run filesrc "location=$file" ! neighbourcodeparse ! fakesink num-buffers=1 ||
     die "'$file' is no recording"
-  die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+  [ -n "$film" ] ||
+    die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
 fi
 
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
@@ -40,6 +41,7 @@ view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinde
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
   need_place "$film"
+  [ ! "$film" -ef "$file" ] || die "--film: '$film' is the recording itself; expected another file"
   drop_empty "$film" ""
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else

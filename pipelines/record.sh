@@ -8,6 +8,7 @@ source "$(dirname "$0")/rtp.sh"
 usage () {
   cat <<'END'
 usage: record.sh FILE [options]
+What was in FILE is FILE~ afterwards.
   --listen PORT  record the stream that arrives at this UDP port, until Ctrl-C; without it, the
                  built-in figure with exact depth:
   --views N      views round the figure (default 4)
@@ -38,7 +39,7 @@ while [ $# -gt 0 ]; do
     --interface) rtp_interface=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; die "unknown option '$1'" ;;
-    *) file=$1 ;;
+    *) [ -z "$file" ] || die "expected one file, got '$file' and '$1'"; file=$1 ;;
   esac
   shift || { echo "record.sh: the last option lacks its value" >&2; exit 2; }
 done
@@ -62,6 +63,8 @@ else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
 fi
+# What there is already must not go for a stream that does not come.
+[ ! -s "$file" ] || mv -f -- "$file" "$file~"
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set): $file is not written}"
 launch "${source[@]}" ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
   ! filesink "location=$file"

@@ -39,7 +39,9 @@ rtp_option () {
     --mtu)
       if [ "$1" = sender ]; then rtp_mtu=$3; else taken=0; fi ;;
     --rtx) rtp_rtx=yes taken=1 ;;
-    --key) rtp_key=$3 ;;
+    --key)
+      [ -n "$3" ] || die "--key: expected a file, got ''"
+      rtp_key=$3 ;;
     --feedback) rtp_feedback=$3 ;;
     *) taken=0 ;;
   esac

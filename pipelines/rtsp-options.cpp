@@ -132,7 +132,8 @@ parse_multicast (const char *text, MulticastRange &range)
                                  &range.last_port, &range.ttl, &more)
                            : 0;
   const bool has_ttl = std::strchr (text, '/') != nullptr;
-  if (parsed != (has_ttl ? 3 : 2))
+  const bool ends_with_port = has_ttl || g_ascii_isdigit (text[std::strlen (text) - 1]);
+  if (parsed != (has_ttl ? 3 : 2) || !ends_with_port)
     return bad_option ("--multicast", kExpected, text);
   const std::string addresses (text, colon);
   const auto dash = addresses.find ('-');
@@ -217,6 +218,12 @@ take_strings (const Strings &strings, RtspOptions &options)
   take (strings.address, options.address);
   take (strings.mount, options.mount);
   take (strings.realm, options.realm);
+  if (options.realm.find_first_of ("\"\\") != std::string::npos)
+    return bad_option ("--realm", "a name without quotation marks and backslashes", options.realm);
+  for (const auto &[option, file] :
+      {std::pair ("--cert", strings.certificate), {"--key", strings.key}})
+    if (file && !*file)
+      return bad_option (option, "a file", file);
   take (strings.certificate, options.certificate_file);
   take (strings.key, options.key_file);
   options.always = strings.always;

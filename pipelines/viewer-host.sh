@@ -43,7 +43,7 @@ while [ $# -gt 0 ]; do
 done
 need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
-need_size "$size" --size
+need_picture "$size" --size
 need_degrees "$orbit" --orbit
 [ -z "$group" ] || need_group "$group"
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"

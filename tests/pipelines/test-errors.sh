@@ -209,7 +209,25 @@ test_udp_relay_names_what_is_missing () {
   [ "$(id -u)" != 0 ] || expect_error "lo: is no cable" udp-relay --between lo,eth0
 }
 
+test_recordings_that_there_are_are_kept () {
+  "$pipelines/record.sh" good.rcnc --frames 3 --size 160x120 --views 1
+  cp good.rcnc before.rcnc
+  expect_error "is the recording itself" "$pipelines/play.sh" good.rcnc --film good.rcnc
+  cmp good.rcnc before.rcnc || fail "it was changed"
+  timeout -s INT 3 "$pipelines/record.sh" good.rcnc --listen $((ports + 203)) >record.log 2>&1 || true
+  cmp good.rcnc~ before.rcnc || fail "it is gone: $(ls) $(cat record.log)"
+  echo text >old.txt
+  cp before.rcnc film.webm
+  expect_error "is no recording" "$pipelines/play.sh" old.txt --film film.webm
+  cmp film.webm before.rcnc || fail "the film before is gone"
+}
+
 test_scripts_name_the_bad_option () {
+  expect_error "--listen: expected a whole number" "$pipelines/parent-host.sh" --views 1 --listen 08000 --to 127.0.0.1:1
+  expect_error "--frames: expected a whole number" "$pipelines/record.sh" none.rcnc --frames 99999999999999999999
+  expect_error "--key: expected a file" "$pipelines/record.sh" none.rcnc --listen $((ports + 203)) --key ''
+  expect_error "--size: expected 16x16" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --size 1x1
+  expect_error "expected one file" "$pipelines/record.sh" none.rcnc other.rcnc
   expect_error "--orbit" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --orbit x
   touch empty.rcnc
   expect_error "--orbit" "$pipelines/play.sh" empty.rcnc --film film.webm --orbit 4000

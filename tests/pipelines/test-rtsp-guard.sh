@@ -388,6 +388,10 @@ test_wrong_usage_is_named () {
   expect_error "expected a payloader named pay0" rtsp-server -- videotestsrc ! fakesink
   expect_error "--port" rtsp-server --port 99999 -- "$figure"
   expect_error "--mount" rtsp-server --mount live -- "$figure"
+  expect_error "--realm" rtsp-server --realm 'a"b' -- "$figure"
+  expect_error "--cert: expected a file" rtsp-server --cert '' -- "$figure"
+  expect_error "--key: expected a file" rtsp-server --key '' -- "$figure"
+  expect_error "--multicast" rtsp-server --multicast 239.1.2.3:5000-5001,junk -- "$figure"
   expect_error "expected NAME:PASSWORD" rtsp-server --user anna -- "$figure"
   expect_error "--users" rtsp-server --users nowhere -- "$figure"
   : >empty.txt
