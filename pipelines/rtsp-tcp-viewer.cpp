@@ -348,6 +348,14 @@ public:
       gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
     taps_.clear ();
   }
+  std::vector<Handle> queues ()
+  {
+    std::lock_guard guard (lock_);
+    std::vector<Handle> queues;
+    for (const Tap *tap : taps_)
+      queues.push_back (tap->queue);
+    return queues;
+  }
 
 private:
   std::mutex lock_; /* taken before that of a stream */
@@ -371,6 +379,50 @@ delete_tap (gpointer user_data)
   delete tap;
 }
 
+/* ---- reports of the stream ---- */
+
+/* RFC 3550, 6.1; RFC 5761, 4: by its type. */
+static bool
+is_report (GstBuffer *packet)
+{
+  guint8 header[2];
+  return gst_buffer_extract (packet, 0, header, sizeof header) == sizeof header &&
+         header[0] >> 6 == 2 && header[1] >= 192 && header[1] <= 223;
+}
+
+/* Frame sets and reports each come to an appsink, which holds one. The library's one thread (1.22)
+ * that takes them from there sends a report first, where there are both, and then sleeps until the
+ * next comes: but no frame set comes while one waits, and the stream stands still for all viewers.
+ * So reports go to the queues from here. */
+static GstPadProbeReturn
+on_report (GstPad *, GstPadProbeInfo *info, gpointer taps)
+{
+  GstBuffer *packet = GST_PAD_PROBE_INFO_BUFFER (info);
+  if (!is_report (packet))
+    return GST_PAD_PROBE_OK;
+  for (const Handle &queue : (*static_cast<TapsHandle *> (taps))->queues ())
+    queue->take ({gst_buffer_ref (packet), nullptr, false, 0});
+  return GST_PAD_PROBE_DROP;
+}
+
+static void
+delete_taps (gpointer taps)
+{
+  delete static_cast<TapsHandle *> (taps);
+}
+
+static void
+on_element (GstBin *, GstElement *element, gpointer taps)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory || !g_str_equal (GST_OBJECT_NAME (factory), "appsink"))
+    return;
+  GstPad *pad = gst_element_get_static_pad (element, "sink");
+  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, on_report,
+      new TapsHandle (*static_cast<TapsHandle *> (taps)), delete_taps);
+  gst_object_unref (pad);
+}
+
 /* Comes before the streams leave the pipeline. */
 static void
 on_target_state (GstRTSPMedia *media, GstState state, gpointer)
@@ -382,8 +434,16 @@ on_target_state (GstRTSPMedia *media, GstState state, gpointer)
 void
 prepare_tcp_queues (GstRTSPMedia *media)
 {
-  g_object_set_data_full (G_OBJECT (media), kTapsKey, new TapsHandle (std::make_shared<Taps> ()),
-      [] (gpointer taps) { delete static_cast<TapsHandle *> (taps); });
+  auto taps = new TapsHandle (std::make_shared<Taps> ());
+  g_object_set_data_full (G_OBJECT (media), kTapsKey, taps, delete_taps);
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
+  if (pipeline && gst_rtsp_media_n_streams (media) == 1) /* of several each has its own viewers */
+    g_signal_connect_data (
+        pipeline, "element-added", G_CALLBACK (on_element), new TapsHandle (*taps),
+        [] (gpointer own, GClosure *) { delete_taps (own); }, GConnectFlags (0));
+  gst_clear_object (&pipeline);
+  gst_object_unref (bin);
   g_signal_connect (media, "target-state", G_CALLBACK (on_target_state), nullptr);
 }
 

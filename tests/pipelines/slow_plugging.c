@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* For LD_PRELOAD: a tee whose every push takes its time, and queues that start late, as on a
- * machine that is busy with other things just then. What is linked to a running tee before it is
- * started ends the stream then, and not once in a thousand times. */
+/* For LD_PRELOAD: a tee whose every push takes its time, queues that start late, appsinks that are
+ * emptied late, as on a machine that is busy with other things just then. What is linked to a
+ * running tee before it is started ends the stream then, and not once in a thousand times. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <gst/app/gstappsink.h>
 #include <gst/gst.h>
 #include <stdbool.h>
 #include <string.h>
@@ -25,6 +26,15 @@ gst_pad_push_list (GstPad *pad, GstBufferList *list)
     g_usleep (30000);
   gst_clear_object (&element);
   return flow;
+}
+
+/* Two of these come while one is on its way. */
+GstSample *
+gst_app_sink_pull_sample (GstAppSink *sink)
+{
+  GstSample *(*pull) (GstAppSink *) = dlsym (RTLD_NEXT, "gst_app_sink_pull_sample");
+  g_usleep (100000);
+  return pull (sink);
 }
 
 gboolean
