@@ -29,6 +29,10 @@ done
 [ -f "$file" ] || die "no file '$file'"
 need_picture "$size" --size
 need_degrees "$orbit" --orbit
+if [ -n "$film" ]; then
+  need_place "$film"
+  [ ! "$film" -ef "$file" ] || die "--film: '$film' is the recording itself; expected another file"
+fi
 if [ -n "$film" ] || ! has_display; then
   ! command -v rangecast-run >/dev/null || rangecast-run filesrc "location=$file" ! neighbourcodeparse ! fakesink num-buffers=1 ||
     die "'$file' is no recording"
@@ -40,8 +44,6 @@ picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
   ! striprender "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
-  need_place "$film"
-  [ ! "$film" -ef "$file" ] || die "--film: '$film' is the recording itself; expected another file"
   drop_empty "$film" ""
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"
 else

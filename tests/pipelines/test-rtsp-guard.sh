@@ -187,7 +187,7 @@ test_crowd_with_few_descriptors_keeps_nobody_out () {
 # The launch string has most of them, which nobody can know before. Who cannot be taken must not wake the server all the time.
 test_descriptors_that_a_launch_string_has_are_no_connections () {
   local more="" i before after
-  for ((i = 0; i < 20; i++)); do more+="udpsrc port=0 ! fakesink async=false "; done
+  for ((i = 0; i < 16; i++)); do more+="udpsrc port=0 ! fakesink async=false "; done
   rtsp-server () { ulimit -n 128; exec rtsp-server "$@"; }
   serve --max-viewers 32 --always --stats 1 -- "$more ${figure/15/2}"
   runs_alone () { [ "$(stat_of frame-sets)" -gt 2 ]; }
