@@ -136,7 +136,7 @@ Connections::note_thread (GstRTSPClient *client, GstRTSPThread *thread)
 
 struct Closing {
   GstRTSPClient *client;
-  GstRTSPThread *thread;
+  GstRTSPThread *thread; /* of gst_rtsp_thread_reuse(), which takes a reference */
 };
 
 static gboolean
@@ -164,8 +164,7 @@ close_in_its_thread (GstRTSPClient *client, GstRTSPThread *thread)
   GSource *source = g_idle_source_new ();
   g_source_set_priority (source, G_PRIORITY_HIGH); /* before what it still asks for */
   g_source_set_callback (source, close_client,
-      new Closing{GST_RTSP_CLIENT (g_object_ref (client)), gst_rtsp_thread_ref (thread)},
-      delete_closing);
+      new Closing{GST_RTSP_CLIENT (g_object_ref (client)), thread}, delete_closing);
   g_source_attach (source, thread->context);
   g_source_unref (source);
 }

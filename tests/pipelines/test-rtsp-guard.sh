@@ -485,3 +485,14 @@ END
     ! grep -i "critical\|warning" server.log || fail "$(head -n 5 server.log)"
   done
 }
+
+test_connections_that_it_closes_leave_nothing () {
+  export GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1
+  serve -- "$figure"
+  unset GST_TRACERS GST_DEBUG
+  count "$url" --viewers 2 --tcp >tcp.txt
+  connect_idle 8
+  stop_server
+  kill "$crowd" 2>/dev/null || true
+  ! grep -q 'GST_TRACER :0:: object-alive' server.log || fail "$(grep 'GST_TRACER :0:: object-alive' server.log | cut -c1-300 | head -n 5)"
+}
