@@ -583,6 +583,30 @@ TEST (Model, test_obj_file_gives_each_group_its_material)
   EXPECT_EQ (shot.at (0.12, 0), "blue");
 }
 
+TEST (Model, test_picture_with_a_path_of_another_machine_is_found_beside_the_obj_file)
+{
+  const Folder folder;
+  (void)folder.write ("paint.mtl", "newmtl a\nmap_Kd C:\\work\\red.png\n");
+  const auto red = plain_png (kRed);
+  (void)folder.write ("red.png", std::string (red.begin (), red.end ()));
+  Shot shot (folder.write ("one.obj", "mtllib paint.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n"
+                                      "vt 0 0\nusemtl a\nf 1/1 2/1 3/1 4/1\n"));
+  EXPECT_EQ (shot.at (0, 0), "red");
+}
+
+TEST (Model, test_texture_that_is_missing_is_named)
+{
+  const Folder folder;
+  (void)folder.write ("paint.mtl", "newmtl a\nmap_Kd gone.png\n");
+  Figure figure;
+  const Status status =
+      load (folder.write ("one.obj", "mtllib paint.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\n"
+                                     "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"),
+          figure);
+  EXPECT_EQ (status.code (), StatusCode::kNotFound);
+  EXPECT_NE (status.message ().find ("gone.png"), std::string::npos) << status.message ();
+}
+
 TEST (Model, test_dressed_head_has_ten_meshes_in_their_own_colours)
 {
   RANGECAST_NEED_DATA ("dressed_head");

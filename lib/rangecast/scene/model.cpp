@@ -99,9 +99,14 @@ add_picture (const aiScene &scene, const std::string &model, const char *name, M
     if (embedded->mHeight == 0)
       picture.bytes.assign (bytes, bytes + embedded->mWidth);
   } else {
-    std::string path = name;
-    std::ranges::replace (path, '\\', '/'); /* as programs on Windows write it */
-    picture.name = (fs::path (model).parent_path () / path).string ();
+    std::string text = name;
+    std::ranges::replace (text, '\\', '/'); /* as programs on Windows write it */
+    const fs::path folder = fs::path (model).parent_path (), path = text;
+    /* Some exporters write where the picture was on their own machine. */
+    std::error_code error;
+    const bool there = fs::exists (folder / path, error);
+    const bool beside = fs::exists (folder / path.filename (), error);
+    picture.name = (folder / (!there && beside ? path.filename () : path)).string ();
   }
   to.pictures.push_back (std::move (picture));
 }
