@@ -43,9 +43,8 @@ layout (location = 0) in uint a_vertex;
 uniform sampler2D u_weight; /* square root */
 uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
 uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
-const float kLeastAngle = 0.03, kAnglePower = 6.0; /* square root of the least weight */
+const float kLeastAngle = 0.03; /* square root of the least weight; the cosine's power is 6 */
 out vec4 v_colour; /* and the square root of the weight */
-out float v_beyond; /* pixels beyond the last one */
 #else
 out vec3 v_colour;
 #endif
@@ -85,24 +84,29 @@ void main ()
   float depth = float (texelFetch (u_depth, pixel, 0).r);
 #if WITH_OFFSETS
   ivec2 place = ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u));
+#if BLEND
   bool behind = place.x == 2; /* of what stands before the surface here: in the pixel's own place */
-  vec2 offset = behind ? vec2 (0.0) : vec2 (place - 3) * 0.25;
+  at += behind ? vec2 (0.0) : clamp (vec2 (place - 3) * 0.25, -0.5, 0.5);
+#else
+  vec2 offset = vec2 (place - 3) * 0.25;
   at += offset;
   if (offset.x != 0.0)
     depth += offset.x * slope (pixel, ivec2 (1, 0), offset.x, depth);
   if (offset.y != 0.0)
     depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
 #endif
+#endif
   gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
   /* the depth of what is u_behind.y metres farther, in the same place of the picture */
   gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
 #if BLEND
+#if BLEND_SUM
   vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
   float along = dot (normalize (ray), normalize (ray * depth * u_unit - u_viewer));
-  float angle = max (pow (max (along, 0.0), kAnglePower / 2.0), kLeastAngle);
+  float angle = max (along * along * along, kLeastAngle);
   v_colour.rgb = texelFetch (u_colour, pixel, 0).rgb;
   v_colour.a = behind ? 0.0 : texelFetch (u_weight, pixel, 0).r * angle;
-  v_beyond = max (abs (offset.x), abs (offset.y));
+#endif
 #else
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
@@ -110,27 +114,19 @@ void main ()
 }
 )";
 
-/* A surface ends half a pixel beyond its last one. */
+/* Half floats hold the sums of 64 views of full weight, and colours of the least weight. */
 static const char *const kBlendFragmentShader = R"(
 precision highp float;
-in vec4 v_colour;
-in float v_beyond;
 #if BLEND_SUM
-layout (location = 0) out vec4 sum;
-layout (location = 1) out vec4 sum_of_weights;
-#endif
-/* Half floats hold the sums of 64 views of full weight, and colours of the least weight. */
+in vec4 v_colour;
+out vec4 sum;
 const float kScale = 1000.0, kLeastWeight = 2e-6;
+#endif
 void main ()
 {
 #if BLEND_SUM
-  float coverage = clamp ((0.5 - v_beyond) / max (fwidth (v_beyond), 0.001) + 0.5, 0.0, 1.0);
-  float weight = max (v_colour.a * v_colour.a, kLeastWeight) * coverage * kScale;
-  sum = vec4 (v_colour.rgb * weight, coverage);
-  sum_of_weights = vec4 (weight);
-#else
-  if (v_beyond > 0.5)
-    discard;
+  float weight = max (v_colour.a * v_colour.a, kLeastWeight) * kScale;
+  sum = vec4 (v_colour.rgb * weight, weight);
 #endif
 }
 )";

@@ -209,28 +209,20 @@ private:
     return {mean (r), mean (g), mean (b), at->x};
   }
 
-  /* What depth changes by from one pixel to the next: the mean over two pixels each way, or the
-   * steepest step beside the pixel, if that is a steep one. */
+  /* What depth changes by from one pixel to the next: the mean of both sides, or the steeper step,
+   * if that is a steep one. */
   [[nodiscard]] float slope (int x, int y, int dx, int dy, std::uint8_t joins) const
   {
     const std::ptrdiff_t way = dx + dy * image_.depth.stride / 2;
     const std::uint16_t *depth = image_.depth.row (y) + x;
-    int before = 0, after = 0;
-    while (before < 2 && x - (before + 1) * dx >= 0 && y - (before + 1) * dy >= 0 &&
-           has (x - (before + 1) * dx, y - (before + 1) * dy, joins))
-      before++;
-    while (after < 2 && has (x + after * dx, y + after * dy, joins))
-      after++;
-    if (before + after == 0)
-      return 0;
-    const float mean = static_cast<float> (depth[after * way] - depth[-before * way]) /
-                       static_cast<float> (before + after);
-    int steepest = after ? depth[way] - depth[0] : 0;
-    if (const int other = before ? depth[0] - depth[-way] : 0; std::abs (other) > std::abs (steepest))
-      steepest = other;
-    const auto step = static_cast<float> (steepest);
-    const float steepness = std::abs (step) / (steep_ * static_cast<float> (depth[0]));
-    return mean + std::clamp (2 * steepness - 1, 0.f, 1.f) * (step - mean);
+    const bool has_before = x >= dx && y >= dy && has (x - dx, y - dy, joins),
+               has_after = has (x, y, joins);
+    const int before = has_before ? depth[0] - depth[-way] : 0,
+              after = has_after ? depth[way] - depth[0] : 0;
+    const auto mean = static_cast<float> (before + after) / (has_before && has_after ? 2.f : 1.f);
+    const auto steeper = static_cast<float> (std::abs (before) > std::abs (after) ? before : after);
+    const float steepness = std::abs (steeper) / (steep_ * static_cast<float> (depth[0]));
+    return mean + std::clamp (2 * steepness - 1, 0.f, 1.f) * (steeper - mean);
   }
 
   /* Cosine between the surface's normal and the ray to the camera. */

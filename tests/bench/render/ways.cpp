@@ -13,8 +13,11 @@ public:
   StripWay (std::string name, StripPainter &painter, const FrameSet &set,
       const StripSettings &settings, bool held)
       : Way (std::move (name)), painter_ (painter), set_ (set), settings_ (settings), held_ (held),
-        vertices_ (set.images.size ()), results_ (set.images.size ())
+        vertices_ (set.images.size ()), results_ (set.images.size ()),
+        planes_ (set.images.size ())
   {
+    for (const RangeImage &image : set.images)
+      views_.push_back ({image, set.rig.find (image.view_id)});
   }
 
   void build () override
@@ -23,7 +26,10 @@ public:
       return;
     in_parallel (vertices_.size (), 0, [&] (std::size_t i) {
       results_[i] = {};
-      build_strips (set_.images[i], settings_, vertices_[i], results_[i]);
+      if (blends ())
+        make_blend_planes (views_, i, settings_.depth_step, planes_[i]);
+      build_strips (set_.images[i], settings_, vertices_[i], results_[i],
+          blends () ? &planes_[i] : nullptr);
     });
   }
 
@@ -34,7 +40,8 @@ public:
     own.depth_step = settings_.depth_step;
     std::vector<StripPainter::Layer> layers;
     for (std::size_t i = 0; i < vertices_.size (); i++)
-      layers.push_back ({set_.images[i], set_.rig.find (set_.images[i].view_id), vertices_[i]});
+      layers.push_back (
+          {set_.images[i], views_[i].view, vertices_[i], blends () ? &planes_[i] : nullptr});
     const guint64 bytes = held_ && uploaded_ ? 0 : painter_.upload (layers);
     uploaded_ = true;
     painter_.draw (own, layers);
@@ -58,6 +65,8 @@ public:
   }
 
 private:
+  [[nodiscard]] bool blends () const { return settings_.mode == StripMode::kBlend; }
+
   StripPainter &painter_;
   const FrameSet &set_;
   const StripSettings settings_;
@@ -65,6 +74,8 @@ private:
   bool uploaded_ = false;
   std::vector<std::vector<StripVertex>> vertices_;
   std::vector<StripResult> results_;
+  std::vector<BlendPlanes> planes_;
+  std::vector<SurfaceView> views_;
 };
 
 } // namespace
