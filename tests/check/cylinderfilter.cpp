@@ -326,7 +326,7 @@ GST_START_TEST (test_every_property_set_while_playing_is_kept_and_read_for_the_n
   gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, 0)));
   const char *changes[][2] = {{"axis", "fixed"}, {"axis-position", "<0.1,0.0,0.0>"},
       {"axis-direction", "<0.0,0.0,2.0>"}, {"layer-gap", "0.2"}, {"smoothing", "0.05"},
-      {"hidden-gap", "0"}, {"columns", "90"}, {"blend-width", "0.1"}, {"colour-balance", "off"},
+      {"overlap", "2.5"}, {"columns", "90"}, {"blend-width", "0.1"}, {"colour-balance", "off"},
       {"n-threads", "1"}};
   GstClockTime time = 0;
   for (const auto &change : changes) {
