@@ -266,7 +266,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
             right_v = v[2] + v[5] + v[8] - v[0] - v[3] - v[6],
             down_u = u[6] + u[7] + u[8] - u[0] - u[1] - u[2],
             down_v = v[6] + v[7] + v[8] - v[0] - v[1] - v[2];
-    facing = right_u * down_v - right_v * down_u > 0;
+    facing = right_u * down_v - right_v * down_u >= 0; /* 0: a point alone */
   }
 
   /* Finds the candidates among some pixels that go. */
