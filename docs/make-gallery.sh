@@ -17,10 +17,10 @@ raw=video/x-raw,width=640,height=480,framerate=12/1
 range=video/x-range,width=640,height=480,framerate=12/1
 stream=application/x-neighbour-code,alignment=byte-stream
 
-# Six views in exact depth: one frame set.
+# Six views in exact depth: one frame set. usage: record_exact RECORDING avatartestsrc's properties...
 record_exact () {
-  gst-launch-1.0 -q -e avatartestsrc "${figure[@]}" noise=0 views=6 num-buffers=1 range-person-only=true ! "$range" \
-    ! neighbourcodeenc depth-threshold=0 colour-threshold=0 ! neighbourcodeparse ! "$stream" ! filesink location=exact.rcnc
+  gst-launch-1.0 -q -e avatartestsrc "${@:2}" noise=0 views=6 num-buffers=1 range-person-only=true ! "$range" \
+    ! neighbourcodeenc depth-threshold=0 colour-threshold=0 ! neighbourcodeparse ! "$stream" ! filesink "location=$1"
 }
 
 # The same six views as stereo cameras see them, without and with the person, through the whole chain.
@@ -59,11 +59,15 @@ film () { # FILE
   ffmpeg -v error -y -framerate 12 -i orbit-%05d.png -c:v libwebp_anim -quality 85 -loop 0 "$out/$1"
 }
 
-record_exact
+record_exact exact.rcnc "${figure[@]}"
+record_exact bare.rcnc motion=0
+record_exact dressed.rcnc motion=0 dress=all
 record_stereo
 near="azimuth=20 distance=0.4 elevation=8 pan-y=0.03"
 sheet gallery-overlap.jpg stereo.rcnc "off|$near" "winner|$near"
 sheet gallery-modes.jpg exact.rcnc "winner|$near mode=points" "winner|$near mode=rectangles" "winner|$near mode=strips"
+sheet gallery-bare.jpg bare.rcnc "winner|azimuth=0" "winner|azimuth=30" "winner|azimuth=150"
+sheet gallery-dressed.jpg dressed.rcnc "winner|azimuth=0" "winner|azimuth=30" "winner|azimuth=150"
 sheet gallery-units.jpg exact.rcnc "off|azimuth=20 elevation=8 show-units=true" "winner|azimuth=20 elevation=8 show-units=true"
 if command -v ffmpeg >/dev/null; then
   film gallery-orbit.webp

@@ -28,7 +28,23 @@ enum {
   PROP_WALL_WARMTH,
   PROP_CHAIR,
   PROP_LOOP_FRAMES,
+  PROP_MODEL_TOP,
+  PROP_DRESS,
 };
+
+#define TYPE_AVATAR_DRESS (avatar_dress_get_type ())
+static GType
+avatar_dress_get_type ()
+{
+  static const GFlagsValue values[] = {{0, "Nothing", "none"},
+      {rangecast::kDressHair, "Long hair with free strands", "hair"},
+      {rangecast::kDressGlasses, "Glasses", "glasses"},
+      {rangecast::kDressCollar, "Open collar", "collar"},
+      {rangecast::kDressHand, "Forearm and hand before the chest", "hand"},
+      {rangecast::kDressAll, "All of these", "all"}, {0, nullptr, nullptr}};
+  static const GType type = g_flags_register_static ("GstAvatarTestSrcDress", values);
+  return type;
+}
 
 static std::string
 string_of (const GValue *value)
@@ -91,6 +107,12 @@ AvatarSettings::set (guint id, const GValue *value)
       return true;
     case PROP_TEXTURE_FLIP:
       scene.texture_flip = g_value_get_boolean (value);
+      return true;
+    case PROP_MODEL_TOP:
+      scene.model_top_m = g_value_get_double (value);
+      return true;
+    case PROP_DRESS:
+      scene.dress = g_value_get_flags (value);
       return true;
     case PROP_RIG_EXPORT:
       rig_export = string_of (value);
@@ -184,6 +206,12 @@ AvatarSettings::get (guint id, GValue *value) const
       return true;
     case PROP_TEXTURE_FLIP:
       g_value_set_boolean (value, scene.texture_flip);
+      return true;
+    case PROP_MODEL_TOP:
+      g_value_set_double (value, scene.model_top_m);
+      return true;
+    case PROP_DRESS:
+      g_value_set_flags (value, scene.dress);
       return true;
     case PROP_RIG_EXPORT:
       set_string (value, rig_export);
@@ -289,6 +317,15 @@ install_scene (const Installer &to)
 }
 
 static void
+install_dress (const Installer &to)
+{
+  g_object_class_install_property (to.klass, PROP_DRESS,
+      g_param_spec_flags ("dress", "Dress",
+          "What the built-in figure wears: surfaces one behind the other (default: none)",
+          TYPE_AVATAR_DRESS, 0, Installer::kReady));
+}
+
+static void
 install_room (const Installer &to)
 {
   to.add_int (PROP_PERSONS, "persons", "Persons",
@@ -327,8 +364,14 @@ install_model_and_stream (const Installer &to)
       "Take pictures at multiples of the frame period of the pipeline's clock (default: false)");
   to.add_string (PROP_LOCATION, "location", "Location",
       "Model of the figure, glTF or OBJ (default: the built-in one)");
+  to.add_double (PROP_MODEL_TOP, "model-top", "Model top",
+      "How much of the model is kept, metres from the crown down of a person of 1.8 m (0.1 to 1.8; "
+      "0: all of it, scaled to 0.5 m; -1, the default: 0.5 m of a model that stands like a person, "
+      "else all)",
+      -1, 1.8, -1);
   to.add_string (PROP_TEXTURE, "texture", "Texture",
-      "Picture for the model (default: what the model names, or a colour map beside it)");
+      "Picture for all meshes of the model (default: what its materials name, or a colour map "
+      "beside it)");
   to.add_bool (PROP_TEXTURE_FLIP, "texture-flip", "Texture upside down",
       "Turn the model's texture upside down, for a picture made for the other direction of v "
       "(default: false)");
@@ -344,6 +387,8 @@ void
 AvatarSettings::install (GObjectClass *klass)
 {
   install_scene ({klass});
+  install_dress ({klass});
+  gst_type_mark_as_plugin_api (TYPE_AVATAR_DRESS, GstPluginAPIFlags (0));
   install_room ({klass});
   install_model_and_stream ({klass});
 }

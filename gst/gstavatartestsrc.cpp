@@ -4,8 +4,10 @@
  * @title: avatartestsrc
  *
  * A rig without cameras: a moving head and shoulders in a textured room, seen by stereo cameras
- * that stand round it. The figure is a built-in one or a model: #GstAvatarTestSrc:location names a
- * glTF or OBJ file, #GstAvatarTestSrc:texture a picture for it where the model names none.
+ * that stand round it. The figure is a built-in one, which may wear hair, glasses, a collar and a
+ * hand before its chest (#GstAvatarTestSrc:dress), or a model: #GstAvatarTestSrc:location names a
+ * glTF or OBJ file. Of a model of a whole person only head and shoulders are shown unless
+ * #GstAvatarTestSrc:model-top says otherwise.
  *
  * Request pads: `left`, `right` and `third` give the cameras of one view, `src` gives exact range
  * images. All pads are fed by one thread; where several are used, put a queue behind each. Pads

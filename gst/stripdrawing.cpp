@@ -65,7 +65,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   const rangecast::SceneFrame &frame = job.scene->frame ();
   const rangecast::Eye eye = {place.side * settings.eye_distance_m / 2, settings.convergence_m};
   const auto matrices = rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye,
-      job.scene->hull (), 2 * settings.view_gap_m /* of a view that looks the other way */);
+      job.scene->hull (),
+      std::max (2 * settings.view_gap_m, settings.blend_range_m) /* by which surfaces move back */);
   if (result.width == 0) {
     result.matrices = matrices;
     result.width = place.width;
@@ -86,6 +87,7 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   /* what one camera sees is open at the back: there is nothing else to look at from there */
   picture.back_faces = settings.back_faces || job.scene->rig_views () == 1;
   picture.view_gap_m = settings.view_gap_m;
+  picture.blend_range_m = settings.blend_range_m;
   picture.width = width_;
   picture.height = height_;
   return picture;
@@ -148,7 +150,9 @@ void
 StripDrawing::draw_memory (Call &call)
 {
   const StripRenderSettings &settings = *call.job->settings;
-  const bool antialiased = multisampler_.begin (context_, width_, height_, settings.samples);
+  /* mode blend has smooth outlines of its own */
+  const int samples = settings.strips.mode == rangecast::StripMode::kBlend ? 0 : settings.samples;
+  const bool antialiased = multisampler_.begin (context_, width_, height_, samples);
   for (const EyePlace &place : eyes_.all ())
     if (place.memory == call.memory)
       draw_eye (call, place, antialiased);

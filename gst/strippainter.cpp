@@ -39,7 +39,16 @@ uniform float u_step;
 uniform float u_point_size;
 uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
+#if BLEND
+uniform sampler2D u_weight; /* square root */
+uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
+uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
+const float kLeastAngle = 0.03, kAnglePower = 6.0; /* square root of the least weight */
+out vec4 v_colour; /* and the square root of the weight */
+out float v_beyond; /* pixels beyond the last one */
+#else
 out vec3 v_colour;
+#endif
 
 #if WITH_OFFSETS
 /* What depth grows by on the way from a neighbour, if there is one on the surface. */
@@ -75,7 +84,9 @@ void main ()
   vec2 at = vec2 (pixel);
   float depth = float (texelFetch (u_depth, pixel, 0).r);
 #if WITH_OFFSETS
-  vec2 offset = vec2 (ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u)) - 3) * 0.25;
+  ivec2 place = ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u));
+  bool behind = place.x == 2; /* of what stands before the surface here: in the pixel's own place */
+  vec2 offset = behind ? vec2 (0.0) : vec2 (place - 3) * 0.25;
   at += offset;
   if (offset.x != 0.0)
     depth += offset.x * slope (pixel, ivec2 (1, 0), offset.x, depth);
@@ -85,20 +96,56 @@ void main ()
   gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
   /* the depth of what is u_behind.y metres farther, in the same place of the picture */
   gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
+#if BLEND
+  vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
+  float along = dot (normalize (ray), normalize (ray * depth * u_unit - u_viewer));
+  float angle = max (pow (max (along, 0.0), kAnglePower / 2.0), kLeastAngle);
+  v_colour.rgb = texelFetch (u_colour, pixel, 0).rgb;
+  v_colour.a = behind ? 0.0 : texelFetch (u_weight, pixel, 0).r * angle;
+  v_beyond = max (abs (offset.x), abs (offset.y));
+#else
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
+#endif
 }
 )";
 
-/* What the shader of a mode has beyond pixels in their places: bands reach beyond their ends, in
- * the direction away from them; rectangles have all four sides. */
+/* A surface ends half a pixel beyond its last one. */
+static const char *const kBlendFragmentShader = R"(
+precision highp float;
+in vec4 v_colour;
+in float v_beyond;
+#if BLEND_SUM
+layout (location = 0) out vec4 sum;
+layout (location = 1) out vec4 sum_of_weights;
+#endif
+/* Half floats hold the sums of 64 views of full weight, and colours of the least weight. */
+const float kScale = 1000.0, kLeastWeight = 2e-6;
+void main ()
+{
+#if BLEND_SUM
+  float coverage = clamp ((0.5 - v_beyond) / max (fwidth (v_beyond), 0.001) + 0.5, 0.0, 1.0);
+  float weight = max (v_colour.a * v_colour.a, kLeastWeight) * coverage * kScale;
+  sum = vec4 (v_colour.rgb * weight, coverage);
+  sum_of_weights = vec4 (weight);
+#else
+  if (v_beyond > 0.5)
+    discard;
+#endif
+}
+)";
+
+/* What shaders have beyond pixels in their places: bands reach beyond their ends, in the direction
+ * away from them; rectangles have all four sides. */
 static const char *const kVariants[] = {
-    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
-    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
-    "#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
+    "#define BLEND 0\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
+    "#define BLEND 0\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
+    "#define BLEND 0\n#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
+    "#define BLEND 1\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n#define BLEND_SUM 0\n",
+    "#define BLEND 1\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n#define BLEND_SUM 1\n",
 };
-static_assert (int (StripMode::kStrips) == 0 && int (StripMode::kRectangles) == 1 &&
-               int (StripMode::kPoints) == 2);
+static_assert (int (StripMode::kStrips) == 1 && int (StripMode::kRectangles) == 2 &&
+               int (StripMode::kPoints) == 3); /* draw() counts on it */
 
 bool
 StripPainter::start (GstGLContext *context, GError **error)
@@ -118,9 +165,16 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
+  can_blend_ = targets_.start (context, error);
+  if (error && *error)
+    return false;
+  if (!can_blend_)
+    GST_WARNING ("OpenGL cannot render to half-float textures: mode blend draws strips");
   for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string source = std::string (kVariants[i]) + kVertexShader;
-    shaders_[i] = make_shader (context, source.c_str (), kColourFragmentShader, error);
+    const std::string vertex = std::string (kVariants[i]) + kVertexShader;
+    const std::string blended = std::string (kVariants[i]) + kBlendFragmentShader;
+    shaders_[i] = make_shader (context, vertex.c_str (),
+        i < kBlendDepth ? kColourFragmentShader : blended.c_str (), error);
     if (!shaders_[i])
       return false;
   }
@@ -136,8 +190,8 @@ StripPainter::stop ()
   for (auto &turn : objects_)
     for (ViewObjects &objects : turn) {
       if (objects.depth) {
-        const guint textures[] = {objects.depth, objects.colour};
-        gl->DeleteTextures (2, textures);
+        const guint textures[] = {objects.depth, objects.colour, objects.weight};
+        gl->DeleteTextures (3, textures);
         gl->DeleteBuffers (1, &objects.vertices);
         gl->DeleteVertexArrays (1, &objects.array);
       }
@@ -145,6 +199,7 @@ StripPainter::stop ()
     }
   for (GstGLShader *&shader : shaders_)
     gst_clear_object (&shader);
+  targets_.stop ();
   context_ = nullptr;
 }
 
@@ -172,6 +227,7 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
   if (!objects.depth) {
     gl->GenTextures (1, &objects.depth);
     gl->GenTextures (1, &objects.colour);
+    gl->GenTextures (1, &objects.weight);
     gl->GenBuffers (1, &objects.vertices);
     gl->GenVertexArrays (1, &objects.array);
     gl->BindVertexArray (objects.array);
@@ -193,6 +249,7 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
   };
   allocate (objects.depth, GL_R16UI, GL_RED_INTEGER, GL_UNSIGNED_SHORT);
   allocate (objects.colour, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
+  allocate (objects.weight, GL_R8, GL_RED, GL_UNSIGNED_BYTE);
 }
 
 guint64
@@ -201,17 +258,23 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
   const auto &colour = layer.image.colour;
+  const rangecast::BlendPlanes *planes = layer.planes;
   prepare (objects, depth.width, depth.height);
-  gl->PixelStorei (GL_UNPACK_ALIGNMENT, 2);
-  gl->PixelStorei (GL_UNPACK_ROW_LENGTH, gint (depth.stride / 2));
-  gl->BindTexture (GL_TEXTURE_2D, objects.depth);
-  gl->TexSubImage2D (GL_TEXTURE_2D, 0, 0, 0, depth.width, depth.height, GL_RED_INTEGER,
-      GL_UNSIGNED_SHORT, depth.data);
-  gl->PixelStorei (GL_UNPACK_ALIGNMENT, 4);
-  gl->PixelStorei (GL_UNPACK_ROW_LENGTH, gint (colour.stride / 4));
-  gl->BindTexture (GL_TEXTURE_2D, objects.colour);
-  gl->TexSubImage2D (
-      GL_TEXTURE_2D, 0, 0, 0, colour.width, colour.height, GL_RGBA, GL_UNSIGNED_BYTE, colour.data);
+  const auto copy = [&] (guint texture, int width, int height, guint format, guint type,
+                        std::ptrdiff_t row_pixels, const void *data) {
+    gl->PixelStorei (GL_UNPACK_ROW_LENGTH, gint (row_pixels));
+    gl->BindTexture (GL_TEXTURE_2D, texture);
+    gl->TexSubImage2D (GL_TEXTURE_2D, 0, 0, 0, width, height, format, type, data);
+  };
+  gl->PixelStorei (GL_UNPACK_ALIGNMENT, 1);
+  copy (objects.depth, depth.width, depth.height, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
+      depth.stride / 2, depth.data);
+  const auto picture = planes ? planes->colour_plane () : colour;
+  copy (objects.colour, colour.width, colour.height, GL_RGBA, GL_UNSIGNED_BYTE, picture.stride / 4,
+      picture.data);
+  if (planes)
+    copy (objects.weight, planes->width, planes->height, GL_RED, GL_UNSIGNED_BYTE, planes->width,
+        planes->weight.data ());
   gl->PixelStorei (GL_UNPACK_ROW_LENGTH, 0);
   gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
   gl->BufferData (
@@ -274,12 +337,39 @@ behind (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double gap_m)
   return {float (b * g), float (g)};
 }
 
+/* Where the viewer stands: what the matrix makes x = y = w = 0 of. */
+static rangecast::Vec3
+viewer_of (const Mat4 &m)
+{
+  const rangecast::Vec3 x = row_of (m, 0), y = row_of (m, 1), w = row_of (m, 3);
+  const double volume = dot (x, cross (y, w));
+  const rangecast::Vec3 sum = double (m[12]) * cross (y, w) + double (m[13]) * cross (w, x) +
+                              double (m[15]) * cross (x, y);
+  return (-1 / volume) * sum;
+}
+
+/* What mode blend needs to know of a view beyond the other modes. */
+static void
+set_blend_uniforms (GstGLShader *shader, const StripPainter::Picture &picture,
+    const StripPainter::Layer &layer)
+{
+  const rangecast::View &view = *layer.view;
+  const rangecast::Intrinsics &lens = view.intrinsics;
+  const rangecast::Mat3 &r = view.world_from_view.rotation;
+  const rangecast::Vec3 from =
+      viewer_of (picture.clip_from_world) - view.world_from_view.translation;
+  gst_gl_shader_set_uniform_4f (shader, "u_lens", gfloat (lens.cx - layer.image.roi.x),
+      gfloat (lens.cy - layer.image.roi.y), gfloat (1 / lens.fx), gfloat (1 / lens.fy));
+  gst_gl_shader_set_uniform_3f (shader, "u_viewer", gfloat (dot (from, {r[0], r[3], r[6]})),
+      gfloat (dot (from, {r[1], r[4], r[7]})), gfloat (dot (from, {r[2], r[5], r[8]})));
+}
+
 void
-StripPainter::draw_layer (
-    const ViewObjects &objects, const Layer &layer, const Picture &picture, Side side)
+StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture,
+    GstGLShader *shader, Side side)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  GstGLShader *shader = shaders_[std::size_t (picture.mode)];
+  const bool blends = shader == shaders_[kBlendDepth] || shader == shaders_[kBlendSum];
   Mat4 matrix = clip_from_pixel (picture.clip_from_world, layer);
   /* Where two views see one surface, the one that looks more as the viewer does is before the
    * other: what it sees has more pixels there, and noise must not let both shine through. */
@@ -288,13 +378,20 @@ StripPainter::draw_layer (
   const double along = dot (forward, {r[2], r[5], r[8]}) / norm (forward);
   if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
     matrix = in_half_of_depths (matrix, side == Side::kBack);
-  const auto moved = behind (matrix, picture.clip_from_world, picture.view_gap_m * (1 - along));
+  const double gap_m = !blends                           ? picture.view_gap_m * (1 - along)
+                       : shader == shaders_[kBlendDepth] ? picture.blend_range_m
+                                                         : 0;
+  const auto moved = behind (matrix, picture.clip_from_world, gap_m);
+  if (blends)
+    set_blend_uniforms (shader, picture, layer);
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
   gst_gl_shader_set_uniform_2f (shader, "u_behind", moved[0], moved[1]);
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
       shader, "u_size", layer.image.depth.width, layer.image.depth.height);
+  gl->ActiveTexture (GL_TEXTURE2);
+  gl->BindTexture (GL_TEXTURE_2D, objects.weight);
   gl->ActiveTexture (GL_TEXTURE1);
   gl->BindTexture (GL_TEXTURE_2D, objects.colour);
   gl->ActiveTexture (GL_TEXTURE0);
@@ -315,22 +412,14 @@ show_side (const GstGLFuncs *gl, const Mat4 &m, bool back)
   gl->CullFace (mirrors != back ? GL_FRONT : GL_BACK);
 }
 
-/* What all modes set in OpenGL, and what goes back to its default afterwards. */
+/* What all shaders of views share. */
 void
-StripPainter::begin (const Picture &picture)
+StripPainter::begin (const Picture &picture, GstGLShader *shader)
 {
-  const GstGLFuncs *gl = context_->gl_vtable;
-  const float *c = picture.background;
-  gl->Viewport (0, 0, picture.width, picture.height);
-  gl->ClearColor (c[0], c[1], c[2], c[3]);
-  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  gl->Enable (GL_DEPTH_TEST);
-  if (!is_gles (context_)) /* OpenGL ES always takes it from the shader */
-    gl->Enable (GL_PROGRAM_POINT_SIZE);
-  GstGLShader *shader = shaders_[std::size_t (picture.mode)];
   gst_gl_shader_use (shader);
   gst_gl_shader_set_uniform_1i (shader, "u_depth", 0);
   gst_gl_shader_set_uniform_1i (shader, "u_colour", 1);
+  gst_gl_shader_set_uniform_1i (shader, "u_weight", 2);
   gst_gl_shader_set_uniform_1f (shader, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
       shader, "u_point_size", picture.point_size * picture.pixels_per_unit);
@@ -363,7 +452,8 @@ StripPainter::upload (std::span<const Layer> layers)
 }
 
 void
-StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
+StripPainter::draw_layers (
+    std::span<const Layer> layers, const Picture &picture, GstGLShader *shader)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   /* Noise turns many a single rectangle over: they have two sides, as points have. */
@@ -373,11 +463,44 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
       show_side (gl, picture.clip_from_world, side == Side::kBack);
     for (const Layer &layer : layers)
       if (!layer.vertices.empty ())
-        draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, side);
+        draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, shader, side);
   };
-  begin (picture);
+  begin (picture, shader);
   draw_all (Side::kFront);
   if (sided && picture.back_faces)
     draw_all (Side::kBack);
+}
+
+/* The nearest surface of each pixel, sums over the views that see it, and their quotient. */
+void
+StripPainter::blend (const Picture &picture, std::span<const Layer> layers)
+{
+  draw_layers (layers, picture, shaders_[kBlendDepth]);
+  targets_.begin_sum ();
+  draw_layers (layers, picture, shaders_[kBlendSum]);
+  context_->gl_vtable->Disable (GL_CULL_FACE);
+  targets_.resolve (picture.background);
+}
+
+void
+StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const float *c = picture.background;
+  if (picture.mode == StripMode::kBlend && can_blend_ &&
+      targets_.begin_depth (picture.width, picture.height)) {
+    blend (picture, layers);
+    end ();
+    return;
+  }
+  gl->Viewport (0, 0, picture.width, picture.height);
+  gl->ClearColor (c[0], c[1], c[2], c[3]);
+  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  gl->Enable (GL_DEPTH_TEST);
+  if (!is_gles (context_)) /* OpenGL ES always takes it from the shader */
+    gl->Enable (GL_PROGRAM_POINT_SIZE);
+  const bool blends = picture.mode == StripMode::kBlend; /* OpenGL cannot */
+  draw_layers (
+      layers, picture, shaders_[blends ? std::size_t (kStrips) : std::size_t (picture.mode) - 1]);
   end ();
 }

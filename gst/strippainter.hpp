@@ -8,7 +8,10 @@
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/strips/orbit.hpp>
 #include <rangecast/strips/strips.hpp>
+#include <rangecast/surface/blend_planes.hpp>
 #include <span>
+
+#include "render/blendtargets.hpp"
 
 /** Draws range images with OpenGL (core 3.3 or GLES 3.0). All functions in the GL thread. */
 class StripPainter {
@@ -30,12 +33,15 @@ public:
     /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
      *  between the two's directions. */
     double view_gap_m = 0.012;
+    /** Mode blend: metres by which what a pixel shows may lie behind the nearest surface. */
+    double blend_range_m = 0.02;
     int width, height;
   };
   struct Layer {
     rangecast::RangeImage image;
     const rangecast::View *view;
     std::span<const rangecast::StripVertex> vertices;
+    const rangecast::BlendPlanes *planes = nullptr; ///< mode blend
   };
   /** Whether OpenGL's textures can be as large as the layers' ROIs. */
   [[nodiscard]] bool fits (std::span<const Layer> layers) const;
@@ -52,16 +58,19 @@ public:
 
 private:
   struct ViewObjects { /* OpenGL names of one view */
-    guint depth = 0, colour = 0, vertices = 0, array = 0;
+    guint depth = 0, colour = 0, weight = 0, vertices = 0, array = 0;
     int width = 0, height = 0; /* of the textures, pixels */
   };
   void prepare (ViewObjects &objects, int width, int height);
   guint64 upload_layer (ViewObjects &objects, const Layer &layer);
-  void begin (const Picture &picture);
+  void begin (const Picture &picture, GstGLShader *shader);
   void end ();
   enum class Side { kFront, kBack };
-  void draw_layer (
-      const ViewObjects &objects, const Layer &layer, const Picture &picture, Side side);
+  void draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture,
+      GstGLShader *shader, Side side);
+  void draw_layers (
+      std::span<const Layer> layers, const Picture &picture, GstGLShader *shader);
+  void blend (const Picture &picture, std::span<const Layer> layers);
 
   /* glVertexAttribIPointer, which GStreamer's table of functions lacks */
   using AttributePointer = void (GSTGLAPI *) (
@@ -70,7 +79,11 @@ private:
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
   gint largest_ = 0;                       /* side of a texture, pixels */
-  std::array<GstGLShader *, 3> shaders_{}; /* by mode */
+  /* Of strips, rectangles and points; of blended strips their depth, and their sums. */
+  enum ShaderIndex { kStrips, kRectangles, kPoints, kBlendDepth, kBlendSum, kShaders };
+  std::array<GstGLShader *, kShaders> shaders_{};
+  BlendTargets targets_;
+  bool can_blend_ = false;
   /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;

@@ -62,15 +62,25 @@ StripScene::build (
 {
   const bool built = same_frame_set && is_built (images.size (), settings);
   complete_ = false; /* memory may end halfway */
+  const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
+  std::array<rangecast::SurfaceView, rangecast::kMaxViews> views;
+  for (std::size_t i = 0; i < images.size (); i++)
+    views[i] = {images[i], rig_->find (images[i].view_id)};
   rangecast::in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) {
     results_[i] = {};
-    rangecast::build_strips (images[i], settings.strips, memory_[i].vertices, results_[i]);
+    rangecast::BlendPlanes *planes = blends ? &memory_[i].planes : nullptr;
+    if (planes)
+      rangecast::make_blend_planes (
+          {views.data (), images.size ()}, i, settings.strips.depth_step, *planes);
+    rangecast::build_strips (
+        images[i], settings.strips, memory_[i].vertices, results_[i], planes);
   });
   for (std::size_t i = 0; i < images.size (); i++) {
     const rangecast::View *view = rig_->find (images[i].view_id);
     StripPainter::Layer &layer = layers_[i];
     const auto tinted = layer.image.colour;
-    layer = {images[i], view, memory_[i].vertices};
+    layer = {images[i], view, memory_[i].vertices,
+        settings.strips.mode == rangecast::StripMode::kBlend ? &memory_[i].planes : nullptr};
     if (settings.show_units)
       layer.image.colour =
           built ? tinted

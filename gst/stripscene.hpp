@@ -46,6 +46,7 @@ private:
   struct ViewMemory {
     std::vector<rangecast::StripVertex> vertices;
     std::vector<rangecast::Rgbx> tinted;
+    rangecast::BlendPlanes planes;
   };
   bool is_built (std::size_t images, const StripRenderSettings &settings) const;
   void surround ();

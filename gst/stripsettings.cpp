@@ -59,6 +59,10 @@ static const NumberRow kNumbers[] = {
         "Metres by which what a view sees moves behind what others see, times 1 - cosine of the "
         "angle between its direction and the picture's (0 to 1, default 0.012)",
         0, 1, 0.012, [] (Settings &s) -> double & { return s.view_gap_m; }},
+    {"blend-range", "Blend range",
+        "Of mode blend: metres behind the nearest surface in which what other views see is taken for "
+        "the same surface (0 to 1, default 0.02)",
+        0, 1, 0.02, [] (Settings &s) -> double & { return s.blend_range_m; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
     {"eye-distance", "Eye distance",
@@ -121,6 +125,7 @@ gst_strip_render_mode_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
+        {int (StripMode::kBlend), "Strips, blended where several views see a surface", "blend"},
         {int (StripMode::kStrips), "Bands of triangles along the rows", "strips"},
         {int (StripMode::kRectangles), "One rectangle a pixel", "rectangles"},
         {int (StripMode::kPoints), "One point a pixel", "points"}, {}};
@@ -144,8 +149,8 @@ install_strip_settings (GObjectClass *object_class)
         g_param_spec_boolean (row.name, row.nick, row.blurb, FALSE, row.flags));
   }
   g_object_class_install_property (object_class, PROP_MODE,
-      g_param_spec_enum ("mode", "Mode", "What is drawn for the points (default: strips)",
-          GST_TYPE_STRIP_RENDER_MODE, int (StripMode::kStrips), kFlags));
+      g_param_spec_enum ("mode", "Mode", "What is drawn for the points (default: blend)",
+          GST_TYPE_STRIP_RENDER_MODE, int (StripMode::kBlend), kFlags));
   g_object_class_install_property (object_class, PROP_BACKGROUND,
       g_param_spec_uint ("background", "Background",
           "Colour behind the scene, ARGB (default 0xff20242a)", 0, G_MAXUINT32,

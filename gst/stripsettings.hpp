@@ -17,6 +17,7 @@ struct StripRenderSettings {
   bool show_cameras = false;
   bool back_faces = false;
   double view_gap_m = 0.012;
+  double blend_range_m = 0.02;
   int samples = 0; ///< a pixel; below 2: no antialiasing
   bool show_units = false;
   bool show_stats = false;

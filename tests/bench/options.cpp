@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "options.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
+#include <rangecast/scene/scene.hpp>
 #include <sstream>
 
 namespace {
@@ -78,6 +80,27 @@ Options::size (const std::string &name, int &width, int &height, int least, int 
         read_number (value.substr (x + 1), height, least, most))
       return {};
     return "WIDTHxHEIGHT, each from " + std::to_string (least) + " to " + std::to_string (most);
+  };
+}
+
+void
+Options::dress (const std::string &name, std::optional<unsigned> &to)
+{
+  values_[name] = [&to] (const std::string &value) -> std::string {
+    constexpr std::pair<const char *, unsigned> kPieces[] = {{"none", 0},
+        {"hair", rangecast::kDressHair}, {"glasses", rangecast::kDressGlasses},
+        {"collar", rangecast::kDressCollar}, {"hand", rangecast::kDressHand},
+        {"all", rangecast::kDressAll}};
+    std::istringstream pieces (value);
+    to = 0;
+    for (std::string piece; std::getline (pieces, piece, '+');) {
+      const auto known =
+          std::ranges::find_if (kPieces, [&] (const auto &k) { return piece == k.first; });
+      if (known == std::end (kPieces))
+        return "none, all, or some of hair, glasses, collar and hand with + between";
+      *to |= known->second;
+    }
+    return {};
   };
 }
 

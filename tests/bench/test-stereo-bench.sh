@@ -201,9 +201,13 @@ test_ours_is_denser_and_better_than_opencv_on_motorcycle () {
 
 test_scene_is_rendered_and_matched_whole_and_in_part () {
   stereo_bench --scene --frames 2 >table.txt
+  for scene in "bare figure" "dressed figure"; do
+    grep -qx "$scene" table.txt || fail "no $scene in the table: $(cat table.txt)"
+  done
   for row in "stereodepth, whole picture" "stereodepth, person's ROI" "stereodepth, third camera, whole picture" "OpenCV SGBM 3-way, whole picture"; do
     grep -q "^$row  " table.txt || fail "$row is not in the table: $(cat table.txt)"
   done
   refuse 2 "--scene" --scene --left left.png
+  refuse 2 "--dress hat" --scene --dress hat
   refuse 1 "nowhere.glb" --scene --model nowhere.glb
 }

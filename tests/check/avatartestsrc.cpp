@@ -499,6 +499,43 @@ GST_START_TEST (test_file_that_is_no_model_is_one_error_that_names_it)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_dress_is_set_by_the_names_of_its_pieces)
+{
+  GstElement *source = gst_element_factory_make ("avatartestsrc", nullptr);
+  guint pieces = 99;
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, 0);
+  gst_util_set_object_arg (G_OBJECT (source), "dress", "hair+hand");
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, kDressHair | kDressHand);
+  gst_util_set_object_arg (G_OBJECT (source), "dress", "all");
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, kDressAll);
+  gst_object_unref (source);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_dressed_figure_is_another_picture)
+{
+  std::string pictures[2];
+  for (guint dressed : {0, 1}) {
+    GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
+    g_object_set (h->element, "num-buffers", 1, "dress", dressed ? kDressAll : 0u, nullptr);
+    gst_harness_play (h);
+    pictures[dressed] = take_bytes (gst_harness_pull (h));
+    gst_harness_teardown (h);
+  }
+  fail_if (pictures[0] == pictures[1]);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_model_top_that_is_no_length_is_named)
+{
+  fail_unless (
+      run ("avatartestsrc model-top=0.05 ! fakesink").find ("model-top") != std::string::npos);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_capsfilters_change_changes_all_pads_at_one_frame)
 {
   GstElement *pipeline =
@@ -582,6 +619,9 @@ avatartestsrc_suite ()
   tcase_add_test (tc, test_downstreams_alignment_is_kept_to);
   tcase_add_test (tc, test_downstreams_pool_that_refuses_is_replaced);
   tcase_add_test (tc, test_file_that_is_no_model_is_one_error_that_names_it);
+  tcase_add_test (tc, test_dress_is_set_by_the_names_of_its_pieces);
+  tcase_add_test (tc, test_dressed_figure_is_another_picture);
+  tcase_add_test (tc, test_model_top_that_is_no_length_is_named);
   tcase_add_test (tc, test_capsfilters_change_changes_all_pads_at_one_frame);
   tcase_add_test (tc, test_second_run_begins_as_the_first);
   return suite;

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mesh.hpp"
+#include "figure.hpp"
 #include "pattern.hpp"
+#include "scene.hpp"
 
 namespace rangecast {
 
@@ -16,11 +17,6 @@ constexpr int kColumns = 96;
 constexpr int kRows = 68;
 constexpr int kTextureSize = 512;
 constexpr double kTop = 0.220, kBottom = -0.250; ///< metres
-
-/** Half axes of the cross-section at a height, metres. */
-struct Section {
-  double y, side, front, back, centre_z;
-};
 
 constexpr Section kSections[] = {
     {0.2200, 0.0000, 0.0000, 0.0000, -0.005},
@@ -58,7 +54,8 @@ section_at (double y)
       std::lerp (a.back, b.back, k), std::lerp (a.centre_z, b.centre_z, t)};
 }
 
-/** The same, without the table's edges. */
+} // namespace
+
 Section
 smooth_section_at (double y)
 {
@@ -77,6 +74,8 @@ smooth_section_at (double y)
   }
   return sum;
 }
+
+namespace {
 
 double
 bump (double x, double y, double x0, double y0, double spread_x, double spread_y)
@@ -269,15 +268,24 @@ close_bottom (Mesh &mesh)
 
 } // namespace
 
-Mesh
-make_figure (std::uint32_t seed)
+Figure
+make_figure (std::uint32_t seed, unsigned dress)
 {
-  Mesh mesh;
-  add_grid (mesh, seed);
-  close_bottom (mesh);
-  compute_normals (mesh);
-  mesh.texture = make_texture (seed);
-  return mesh;
+  Mesh body;
+  add_grid (body, seed);
+  close_bottom (body);
+  compute_normals (body);
+  body.texture = std::make_shared<MipMap> (make_texture (seed));
+  Figure figure{std::move (body)};
+  if (dress & kDressHair)
+    add_long_hair (seed, figure);
+  if (dress & kDressGlasses)
+    add_glasses (figure);
+  if (dress & kDressCollar)
+    add_collar (seed, figure);
+  if (dress & kDressHand)
+    add_hand (seed, figure);
+  return figure;
 }
 
 } // namespace rangecast

@@ -82,7 +82,7 @@ make_chair (std::uint32_t seed)
   for (const double side : {x - half, x + half - leg})
     for (const double back : {z - half, z + half - leg})
       add_box (mesh, {{side, floor, back}, {side + leg, back < z ? -0.42 : -0.55, back + leg}});
-  mesh.texture = wood (seed);
+  mesh.texture = std::make_shared<MipMap> (wood (seed));
   return mesh;
 }
 
@@ -104,10 +104,10 @@ ShadowMap::begin ()
 }
 
 void
-ShadowMap::add (const std::vector<RasterVertex> &vertices, const Mesh &figure)
+ShadowMap::add (const std::vector<RasterVertex> &vertices, const Mesh &mesh)
 {
-  rasteriser_.draw (vertices, figure.triangles, figure.texture,
-      {scratch_.data (), kMapSize, kMapSize, kMapSize * sizeof (Rgbx)});
+  rasteriser_.draw (
+      vertices, mesh, {scratch_.data (), kMapSize, kMapSize, kMapSize * sizeof (Rgbx)});
 }
 
 void

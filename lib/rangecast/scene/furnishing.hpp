@@ -22,9 +22,9 @@ public:
   [[nodiscard]] const Intrinsics &intrinsics () const { return intrinsics_; }
   [[nodiscard]] const Pose &world_from_lamp () const { return world_from_lamp_; }
 
-  /** @name One moment: begin, add every figure as the lamp sees it, end. @{ */
+  /** @name One moment: begin, add every mesh as the lamp sees it, end. @{ */
   void begin ();
-  void add (const std::vector<RasterVertex> &vertices, const Mesh &figure);
+  void add (const std::vector<RasterVertex> &vertices, const Mesh &mesh);
   void end ();
   /** @} */
 

@@ -16,8 +16,24 @@ average (int a, int b, int c, int d)
   return static_cast<std::uint8_t> ((a + b + c + d + 2) / 4);
 }
 
-MipMap::MipMap (int width, int height, std::vector<Rgbx> pixels)
+/* The highest threshold that at least this share of the pixels reaches. */
+static int
+threshold_of (const std::vector<Rgbx> &pixels, double share)
 {
+  std::size_t histogram[256] = {}, above = 0;
+  for (const Rgbx &p : pixels)
+    histogram[p.x]++;
+  int threshold = 256;
+  while (threshold > 1 && double (above) < share * double (pixels.size ()))
+    above += histogram[--threshold];
+  return threshold;
+}
+
+MipMap::MipMap (int width, int height, std::vector<Rgbx> pixels, std::uint8_t alpha_cutoff)
+{
+  const auto covered = std::ranges::count_if (
+      pixels, [alpha_cutoff] (const Rgbx &p) { return p.x >= alpha_cutoff; });
+  const double share = double (covered) / double (pixels.size ());
   levels_.push_back ({width, height, std::move (pixels)});
   while (levels_.back ().width > 1 || levels_.back ().height > 1) {
     const Level &big = levels_.back ();
@@ -32,8 +48,14 @@ MipMap::MipMap (int width, int height, std::vector<Rgbx> pixels)
         };
         const Rgbx a = at (x0, y0), b = at (x1, y0), c = at (x0, y1), d = at (x1, y1);
         half.pixels[static_cast<std::size_t> (y) * half.width + x] = {average (a.r, b.r, c.r, d.r),
-            average (a.g, b.g, c.g, d.g), average (a.b, b.b, c.b, d.b), 0};
+            average (a.g, b.g, c.g, d.g), average (a.b, b.b, c.b, d.b),
+            average (a.x, b.x, c.x, d.x)};
       }
+    if (alpha_cutoff > 0 && covered > 0) {
+      const int threshold = threshold_of (half.pixels, share);
+      for (Rgbx &p : half.pixels)
+        p.x = static_cast<std::uint8_t> (std::min (p.x * alpha_cutoff / threshold, 255));
+    }
     levels_.push_back (std::move (half));
   }
 }
@@ -67,22 +89,114 @@ compute_normals (Mesh &mesh)
   }
 }
 
-void
-fit_figure (Mesh &mesh)
+std::shared_ptr<const MipMap>
+Mesh::plain_texture (Rgbx colour)
 {
-  float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
-  for (const MeshVertex &v : mesh.vertices)
-    for (int i = 0; i < 3; i++) {
-      low[i] = std::min (low[i], (&v.x)[i]);
-      high[i] = std::max (high[i], (&v.x)[i]);
+  return std::make_shared<MipMap> (1, 1, std::vector<Rgbx>{colour});
+}
+
+void
+drop_unused_vertices (Mesh &mesh)
+{
+  constexpr std::uint32_t kUnused = UINT32_MAX;
+  std::vector<std::uint32_t> place (mesh.vertices.size (), kUnused);
+  std::vector<MeshVertex> vertices;
+  std::vector<Rgbx> colours;
+  for (auto &triangle : mesh.triangles)
+    for (std::uint32_t &index : triangle) {
+      if (place[index] == kUnused) {
+        place[index] = static_cast<std::uint32_t> (vertices.size ());
+        vertices.push_back (mesh.vertices[index]);
+        if (!mesh.colours.empty ())
+          colours.push_back (mesh.colours[index]);
+      }
+      index = place[index];
     }
-  constexpr float kWidth = 0.5f;
-  const float scale = kWidth / std::max (high[0] - low[0], 1e-20f);
-  for (MeshVertex &v : mesh.vertices) {
-    for (int i = 0; i < 3; i++)
-      (&v.x)[i] = scale * ((&v.x)[i] - (low[i] + high[i]) / 2);
-    v.head = static_cast<float> (smooth_step (-0.09, -0.01, v.y));
+  mesh.vertices = std::move (vertices);
+  mesh.colours = std::move (colours);
+}
+
+namespace {
+
+struct Box {
+  float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
+
+  [[nodiscard]] double side (int axis) const { return double (high[axis]) - low[axis]; }
+  [[nodiscard]] double centre (int axis) const { return (double (high[axis]) + low[axis]) / 2; }
+};
+
+/* Of what is drawn: vertices that belong to no triangle do not count. */
+Box
+box_of (const Figure &figure)
+{
+  Box box;
+  for (const Mesh &mesh : figure)
+    for (const auto &triangle : mesh.triangles)
+      for (const std::uint32_t index : triangle)
+        for (int i = 0; i < 3; i++) {
+          const float value = (&mesh.vertices[index].x)[i];
+          box.low[i] = std::min (box.low[i], value);
+          box.high[i] = std::max (box.high[i], value);
+        }
+  return box;
+}
+
+void
+move_to_origin (Figure &figure, const Box &box, double scale)
+{
+  for (Mesh &mesh : figure)
+    for (MeshVertex &v : mesh.vertices)
+      for (int i = 0; i < 3; i++)
+        (&v.x)[i] = static_cast<float> (scale * ((&v.x)[i] - box.centre (i)));
+}
+
+/* Keeps the triangles that lie above a floor and near the axis. */
+void
+cut (Figure &figure, double floor_y, double radius)
+{
+  for (Mesh &mesh : figure) {
+    std::erase_if (mesh.triangles, [&] (const auto &triangle) {
+      return std::ranges::any_of (triangle, [&] (std::uint32_t index) {
+        const MeshVertex &v = mesh.vertices[index];
+        return v.y < floor_y || std::hypot (v.x, v.z) > radius;
+      });
+    });
+    drop_unused_vertices (mesh);
   }
+  std::erase_if (figure, [] (const Mesh &mesh) { return mesh.triangles.empty (); });
+}
+
+} // namespace
+
+bool
+fit_figure (Figure &figure, double top_m)
+{
+  constexpr double kSize = 0.5, kReach = 0.45, kNeckBelowCrown = 0.27; /* metres */
+  Box box = box_of (figure);
+  if (figure.empty () || box.side (1) < 0)
+    return false;
+  const bool stands = box.side (1) >= 3.5 * box.side (2) && box.side (2) > 0;
+  if (top_m == kTopAutomatic)
+    top_m = stands ? kSize : kTopAll;
+  double scale = kSize / std::max ({box.side (0), box.side (1), 1e-20});
+  if (top_m > 0) {
+    scale = kPersonHeight / std::max (box.side (1), 1e-20);
+    move_to_origin (figure, box, scale);
+    cut (figure, kPersonHeight / 2 - top_m, kReach);
+    box = box_of (figure);
+    scale = 1;
+    if (figure.empty ())
+      return false;
+  }
+  move_to_origin (figure, box, scale);
+  /* A bust has its neck where the built-in figure has it, a person where persons do. */
+  const double person = top_m > 0 ? 1 : kSize / kPersonHeight;
+  const double chin = stands ? box.side (1) * scale / 2 - person * kNeckBelowCrown : -0.01;
+  const double spread = stands ? person * 0.08 : 0.08;
+  for (Mesh &mesh : figure)
+    for (MeshVertex &v : mesh.vertices)
+      v.head = static_cast<float> (smooth_step (chin - spread, chin, v.y));
+  return true;
 }
 
 } // namespace rangecast

@@ -9,21 +9,19 @@
 #include <assimp/scene.h>
 #include <cctype>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
+#include <map>
+#include <set>
+#include <tuple>
 #include <utility>
 
-#include "../geometry/range_image.hpp"
+#include "gltf.hpp"
+#include "texture.hpp"
 
 namespace fs = std::filesystem;
 
 namespace rangecast {
 namespace {
-
-/* More than any scan that a software rasteriser could draw live. */
-constexpr std::size_t kMaxVertices = 4'000'000;
 
 /* Positions and texture coordinates that the rasteriser's arithmetic can hold: far more than any
  * scan, in any unit, needs. */
@@ -51,27 +49,128 @@ is_drawable (const Mesh &mesh)
          std::ranges::all_of (mesh.triangles, triangle_ok);
 }
 
-void
-add_mesh (const aiMesh &from, Mesh &mesh)
+/* ---- what assimp reads ---- */
+
+Rgbx
+byte_colour (const aiColor4D &c)
 {
-  const auto first = static_cast<std::uint32_t> (mesh.vertices.size ());
+  const auto byte = [] (float value) {
+    return static_cast<std::uint8_t> (std::lround (255 * std::clamp (value, 0.f, 1.f)));
+  };
+  return {byte (c.r), byte (c.g), byte (c.b), 255};
+}
+
+Mesh
+mesh_of (const aiMesh &from)
+{
+  Mesh mesh;
   for (unsigned i = 0; i < from.mNumVertices; i++) {
     const aiVector3D &p = from.mVertices[i];
     MeshVertex vertex{p.x, p.y, p.z, 0, 0, 0, 0, 0, 0};
+    if (from.HasNormals ()) {
+      const aiVector3D &n = from.mNormals[i];
+      vertex.nx = n.x, vertex.ny = n.y, vertex.nz = n.z;
+    }
     if (from.HasTextureCoords (0)) {
       vertex.u = from.mTextureCoords[0][i].x;
-      /* assimp counts from the picture's bottom, whatever the file does: it turns glTF's v. */
-      vertex.v = 1 - from.mTextureCoords[0][i].y;
+      vertex.v = 1 - from.mTextureCoords[0][i].y; /* assimp counts from the picture's bottom */
     }
     mesh.vertices.push_back (vertex);
+    if (from.HasVertexColors (0))
+      mesh.colours.push_back (byte_colour (from.mColors[0][i]));
   }
   for (unsigned i = 0; i < from.mNumFaces; i++) {
     const aiFace &face = from.mFaces[i];
     if (face.mNumIndices == 3) /* points and lines have no surface */
-      mesh.triangles.push_back (
-          {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+      mesh.triangles.push_back ({face.mIndices[0], face.mIndices[1], face.mIndices[2]});
   }
+  return mesh;
 }
+
+/* A picture inside the model's own file: compressed, or plain BGRA, for which there is no name. */
+void
+add_picture (const aiScene &scene, const std::string &model, const char *name, Model &to)
+{
+  ModelPicture picture;
+  if (const aiTexture *embedded = scene.GetEmbeddedTexture (name)) {
+    picture.name = model + " (its texture)";
+    picture.embedded = true;
+    const auto *bytes = reinterpret_cast<const std::uint8_t *> (embedded->pcData);
+    if (embedded->mHeight == 0)
+      picture.bytes.assign (bytes, bytes + embedded->mWidth);
+  } else {
+    std::string path = name;
+    std::ranges::replace (path, '\\', '/'); /* as programs on Windows write it */
+    picture.name = (fs::path (model).parent_path () / path).string ();
+  }
+  to.pictures.push_back (std::move (picture));
+}
+
+ModelMaterial
+material_of (const aiScene &scene, const std::string &model, const aiMaterial &from, Model &to)
+{
+  ModelMaterial material;
+  material.double_sided = true; /* OBJ has no flag for it, and leaves sheets open */
+  aiString name;
+  aiTextureMapMode modes[2] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
+  for (aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE})
+    if (material.picture < 0 &&
+        from.GetTexture (type, 0, &name, nullptr, nullptr, nullptr, nullptr, modes) == AI_SUCCESS) {
+      material.picture = int (to.pictures.size ());
+      add_picture (scene, model, name.C_Str (), to);
+    }
+  const auto wrap = [] (aiTextureMapMode mode) {
+    return mode == aiTextureMapMode_Clamp    ? TextureWrap::kClamp
+           : mode == aiTextureMapMode_Mirror ? TextureWrap::kMirror
+                                             : TextureWrap::kRepeat;
+  };
+  material.wrap_u = wrap (modes[0]);
+  material.wrap_v = wrap (modes[1]);
+  /* A picture that is both colour and opacity has its own alpha. */
+  aiString opacity;
+  material.masked = from.GetTexture (aiTextureType_OPACITY, 0, &opacity) == AI_SUCCESS &&
+                    material.picture >= 0 && opacity == name;
+  aiColor4D colour;
+  const bool unnamed = from.GetName () == aiString (AI_DEFAULT_MATERIAL_NAME);
+  if (material.picture < 0 && !unnamed && /* exporters leave any colour beside a picture */
+      from.Get (AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
+    material.factor = {colour.r, colour.g, colour.b, 1};
+    material.has_colour = true;
+  }
+  material.has_colour |= material.picture >= 0;
+  float visible = 1;
+  from.Get (AI_MATKEY_OPACITY, visible);
+  material.visible = visible >= 0.5f;
+  return material;
+}
+
+Status
+read_with_assimp (const std::string &path, Model &model)
+{
+  Assimp::Importer importer;
+  const aiScene *scene =
+      importer.ReadFile (path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices |
+                                   aiProcess_PreTransformVertices | aiProcess_SortByPType);
+  if (!scene)
+    return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
+  std::size_t vertices = 0, triangles = 0;
+  for (unsigned i = 0; i < scene->mNumMeshes; i++) {
+    const aiMesh &mesh = *scene->mMeshes[i];
+    vertices += mesh.mNumVertices;
+    triangles += mesh.mNumFaces;
+    if (vertices > kMaxModelVertices || triangles > kMaxModelTriangles)
+      return {
+          StatusCode::kUnsupported, path + ": more than 4 million vertices or 8 million triangles"};
+    model.meshes.push_back (mesh_of (mesh));
+    model.materials.push_back (
+        mesh.mMaterialIndex < scene->mNumMaterials ? int (mesh.mMaterialIndex) : -1);
+  }
+  for (unsigned i = 0; i < scene->mNumMaterials; i++)
+    model.palette.push_back (material_of (*scene, path, *scene->mMaterials[i], model));
+  return {};
+}
+
+/* ---- textures ---- */
 
 std::string
 lower_case (std::string text)
@@ -102,32 +201,6 @@ colour_map_beside (const std::string &model)
   return found;
 }
 
-Status
-take_picture (const cv::Mat &bgr, const std::string &name, Mesh &mesh)
-{
-  if (bgr.empty () || bgr.type () != CV_8UC3 || bgr.cols > kMaxImageSide ||
-      bgr.rows > kMaxImageSide)
-    return {StatusCode::kBadData, name + ": cannot be read as a picture; expected JPEG or PNG"};
-  std::vector<Rgbx> pixels;
-  pixels.reserve (bgr.total ());
-  for (int y = 0; y < bgr.rows; y++)
-    for (int x = 0; x < bgr.cols; x++) {
-      const auto &p = bgr.at<cv::Vec3b> (y, x);
-      pixels.push_back ({p[2], p[1], p[0], 0});
-    }
-  mesh.texture = MipMap (bgr.cols, bgr.rows, std::move (pixels));
-  return {};
-}
-
-Status
-take_picture_file (const std::string &path, Mesh &mesh)
-{
-  std::error_code error;
-  if (!fs::is_regular_file (path, error))
-    return {StatusCode::kNotFound, path + ": no such file; expected a texture (JPEG or PNG)"};
-  return take_picture (cv::imread (path, cv::IMREAD_COLOR), path, mesh);
-}
-
 void
 turn_texture (Mesh &mesh)
 {
@@ -135,92 +208,214 @@ turn_texture (Mesh &mesh)
     vertex.v = 1 - vertex.v;
 }
 
-/* A colour map that lies beside a glTF file which does not name it was as a rule drawn for the
- * scan's first format, where v counts from the bottom; exporters carry v over as it is. */
-Status
-take_picture_beside (const std::string &model, Mesh &mesh)
-{
-  const std::string picture = colour_map_beside (model);
-  if (picture.empty ())
-    return {};
-  const std::string type = lower_case (fs::path (model).extension ().string ());
-  if (type == ".glb" || type == ".gltf")
-    turn_texture (mesh);
-  return take_picture_file (picture, mesh);
-}
-
-/* A picture inside the model's own file: compressed, or plain BGRA. */
-Status
-take_embedded (const aiTexture &texture, const std::string &model, Mesh &mesh)
-{
-  if (texture.mHeight == 0) {
-    const cv::Mat bytes (1, static_cast<int> (texture.mWidth), CV_8U, texture.pcData);
-    return take_picture (cv::imdecode (bytes, cv::IMREAD_COLOR), model + " (its texture)", mesh);
+/** Gives meshes their textures; a texture that several materials share is decoded once. */
+class Texturer {
+public:
+  Texturer (const ModelSettings &settings, const Model &model)
+      : settings_ (settings), model_ (model)
+  {
+    const auto used = [&model] (auto test) { return std::ranges::any_of (model.palette, test); };
+    any_picture_ = used ([] (const ModelMaterial &m) { return m.picture >= 0; });
+    any_colour_ = used ([] (const ModelMaterial &m) { return m.has_colour; }) ||
+                  std::ranges::any_of (
+                      model.meshes, [] (const Mesh &mesh) { return !mesh.colours.empty (); });
+    /* Many textures share the memory of sixteen of 2048 x 2048. */
+    const std::size_t n = model.pictures.size ();
+    max_side_ = n <= 16 ? 2048 : n <= 64 ? 1024 : n <= 256 ? 512 : 256;
+    const std::set<int> materials (model.materials.begin (), model.materials.end ());
+    if (settings.texture.empty () && !any_picture_ && materials.size () <= 1)
+      beside_ = colour_map_beside (settings.path);
   }
-  cv::Mat bgr (static_cast<int> (texture.mHeight), static_cast<int> (texture.mWidth), CV_8UC3);
-  for (int y = 0; y < bgr.rows; y++)
-    for (int x = 0; x < bgr.cols; x++) {
-      const aiTexel &t = texture.pcData[y * bgr.cols + x];
-      bgr.at<cv::Vec3b> (y, x) = {t.b, t.g, t.r};
+
+  Status dress (int material, Mesh &mesh)
+  {
+    const ModelMaterial plain,
+        &m = material < 0 ? plain : model_.palette[static_cast<std::size_t> (material)];
+    mesh.double_sided = m.double_sided;
+    Status status;
+    if (!settings_.texture.empty ()) {
+      status = from_file (settings_.texture, mesh);
+    } else if (!beside_.empty ()) {
+      /* A colour map that lies beside a glTF file which does not name it was usually made for the
+       * scan's first format, where v counts from the bottom; exporters copy v unchanged. */
+      if (is_gltf (settings_.path))
+        turn_texture (mesh);
+      status = from_file (beside_, mesh);
+    } else if (m.picture >= 0) {
+      status = from_material (m, mesh);
+    } else if (any_colour_) {
+      mesh.texture = Mesh::plain_texture (colour_of (m));
     }
-  return take_picture (bgr, model + " (its texture)", mesh);
+    if (settings_.texture_flip)
+      turn_texture (mesh);
+    return status;
+  }
+
+private:
+  static Rgbx colour_of (const ModelMaterial &m)
+  {
+    const auto byte = [] (double value) {
+      return static_cast<std::uint8_t> (std::lround (255 * std::clamp (value, 0.0, 1.0)));
+    };
+    return {byte (m.factor[0]), byte (m.factor[1]), byte (m.factor[2]), 255};
+  }
+
+  Status from_file (const std::string &path, Mesh &mesh)
+  {
+    mesh.colours.clear ();
+    if (!file_)
+      if (Status s = read_texture (path, {4 * max_side_, {1, 1, 1, 1}, 0}, file_); !s.ok ())
+        return s;
+    mesh.texture = file_;
+    return {};
+  }
+
+  Status from_material (const ModelMaterial &m, Mesh &mesh)
+  {
+    const ModelPicture &picture = model_.pictures[static_cast<std::size_t> (m.picture)];
+    TextureSettings settings;
+    settings.max_side = max_side_;
+    std::ranges::copy (m.factor, settings.factor);
+    if (m.masked)
+      settings.alpha_cutoff =
+          static_cast<std::uint8_t> (std::clamp (std::lround (255 * m.alpha_cutoff), 0l, 255l));
+    auto &texture = made_[{m.picture, m.factor, settings.alpha_cutoff}];
+    if (!texture) {
+      const Status s = picture.embedded
+                           ? decode_texture (picture.bytes, picture.name, settings, texture)
+                           : read_texture (picture.name, settings, texture);
+      if (!s.ok ())
+        return s;
+    }
+    mesh.texture = texture;
+    mesh.alpha_cutoff = settings.alpha_cutoff;
+    place_texture (m, mesh);
+    return {};
+  }
+
+  /* The material's transform, and wrap where coordinates leave the picture. */
+  static void place_texture (const ModelMaterial &m, Mesh &mesh)
+  {
+    float low[2] = {1e30f, 1e30f}, high[2] = {-1e30f, -1e30f};
+    for (MeshVertex &vertex : mesh.vertices) {
+      const double u = vertex.u, v = vertex.v;
+      const auto &t = m.transform;
+      vertex.u = static_cast<float> (t[0] * u + t[1] * v + t[2]);
+      vertex.v = static_cast<float> (t[3] * u + t[4] * v + t[5]);
+      for (int i = 0; i < 2; i++) {
+        low[i] = std::min (low[i], (&vertex.u)[i]);
+        high[i] = std::max (high[i], (&vertex.u)[i]);
+      }
+    }
+    const auto leaves = [&] (int i) { return low[i] < -1e-4f || high[i] > 1.0001f; };
+    mesh.wrap_u = leaves (0) ? m.wrap_u : TextureWrap::kClamp;
+    mesh.wrap_v = leaves (1) ? m.wrap_v : TextureWrap::kClamp;
+    /* Whole periods change nothing, and small numbers keep their digits. */
+    const float period_u = 2 * std::floor (low[0] / 2), period_v = 2 * std::floor (low[1] / 2);
+    for (MeshVertex &vertex : mesh.vertices) {
+      vertex.u -= mesh.wrap_u == TextureWrap::kClamp ? 0 : period_u;
+      vertex.v -= mesh.wrap_v == TextureWrap::kClamp ? 0 : period_v;
+    }
+  }
+
+  const ModelSettings &settings_;
+  const Model &model_;
+  bool any_picture_ = false, any_colour_ = false;
+  int max_side_ = 0;
+  std::string beside_;
+  std::shared_ptr<const MipMap> file_;
+  std::map<std::tuple<int, std::array<double, 4>, int>, std::shared_ptr<const MipMap>> made_;
+};
+
+/* ---- geometry ---- */
+
+/* Exporters write a sheet's both sides as two triangles where a format has no flag for it; of a
+ * double-sided mesh one is enough, and opposite normals would cancel. */
+void
+drop_second_sides (Mesh &mesh)
+{
+  std::vector<std::pair<std::array<std::uint32_t, 3>, std::size_t>> sorted;
+  for (std::size_t i = 0; i < mesh.triangles.size (); i++) {
+    auto key = mesh.triangles[i];
+    std::ranges::sort (key);
+    sorted.emplace_back (key, i);
+  }
+  std::ranges::sort (sorted);
+  std::vector<std::array<std::uint32_t, 3>> kept;
+  std::vector<bool> second (mesh.triangles.size (), false);
+  for (std::size_t i = 1; i < sorted.size (); i++)
+    second[sorted[i].second] = sorted[i].first == sorted[i - 1].first;
+  for (std::size_t i = 0; i < mesh.triangles.size (); i++)
+    if (!second[i])
+      kept.push_back (mesh.triangles[i]);
+  mesh.triangles = std::move (kept);
+}
+
+bool
+has_normals (const Mesh &mesh)
+{
+  return std::ranges::all_of (mesh.vertices, [] (const MeshVertex &v) {
+    const float length = v.nx * v.nx + v.ny * v.ny + v.nz * v.nz;
+    return length > 0.5f && length < 2;
+  });
 }
 
 Status
-take_texture (
-    const aiScene &scene, const std::string &model, const std::string &texture, Mesh &mesh)
+make_figure (const ModelSettings &settings, Model &model, Figure &figure)
 {
-  if (!texture.empty ())
-    return take_picture_file (texture, mesh);
-  for (unsigned i = 0; i < scene.mNumMaterials; i++)
-    for (aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
-      aiString name;
-      if (scene.mMaterials[i]->GetTexture (type, 0, &name) != AI_SUCCESS)
+  Texturer texturer (settings, model);
+  for (std::size_t i = 0; i < model.meshes.size (); i++) {
+    const int material = model.materials[i];
+    if (material >= 0) {
+      const ModelMaterial &m = model.palette[static_cast<std::size_t> (material)];
+      const bool clear = m.masked && m.factor[3] < m.alpha_cutoff;
+      if (!m.visible || clear)
         continue;
-      if (const aiTexture *embedded = scene.GetEmbeddedTexture (name.C_Str ()))
-        return take_embedded (*embedded, model, mesh);
-      return take_picture_file ((fs::path (model).parent_path () / name.C_Str ()).string (), mesh);
     }
-  return take_picture_beside (model, mesh);
+    Mesh mesh = std::move (model.meshes[i]);
+    if (mesh.triangles.empty ())
+      continue;
+    if (Status s = texturer.dress (material, mesh); !s.ok ())
+      return s;
+    if (!is_drawable (mesh))
+      return {StatusCode::kBadData, settings.path + ": a position, texture coordinate or index is "
+                                                    "out of range; expected finite positions below "
+                                                    "1e9 and texture coordinates below 1e4"};
+    if (mesh.double_sided)
+      drop_second_sides (mesh);
+    if (!has_normals (mesh))
+      compute_normals (mesh);
+    figure.push_back (std::move (mesh));
+  }
+  if (figure.empty ())
+    return {StatusCode::kBadData, settings.path + ": a model without triangles"};
+  return {};
 }
 
 } // namespace
 
 Status
-load_model (const std::string &path, const std::string &texture, bool flip, Mesh &mesh)
+load_model (const ModelSettings &settings, Figure &figure)
 {
+  const std::string &path = settings.path;
   std::error_code error;
   if (!fs::is_regular_file (path, error))
     return {StatusCode::kNotFound, path + ": no such file; expected a model (glTF or OBJ)"};
-  Mesh loaded;
+  Figure loaded;
   try {
-    Assimp::Importer importer;
-    const aiScene *scene =
-        importer.ReadFile (path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices |
-                                     aiProcess_PreTransformVertices | aiProcess_SortByPType);
-    if (!scene)
-      return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
-    for (unsigned i = 0; i < scene->mNumMeshes; i++) {
-      if (loaded.vertices.size () + scene->mMeshes[i]->mNumVertices > kMaxVertices)
-        return {StatusCode::kUnsupported, path + ": more than 4 million vertices"};
-      add_mesh (*scene->mMeshes[i], loaded);
-    }
-    if (loaded.triangles.empty ())
-      return {StatusCode::kBadData, path + ": a model without triangles"};
-    if (!is_drawable (loaded))
-      return {StatusCode::kBadData, path + ": a position, texture coordinate or index is out of "
-                                           "range; expected finite positions below 1e9 and texture "
-                                           "coordinates below 1e4"};
-    if (Status s = take_texture (*scene, path, texture, loaded); !s.ok ())
-      return s;
-    if (flip)
-      turn_texture (loaded);
-  } catch (const std::exception &) { /* OpenCV's decoders and allocations */
+    Model model;
+    Status status = is_gltf (path) ? read_gltf (path, model) : read_with_assimp (path, model);
+    if (status.ok ())
+      status = make_figure (settings, model, loaded);
+    if (!status.ok ())
+      return status;
+  } catch (const std::exception &) { /* assimp, and allocations */
     return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
   }
-  fit_figure (loaded);
-  compute_normals (loaded);
-  mesh = std::move (loaded);
+  if (!fit_figure (loaded, settings.top_m))
+    return {StatusCode::kBadValue,
+        "model-top: " + path + " has no triangle that lies wholly in that part of it"};
+  figure = std::move (loaded);
   return {};
 }
 
@@ -231,10 +426,10 @@ load_model (const std::string &path, const std::string &texture, bool flip, Mesh
 namespace rangecast {
 
 Status
-load_model (const std::string &path, const std::string &, bool, Mesh &)
+load_model (const ModelSettings &settings, Figure &)
 {
   return {StatusCode::kUnsupported,
-      path + ": this build reads no models (built without assimp); expected no location"};
+      settings.path + ": this build reads no models (built without assimp); expected no location"};
 }
 
 } // namespace rangecast

@@ -8,12 +8,18 @@
 
 namespace rangecast {
 
+struct ModelSettings {
+  std::string path;    ///< glTF (.glb, .gltf), OBJ or whatever else assimp reads
+  std::string texture; ///< JPEG or PNG for all meshes; empty: what each material names, else a
+                       ///< picture beside a model of one material whose name says that it is a
+                       ///< colour map, else plain skin
+  bool texture_flip = false;    ///< turn textures upside down
+  double top_m = kTopAutomatic; ///< see fit_figure()
+};
+
 /** Loads a textured figure, and scales and centres it as fit_figure() says.
- *  @param path     glTF (.glb, .gltf), OBJ or whatever else assimp reads
- *  @param texture  JPEG or PNG; empty: the one that the material names, else a picture beside the
- *                  model whose name says that it is a colour map, else plain skin
- *  @param flip     turn the texture upside down, for a picture drawn for v the other way round
- *  @return kNotFound or kBadData naming the file; kUnsupported in a build without assimp */
-Status load_model (const std::string &path, const std::string &texture, bool flip, Mesh &mesh);
+ *  @return kNotFound, kBadData or kUnsupported naming the file; kUnsupported in a build without
+ *          assimp */
+Status load_model (const ModelSettings &settings, Figure &figure);
 
 } // namespace rangecast

@@ -30,6 +30,11 @@ struct Rasteriser::Plane {
   }
 };
 
+/** A corner with the light of the side that is seen. */
+struct Rasteriser::Corner : RasterVertex {
+  Rgbx tint; ///< the vertex's own colour
+};
+
 static inline Rgbx
 sample (ImageView<const Rgbx> level, float u, float v, float light)
 {
@@ -50,6 +55,38 @@ sample (ImageView<const Rgbx> level, float u, float v, float light)
   return {blend (top[0].r, top[step].r, low[0].r, low[step].r),
       blend (top[0].g, top[step].g, low[0].g, low[step].g),
       blend (top[0].b, top[step].b, low[0].b, low[step].b), 0};
+}
+
+static inline int
+wrapped (int i, int size, TextureWrap wrap)
+{
+  if (wrap == TextureWrap::kClamp)
+    return std::clamp (i, 0, size - 1);
+  const int period = wrap == TextureWrap::kRepeat ? size : 2 * size;
+  const int at = (i % period + period) % period;
+  return at < size ? at : 2 * size - 1 - at;
+}
+
+/** Any wrap, with alpha in x. @param light  of R, G, B */
+static Rgbx
+sample_wrapped (
+    ImageView<const Rgbx> level, float u, float v, const float (&light)[3], const Mesh &mesh)
+{
+  const auto bounded = [] (float at) { return std::abs (at) < 1e9f ? at : 0; }; /* and not NaN */
+  const float x = bounded (u * static_cast<float> (level.width) - 0.5f),
+              y = bounded (v * static_cast<float> (level.height) - 0.5f);
+  const float left = std::floor (x), top = std::floor (y), fx = x - left, fy = y - top;
+  const int x0 = wrapped (static_cast<int> (left), level.width, mesh.wrap_u),
+            x1 = wrapped (static_cast<int> (left) + 1, level.width, mesh.wrap_u);
+  const Rgbx *upper = level.row (wrapped (static_cast<int> (top), level.height, mesh.wrap_v)),
+             *lower = level.row (wrapped (static_cast<int> (top) + 1, level.height, mesh.wrap_v));
+  const auto blend = [&] (std::uint8_t Rgbx::*c, float factor) {
+    const float above = upper[x0].*c + fx * static_cast<float> (upper[x1].*c - upper[x0].*c),
+                below = lower[x0].*c + fx * static_cast<float> (lower[x1].*c - lower[x0].*c);
+    return static_cast<std::uint8_t> (factor * (above + fy * (below - above)) + 0.5f);
+  };
+  return {blend (&Rgbx::r, light[0]), blend (&Rgbx::g, light[1]), blend (&Rgbx::b, light[2]),
+      blend (&Rgbx::x, 1)};
 }
 
 void
@@ -82,9 +119,11 @@ level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, 
   return static_cast<int> (std::min (0.5f * std::log2 (texels / area) + 0.5f, last));
 }
 
+/** @tparam kPlain  a texture without wrap and alpha, and no colours of vertices */
+template <bool kPlain>
 void
-Rasteriser::triangle (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c,
-    const MipMap &texture, ImageView<Rgbx> colour)
+Rasteriser::triangle (
+    const Corner &a, const Corner &b, const Corner &c, const Mesh &mesh, ImageView<Rgbx> colour)
 {
   using std::int64_t;
   const int64_t ax = std::lrint (a.x * kSubpixels), ay = std::lrint (a.y * kSubpixels);
@@ -110,9 +149,21 @@ Rasteriser::triangle (const RasterVertex &a, const RasterVertex &b, const Raster
   u.rebase (a, a.u * a.inverse_depth, x0, y0);
   v.rebase (a, a.v * a.inverse_depth, x0, y0);
   l.rebase (a, a.light, x0, y0);
+  const MipMap &texture = *mesh.texture;
   const ImageView<const Rgbx> level = texture.level (level_for (a, b, c, std::abs (area), texture));
+  const auto tinted = [&] (std::uint8_t Rgbx::*channel) {
+    const auto at = [channel] (const Corner &corner) {
+      return corner.light * static_cast<float> (corner.tint.*channel) / 255;
+    };
+    Plane plane (a, b, c, k, at (a), at (b), at (c));
+    plane.rebase (a, at (a), x0, y0);
+    return plane;
+  };
+  const Plane tint[] = {kPlain ? l : tinted (&Rgbx::r), kPlain ? l : tinted (&Rgbx::g),
+      kPlain ? l : tinted (&Rgbx::b)};
 
-  /* Inside means on the same side of all edges (front faces have negative area: y points down). */
+  /* Inside means on the same side of all edges (front faces have negative area: y points down; of
+   * others two corners were exchanged). */
   const auto edge = [] (int64_t px, int64_t py, int64_t qx, int64_t qy, int64_t x, int64_t y) {
     return (qy - py) * (x - px) - (qx - px) * (y - py);
   };
@@ -128,11 +179,23 @@ Rasteriser::triangle (const RasterVertex &a, const RasterVertex &b, const Raster
         const auto i = static_cast<float> (x - x0), j = static_cast<float> (y - y0);
         const float inverse = w.base + w.dx * i + w.dy * j;
         if (inverse > depth[x]) {
-          depth[x] = inverse;
           const float z = 1 / inverse;
-          out[x] =
-              sample (level, (u.base + u.dx * i + u.dy * j) * z, (v.base + v.dx * i + v.dy * j) * z,
-                  std::clamp (l.base + l.dx * i + l.dy * j, 0.0f, 1.0f));
+          const float tu = (u.base + u.dx * i + u.dy * j) * z,
+                      tv = (v.base + v.dx * i + v.dy * j) * z;
+          const auto light_at = [i, j] (const Plane &p) {
+            return std::clamp (p.base + p.dx * i + p.dy * j, 0.0f, 1.0f);
+          };
+          if constexpr (kPlain) {
+            depth[x] = inverse;
+            out[x] = sample (level, tu, tv, light_at (l));
+          } else {
+            const float light[] = {light_at (tint[0]), light_at (tint[1]), light_at (tint[2])};
+            const Rgbx pixel = sample_wrapped (level, tu, tv, light, mesh);
+            if (pixel.x >= mesh.alpha_cutoff) {
+              depth[x] = inverse;
+              out[x] = {pixel.r, pixel.g, pixel.b, 0};
+            }
+          }
         }
       }
       f0 += (by - ay) * kSubpixels;
@@ -146,19 +209,31 @@ Rasteriser::triangle (const RasterVertex &a, const RasterVertex &b, const Raster
 }
 
 void
-Rasteriser::draw (const std::vector<RasterVertex> &vertices,
-    const std::vector<std::array<std::uint32_t, 3>> &triangles, const MipMap &texture,
-    ImageView<Rgbx> colour)
+Rasteriser::draw (
+    const std::vector<RasterVertex> &vertices, const Mesh &mesh, ImageView<Rgbx> colour)
 {
   const auto usable = [] (const RasterVertex &v) {
     return v.inverse_depth > 0 && std::abs (v.x) < kFarthest && std::abs (v.y) < kFarthest;
   };
-  for (const auto &t : triangles) {
+  const bool plain = mesh.colours.empty () && mesh.alpha_cutoff == 0 &&
+                     mesh.wrap_u == TextureWrap::kClamp && mesh.wrap_v == TextureWrap::kClamp;
+  for (const auto &t : mesh.triangles) {
     const RasterVertex &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
     /* Counter-clockwise from outside is negative here, because y points down. */
-    if ((b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y) < 0 && usable (a) && usable (b) &&
-        usable (c))
-      triangle (a, b, c, texture, colour);
+    const bool front = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y) < 0;
+    if ((!front && !mesh.double_sided) || !usable (a) || !usable (b) || !usable (c))
+      continue;
+    const auto corner = [&] (std::uint32_t i) {
+      Corner made{vertices[i], mesh.colours.empty () ? Rgbx{255, 255, 255, 255} : mesh.colours[i]};
+      if (!front)
+        made.light = made.back_light;
+      return made;
+    };
+    const Corner second = corner (front ? t[1] : t[2]), third = corner (front ? t[2] : t[1]);
+    if (plain)
+      triangle<true> (corner (t[0]), second, third, mesh, colour);
+    else
+      triangle<false> (corner (t[0]), second, third, mesh, colour);
   }
 }
 

@@ -15,6 +15,7 @@ struct RasterVertex {
   float inverse_depth; ///< 1 / m; 0 or less: behind the camera, its triangles are left out
   float u, v;          ///< texture, 0 to 1
   float light;         ///< the texture's colour is multiplied by it, 0 to 1
+  float back_light;    ///< the same of the other side, if the mesh is double-sided
 };
 
 /** Draws textured triangles into a picture, nearest first by z-buffer. Coverage is decided at pixel
@@ -27,10 +28,9 @@ public:
   void begin (int width, int height);
   /** The same, with something there already. @param inverse_depth  1/z, 1/m, row by row */
   void begin (int width, int height, const std::vector<float> &inverse_depth);
-  /** Draws what faces the camera. Texture and vertices belong to the caller. */
-  void draw (const std::vector<RasterVertex> &vertices,
-      const std::vector<std::array<std::uint32_t, 3>> &triangles, const MipMap &texture,
-      ImageView<Rgbx> colour);
+  /** Draws what faces the camera, and the rest of a double-sided mesh.
+   *  @param vertices  the mesh's as the camera sees them */
+  void draw (const std::vector<RasterVertex> &vertices, const Mesh &mesh, ImageView<Rgbx> colour);
   /** 1/z of what was drawn, 1/m, row by row; 0 where nothing was. */
   [[nodiscard]] const float *row (int y) const
   {
@@ -39,8 +39,10 @@ public:
 
 private:
   struct Plane;
-  void triangle (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c,
-      const MipMap &texture, ImageView<Rgbx> colour);
+  struct Corner;
+  template <bool kPlain>
+  void triangle (
+      const Corner &a, const Corner &b, const Corner &c, const Mesh &mesh, ImageView<Rgbx> colour);
 
   int width_ = 0, height_ = 0;
   std::vector<float> inverse_depth_;

@@ -30,9 +30,10 @@ static Vec3
 room_colour (Vec3 p, double radius_m, const RoomPaint &paint)
 {
   const auto &[seed, contrast, warmth] = paint;
-  const double fine = smooth_noise (p, 0.12, 3, seed + 20);
-  const double coarse = smooth_noise (p, 0.5, 2, seed + 30);
-  const double light = 1 + contrast * (0.35 * fine + 0.25 * coarse);
+  double light = 1;
+  if (contrast > 0)
+    light += contrast * (0.35 * smooth_noise (p, 0.12, 3, seed + 20) +
+                            0.25 * smooth_noise (p, 0.5, 2, seed + 30));
   if (p.y < kFloor + 1e-6)
     return light * Vec3{104, 108, 100};
   if (p.y > kCeiling - 1e-6)

@@ -170,6 +170,11 @@ check (const SceneSettings &s)
     return bad_setting ("noise", "0 to 20 grey levels");
   if (!(s.motion >= 0 && s.motion <= 2))
     return bad_setting ("motion", "0 to 2");
+  if (s.dress > kDressAll)
+    return bad_setting ("dress", "hair, glasses, collar, hand");
+  if (s.model_top_m != kTopAutomatic && s.model_top_m != kTopAll &&
+      !(s.model_top_m >= 0.1 && s.model_top_m <= kPersonHeight))
+    return bad_setting ("model-top", "-1, 0, or 0.1 to 1.8 metres");
   return check_room (s);
 }
 
@@ -218,9 +223,9 @@ scale_light (ImageView<Rgbx> colour, double factor)
     }
 }
 
-/** A figure as a camera sees it. */
+/** A mesh as a camera sees it. */
 void
-project (const Mesh &figure, const FigurePose &pose, const Intrinsics &in,
+project (const Mesh &mesh, const FigurePose &pose, const Intrinsics &in,
     const Pose &world_from_camera, std::vector<RasterVertex> &corners)
 {
   const Pose view_from_world = world_from_camera.inverse ();
@@ -234,9 +239,9 @@ project (const Mesh &figure, const FigurePose &pose, const Intrinsics &in,
   constexpr auto kNeck = static_cast<float> (kNeckHeight);
   constexpr float kNearest = 0.05f; ///< metres: nothing is drawn in front of that
 
-  corners.resize (figure.vertices.size ());
-  for (std::size_t i = 0; i < figure.vertices.size (); i++) {
-    const MeshVertex &v = figure.vertices[i];
+  corners.resize (mesh.vertices.size ());
+  for (std::size_t i = 0; i < mesh.vertices.size (); i++) {
+    const MeshVertex &v = mesh.vertices[i];
     Direction p = turned (pose, v.head, {v.x, v.y - kNeck, v.z});
     p = {p.x + pose.dx, p.y + kNeck, p.z + pose.dz};
     const Direction n = turned (pose, v.head, {v.nx, v.ny, v.nz});
@@ -244,7 +249,7 @@ project (const Mesh &figure, const FigurePose &pose, const Intrinsics &in,
     const float inverse = z > kNearest ? 1 / z : 0;
     corners[i] = {f * (r[0] * p.x + r[1] * p.y + r[2] * p.z + tx) * inverse + cx,
         f * (r[3] * p.x + r[4] * p.y + r[5] * p.z + ty) * inverse + cy, inverse, v.u, v.v,
-        light_on (n)};
+        light_on (n), mesh.double_sided ? light_on ({-n.x, -n.y, -n.z}) : 0};
   }
 }
 
@@ -253,11 +258,11 @@ project (const Mesh &figure, const FigurePose &pose, const Intrinsics &in,
 struct Scene::Impl {
   SceneSettings settings;
   Rig rig, range_rig;
-  std::vector<Mesh> figures; ///< one a person, or one model for all
+  std::vector<Figure> figures; ///< one a person, or one model for all
   NoiseTable noise;
   std::vector<CameraState> cameras;
 
-  [[nodiscard]] const Mesh &figure (int person) const
+  [[nodiscard]] const Figure &figure (int person) const
   {
     return figures[std::min (static_cast<std::size_t> (person), figures.size () - 1)];
   }
@@ -297,7 +302,7 @@ Scene::Impl::draw_chair (CameraState &camera, ImageView<Rgbx> room) const
   project (
       chair, pose_at (0, 0), rig.views[0].intrinsics, camera.world_from_camera, camera.corners);
   camera.rasteriser.begin (settings.width, settings.height, camera.room_depth);
-  camera.rasteriser.draw (camera.corners, chair.triangles, chair.texture, room);
+  camera.rasteriser.draw (camera.corners, chair, room);
   camera.room_depth.assign (
       camera.rasteriser.row (0), camera.rasteriser.row (0) + camera.room_depth.size ());
 }
@@ -309,11 +314,12 @@ Scene::Impl::draw_shadow (CameraState &camera, double time_s, ImageView<Rgbx> co
     camera.shadow = std::make_unique<ShadowMap> ();
   ShadowMap &shadow = *camera.shadow;
   shadow.begin ();
-  for (int i = 0; i < settings.persons; i++) {
-    project (figure (i), pose_of (i, time_s, settings.motion), shadow.intrinsics (),
-        shadow.world_from_lamp (), camera.corners);
-    shadow.add (camera.corners, figure (i));
-  }
+  for (int i = 0; i < settings.persons; i++)
+    for (const Mesh &mesh : figure (i)) {
+      project (mesh, pose_of (i, time_s, settings.motion), shadow.intrinsics (),
+          shadow.world_from_lamp (), camera.corners);
+      shadow.add (camera.corners, mesh);
+    }
   shadow.end ();
   shadow.darken (rig.views[0].intrinsics, camera.world_from_camera, camera.room_depth.data (),
       settings.cast_shadow, colour);
@@ -377,8 +383,10 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
   impl.settings = settings;
   if (settings.model.empty ())
     for (int i = 0; i < settings.persons; i++)
-      impl.figures.push_back (make_figure (settings.seed + static_cast<std::uint32_t> (i)));
-  else if (Status status = load_model (settings.model, settings.texture, settings.texture_flip,
+      impl.figures.push_back (
+          make_figure (settings.seed + static_cast<std::uint32_t> (i), settings.dress));
+  else if (Status status = load_model (
+               {settings.model, settings.texture, settings.texture_flip, settings.model_top_m},
                impl.figures.emplace_back ());
            !status.ok ())
     return status;
@@ -436,12 +444,12 @@ Scene::render (int view_id, SceneCamera which, double time_s, bool empty, ImageV
   camera.rasteriser.begin (s.width, s.height, camera.room_depth);
   if (!empty && s.cast_shadow > 0)
     impl_->draw_shadow (camera, time_s, colour);
-  for (int i = 0; !empty && i < s.persons; i++) {
-    const Mesh &figure = impl_->figure (i);
-    project (figure, pose_of (i, time_s, s.motion), impl_->rig.views[0].intrinsics,
-        camera.world_from_camera, camera.corners);
-    camera.rasteriser.draw (camera.corners, figure.triangles, figure.texture, colour);
-  }
+  for (int i = 0; !empty && i < s.persons; i++)
+    for (const Mesh &mesh : impl_->figure (i)) {
+      project (mesh, pose_of (i, time_s, s.motion), impl_->rig.views[0].intrinsics,
+          camera.world_from_camera, camera.corners);
+      camera.rasteriser.draw (camera.corners, mesh, colour);
+    }
   impl_->write_depth (camera, depth, mask);
   if (s.light_drift > 0)
     scale_light (colour, 1 + s.light_drift * wave (time_s, kLightPeriod));

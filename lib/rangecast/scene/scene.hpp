@@ -12,6 +12,15 @@
 
 namespace rangecast {
 
+/** What the built-in figure wears: surfaces one behind the other, which a bare head has not. */
+enum DressFlags : unsigned {
+  kDressHair = 1,    ///< long hair, with strands that hang free before cheeks and neck
+  kDressGlasses = 2, ///< thin rims before the eyes
+  kDressCollar = 4,  ///< a stiff white collar, open at the throat
+  kDressHand = 8,    ///< a forearm and an open hand before the chest
+  kDressAll = 15,
+};
+
 /** What the synthetic rig is made of. */
 struct SceneSettings {
   int views = 4;           ///< 1 .. kMaxViews
@@ -26,6 +35,9 @@ struct SceneSettings {
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
   std::string texture;     ///< picture for the model; empty: what the model names, or one beside it
   bool texture_flip = false; ///< turn the model's texture upside down
+  double model_top_m = -1;   ///< of a model of 1.8 m, kept from the crown down, 0.1 .. 1.8; 0: all
+                             ///< of it, 0.5 m large; -1: 0.5 m of a standing person, else all
+  unsigned dress = 0;        ///< what the built-in figure wears, DressFlags
 
   int persons = 1;    ///< figures, 1 .. kMaxPersons; the others stand 0.4 m behind, left and right
   double far_m = 1.3; ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls

@@ -73,8 +73,9 @@ private:
 class Builder {
 public:
   Builder (const ConstRangeImage &image, const StripSettings &settings,
-      std::vector<StripVertex> &to, StripResult &result)
-      : image_ (image), settings_ (settings), to_ (to), result_ (result),
+      std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes)
+      : image_ (image), colour_ (planes ? planes->colour_plane () : image.colour),
+        planes_ (planes), settings_ (settings), to_ (to), result_ (result),
         width_ (std::min (image.depth.width, kMaxStripSide)),
         height_ (std::min (image.depth.height, kMaxStripSide)),
         step_ (static_cast<int> (settings.depth_step * 65536)),
@@ -86,12 +87,12 @@ public:
 
   void build ()
   {
-    if (settings_.mode == StripMode::kStrips)
+    if (is_banded ())
       choose_kept (0, kept_below_);
     for (int y = 0; y < height_; y++) {
       depth_ = image_.depth.row (y);
       row_ = y;
-      if (settings_.mode == StripMode::kStrips) {
+      if (is_banded ()) {
         std::swap (kept_, kept_below_);
         if (y + 1 < height_)
           choose_kept (y + 1, kept_below_);
@@ -110,10 +111,27 @@ private:
     return Lanes{static_cast<float> (depth) + 1e-7f, c, c, c};
   }
 
+  [[nodiscard]] bool is_banded () const
+  {
+    return settings_.mode == StripMode::kBlend || settings_.mode == StripMode::kStrips;
+  }
+
   [[nodiscard]] bool near (int a, int b) const
   {
     return static_cast<std::int64_t> (std::abs (a - b)) * 65536 <=
            static_cast<std::int64_t> (std::min (a, b)) * step_;
+  }
+
+  /* Whether neighbours, both valid, are of one surface. */
+  [[nodiscard]] bool joins_pixel_right (int x, int y) const
+  {
+    return planes_ ? (colour_.at (x, y).x & kJoinsRight) != 0
+                   : near (image_.depth.at (x, y), image_.depth.at (x + 1, y));
+  }
+  [[nodiscard]] bool joins_pixel_below (int x) const
+  {
+    return planes_ ? (colour_.at (x, row_).x & kJoinsBelow) != 0
+                   : near (depth_[x], image_.depth.at (x, row_ + 1));
   }
 
   /* Where the lower vertex of a pixel is: on the pixel that many rows below, or, 0, at a place of
@@ -131,7 +149,7 @@ private:
     const int last = std::min (height_ - 1, row_ + 1 + settings_.max_gap);
     for (int y = row_ + 1; y <= last; y++)
       if (const std::uint16_t depth = image_.depth.at (x, y); depth != kInvalidDepth) {
-        if (near (depth_[x], depth))
+        if (y == row_ + 1 ? joins_pixel_below (x) : near (depth_[x], depth))
           return {static_cast<std::uint16_t> (y - row_), kCentre, depth};
         return {0, y == row_ + 1 && depth < depth_[x] ? kFullAfter : kFarAfter, depth_[x]};
       }
@@ -146,7 +164,7 @@ private:
       met_[x] = row_ > 0 && reach_[x] == row_;
       if (depth_[x] == kInvalidDepth)
         continue;
-      if (below && below[x] != kInvalidDepth && near (depth_[x], below[x]))
+      if (below && below[x] != kInvalidDepth && joins_pixel_below (x))
         lower_[x] = {1, kCentre, below[x]};
       else
         lower_[x] = lower_of (x);
@@ -161,7 +179,7 @@ private:
     const int last = std::min (width_ - 1, x + 1 + settings_.max_gap);
     for (int n = x + 1; n <= last; n++)
       if (depth_[n] != kInvalidDepth)
-        return near (depth_[x], depth_[n]) ? n : -1;
+        return (n == x + 1 ? joins_pixel_right (x, row_) : near (depth_[x], depth_[n])) ? n : -1;
     return -1;
   }
 
@@ -177,7 +195,7 @@ private:
   void choose_kept (int y, bool *kept) const
   {
     const std::uint16_t *depth = image_.depth.row (y);
-    const Rgbx *colour = image_.colour.row (y);
+    const Rgbx *colour = colour_.row (y);
     std::fill_n (kept, width_, settings_.merge <= 0);
     if (settings_.merge <= 0)
       return;
@@ -185,7 +203,7 @@ private:
     Lanes before{};
     int first = -1; /* where the piece begins; -1: none does */
     for (int x = 0; x < width_; x++) {
-      const bool on = first >= 0 && near (depth[x - 1], depth[x]); /* not if invalid: 0 */
+      const bool on = first >= 0 && depth[x] != kInvalidDepth && joins_pixel_right (x - 1, y);
       if (first >= 0 && !on) {
         kept[x - 1] = true;
         first = -1;
@@ -203,7 +221,7 @@ private:
       const bool copy = depth[x] == depth[x - 1] && same_colour (colour[x], colour[x - 1]);
       const Lanes off = tolerance (copy, depth[x]);
       if (x - first > kLongestPiece || !near (depth[first], depth[x]) ||
-          !cone.take (here, x - first, off)) {
+          !cone.take (here, x - first, off) || weight_steps (first, x, y)) {
         kept[x - 1] = true;
         cone.begin (before);
         cone.take (here, 1, off);
@@ -215,10 +233,25 @@ private:
       kept[width_ - 1] = true;
   }
 
+  /* Whether weights within a piece are far from what they are at its first pixel. */
+  [[nodiscard]] bool weight_steps (int first, int x, int y) const
+  {
+    constexpr int kFar = 40; /* of 255 */
+    const auto weight = [&] (int at) {
+      return planes_->weight[static_cast<std::size_t> (y) *
+                                 static_cast<std::size_t> (planes_->width) +
+                             static_cast<std::size_t> (at)];
+    };
+    return planes_ && std::abs (weight (x) - weight (first)) > kFar;
+  }
+
   /* Whether the step from pixel a to b can use what lies below them: both of its triangles then
    * have depths that are near, each to each. */
   [[nodiscard]] bool step_fits_below (int a, int b) const
   {
+    if (planes_ && lower_[a].rows == 1 && lower_[b].rows == 1 && b == a + 1 &&
+        !joins_pixel_right (a, row_ + 1))
+      return false;
     return near (lower_[a].depth, depth_[b]) && near (lower_[a].depth, lower_[b].depth);
   }
 
@@ -235,7 +268,7 @@ private:
   /* A band begins where the one above ends, or at the upper edge of its pixels. */
   [[nodiscard]] StripVertex upper (int x, StripPlace horizontal) const
   {
-    return strip_vertex (x, row_, horizontal, met_[x] ? kCentre : kBefore);
+    return strip_vertex (x, row_, horizontal, met_[x] ? kCentre : planes_ ? kFarBefore : kBefore);
   }
 
   /* The two vertices of a pixel, or of an end of the band beside it. */
@@ -345,6 +378,56 @@ private:
   {
     for (int x = 0; x < width_;)
       x = depth_[x] == kInvalidDepth ? x + 1 : band (x);
+    for (int x = 0; planes_ && x + 1 < width_; x++)
+      if (depth_[x] != kInvalidDepth) {
+        bridge_right (x);
+        bridge_down (x);
+      }
+  }
+
+  /* Whether both sides of what hides a surface are that surface. */
+  [[nodiscard]] bool is_level (int a, int b) const
+  {
+    return std::abs (a - b) <= planes_->steep_step * std::min (a, b);
+  }
+
+  void bridge (int left, int right, int top, int bottom)
+  {
+    begin_piece (strip_vertex (left, top, kBehind, kCentre));
+    for (const int x : {left, right})
+      for (const int y : {top, bottom})
+        to_.push_back (strip_vertex (x, y, kBehind, kCentre));
+    result_.triangles += 2;
+  }
+
+  /* What nearer pixels of this row hide, between two steps down of one surface. */
+  void bridge_right (int x)
+  {
+    if (row_ + 1 >= height_ || depth_[x + 1] == kInvalidDepth || depth_[x + 1] >= depth_[x] ||
+        joins_pixel_right (x, row_) || !joins_pixel_below (x))
+      return;
+    for (int n = x + 2; n < width_ && n <= x + 1 + kWidestHidden; n++)
+      if (depth_[n] != kInvalidDepth && is_level (depth_[x], depth_[n])) {
+        if (joins_pixel_below (n))
+          bridge (x, n, row_, row_ + 1);
+        return;
+      }
+  }
+
+  /* The same of two columns. */
+  void bridge_down (int x)
+  {
+    if (row_ + 1 >= height_ || !joins_pixel_right (x, row_))
+      return;
+    const std::uint16_t below = image_.depth.at (x, row_ + 1);
+    if (below == kInvalidDepth || below >= depth_[x] || joins_pixel_below (x))
+      return;
+    for (int y = row_ + 2; y < height_ && y <= row_ + 1 + kWidestHidden; y++)
+      if (const int depth = image_.depth.at (x, y); depth != kInvalidDepth && is_level (depth_[x], depth)) {
+        if (joins_pixel_right (x, y))
+          bridge (x, x + 1, row_, y);
+        return;
+      }
   }
 
   void pixels_of_row ()
@@ -361,6 +444,8 @@ private:
   }
 
   const ConstRangeImage &image_;
+  const ImageView<const Rgbx> colour_;
+  const BlendPlanes *const planes_; /* or nullptr */
   const StripSettings &settings_;
   std::vector<StripVertex> &to_;
   StripResult &result_;
@@ -382,11 +467,11 @@ private:
 
 void
 build_strips (const ConstRangeImage &image, const StripSettings &settings,
-    std::vector<StripVertex> &to, StripResult &result)
+    std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes)
 {
   to.clear ();
   if (!image.roi.empty ())
-    Builder (image, settings, to, result).build ();
+    Builder (image, settings, to, result, planes).build ();
 }
 
 } // namespace rangecast

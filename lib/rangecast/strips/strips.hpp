@@ -5,17 +5,19 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
+#include "../surface/blend_planes.hpp"
 
 namespace rangecast {
 
 enum class StripMode {
+  kBlend,      ///< as kStrips; colours of all views of a surface are blended
   kStrips,     ///< bands of triangles along the rows
   kRectangles, ///< one rectangle a pixel
   kPoints,     ///< one point a pixel
 };
 
 struct StripSettings {
-  StripMode mode = StripMode::kStrips;
+  StripMode mode = StripMode::kBlend;
   double depth_step = 0.03; ///< neighbours that differ by more than this share of their depth do
                             ///< not belong to one surface
   int max_gap = 2; ///< invalid pixels that a strip bridges if its two ends are near in depth
@@ -41,6 +43,7 @@ using StripVertex = std::uint32_t;
 enum StripPlace : std::uint32_t {
   kFarBefore = 0, ///< three quarters: an end of a band, so that it meets what another camera saw
   kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
+  kBehind = 2,    ///< horizontal, mode kBlend: the pixel's own place, on what lies behind others
   kCentre = 3,
   kAfter = 5, ///< half a pixel right or down
   kFarAfter = 6,
@@ -54,6 +57,8 @@ strip_offset (StripPlace place)
 }
 /** Pixels in a row that one piece stands for, at most. */
 inline constexpr int kLongestPiece = 32;
+/** Pixels that hide a surface which goes on behind them, in a row or a column, at most. */
+inline constexpr int kWidestHidden = 8;
 /** No image that is drawn is larger, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -87,11 +92,15 @@ struct StripResult {
  *  The bands above and below a row leave out the same ones, so that no crack opens there. Between
  *  pixels that stay no step is larger than depth_step allows.
  *
+ *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say. What at
+ *  most kWidestHidden nearer pixels hide of a surface is bridged behind them (kBehind).
+ *
  *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn
  *  @param[out] to    replaced; keeps its memory
+ *  @param planes     mode kBlend: of the image
  *  Reentrant. */
 void build_strips (const ConstRangeImage &image, const StripSettings &settings,
-    std::vector<StripVertex> &to, StripResult &result);
+    std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes = nullptr);
 
 } // namespace rangecast

@@ -33,6 +33,7 @@ scene_settings (const HeadSettings &settings, double noise)
   s.noise_sigma = noise;
   s.motion = 0; /* so that the mesh as it is loaded is the truth */
   s.model = settings.model;
+  s.dress = settings.dress;
   return s;
 }
 
@@ -47,20 +48,26 @@ view_of (std::vector<T> &pixels, const View &view)
 Status
 make_surface (const HeadSettings &settings, Head &head)
 {
-  Mesh mesh;
+  Figure figure;
   if (settings.model.empty ())
-    mesh = make_figure (SceneSettings{}.seed);
-  else if (Status s = load_model (settings.model, "", false, mesh); !s.ok ())
+    figure = make_figure (SceneSettings{}.seed, settings.dress);
+  else if (Status s = load_model ({settings.model, "", false}, figure); !s.ok ())
     return s;
   std::vector<Vec3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
   Vec3 nose{0, 0, -1};
-  for (const MeshVertex &v : mesh.vertices) {
-    vertices.push_back ({v.x, v.y, v.z});
-    if (v.y > kNeck && v.z > nose.z)
-      nose = vertices.back ();
+  for (const Mesh &mesh : figure) {
+    const auto first = static_cast<std::uint32_t> (vertices.size ());
+    for (const MeshVertex &v : mesh.vertices) {
+      vertices.push_back ({v.x, v.y, v.z});
+      if (v.y > kNeck && v.z > nose.z)
+        nose = vertices.back ();
+    }
+    for (const auto &t : mesh.triangles)
+      triangles.push_back ({first + t[0], first + t[1], first + t[2]});
   }
   head.nose_y = nose.y;
-  head.surface = std::make_shared<Surface> (std::move (vertices), mesh.triangles);
+  head.surface = std::make_shared<Surface> (std::move (vertices), std::move (triangles));
   return {};
 }
 

@@ -18,7 +18,8 @@ enum class DepthNoise {
 const char *name_of (DepthNoise noise);
 
 struct HeadSettings {
-  std::string model; ///< glTF or OBJ; empty: the built-in figure
+  std::string model;  ///< glTF or OBJ; empty: the built-in figure
+  unsigned dress = 0; ///< of the built-in figure, rangecast::DressFlags
   int views = 4, width = 320, height = 240;
   DepthNoise noise = DepthNoise::kExact;
   double colour_noise = 0;          ///< of the pictures, grey levels

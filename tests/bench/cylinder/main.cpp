@@ -30,6 +30,9 @@ const char *const kUsage =
     "  --bunny DIR     also what pipelines/bunny-to-range.py wrote there (--truth: that alone)\n"
     "With --truth: a head of known surface, seen by cameras on a ring, before and after.\n"
     "  --model FILE    glTF or OBJ (default: the built-in figure)\n"
+    "  --dress PIECES  of the built-in figure: none, all, or hair, glasses, collar and hand with "
+    "+\n"
+    "                  between (default: none; --truth without a pose: then all, rig right)\n"
     "  --views N       cameras, 2 to 64 (default: 4, then 8)\n"
     "  --size WxH      of their pictures (default 320x240)\n"
     "  --noise KIND    of depth: exact; smooth, normal with 3 mm and alike over some 10 pixels;\n"
@@ -172,9 +175,9 @@ idle_option (const Job &job)
   const TruthJob &truth = job.truth;
   const bool of_head = job.want_truth || job.want_colour || !job.picture.empty ();
   const std::pair<const char *, bool> of_heads[] = {{"--model", !truth.model.empty ()},
-      {"--views", truth.views != 0}, {"--noise", truth.noise.has_value ()},
-      {"--pose-mm", truth.pose_mm >= 0}, {"--pose-deg", truth.pose_deg >= 0},
-      {"--mesh", !truth.mesh.empty ()}};
+      {"--dress", truth.dress.has_value ()}, {"--views", truth.views != 0},
+      {"--noise", truth.noise.has_value ()}, {"--pose-mm", truth.pose_mm >= 0},
+      {"--pose-deg", truth.pose_deg >= 0}, {"--mesh", !truth.mesh.empty ()}};
   for (const auto &[name, given] : of_heads)
     if (given && !of_head)
       return std::string (name) + ": expected --truth, --colour or --picture, too";
@@ -208,6 +211,7 @@ main (int argc, char **argv)
   options.flag ("--colour", job.want_colour);
   options.number ("--blend-width", job.blend_width, 0.001, 1.0);
   options.text ("--model", truth.model);
+  options.dress ("--dress", truth.dress);
   options.text ("--mesh", truth.mesh);
   options.number ("--views", truth.views, 2, kMaxViews);
   options.size ("--size", truth.width, truth.height, 64, 4096);

@@ -2,6 +2,7 @@
 #include "truth_run.hpp"
 
 #include <functional>
+#include <rangecast/scene/scene.hpp>
 
 #include "peers.hpp"
 #include "picture.hpp"
@@ -65,7 +66,7 @@ run_head (const TruthJob &job, const HeadSettings &settings, std::vector<TruthRo
   const Judge judge (
       head.set, *head.surface, visible_places (*head.surface, head.rig, head.depth), head.nose_y);
   TruthRow row;
-  row.scene = settings.model.empty () ? "figure" : "head";
+  row.scene = !settings.model.empty () ? "head" : settings.dress ? "dressed" : "figure";
   row.views = settings.views;
   row.noise = name_of (settings.noise);
   row.pose_mm = settings.pose_mm;
@@ -106,6 +107,7 @@ heads_of (const TruthJob &job)
 {
   HeadSettings head;
   head.model = job.model;
+  head.dress = job.dress.value_or (0);
   head.width = job.width;
   head.height = job.height;
   const double poses[][2] = {{0, 0}, {2, 0}, {5, 0}, {0, 0.5}};
@@ -136,6 +138,15 @@ run_truth (const TruthJob &job, std::vector<TruthRow> &rows)
   for (const HeadSettings &settings : heads_of (job))
     if (Status s = run_head (job, settings, rows); !s.ok ())
       return s;
+  if (!job.model.empty () || job.dress || job.pose_mm >= 0 || job.pose_deg >= 0)
+    return {};
+  for (HeadSettings settings : heads_of (job)) { /* with the right rig alone */
+    settings.dress = kDressAll;
+    if (settings.pose_mm > 0 || settings.pose_deg > 0)
+      continue;
+    if (Status s = run_head (job, settings, rows); !s.ok ())
+      return s;
+  }
   return {};
 }
 

@@ -12,8 +12,9 @@
 namespace bench {
 
 struct TruthJob {
-  std::string model;       ///< empty: the built-in figure
-  std::string bunny, mesh; ///< folder of range images, and the merged mesh; empty: the head
+  std::string model;             ///< empty: the built-in figure
+  std::optional<unsigned> dress; ///< of the built-in figure; nothing: bare, then all of it
+  std::string bunny, mesh;       ///< folder of range images, and the merged mesh; empty: the head
   int width = 320, height = 240;
   int views = 0;                      ///< 0: four and eight
   std::optional<DepthNoise> noise;    ///< nothing: all

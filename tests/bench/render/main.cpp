@@ -10,6 +10,7 @@
 #include <ctime>
 #include <list>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <rangecast/strips/orbit.hpp>
 #include <rangecast/strips/scene_hull.hpp>
 
@@ -24,7 +25,8 @@ using namespace bench;
 namespace {
 
 const char *const kUsage =
-    "usage: render_bench [--model FILE] [--size WxH] [--rounds N] [--json FILE] [--pictures DIR]\n"
+    "usage: render_bench [--model FILE] [--dress PIECES] [--size WxH] [--rounds N] [--json FILE] "
+    "[--pictures DIR]\n"
     "Draws four views of the test scene in 640x480, as striprender does, in each mode, and judges\n"
     "the pictures by the scene rendered from the same places: 0, 20 and 45 degrees off the "
     "nearest\n"
@@ -37,10 +39,19 @@ const char *const kUsage =
     "surface, and point-cloud, GL points; both from a vertex buffer that the CPU unprojects into.\n"
     "  ms      one picture from depth and colour until the GPU has finished, median\n"
     "  CPU ms  processor time of all threads for it, median: what a busy machine changes less\n"
-    "  holes   share of the figure's pixels that are not drawn\n"
+    "Truth and picture lie over mid-grey by their own coverage; what no camera sees does not "
+    "count:\n"
+    "  SSIM all  over the figure, its outline and everything drawn beside it\n"
+    "  holes   share of the figure's seen pixels that are not drawn\n"
+    "  edge    distance between the outlines, both ways, pixels: mean, and what 95 % keep within\n"
+    "  PSNR, SSIM  3 pixels and more inside of both outlines\n"
+    "  seam    gradients inside that the truth has not, over those that it has\n"
+    "  bad     share of the pixels inside that are more than 40 levels off\n"
     "  spill   pixels drawn beside the figure, as a share of the figure's\n"
-    "  PSNR, SSIM  over the pixels that have both\n"
     "  --model FILE    glTF or OBJ model (default: the built-in figure)\n"
+    "  --dress PIECES  of the built-in figure: none, all, or hair, glasses, collar and hand with "
+    "+\n"
+    "                  between (default: none, then all)\n"
     "  --size WxH      of the range images (default 320x240)\n"
     "  --rounds N      times are medians of so many (default 15)\n"
     "  --merge N       of the strips (default 1)\n"
@@ -76,8 +87,14 @@ median (std::vector<double> values)
   return values[values.size () / 2];
 }
 
+/* striprender's own ways, beside the peers. */
+constexpr std::pair<const char *, StripMode> kModes[] = {{"strips", StripMode::kStrips},
+    {"rectangles", StripMode::kRectangles}, {"points", StripMode::kPoints}};
+
 struct Job {
   SceneSettings scene;
+  std::string scene_name;
+  std::optional<unsigned> dress; /* empty: the figure bare and dressed */
   int rounds = 15;
   double merge = StripSettings{}.merge;
   double view_gap_m = StripPainter::Picture{}.view_gap_m;
@@ -127,9 +144,8 @@ make_ways (Job &job, Kind &kind)
     settings.max_gap = job.max_gap;
     kind.ways.push_back (make_strip_way (name, job.painter, set, settings));
   };
-  strips ("strips", kind.set, StripMode::kStrips);
-  strips ("rectangles", kind.set, StripMode::kRectangles);
-  strips ("points", kind.set, StripMode::kPoints);
+  for (const auto &[name, mode] : kModes)
+    strips (name, kind.set, mode);
   if (!kind.coded.images.empty ()) { /* of exact depth */
     strips ("strips-merged", kind.coded, StripMode::kStrips);
     StripSettings settings;
@@ -205,15 +221,13 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
     target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg, job.view_gap_m));
     const cv::Mat rgba = target.read ();
     score.add (shot, rgba);
-    const std::string path = job.pictures + "/" + row.depth + "-" + row.mode + "-" +
+    const std::string scene = row.scene == "dressed" ? "dressed-" : "";
+    const std::string path = job.pictures + "/" + scene + row.depth + "-" + row.mode + "-" +
                              std::to_string (int (shot.azimuth_deg)) + ".png";
     if (!job.pictures.empty () && !cv::imwrite (path, comparison (shot, rgba)))
       job.status = {StatusCode::kNotFound, "--pictures: " + path + " cannot be written"};
   }
-  row.holes = score.holes ();
-  row.spill = score.spill ();
-  row.psnr_db = score.psnr ();
-  row.ssim = score.ssim ();
+  row.score = score;
 }
 
 void
@@ -222,6 +236,7 @@ measure (Job &job, const Kind &kind, Target &target, int angle_deg, const std::v
   std::vector<RenderRow> rows;
   for (const auto &way : kind.ways) {
     rows.emplace_back ();
+    rows.back ().scene = job.scene_name;
     rows.back ().mode = way->name ();
     rows.back ().depth = kind.depth;
     rows.back ().angle_deg = angle_deg;
@@ -236,27 +251,22 @@ measure (Job &job, const Kind &kind, Target &target, int angle_deg, const std::v
 }
 
 Status
-run (Job &job)
+run_scene (Job &job)
 {
-  GError *error = nullptr;
-  if (!job.painter.start (job.context, &error) || !job.held_painter.start (job.context, &error)) {
-    const std::string why = error ? error->message : "no shader";
-    g_clear_error (&error);
-    return {StatusCode::kUnsupported, why};
-  }
   std::list<Kind> kinds; /* which stay where they are */
   std::vector<Shot> shots[std::size (kAngles)];
   Status status;
   for (const char *depth : {"exact", "stereo", "noise"})
     if (status.ok () && (job.depth.empty () || job.depth == depth))
       status = make_kind (job, depth, kinds.emplace_back ());
+  FrameSet cameras;
+  if (status.ok ())
+    status = exact_frames (job.scene, cameras);
   for (std::size_t i = 0; i < std::size (kAngles) && status.ok (); i++)
-    status = make_truth (job.scene, kAngles[i], shots[i]);
+    status = make_truth (job.scene, cameras, kAngles[i], shots[i]);
   Target target (job.context);
   if (status.ok () && !target.usable ())
     status = {StatusCode::kUnsupported, "OpenGL has no framebuffer to draw into"};
-  if (status.ok ())
-    print_head ();
   for (Kind &kind : kinds)
     std::erase_if (kind.ways,
         [&] (const auto &way) { return !job.mode.empty () && job.mode != way->name (); });
@@ -266,9 +276,31 @@ run (Job &job)
   return status;
 }
 
+Status
+run (Job &job)
+{
+  GError *error = nullptr;
+  if (!job.painter.start (job.context, &error) || !job.held_painter.start (job.context, &error)) {
+    const std::string why = error ? error->message : "no shader";
+    g_clear_error (&error);
+    return {StatusCode::kUnsupported, why};
+  }
+  print_head ();
+  Status status;
+  for (const unsigned dress : {0u, unsigned (kDressAll)}) {
+    job.scene.dress = job.dress.value_or (dress);
+    job.scene_name = !job.scene.model.empty () ? "model" : job.scene.dress ? "dressed" : "figure";
+    if (status.ok ())
+      status = run_scene (job);
+    if (job.dress || !job.scene.model.empty ())
+      break;
+  }
+  return status;
+}
+
 /* Whether an argument is one of some names; if not, says so. */
 bool
-is_one_of (const char *option, const std::string &value, std::initializer_list<const char *> names)
+is_one_of (const char *option, const std::string &value, const std::vector<const char *> &names)
 {
   std::string expected;
   for (const char *name : names) {
@@ -300,6 +332,7 @@ main (int argc, char **argv)
   Job job;
   Options options ("render_bench", kUsage);
   options.text ("--model", job.scene.model);
+  options.dress ("--dress", job.dress);
   options.size ("--size", job.scene.width, job.scene.height, 16, 1920);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.number ("--merge", job.merge, 0, 100);
@@ -312,8 +345,10 @@ main (int argc, char **argv)
   options.text ("--pictures", job.pictures);
   if (const auto status = options.parse (argc, argv))
     return *status;
-  if (!is_one_of ("--mode", job.mode,
-          {"strips", "rectangles", "points", "strips-merged", "grid", "point-cloud"}) ||
+  std::vector<const char *> modes{"strips-merged", "strips-held", "grid", "point-cloud"};
+  for (const auto &[name, mode] : kModes)
+    modes.push_back (name);
+  if (!is_one_of ("--mode", job.mode, modes) ||
       !is_one_of ("--depth", job.depth, {"exact", "stereo", "noise"}))
     return 2;
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY")) { /* software, if nothing is chosen */

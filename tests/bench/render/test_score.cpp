@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "truth.hpp"
+#include "score.hpp"
 
 using namespace bench;
 
@@ -16,66 +16,140 @@ constexpr int kSide = 160;
 cv::Mat
 grey_noise (unsigned seed)
 {
-  cv::Mat grey (kSide, kSide, CV_8U), colours[4];
+  cv::Mat grey (kSide, kSide, CV_8U), rgb;
   std::mt19937 random (seed);
   for (auto &level : cv::Mat_<uchar> (grey))
     level = static_cast<uchar> (100 + random () % 100);
-  for (int i = 0; i < 3; i++)
-    colours[i] = grey;
-  colours[3] = cv::Mat (kSide, kSide, CV_8U, cv::Scalar (255));
-  cv::Mat rgba;
-  cv::merge (colours, 4, rgba);
-  return rgba;
+  cv::cvtColor (grey, rgb, cv::COLOR_GRAY2RGB);
+  return rgb;
 }
 
-/* Lines so wide, with gaps of the same width between them; 0: everywhere. */
 cv::Mat
-lines (int width)
+mask_of (cv::Rect box)
 {
-  cv::Mat mask (kSide, kSide, CV_8U, cv::Scalar (255));
-  for (int x = 0; width > 0 && x < kSide; x++)
-    mask.col (x) = cv::Scalar (x / width % 2 ? 255 : 0);
+  cv::Mat mask (kSide, kSide, CV_8U, cv::Scalar (0));
+  mask (box) = 255;
   return mask;
 }
 
-double
-ssim_of (const cv::Mat &truth, const cv::Mat &picture, const cv::Mat &mask)
+/* A figure that some camera sees wholly. */
+Shot
+shot_of (const cv::Mat &rgb, const cv::Mat &mask)
+{
+  return {0, rgb, mask, mask.clone ()};
+}
+
+cv::Mat
+drawn (const cv::Mat &rgb, const cv::Mat &alpha)
+{
+  const int channels[] = {0, 0, 1, 1, 2, 2, 3, 3};
+  cv::Mat parts[] = {rgb, alpha};
+  cv::Mat rgba (rgb.size (), CV_8UC4);
+  cv::mixChannels (parts, 2, &rgba, 1, channels, 4);
+  return rgba;
+}
+
+Score
+score_of (const Shot &shot, const cv::Mat &rgba)
 {
   Score score;
-  score.add ({0, truth, mask}, picture);
-  return score.ssim ();
+  score.add (shot, rgba);
+  return score;
 }
 
-TEST (RenderScore, ssim_of_unrelated_pictures_is_as_low_along_outlines_as_inside)
+const cv::Rect kBox{20, 30, 100, 80};
+
+TEST (RenderScore, perfect_picture_has_ssim_1_and_no_faults)
 {
-  const cv::Mat truth = grey_noise (1), picture = grey_noise (2);
-  const double inside = ssim_of (truth, picture, lines (0));
-  EXPECT_LT (inside, 0.1);
-  for (int width : {3, 8, 20})
-    EXPECT_NEAR (ssim_of (truth, picture, lines (width)), inside, 0.05) << width;
+  const cv::Mat rgb = grey_noise (1), mask = mask_of (kBox);
+  const Score score = score_of (shot_of (rgb, mask), drawn (rgb, mask));
+  EXPECT_NEAR (score.ssim (), 1, 1e-6);
+  EXPECT_NEAR (score.ssim_all (), 1, 1e-6);
+  EXPECT_GT (score.psnr (), 100);
+  EXPECT_EQ (score.holes () + score.spill () + score.edge_px () + score.seam () + score.bad (), 0);
 }
 
-TEST (RenderScore, ssim_is_1_of_equal_pictures_whatever_lies_beside_the_figure)
+TEST (RenderScore, what_lies_beside_the_figure_does_not_count_where_nothing_is_drawn)
 {
-  const cv::Mat truth = grey_noise (1), mask = lines (5);
+  const cv::Mat mask = mask_of (kBox), truth = grey_noise (1);
   cv::Mat picture = grey_noise (2);
   truth.copyTo (picture, mask);
-  EXPECT_NEAR (ssim_of (truth, picture, mask), 1, 1e-4);
+  EXPECT_NEAR (score_of (shot_of (truth, mask), drawn (picture, mask)).ssim_all (), 1, 1e-6);
 }
 
-TEST (RenderScore, holes_and_spill_are_shares_of_the_figure)
+TEST (RenderScore, unrelated_textures_have_no_ssim)
 {
-  const cv::Mat truth = grey_noise (1);
-  cv::Mat mask (kSide, kSide, CV_8U, cv::Scalar (0)), picture = truth.clone ();
-  mask (cv::Rect (20, 20, 100, 100)) = 255;
-  picture.setTo (0);
-  cv::Mat drawn = picture (cv::Rect (30, 20, 100, 100)); /* ten columns too far right */
-  truth (cv::Rect (30, 20, 100, 100)).copyTo (drawn);
-  Score score;
-  score.add ({0, truth, mask}, picture);
+  const cv::Mat mask = mask_of (kBox);
+  const Score score = score_of (shot_of (grey_noise (1), mask), drawn (grey_noise (2), mask));
+  EXPECT_LT (score.ssim (), 0.1);
+  EXPECT_GT (score.bad (), 0.2);
+}
+
+TEST (RenderScore, picture_beside_its_place_has_holes_spill_and_a_distant_edge)
+{
+  const cv::Mat rgb = grey_noise (1), mask = mask_of (kBox),
+                beside = mask_of (kBox + cv::Point (10, 0));
+  const Score score = score_of (shot_of (rgb, mask), drawn (rgb, beside));
   EXPECT_DOUBLE_EQ (score.holes (), 0.1);
   EXPECT_DOUBLE_EQ (score.spill (), 0.1);
-  EXPECT_GT (score.psnr (), 100);
+  EXPECT_NEAR (score.edge95_px (), 10, 1);
+  EXPECT_GT (score.edge_px (), 3);
+  EXPECT_LT (score.ssim_all (), 0.95);
+}
+
+TEST (RenderScore, what_no_camera_saw_is_no_hole)
+{
+  const cv::Mat rgb = grey_noise (1), mask = mask_of (kBox);
+  cv::Mat alpha = mask.clone ();
+  const cv::Rect unseen (60, 60, 20, 20);
+  alpha (unseen) = 0;
+  Shot shot = shot_of (rgb, mask);
+  EXPECT_NEAR (score_of (shot, drawn (rgb, alpha)).holes (), 0.05, 1e-9);
+  shot.seen (unseen) = 0;
+  const Score score = score_of (shot, drawn (rgb, alpha));
+  EXPECT_EQ (score.holes (), 0);
+  EXPECT_EQ (score.edge_px (), 0);
+  EXPECT_NEAR (score.psnr (), score_of (shot, drawn (rgb, mask)).psnr (), 1e-9);
+}
+
+TEST (RenderScore, line_across_the_figure_is_a_seam)
+{
+  const cv::Mat mask = mask_of (kBox);
+  cv::Mat shaded (kSide, kSide, CV_8UC3); /* so that the truth has gradients of its own */
+  for (int x = 0; x < kSide; x++)
+    shaded.col (x) = cv::Scalar::all (80 + x / 2);
+  cv::Mat picture = shaded.clone ();
+  picture.colRange (70, kSide) += cv::Scalar::all (20);
+  EXPECT_EQ (score_of (shot_of (shaded, mask), drawn (shaded, mask)).seam (), 0);
+  EXPECT_GT (score_of (shot_of (shaded, mask), drawn (picture, mask)).seam (), 0.1);
+}
+
+TEST (RenderScore, half_covered_outline_is_no_fault_where_the_truth_is_half_covered_too)
+{
+  const cv::Mat rgb = grey_noise (1);
+  cv::Mat soft = mask_of (kBox);
+  soft.col (kBox.x) *= 0.4;
+  const Score same = score_of (shot_of (rgb, soft), drawn (rgb, soft));
+  EXPECT_NEAR (same.ssim_all (), 1, 1e-6);
+  const Score hard = score_of (shot_of (rgb, soft), drawn (rgb, mask_of (kBox)));
+  EXPECT_LT (hard.ssim_all (), same.ssim_all ());
+}
+
+TEST (RenderScore, figures_are_means_over_the_pictures)
+{
+  const cv::Mat rgb = grey_noise (1), mask = mask_of (kBox);
+  Score score;
+  score.add (shot_of (rgb, mask), drawn (rgb, mask));
+  score.add (shot_of (rgb, mask), drawn (rgb, mask_of (kBox + cv::Point (10, 0))));
+  EXPECT_DOUBLE_EQ (score.holes (), 0.05);
+}
+
+TEST (RenderScore, empty_picture_is_all_hole)
+{
+  const cv::Mat rgb = grey_noise (1), mask = mask_of (kBox);
+  const Score score = score_of (shot_of (rgb, mask), drawn (rgb, mask_of ({0, 0, 0, 0})));
+  EXPECT_EQ (score.holes (), 1);
+  EXPECT_EQ (score.ssim (), 0);
 }
 
 } // namespace

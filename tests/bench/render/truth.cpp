@@ -5,8 +5,6 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
-#include "frames.hpp"
-
 using namespace rangecast;
 
 namespace bench {
@@ -18,6 +16,9 @@ struct Ring {
 };
 constexpr Ring kRings[] = {{0, 4, {0, 1, 2, 3}}, {20, 18, {1, 8, 10, 17}}, {45, 8, {1, 3, 5, 7}}};
 
+constexpr int kSamples = 2; /* each way, of a pixel */
+constexpr double kSeenWithinM = 0.004;
+
 template <typename T>
 ImageView<T>
 view_of (cv::Mat &m)
@@ -25,116 +26,114 @@ view_of (cv::Mat &m)
   return {reinterpret_cast<T *> (m.data), m.cols, m.rows, std::ptrdiff_t (m.step)};
 }
 
-cv::Mat
-drawn (const cv::Mat &rgba)
+/* Whether a camera has a depth near a point's, in the pixel that the point falls on or beside it.
+ */
+bool
+sees (const RangeImage &image, const View &view, Vec3 world)
 {
-  cv::Mat alpha;
-  cv::extractChannel (rgba, alpha, 3);
-  return alpha >= 128;
+  const Vec3 p = view.world_from_view.inverse () * world;
+  if (p.z <= 0)
+    return false;
+  const Intrinsics &lens = view.intrinsics;
+  const int u = int (std::lround (lens.fx * p.x / p.z + lens.cx)) - image.roi.x,
+            v = int (std::lround (lens.fy * p.y / p.z + lens.cy)) - image.roi.y;
+  for (int y = std::max (v - 1, 0); y <= std::min (v + 1, image.roi.height - 1); y++)
+    for (int x = std::max (u - 1, 0); x <= std::min (u + 1, image.roi.width - 1); x++)
+      if (const int depth = image.depth.at (x, y))
+        if (std::abs (depth * view.depth_unit_m - p.z) < kSeenWithinM)
+          return true;
+  return false;
 }
 
-/* The luma, 0 where the other picture has nothing. */
 cv::Mat
-luma_in (const cv::Mat &rgba, const cv::Mat &where)
+seen_by (const FrameSet &cameras, const View &from, const cv::Mat &depth)
 {
-  cv::Mat grey, luma = cv::Mat::zeros (rgba.size (), CV_32F);
-  cv::cvtColor (rgba, grey, cv::COLOR_RGBA2GRAY);
-  grey.convertTo (grey, CV_32F);
-  grey.copyTo (luma, where);
-  return luma;
+  cv::Mat seen = cv::Mat::zeros (depth.size (), CV_8U);
+  for (int y = 0; y < depth.rows; y++)
+    for (int x = 0; x < depth.cols; x++) {
+      const int z = depth.at<std::uint16_t> (y, x);
+      if (z == kInvalidDepth)
+        continue;
+      const Vec3 world =
+          from.world_from_view * from.intrinsics.unproject (x, y, z * from.depth_unit_m);
+      for (const RangeImage &image : cameras.images)
+        if (sees (image, *cameras.rig.find (image.view_id), world)) {
+          seen.at<uchar> (y, x) = 255;
+          break;
+        }
+    }
+  return seen;
 }
 
-/* Windows see only the pixels that both pictures have, which `where` tells: the zeros beyond would
- * be an edge that both have in common, and make pictures alike along their outlines. */
-double
-sum_of_ssim (const cv::Mat &a, const cv::Mat &b, const cv::Mat &where)
+Status
+make_scene (SceneSettings settings, const Ring &ring, int samples, std::unique_ptr<Scene> &scene)
 {
-  const auto sums = [] (const cv::Mat &m) {
-    cv::Mat out;
-    cv::GaussianBlur (m, out, {11, 11}, 1.5);
-    return out;
-  };
-  cv::Mat ones;
-  where.convertTo (ones, CV_32F, 1 / 255.0);
-  const cv::Mat weights = cv::max (sums (ones), 1e-6);
-  const auto mean = [&] (const cv::Mat &m) -> cv::Mat { return sums (m) / weights; };
-  constexpr double kC1 = 0.01 * 255 * 0.01 * 255, kC2 = 0.03 * 255 * 0.03 * 255;
-  const cv::Mat ma = mean (a), mb = mean (b), maa = ma.mul (ma), mbb = mb.mul (mb),
-                mab = ma.mul (mb);
-  const cv::Mat va = mean (a.mul (a)) - maa, vb = mean (b.mul (b)) - mbb,
-                vab = mean (a.mul (b)) - mab;
-  const cv::Mat above = (2 * mab + kC1).mul (2 * vab + kC2);
-  const cv::Mat below = (maa + mbb + kC1).mul (va + vb + kC2);
-  cv::Mat ssim, inside;
-  cv::divide (above, below, ssim);
-  ssim.copyTo (inside, where);
-  return cv::sum (inside)[0];
+  settings.views = ring.cameras;
+  settings.arc_deg = 360;
+  settings.width = kWidth * samples;
+  settings.height = kHeight * samples;
+  settings.noise_sigma = 0;
+  settings.wall_texture = 0; /* the room is not judged, and takes long to draw */
+  return Scene::create (settings, scene);
+}
+
+/* The figure's own colour and coverage, of pictures with several samples a pixel. */
+void
+average (const cv::Mat &colour, const cv::Mat &mask, Shot &shot)
+{
+  cv::Mat rgb, only = cv::Mat::zeros (colour.size (), CV_8UC3), sum, share;
+  cv::cvtColor (colour, rgb, cv::COLOR_RGBA2RGB);
+  rgb.copyTo (only, mask);
+  only.convertTo (only, CV_32F);
+  cv::resize (only, sum, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
+  mask.convertTo (share, CV_32F, 1 / 255.0);
+  cv::resize (share, share, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
+  share.convertTo (shot.coverage, CV_8U, 255);
+  const cv::Mat divisor = cv::max (share, 1e-6);
+  cv::Mat divisors;
+  cv::merge (std::vector<cv::Mat>{divisor, divisor, divisor}, divisors);
+  cv::divide (sum, divisors, sum);
+  sum.convertTo (shot.colour, CV_8U);
+}
+
+Status
+take_shot (Scene &fine, Scene &plain, int view_id, const FrameSet &cameras, Shot &shot)
+{
+  cv::Mat colour (kSamples * kHeight, kSamples * kWidth, CV_8UC4), mask (colour.size (), CV_8U),
+      small (kHeight, kWidth, CV_8UC4), depth (kHeight, kWidth, CV_16U);
+  Status status = fine.render (view_id, SceneCamera::kLeft, kMoment, false, view_of<Rgbx> (colour),
+      {}, view_of<std::uint8_t> (mask));
+  if (status.ok ())
+    status = plain.render (view_id, SceneCamera::kLeft, kMoment, false, view_of<Rgbx> (small),
+        view_of<std::uint16_t> (depth), {});
+  if (!status.ok ())
+    return status;
+  mask *= 255;
+  average (colour, mask, shot);
+  shot.seen = seen_by (cameras, *plain.range_rig ().find (view_id), depth);
+  return {};
 }
 
 } // namespace
 
 Status
-make_truth (SceneSettings settings, int angle_deg, std::vector<Shot> &shots)
+make_truth (
+    SceneSettings settings, const FrameSet &cameras, int angle_deg, std::vector<Shot> &shots)
 {
   const Ring *ring = kRings;
   while (ring->angle_deg != angle_deg)
     ring++;
-  settings.views = ring->cameras;
-  settings.arc_deg = 360;
-  settings.width = kWidth;
-  settings.height = kHeight;
-  settings.noise_sigma = 0;
-  std::unique_ptr<Scene> scene;
-  Status status = Scene::create (settings, scene);
+  std::unique_ptr<Scene> fine, plain;
+  Status status = make_scene (settings, *ring, kSamples, fine);
+  if (status.ok ())
+    status = make_scene (settings, *ring, 1, plain);
   for (int i = 0; i < 4 && status.ok (); i++) {
-    Shot shot{360.0 * ring->which[i] / ring->cameras, {kHeight, kWidth, CV_8UC4},
-        {kHeight, kWidth, CV_8U}};
-    status = scene->render (ring->which[i], SceneCamera::kLeft, kMoment, false,
-        view_of<Rgbx> (shot.colour), {}, view_of<std::uint8_t> (shot.mask));
-    shot.mask *= 255;
+    Shot shot;
+    shot.azimuth_deg = 360.0 * ring->which[i] / ring->cameras;
+    status = take_shot (*fine, *plain, ring->which[i], cameras, shot);
     shots.push_back (shot);
   }
   return status;
-}
-
-void
-Score::add (const Shot &truth, const cv::Mat &rgba)
-{
-  const cv::Mat ours = drawn (rgba), both = ours & truth.mask;
-  cv::Mat difference, wide;
-  cv::absdiff (truth.colour, rgba, difference);
-  difference.setTo (0, ~both);
-  difference.convertTo (wide, CV_32F);
-  const cv::Scalar sums = cv::sum (wide.mul (wide));
-  squares_ += sums[0] + sums[1] + sums[2];
-  truth_ += cv::countNonZero (truth.mask);
-  both_ += cv::countNonZero (both);
-  missing_ += cv::countNonZero (truth.mask & ~ours);
-  beside_ += cv::countNonZero (ours & ~truth.mask);
-  ssim_ += sum_of_ssim (luma_in (truth.colour, both), luma_in (rgba, both), both);
-}
-
-double
-Score::psnr () const
-{
-  return both_ > 0 ? 10 * std::log10 (255.0 * 255 / std::max (squares_ / (3 * both_), 1e-6)) : 0;
-}
-
-cv::Mat
-comparison (const Shot &truth, const cv::Mat &rgba)
-{
-  const cv::Mat ours = drawn (rgba);
-  cv::Mat parts[3], sheet, wide;
-  cv::cvtColor (truth.colour, parts[0], cv::COLOR_RGBA2BGR);
-  parts[0].setTo (cv::Scalar (40, 36, 32), ~truth.mask);
-  cv::cvtColor (rgba, parts[1], cv::COLOR_RGBA2BGR);
-  parts[1].setTo (cv::Scalar (40, 36, 32), ~ours);
-  cv::subtract (parts[1], parts[0], wide, {}, CV_16S);
-  wide.convertTo (parts[2], CV_8U, 4, 128);
-  parts[2].setTo (cv::Scalar (255, 0, 255), truth.mask & ~ours);
-  parts[2].setTo (cv::Scalar (255, 255, 0), ours & ~truth.mask);
-  cv::hconcat (parts, 3, sheet);
-  return sheet;
 }
 
 } // namespace bench

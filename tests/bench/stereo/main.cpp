@@ -5,6 +5,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -48,6 +49,8 @@ const char *const kUsage =
     "from\n"
     "                       the true surface, and errors, beside OpenCV at the same settings\n"
     "  --model FILE         glTF or OBJ model to render (default: the built-in figure)\n"
+    "  --dress PIECES       of the built-in figure: none, all, or hair, glasses, collar and hand\n"
+    "                       with + between (default: none, then all)\n"
     "  --size WxH           (default 320x240)\n"
     "  --distance M         from the cameras, 0.5 to 1.2 (default 0.8; at 1.1 the person's ROI is "
     "a\n"
@@ -64,6 +67,7 @@ struct Job {
   bool tune = false;
   bool scene = false;
   SceneJob rendered;
+  std::optional<unsigned> dress; /* empty: the figure bare and dressed */
 };
 
 void
@@ -85,6 +89,7 @@ add_options (Options &options, Job &job)
   options.flag ("--scene", job.scene);
   SceneSettings &s = job.rendered.scene;
   options.text ("--model", s.model);
+  options.dress ("--dress", job.dress);
   options.size ("--size", s.width, s.height, 64, 4096);
   options.number ("--distance", s.distance_m, 0.5, 1.2);
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
@@ -227,15 +232,28 @@ measure (const Job &job, const Pair &pair)
 }
 
 Status
+run_scenes (const Job &job)
+{
+  SceneJob rendered = job.rendered;
+  for (const unsigned dress : {0u, unsigned (kDressAll)}) {
+    rendered.scene.dress = job.dress.value_or (dress);
+    std::vector<SceneRow> rows;
+    if (Status s = run_scene (rendered, rows); !s.ok ())
+      return s;
+    const bool model = !rendered.scene.model.empty ();
+    std::printf ("%s\n", model ? "model" : rendered.scene.dress ? "dressed figure" : "bare figure");
+    print_scene_rows (rows);
+    if (job.dress || model)
+      break;
+  }
+  return {};
+}
+
+Status
 run (const Job &job)
 {
-  if (job.scene) {
-    std::vector<SceneRow> rows;
-    if (Status s = run_scene (job.rendered, rows); !s.ok ())
-      return s;
-    print_scene_rows (rows);
-    return {};
-  }
+  if (job.scene)
+    return run_scenes (job);
   Pair pair;
   if (Status s = read_pictures (job, pair); !s.ok ())
     return s;

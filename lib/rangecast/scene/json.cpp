@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "json.hpp"
+
+#include <charconv>
+#include <climits>
+#include <cmath>
+#include <cstdint>
+
+namespace rangecast {
+
+namespace {
+
+const Json kNothing;
+constexpr int kMaxLevels = 64;
+
+class Parser {
+public:
+  explicit Parser (std::string_view text) : at_ (text.data ()), end_ (text.data () + text.size ())
+  {
+  }
+
+  bool document (Json &value)
+  {
+    const bool parsed = this->value (value, 0);
+    skip_space ();
+    return parsed && at_ == end_;
+  }
+
+private:
+  void skip_space ()
+  {
+    while (at_ < end_ && (*at_ == ' ' || *at_ == '\t' || *at_ == '\n' || *at_ == '\r'))
+      at_++;
+  }
+
+  bool take (char c)
+  {
+    skip_space ();
+    if (at_ == end_ || *at_ != c)
+      return false;
+    at_++;
+    return true;
+  }
+
+  bool word (std::string_view expected)
+  {
+    if (!std::string_view (at_, std::size_t (end_ - at_)).starts_with (expected))
+      return false;
+    at_ += expected.size ();
+    return true;
+  }
+
+  bool value (Json &value, int level)
+  {
+    skip_space ();
+    if (at_ == end_ || level > kMaxLevels)
+      return false;
+    switch (*at_) {
+      case '{':
+        return object (value, level);
+      case '[':
+        return array (value, level);
+      case '"':
+        value.type = Json::Type::kString;
+        return string (value.text);
+      case 't':
+      case 'f':
+        value.type = Json::Type::kBool;
+        value.number = *at_ == 't';
+        return word (*at_ == 't' ? "true" : "false");
+      case 'n':
+        return word ("null");
+      default:
+        value.type = Json::Type::kNumber;
+        return number (value.number);
+    }
+  }
+
+  bool object (Json &value, int level)
+  {
+    value.type = Json::Type::kObject;
+    at_++;
+    if (take ('}'))
+      return true;
+    do {
+      skip_space ();
+      if (!string (value.names.emplace_back ()) || !take (':') ||
+          !this->value (value.items.emplace_back (), level + 1))
+        return false;
+    } while (take (','));
+    return take ('}');
+  }
+
+  bool array (Json &value, int level)
+  {
+    value.type = Json::Type::kArray;
+    at_++;
+    if (take (']'))
+      return true;
+    do {
+      if (!this->value (value.items.emplace_back (), level + 1))
+        return false;
+    } while (take (','));
+    return take (']');
+  }
+
+  bool number (double &value)
+  {
+    if (*at_ != '-' && (*at_ < '0' || *at_ > '9')) /* from_chars also takes "inf" and "nan" */
+      return false;
+    const auto [next, error] = std::from_chars (at_, end_, value);
+    if (error == std::errc::invalid_argument || !(next > at_))
+      return false;
+    if (error == std::errc::result_out_of_range)
+      value = HUGE_VAL;
+    at_ = next;
+    return true;
+  }
+
+  bool hex (unsigned &unit)
+  {
+    if (end_ - at_ < 4)
+      return false;
+    const auto [next, error] = std::from_chars (at_, at_ + 4, unit, 16);
+    at_ += 4;
+    return error == std::errc () && next == at_;
+  }
+
+  static void append_utf8 (unsigned c, std::string &text)
+  {
+    if (c < 0x80) {
+      text += char (c);
+    } else if (c < 0x800) {
+      text += {char (0xc0 | c >> 6), char (0x80 | (c & 0x3f))};
+    } else if (c < 0x10000) {
+      text += {char (0xe0 | c >> 12), char (0x80 | (c >> 6 & 0x3f)), char (0x80 | (c & 0x3f))};
+    } else {
+      text += {char (0xf0 | c >> 18), char (0x80 | (c >> 12 & 0x3f)), char (0x80 | (c >> 6 & 0x3f)),
+          char (0x80 | (c & 0x3f))};
+    }
+  }
+
+  /* After the backslash. */
+  bool escape (std::string &text)
+  {
+    if (at_ == end_)
+      return false;
+    constexpr std::string_view kShort = "\"\\/bfnrt", kMeant = "\"\\/\b\f\n\r\t";
+    const char c = *at_++;
+    if (const auto i = kShort.find (c); i != std::string_view::npos) {
+      text += kMeant[i];
+      return true;
+    }
+    unsigned unit, low;
+    if (c != 'u' || !hex (unit))
+      return false;
+    if (unit >= 0xd800 && unit < 0xdc00) { /* the first half of a pair */
+      if (!word ("\\u") || !hex (low) || low < 0xdc00 || low > 0xdfff)
+        return false;
+      unit = 0x10000 + ((unit - 0xd800) << 10) + (low - 0xdc00);
+    }
+    append_utf8 (unit, text);
+    return true;
+  }
+
+  bool string (std::string &text)
+  {
+    if (at_ == end_ || *at_++ != '"')
+      return false;
+    while (at_ < end_ && *at_ != '"') {
+      const char *from = at_;
+      while (at_ < end_ && *at_ != '"' && *at_ != '\\')
+        at_++;
+      text.append (from, at_);
+      if (at_ < end_ && *at_ == '\\' && (at_++, !escape (text)))
+        return false;
+    }
+    return at_ < end_ && *at_++ == '"';
+  }
+
+  const char *at_, *end_;
+};
+
+} // namespace
+
+const Json &
+Json::operator[] (std::string_view name) const
+{
+  for (std::size_t i = 0; i < names.size (); i++)
+    if (names[i] == name)
+      return items[i];
+  return kNothing;
+}
+
+const Json &
+Json::operator[] (std::size_t i) const
+{
+  return type == Type::kArray && i < items.size () ? items[i] : kNothing;
+}
+
+double
+Json::number_or (double otherwise) const
+{
+  return type == Type::kNumber && std::isfinite (number) ? number : otherwise;
+}
+
+int
+Json::index () const
+{
+  const bool whole = type == Type::kNumber && number >= 0 && number <= INT_MAX;
+  return whole && number == std::floor (number) ? int (number) : -1;
+}
+
+std::size_t
+Json::size_or (std::size_t otherwise) const
+{
+  const bool whole = type == Type::kNumber && number >= 0 && number <= 9007199254740992.0;
+  return whole && number == std::floor (number) ? std::size_t (number) : otherwise;
+}
+
+bool
+parse_json (std::string_view text, Json &value)
+{
+  value = {};
+  return Parser (text).document (value);
+}
+
+} // namespace rangecast

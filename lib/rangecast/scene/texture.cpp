@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "texture.hpp"
+
+#ifdef RANGECAST_HAVE_ASSIMP
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace fs = std::filesystem;
+
+namespace rangecast {
+namespace {
+
+constexpr std::size_t kMaxFile = std::size_t{256} << 20;
+constexpr std::int64_t kMaxSide = 16384, kMaxPixels = std::int64_t{1} << 26;
+
+struct Size {
+  std::int64_t width = 0, height = 0; ///< 0: unknown
+};
+
+using Bytes = std::span<const std::uint8_t>;
+
+std::int64_t
+big_endian (Bytes bytes, std::size_t at, int n)
+{
+  std::int64_t value = 0;
+  for (int i = 0; i < n; i++)
+    value = value << 8 | bytes[at + std::size_t (i)];
+  return value;
+}
+
+/* JPEG's size is in its frame header, behind segments that may be of any length. */
+Size
+jpeg_size (Bytes b)
+{
+  for (std::size_t at = 2; at + 9 < b.size () && b[at] == 0xff;) {
+    const std::uint8_t marker = b[at + 1];
+    const bool other = marker == 0xc4 || marker == 0xc8 || marker == 0xcc;
+    if (marker == 0xff) { /* padding */
+      at++;
+    } else if (marker >= 0xc0 && marker <= 0xcf && !other) {
+      return {big_endian (b, at + 7, 2), big_endian (b, at + 5, 2)};
+    } else {
+      at += 2 + std::size_t (big_endian (b, at + 2, 2));
+    }
+  }
+  return {};
+}
+
+/* PNM: "P6", width, height as text, with comments between. */
+Size
+pnm_size (Bytes b)
+{
+  std::int64_t sizes[2] = {};
+  std::size_t at = 2;
+  for (std::int64_t &size : sizes) {
+    while (at < b.size () && (std::isspace (b[at]) || b[at] == '#'))
+      if (b[at++] == '#')
+        while (at < b.size () && b[at] != '\n')
+          at++;
+    while (at < b.size () && std::isdigit (b[at]) && size <= kMaxSide)
+      size = 10 * size + (b[at++] - '0');
+  }
+  return {sizes[0], sizes[1]};
+}
+
+Size
+picture_size (Bytes b)
+{
+  if (b.size () < 26)
+    return b.size () > 2 && b[0] == 'P' ? pnm_size (b) : Size{};
+  if (std::memcmp (b.data (), "\x89PNG\r\n\x1a\n", 8) == 0)
+    return {big_endian (b, 16, 4), big_endian (b, 20, 4)};
+  if (b[0] == 0xff && b[1] == 0xd8)
+    return jpeg_size (b);
+  if (b[0] == 'B' && b[1] == 'M') {
+    std::int32_t sides[2]; /* little-endian; a negative height is a picture from the top */
+    std::memcpy (sides, b.data () + 18, sizeof sides);
+    return {sides[0], std::abs (std::int64_t (sides[1]))};
+  }
+  return b[0] == 'P' && b[1] >= '1' && b[1] <= '6' ? pnm_size (b) : Size{};
+}
+
+/* Any depth and number of channels to BGRA of 8 bits. */
+cv::Mat
+to_bgra (cv::Mat picture)
+{
+  if (picture.depth () == CV_16U)
+    picture.convertTo (picture, CV_8U, 1 / 257.0);
+  if (picture.depth () != CV_8U)
+    return {};
+  cv::Mat bgra;
+  switch (picture.channels ()) {
+    case 1:
+      cv::cvtColor (picture, bgra, cv::COLOR_GRAY2BGRA);
+      return bgra;
+    case 3:
+      cv::cvtColor (picture, bgra, cv::COLOR_BGR2BGRA);
+      return bgra;
+    case 4:
+      return picture;
+    default:
+      return {};
+  }
+}
+
+std::shared_ptr<const MipMap>
+make_texture (cv::Mat bgra, const TextureSettings &settings)
+{
+  const int side = std::max (bgra.cols, bgra.rows);
+  if (side > settings.max_side) {
+    const double scale = double (settings.max_side) / side;
+    cv::resize (bgra, bgra,
+        {std::max (1, int (bgra.cols * scale)), std::max (1, int (bgra.rows * scale))}, 0, 0,
+        cv::INTER_AREA);
+  }
+  std::uint8_t tables[4][256];
+  for (int c = 0; c < 4; c++)
+    for (int i = 0; i < 256; i++)
+      tables[c][i] =
+          static_cast<std::uint8_t> (std::lround (std::clamp (i * settings.factor[c], 0.0, 255.0)));
+  std::vector<Rgbx> pixels;
+  pixels.reserve (bgra.total ());
+  for (int y = 0; y < bgra.rows; y++)
+    for (int x = 0; x < bgra.cols; x++) {
+      const auto &p = bgra.at<cv::Vec4b> (y, x);
+      pixels.push_back ({tables[0][p[2]], tables[1][p[1]], tables[2][p[0]], tables[3][p[3]]});
+    }
+  return std::make_shared<MipMap> (bgra.cols, bgra.rows, std::move (pixels), settings.alpha_cutoff);
+}
+
+} // namespace
+
+Status
+decode_texture (Bytes bytes, const std::string &name, const TextureSettings &settings,
+    std::shared_ptr<const MipMap> &texture)
+{
+  const Status bad = {
+      StatusCode::kBadData, name + ": cannot be read as a picture; expected JPEG or PNG"};
+  const Size size = picture_size (bytes);
+  if (size.width <= 0 || size.height <= 0)
+    return bad;
+  if (size.width > kMaxSide || size.height > kMaxSide || size.width * size.height > kMaxPixels)
+    return {StatusCode::kUnsupported, name + ": a picture of " + std::to_string (size.width) + "x" +
+                                          std::to_string (size.height) +
+                                          " pixels; expected at most 64 million, 16384 a side"};
+  try {
+    const cv::Mat data (
+        1, static_cast<int> (bytes.size ()), CV_8U, const_cast<std::uint8_t *> (bytes.data ()));
+    const cv::Mat bgra = to_bgra (cv::imdecode (data, cv::IMREAD_UNCHANGED));
+    if (bgra.empty ())
+      return bad;
+    texture = make_texture (bgra, settings);
+  } catch (const std::exception &) { /* OpenCV's decoders */
+    return bad;
+  }
+  return {};
+}
+
+Status
+read_texture (const std::string &path, const TextureSettings &settings,
+    std::shared_ptr<const MipMap> &texture)
+{
+  std::vector<std::uint8_t> bytes;
+  if (Status s = read_file (path, kMaxFile, "a texture (JPEG or PNG)", bytes); !s.ok ())
+    return s;
+  return decode_texture (bytes, path, settings, texture);
+}
+
+Status
+read_file (
+    const std::string &path, std::size_t limit, const char *what, std::vector<std::uint8_t> &bytes)
+{
+  std::error_code error;
+  const auto size = fs::is_regular_file (path, error) ? fs::file_size (path, error) : 0;
+  std::ifstream file (path, std::ios::binary);
+  if (error || !fs::is_regular_file (path, error) || !file)
+    return {StatusCode::kNotFound, path + ": no such file; expected " + what};
+  if (size > limit)
+    return {StatusCode::kUnsupported,
+        path + ": larger than " + std::to_string (limit >> 20) + " MiB; expected " + what};
+  bytes.resize (size);
+  file.read (reinterpret_cast<char *> (bytes.data ()), static_cast<std::streamsize> (size));
+  bytes.resize (static_cast<std::size_t> (file.gcount ()));
+  return {};
+}
+
+} // namespace rangecast
+
+#endif

@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "blend_planes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+namespace rangecast {
+namespace {
+
+/* Chamfer distances: 3 for a step to the side, 4 for a diagonal one (G. Borgefors, "Distance
+ * transformations in digital images", CVGIP 34, 1986). */
+constexpr int kSide = 3, kDiagonal = 4;
+constexpr int kFarthest = kSide * kFeatherPixels;
+
+/* Metres by which a view has to see farther than a place to see through it. */
+constexpr double kClearance = 0.01;
+/* A view sees the background at an invalid pixel if there is no valid one this near: matching leaves
+ * holes in surfaces, too. */
+constexpr int kBackgroundRadius = 1;
+
+/* Copies of the neighbour code may be off by its threshold, in levels of R, G and B each. */
+constexpr int kCopyRange = 12, kCopyReach = 2;
+
+class Planes {
+public:
+  Planes (std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
+      : views_ (views), which_ (which), image_ (views[which].image), view_ (*views[which].view),
+        depth_step_ (static_cast<float> (depth_step)),
+        steep_ (static_cast<float> (kSteepSlope / view_.intrinsics.fx)), to_ (to),
+        width_ (image_.depth.width), height_ (image_.depth.height)
+  {
+    to.width = width_;
+    to.height = height_;
+    to.steep_step = steep_;
+    const auto size = static_cast<std::size_t> (width_) * static_cast<std::size_t> (height_);
+    to.colour.resize (size);
+    to.weight.resize (size);
+    to.scratch.resize (size);
+    to.copied.resize (size);
+  }
+
+  void make ()
+  {
+    for (int y = 0; y < height_; y++)
+      join_row (y);
+    for (int y = 0; y < height_; y++)
+      begin_distances (y);
+    measure_distances ();
+    smooth_copies ();
+    for (int y = 0; y < height_; y++)
+      weigh_row (y);
+  }
+
+private:
+  [[nodiscard]] std::size_t place (int x, int y) const
+  {
+    return static_cast<std::size_t> (y) * static_cast<std::size_t> (width_) +
+           static_cast<std::size_t> (x);
+  }
+  [[nodiscard]] bool has (int x, int y, std::uint8_t flags) const
+  {
+    return (to_.colour[place (x, y)].x & flags) == flags;
+  }
+
+  [[nodiscard]] Vec3 world_of (int x, int y, double depth) const
+  {
+    return view_.world_from_view * view_.intrinsics.unproject (x + image_.roi.x, y + image_.roi.y,
+                                       depth * view_.depth_unit_m);
+  }
+
+  /* Whether another view sees something farther, or the background, in the direction of a point. */
+  [[nodiscard]] bool is_seen_through (const Vec3 &point) const
+  {
+    for (std::size_t i = 0; i < views_.size (); i++)
+      if (i != which_ && sees_through (views_[i], point))
+        return true;
+    return false;
+  }
+
+  [[nodiscard]] static bool sees_through (const SurfaceView &other, const Vec3 &point)
+  {
+    const View &view = *other.view;
+    const Vec3 from = point - view.world_from_view.translation;
+    const Mat3 &r = view.world_from_view.rotation;
+    const double z = dot (from, {r[2], r[5], r[8]});
+    if (z <= view.near_m)
+      return false;
+    const double u = view.intrinsics.fx * dot (from, {r[0], r[3], r[6]}) / z + view.intrinsics.cx,
+                 v = view.intrinsics.fy * dot (from, {r[1], r[4], r[7]}) / z + view.intrinsics.cy;
+    if (!(u > 0 && v > 0 && u < view.width - 1 && v < view.height - 1))
+      return false;
+    const Roi &roi = other.image.roi;
+    const int x = static_cast<int> (u + 0.5) - roi.x, y = static_cast<int> (v + 0.5) - roi.y;
+    if (x >= 0 && y >= 0 && x < roi.width && y < roi.height)
+      if (const std::uint16_t depth = other.image.depth.at (x, y); depth != kInvalidDepth)
+        return depth * view.depth_unit_m > z + kClearance;
+    for (int b = std::max (y - kBackgroundRadius, 0);
+         b <= std::min (y + kBackgroundRadius, roi.height - 1); b++)
+      for (int a = std::max (x - kBackgroundRadius, 0);
+           a <= std::min (x + kBackgroundRadius, roi.width - 1); a++)
+        if (other.image.depth.at (a, b) != kInvalidDepth)
+          return false;
+    return true;
+  }
+
+  [[nodiscard]] bool joins (int x, int y, int u, int v) const
+  {
+    const int a = image_.depth.at (x, y), b = image_.depth.at (u, v);
+    const auto step = static_cast<float> (std::abs (a - b)), least = static_cast<float> (std::min (a, b));
+    if (b == kInvalidDepth || step > depth_step_ * least)
+      return false;
+    return step <= steep_ * least ||
+           !is_seen_through (0.5 * (world_of (x, y, a) + world_of (u, v, b)));
+  }
+
+  void join_row (int y)
+  {
+    for (int x = 0; x < width_; x++) {
+      Rgbx &colour = to_.colour[place (x, y)];
+      colour = image_.colour.at (x, y);
+      colour.x = 0;
+      if (image_.depth.at (x, y) == kInvalidDepth)
+        continue;
+      colour.x = kValid;
+      if (x + 1 < width_ && joins (x, y, x + 1, y))
+        colour.x |= kJoinsRight;
+      if (y + 1 < height_ && joins (x, y, x, y + 1))
+        colour.x |= kJoinsBelow;
+    }
+  }
+
+  /* One step for pixels at a depth edge. */
+  void begin_distances (int y)
+  {
+    for (int x = 0; x < width_; x++) {
+      const bool inside = x > 0 && y > 0 && has (x, y, kValid | kJoinsRight | kJoinsBelow) &&
+                          has (x - 1, y, kJoinsRight) && has (x, y - 1, kJoinsBelow);
+      to_.weight[place (x, y)] =
+          static_cast<std::uint8_t> (inside ? kFarthest : has (x, y, kValid) ? kSide : 0);
+    }
+  }
+
+  /* Pixels at the border of the image are at an edge already. */
+  void measure_distances ()
+  {
+    const auto sweep = [this] (int x, int y, int way) {
+      std::uint8_t *at = &to_.weight[place (x, y)];
+      const std::ptrdiff_t row = way * width_;
+      const int least = std::min (std::min (at[way], at[row]) + kSide,
+          std::min (at[row - 1], at[row + 1]) + kDiagonal);
+      *at = static_cast<std::uint8_t> (std::min<int> (*at, least));
+    };
+    for (int y = 1; y + 1 < height_; y++)
+      for (int x = 1; x + 1 < width_; x++)
+        sweep (x, y, -1);
+    for (int y = height_ - 2; y > 0; y--)
+      for (int x = width_ - 2; x > 0; x--)
+        sweep (x, y, 1);
+  }
+
+  [[nodiscard]] bool is_copy_of (int x, int y, int u, int v) const
+  {
+    if (u < 0 || v < 0 || u >= width_ || image_.depth.at (x, y) != image_.depth.at (u, v))
+      return false;
+    const Rgbx a = image_.colour.at (x, y), b = image_.colour.at (u, v);
+    return a.r == b.r && a.g == b.g && a.b == b.b;
+  }
+
+  /* Means of what is within the code's threshold round pixels that it copied, along rows, then
+   * along columns. */
+  void smooth_copies ()
+  {
+    for (int y = 0; y < height_; y++)
+      for (int x = 0; x < width_; x++)
+        to_.copied[place (x, y)] = has (x, y, kValid) &&
+                                   (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
+                                       is_copy_of (x, y, x - 1, y - 1) ||
+                                       is_copy_of (x, y, x + 1, y - 1));
+    smooth (1, [this] (int x, int) { return std::pair (x, width_); });
+    smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
+  }
+
+  template <typename Along> void smooth (std::ptrdiff_t way, const Along &along)
+  {
+    std::ranges::copy (to_.colour, to_.scratch.begin ());
+    for (int y = 0; y < height_; y++)
+      for (int x = 0; x < width_; x++)
+        if (const std::size_t at = place (x, y); to_.copied[at]) {
+          const auto [position, length] = along (x, y);
+          to_.colour[at] = mean_along (&to_.scratch[at], way, std::max (-kCopyReach, -position),
+              std::min (kCopyReach, length - 1 - position));
+        }
+  }
+
+  [[nodiscard]] static Rgbx mean_along (
+      const Rgbx *at, std::ptrdiff_t way, int first, int last)
+  {
+    int n = 0, r = 0, g = 0, b = 0;
+    for (int k = first; k <= last; k++) {
+      const Rgbx c = at[k * way];
+      if (!(c.x & kValid) || std::abs (c.r - at->r) > kCopyRange ||
+          std::abs (c.g - at->g) > kCopyRange || std::abs (c.b - at->b) > kCopyRange)
+        continue;
+      n++, r += c.r, g += c.g, b += c.b;
+    }
+    const auto mean = [n] (int sum) { return static_cast<std::uint8_t> ((sum + n / 2) / n); };
+    return {mean (r), mean (g), mean (b), at->x};
+  }
+
+  /* What depth changes by from one pixel to the next: the mean over two pixels each way, or the
+   * steepest step beside the pixel, if that is a steep one. */
+  [[nodiscard]] float slope (int x, int y, int dx, int dy, std::uint8_t joins) const
+  {
+    const std::ptrdiff_t way = dx + dy * image_.depth.stride / 2;
+    const std::uint16_t *depth = image_.depth.row (y) + x;
+    int before = 0, after = 0;
+    while (before < 2 && x - (before + 1) * dx >= 0 && y - (before + 1) * dy >= 0 &&
+           has (x - (before + 1) * dx, y - (before + 1) * dy, joins))
+      before++;
+    while (after < 2 && has (x + after * dx, y + after * dy, joins))
+      after++;
+    if (before + after == 0)
+      return 0;
+    const float mean = static_cast<float> (depth[after * way] - depth[-before * way]) /
+                       static_cast<float> (before + after);
+    int steepest = after ? depth[way] - depth[0] : 0;
+    if (const int other = before ? depth[0] - depth[-way] : 0; std::abs (other) > std::abs (steepest))
+      steepest = other;
+    const auto step = static_cast<float> (steepest);
+    const float steepness = std::abs (step) / (steep_ * static_cast<float> (depth[0]));
+    return mean + std::clamp (2 * steepness - 1, 0.f, 1.f) * (step - mean);
+  }
+
+  /* Cosine between the surface's normal and the ray to the camera. */
+  [[nodiscard]] float squareness (int x, int y) const
+  {
+    const float depth = image_.depth.at (x, y);
+    const float gx = slope (x, y, 1, 0, kJoinsRight), gy = slope (x, y, 0, 1, kJoinsBelow);
+    const Intrinsics &lens = view_.intrinsics;
+    const auto fx = static_cast<float> (lens.fx), fy = static_cast<float> (lens.fy);
+    const auto u = static_cast<float> (x + image_.roi.x - lens.cx),
+               v = static_cast<float> (y + image_.roi.y - lens.cy);
+    const float nx = fx * gx, ny = fy * gy, nz = depth + u * gx + v * gy;
+    const float ray = 1 + u * u / (fx * fx) + v * v / (fy * fy);
+    return std::min (depth / std::sqrt ((nx * nx + ny * ny + nz * nz) * ray), 1.f);
+  }
+
+  void weigh_row (int y)
+  {
+    static const auto kDistanceWeights = [] {
+      std::array<float, kFarthest + 1> weights;
+      for (int i = 0; i <= kFarthest; i++)
+        weights[static_cast<std::size_t> (i)] = 255 * std::sqrt (float (i) / kFarthest);
+      return weights;
+    }();
+    for (int x = 0; x < width_; x++)
+      if (std::uint8_t &weight = to_.weight[place (x, y)]; weight > 0)
+        weight = static_cast<std::uint8_t> (
+            std::max (kDistanceWeights[weight] * squareness (x, y) + 0.5f, 1.f));
+  }
+
+  const std::span<const SurfaceView> views_;
+  const std::size_t which_;
+  const ConstRangeImage &image_;
+  const View &view_;
+  const float depth_step_, steep_; /* shares of the depth */
+  BlendPlanes &to_;
+  const int width_, height_;
+};
+
+} // namespace
+
+void
+make_blend_planes (std::span<const SurfaceView> views, std::size_t which, double depth_step,
+    BlendPlanes &to)
+{
+  Planes (views, which, depth_step, to).make ();
+}
+
+} // namespace rangecast
