@@ -168,6 +168,14 @@ template <typename L> struct RedundantPoints::CoverLoop {
     return row;
   }
 
+  /* A place so near a pixel is that pixel, so that the outline of one view ends at another's. */
+  static constexpr float kSnap = 1.f / 32;
+  static float snapped (float place)
+  {
+    const auto pixel = static_cast<float> (static_cast<int> (place + 0.5f));
+    return std::abs (place - pixel) < kSnap ? pixel : place;
+  }
+
   /* Where the other image sees some pixels of a row, and whether they lie on its surface. */
   void place (Row &row, int first, int y) const
   {
@@ -180,12 +188,18 @@ template <typename L> struct RedundantPoints::CoverLoop {
     for (int k = 0; k < 3; k++)
       seen_at[k] =
           origin[k] + depth * (corner[k] + static_cast<float> (y) * down[k] + x * right[k]);
-    const F z = seen_at[2], u = seen_at[0] / z, v = seen_at[1] / z;
+    const F z = seen_at[2];
+    F u = seen_at[0] / z, v = seen_at[1] / z;
+    const I seen = (depth > 0) & (z > 0) & (u > -kSnap) & (v > -kSnap) &
+                   (u < static_cast<float> (other.depth.width - 1) + kSnap) &
+                   (v < static_cast<float> (other.depth.height - 1) + kSnap);
+    for (int i = 0; i < kLanes; i++)
+      if (seen[i]) {
+        u[i] = snapped (u[i]);
+        v[i] = snapped (v[i]);
+      }
     L::at (&row.u[at]) = u;
     L::at (&row.v[at]) = v;
-    const I seen = (depth > 0) & (z > 0) & (u >= 0) & (v >= 0) &
-                   (u < static_cast<float> (other.depth.width - 1)) &
-                   (v < static_cast<float> (other.depth.height - 1));
     compare_depths (u, v, z, seen, L::at (&row.on_surface[at]));
   }
 
@@ -197,14 +211,15 @@ template <typename L> struct RedundantPoints::CoverLoop {
       if (!seen[i])
         continue;
       const int left = static_cast<int> (u[i]), top = static_cast<int> (v[i]);
-      const std::uint16_t *upper = other.depth.row (top) + left,
-                          *lower = other.depth.row (top + 1) + left;
-      corners[0][i] = upper[0];
-      corners[1][i] = upper[1];
-      corners[2][i] = lower[0];
-      corners[3][i] = lower[1];
       right_share[i] = u[i] - static_cast<float> (left);
       down_share[i] = v[i] - static_cast<float> (top);
+      const int beside = right_share[i] > 0 ? 1 : 0;
+      const std::uint16_t *upper = other.depth.row (top) + left,
+                          *lower = other.depth.row (top + (down_share[i] > 0 ? 1 : 0)) + left;
+      corners[0][i] = upper[0];
+      corners[1][i] = upper[beside];
+      corners[2][i] = lower[0];
+      corners[3][i] = lower[beside];
     }
     F least = corners[0], most = corners[0];
     for (int k = 1; k < 4; k++) {
@@ -284,27 +299,30 @@ template <typename L> struct RedundantPoints::CoverLoop {
     for (int k = 0; k < 9; k++)
       widen (extent, u + overlap * (patch.u[k] - u), v + overlap * (patch.v[k] - v));
     covered &= (extent.left >= 0) & (extent.top >= 0) &
-               (extent.right < static_cast<float> (other.depth.width - 1)) &
-               (extent.bottom < static_cast<float> (other.depth.height - 1));
+               (extent.right <= static_cast<float> (other.depth.width - 1)) &
+               (extent.bottom <= static_cast<float> (other.depth.height - 1));
     std::uint8_t *won = state.winner.row (y) + first;
     for (int i = 0; i < std::min (kLanes, end - first); i++)
       if (covered[i] && won[i] == winner &&
-          is_closed (static_cast<int> (extent.left[i]), static_cast<int> (extent.right[i]),
-              static_cast<int> (extent.top[i]), static_cast<int> (extent.bottom[i]))) {
+          is_closed (static_cast<int> (extent.left[i]), last_before (extent.right[i]),
+              static_cast<int> (extent.top[i]), last_before (extent.bottom[i]))) {
         won[i] = kGoes;
         remove (first + i, y);
       }
   }
 
+  /* The last pixel before a place. */
+  static int last_before (float place) { return static_cast<int> (std::ceil (place)) - 1; }
+
   /* Whether the other image has a closed surface between these pixels, and one further each way. */
   [[nodiscard]] bool is_closed (int left, int right_most, int top, int bottom) const
   {
-    for (int y = top; y <= bottom; y++) {
+    for (int y = top; y <= std::max (top, bottom); y++) {
       const std::uint8_t *row = other_state.surface.row (y);
-      for (int x = left; x <= right_most; x += 8) {
+      for (int x = left; x <= std::max (left, right_most); x += 8) {
         std::uint64_t eight;
         std::memcpy (&eight, row + x, sizeof eight);
-        const int beyond = std::max (0, x + 7 - right_most);
+        const int beyond = std::max (0, x + 7 - std::max (left, right_most));
         if ((~eight & ~std::uint64_t{0} >> 8 * beyond) != 0)
           return false;
       }
