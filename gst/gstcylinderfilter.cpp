@@ -45,7 +45,7 @@ enum {
   PROP_COLUMNS,
   PROP_LAYER_GAP,
   PROP_SMOOTHING,
-  PROP_HIDDEN_GAP,
+  PROP_OVERLAP,
   PROP_HYSTERESIS,
   PROP_AGREEMENT,
   PROP_BODIES,
@@ -63,8 +63,8 @@ enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FI
 
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultHiddenGap = 0.015,
-                        kDefaultHysteresis = 0.2, kDefaultAgreement = 0.1;
+                        kDefaultSmoothing = 0.01, kDefaultOverlap = 1, kDefaultHysteresis = 0.2,
+                        kDefaultAgreement = 0.1;
 static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
 struct CylinderCounts {
@@ -403,8 +403,8 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_SMOOTHING:
       settings.units.smoothing_m = g_value_get_double (value);
       break;
-    case PROP_HIDDEN_GAP:
-      settings.hidden_gap_m = g_value_get_double (value);
+    case PROP_OVERLAP:
+      settings.overlap = g_value_get_double (value);
       break;
     case PROP_HYSTERESIS:
       settings.hysteresis = g_value_get_double (value);
@@ -480,8 +480,8 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
     case PROP_SMOOTHING:
       g_value_set_double (value, settings.units.smoothing_m);
       break;
-    case PROP_HIDDEN_GAP:
-      g_value_set_double (value, settings.hidden_gap_m);
+    case PROP_OVERLAP:
+      g_value_set_double (value, settings.overlap);
       break;
     case PROP_HYSTERESIS:
       g_value_set_double (value, settings.hysteresis);
@@ -521,7 +521,7 @@ gst_cylinder_filter_init (GstCylinderFilter *self)
   self->priv = new GstCylinderFilterPrivate;
   self->priv->settings.units = {
       kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
-  self->priv->settings.hidden_gap_m = kDefaultHiddenGap;
+  self->priv->settings.overlap = kDefaultOverlap;
   self->priv->settings.hysteresis = kDefaultHysteresis;
   self->priv->settings.agreement = kDefaultAgreement;
   self->priv->settings.bodies = kDefaultBodies;
@@ -600,11 +600,11 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
           "How far neighbours count in a unit's decision, metres, 0 to 1; 0 decides each unit "
           "alone (default: 0.01)",
           0, 1, kDefaultSmoothing, controllable));
-  g_object_class_install_property (object_class, PROP_HIDDEN_GAP,
-      g_param_spec_double ("hidden-gap", "Hidden gap",
-          "A point this far behind what the winning view sees is hidden from it and stays, metres, "
-          "0 to 100; 0 clears all points of losers (default: 0.015)",
-          0, 100, kDefaultHiddenGap, controllable));
+  g_object_class_install_property (object_class, PROP_OVERLAP,
+      g_param_spec_double ("overlap", "Overlap",
+          "How far round a point the surface of the view that stays must reach before it goes, "
+          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap (default: 1)",
+          0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
 }
 
 static void

@@ -59,8 +59,9 @@ GST_START_TEST (test_clears_what_another_view_sees_and_keeps_times)
   const std::size_t points = points_of_view (in, 0);
   GstBuffer *out = gst_harness_push_and_pull (h, in);
   fail_unless_equals_int (points_of_view (out, 0), points);
-  fail_unless_equals_int (points_of_view (out, 1), 0);
-  fail_unless_equals_int (points_of_view (out, 2), 0);
+  /* Of views in one place the others keep corners of their outline. */
+  fail_unless (points_of_view (out, 1) < points / 20);
+  fail_unless (points_of_view (out, 2) < points / 20);
   fail_unless_equals_uint64 (GST_BUFFER_PTS (out), 5 * GST_SECOND);
   fail_unless_equals_uint64 (GST_BUFFER_DURATION (out), 7);
   fail_unless (GST_BUFFER_FLAG_IS_SET (out, GST_BUFFER_FLAG_MARKER));
@@ -83,7 +84,7 @@ GST_START_TEST (test_works_in_place_and_leaves_shared_buffers_alone)
   const std::size_t points = points_of_view (in, 1);
   out = gst_harness_push_and_pull (h, gst_buffer_ref (in));
   fail_unless (in != out);
-  fail_unless_equals_int (points_of_view (out, 1), 0);
+  fail_unless (points_of_view (out, 1) < points / 20);
   fail_unless_equals_int (points_of_view (in, 1), points);
   gst_buffer_unref (in);
   gst_buffer_unref (out);
@@ -104,7 +105,7 @@ GST_START_TEST (test_mode_off_passes_everything_and_may_change_while_playing)
   gst_buffer_unref (out);
   gst_harness_set (h, "cylinderfilter", "mode", 1, nullptr);
   out = gst_harness_push_and_pull (h, make_frame_set (rig));
-  fail_unless_equals_int (points_of_view (out, 1), 0);
+  fail_unless (points_of_view (out, 1) < points_of_view (out, 0) / 20);
   gst_buffer_unref (out);
   gst_harness_teardown (h);
 }
@@ -155,7 +156,7 @@ GST_START_TEST (test_caps_may_change_in_the_stream)
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (larger, 15, 1)));
   GstBuffer *out = gst_harness_push_and_pull (h, make_frame_set (larger));
   fail_unless (points_of_view (out, 0) > 0);
-  fail_unless_equals_int (points_of_view (out, 4), 0);
+  fail_unless (points_of_view (out, 4) < points_of_view (out, 0) / 10);
   fail_unless_equals_uint64 (stat (element, "frames"), 2);
   gst_buffer_unref (out);
   gst_object_unref (element);
@@ -176,7 +177,7 @@ GST_START_TEST (test_stats_count_frames_points_and_units)
   const guint64 points = points_of_view (out, 0);
   fail_unless_equals_uint64 (stat (element, "frames"), 3);
   fail_unless_equals_uint64 (stat (element, "points-in"), 6 * points);
-  fail_unless_equals_uint64 (stat (element, "points-out"), 3 * points);
+  fail_unless_equals_uint64 (stat (element, "points-out"), 3 * (points + points_of_view (out, 1)));
   fail_unless (stat (element, "units") > 0);
   fail_unless_equals_uint64 (stat (element, "units"), stat (element, "units-shared"));
   GstStructure *stats = nullptr;
@@ -326,7 +327,7 @@ GST_START_TEST (test_every_property_set_while_playing_is_kept_and_read_for_the_n
   gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, 0)));
   const char *changes[][2] = {{"axis", "fixed"}, {"axis-position", "<0.1,0.0,0.0>"},
       {"axis-direction", "<0.0,0.0,2.0>"}, {"layer-gap", "0.2"}, {"smoothing", "0.05"},
-      {"hidden-gap", "0"}, {"columns", "90"}, {"blend-width", "0.1"}, {"colour-balance", "off"},
+      {"overlap", "2.5"}, {"columns", "90"}, {"blend-width", "0.1"}, {"colour-balance", "off"},
       {"n-threads", "1"}};
   GstClockTime time = 0;
   for (const auto &change : changes) {
@@ -424,7 +425,7 @@ GST_START_TEST (test_mode_follows_its_controller)
       gst_direct_control_binding_new_absolute (GST_OBJECT (element), "mode", source));
   for (guint round = 0; round < 2; round++) {
     GstBuffer *out = gst_harness_push_and_pull (h, make_frame_set (rig, round * GST_SECOND));
-    fail_unless_equals_int (points_of_view (out, 1) > 0 ? 0 : 1, round);
+    fail_unless_equals_int (points_of_view (out, 1) == points_of_view (out, 0) ? 0 : 1, round);
     gst_buffer_unref (out);
   }
   gst_object_unref (source);

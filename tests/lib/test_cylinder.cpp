@@ -346,7 +346,7 @@ TEST (Decision, the_camera_that_looks_squarely_at_a_patch_keeps_it)
   shots.filter (vertical_through_origin ());
   EXPECT_EQ (shots.points_of (1).size (), squarely);
   /* At the patch's very edge another view's points may lie in a unit that it has to itself. */
-  EXPECT_LT (shots.points_of (0).size () + shots.points_of (2).size (), squarely / 20);
+  EXPECT_LT (shots.points_of (0).size () + shots.points_of (2).size (), squarely / 10);
 }
 
 TEST (Decision, the_plain_rule_decides_unit_by_unit)
@@ -364,7 +364,7 @@ TEST (Decision, the_plain_rule_decides_unit_by_unit)
   EXPECT_LT (shots.points_of (0).size (), squarely / 5);
 }
 
-TEST (Decision, of_two_that_see_it_equally_the_first_keeps_all)
+TEST (Decision, of_two_that_see_it_equally_the_first_keeps_all_and_the_second_its_outline)
 {
   Rig rig;
   rig.views = {ring_view (5, 0), ring_view (2, 0)};
@@ -372,9 +372,8 @@ TEST (Decision, of_two_that_see_it_equally_the_first_keeps_all)
   const std::size_t first = shots.points_of (0).size ();
   const CylinderResult result = shots.filter ({});
   EXPECT_EQ (shots.points_of (0).size (), first);
-  EXPECT_EQ (shots.points_of (1).size (), 0u);
+  EXPECT_LT (shots.points_of (1).size (), first / 10);
   EXPECT_EQ (result.points_in, 2 * first);
-  EXPECT_EQ (result.points_out, first);
   EXPECT_EQ (result.units, result.units_shared);
 }
 
@@ -390,10 +389,10 @@ TEST (Decision, surfaces_further_apart_than_the_layer_gap_do_not_compete)
   const CylinderResult apart = chest.filter (vertical_through_origin ());
   EXPECT_EQ (apart.points_out, points);
   EXPECT_GT (apart.units_shared, 0u);
+  /* Even where they do, neither covers the other. */
   CylinderSettings settings = vertical_through_origin ();
   settings.units.layer_gap_m = 0.2;
-  settings.hidden_gap_m = 0;
-  EXPECT_LT (chest.filter (settings).points_out, points);
+  EXPECT_EQ (chest.filter (settings).points_out, points);
 }
 
 TEST (Decision, a_view_with_one_point_in_a_unit_competes)
@@ -407,7 +406,7 @@ TEST (Decision, a_view_with_one_point_in_a_unit_competes)
   int left = 0;
   for (int v = 0; v < depth.height; v++)
     for (int u = 0; u < depth.width; u++)
-      if (depth.at (u, v) && !(v == 120 && !left++))
+      if (depth.at (u, v) && !(v == 120 && left++ == 5))
         depth.at (u, v) = 0;
   ASSERT_EQ (shots.points_of (1).size (), 1u);
   shots.filter (vertical_through_origin ());
@@ -450,62 +449,66 @@ TEST (Decision, both_sides_of_a_thin_thing_stay)
   EXPECT_EQ (shots.filter (vertical_through_origin ()).points_out, points);
 }
 
-TEST (Decision, a_loser_fills_the_hole_of_the_winner)
+TEST (Coverage, the_hole_of_the_winner_stays_filled)
 {
   Rig rig;
   rig.views = {ring_view (0, 40), ring_view (1, 0)};
   Shots shots (rig, patch ({0, 0, 0.1}, {0, 0, 1}, 0.03));
+  Shots whole = shots;
+  whole.filter (vertical_through_origin ());
   const std::vector<Vec3> before = shots.points ();
   auto depth = shots.depth[1].view ();
   for (int v = depth.height / 2 - 1; v <= depth.height / 2 + 1; v++)
     for (int u = depth.width / 2 - 1; u <= depth.width / 2 + 1; u++)
       depth.at (u, v) = 0;
-  Shots plain = shots;
-  CylinderSettings settings = vertical_through_origin ();
-  shots.filter (settings);
-  settings.hidden_gap_m = 0;
-  plain.filter (settings);
-  EXPECT_GT (farthest_gap (before, plain.points ()), 0.0035);
+  shots.filter (vertical_through_origin ());
   EXPECT_LT (farthest_gap (before, shots.points ()), 0.0025);
   /* The hole and the rim, no more. */
-  EXPECT_LT (shots.points_of (0).size (), plain.points_of (0).size () + 30);
+  EXPECT_GT (shots.points_of (0).size (), whole.points_of (0).size () + 9);
+  EXPECT_LT (shots.points_of (0).size (), whole.points_of (0).size () + 50);
 }
 
-TEST (Decision, scraps_go_and_what_is_a_surface_stays)
+TEST (Coverage, what_lies_a_little_behind_the_winners_surface_is_another_surface)
 {
-  /* Eight views: seams everywhere, and along them single points that overlap with nothing's end. */
-  Shots shots (ring_rig (8), bust ());
-  const auto lone = [&] {
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < 8; i++) {
-      const auto depth = shots.depth[i].view ();
-      for (int v = 0; v < depth.height; v++)
-        for (int u = 1; u + 1 < depth.width; u++)
-          n += depth.at (u, v) && !depth.at (u - 1, v) && !depth.at (u + 1, v);
-    }
-    return n;
-  };
-  const std::vector<Vec3> before = shots.points ();
-  shots.filter ({});
-  EXPECT_LT (lone (), shots.points ().size () / 200);
-  EXPECT_LT (farthest_gap (before, shots.points ()), 0.006);
-}
-
-TEST (Decision, what_the_winner_cannot_see_stays_although_one_unit_holds_both)
-{
-  /* A shoulder: what lies behind its edge for one camera is open to the other. */
+  /* Hair before a cheek: for the one camera it hides the cheek, which is open to the other. */
   Rig rig;
   rig.views = {ring_view (0, 0), ring_view (1, 30)};
-  for (const double behind : {0.003, 0.022}) {
-    Shots edge (rig, patch ({0, 0, 0.1}, {0, 0, 1}, 0.03)),
-        hidden (rig, patch ({0, 0, 0.1 - behind}, {0, 0, 1}, 0.03));
-    hidden.depth[0] = edge.depth[0];
-    const std::size_t points = hidden.points_of (1).size ();
-    hidden.filter (vertical_through_origin ());
-    if (behind > CylinderSettings{}.hidden_gap_m)
-      EXPECT_EQ (hidden.points_of (1).size (), points);
+  for (const double behind : {0.001, 0.006, 0.022}) {
+    Shots near (rig, patch ({0, 0, 0.1}, {0, 0, 1}, 0.03)),
+        far (rig, patch ({0, 0, 0.1 - behind}, {0, 0, 1}, 0.03));
+    far.depth[0] = near.depth[0];
+    const std::size_t points = far.points_of (1).size ();
+    far.filter (vertical_through_origin ());
+    if (behind > 0.002)
+      EXPECT_EQ (far.points_of (1).size (), points) << behind;
     else
-      EXPECT_LT (hidden.points_of (1).size (), points / 5);
+      EXPECT_LT (far.points_of (1).size (), points / 2);
+  }
+}
+
+TEST (Coverage, the_other_side_of_a_thin_thing_is_another_surface)
+{
+  /* A ribbon that one camera sees from the front at a slant and the other from behind. */
+  Rig rig;
+  rig.views = {ring_view (0, 0), ring_view (1, 60)};
+  const double turn = 110 * M_PI / 180;
+  Shots shots (rig, patch ({0, 0, 0.05}, {std::sin (turn), 0, std::cos (turn)}, 0.03));
+  ASSERT_GT (shots.points_of (0).size (), 100u);
+  const std::size_t points = shots.points ().size ();
+  EXPECT_EQ (shots.filter (vertical_through_origin ()).points_out, points);
+}
+
+TEST (Coverage, a_wider_overlap_keeps_more_and_no_less)
+{
+  std::size_t before = 0;
+  for (const double overlap : {0.0, 1.0, 3.0, 6.0}) {
+    Shots shots (ring_rig (4), bust ());
+    CylinderSettings settings;
+    settings.overlap = overlap;
+    const CylinderResult result = shots.filter (settings);
+    EXPECT_GT (result.points_out, before) << overlap;
+    EXPECT_LT (result.points_out, result.points_in) << overlap;
+    before = result.points_out;
   }
 }
 
@@ -536,7 +539,7 @@ TEST (Filter, doubles_go_and_no_holes_come)
     EXPECT_EQ (result.points_out, after.size ());
     EXPECT_LT (farthest_gap (before, after), 0.006) << noise_m;
     EXPECT_GT (before_doubles, before.size () / 4) << noise_m;
-    EXPECT_LT (doubles (shots), before_doubles / 10) << noise_m;
+    EXPECT_LT (doubles (shots), before_doubles / 5) << noise_m;
   }
 }
 
@@ -551,7 +554,7 @@ TEST (Filter, what_is_left_of_each_view_is_its_own_quarter)
         continue;
       double off = std::abs (std::atan2 (p.x, p.z) - i * M_PI / 2);
       off = std::min (off, 2 * M_PI - off) * 180 / M_PI;
-      wrong += off > 45 + 5;
+      wrong += off > 45 + 8; /* where regions meet they overlap */
       all++;
     }
   EXPECT_LT (wrong, all / 200);

@@ -21,8 +21,8 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: columns, expected 8 to 3600");
   if (!(u.layer_gap_m >= 0 && u.layer_gap_m <= 100) || !(u.smoothing_m >= 0 && u.smoothing_m <= 1))
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
-  if (!(settings.hidden_gap_m >= 0 && settings.hidden_gap_m <= 100))
-    return bad ("cylinder: hidden gap, expected 0 to 100 metres");
+  if (!(settings.overlap >= 0 && settings.overlap <= kMaxOverlap))
+    return bad ("cylinder: overlap, expected 0 to 16 pixels");
   if (!(settings.hysteresis >= 0 && settings.hysteresis <= 2) ||
       !(settings.agreement >= 0 && settings.agreement <= 2))
     return bad ("cylinder: hysteresis and agreement, expected 0 to 2");
@@ -295,10 +295,10 @@ CylinderFilter::work (
   units_.sort (cloud_, radius_, column_, runs_, ranges_, settings.units, settings.threads);
   set_rules (settings, images.size ());
   decide_units (settings, result);
-  clear_losers (images, settings);
+  clear_redundant (images, settings);
   units_.rows.remember (rules_, ids_);
   decided_ = true;
-  result.points_out -= losers_.size ();
+  result.points_out -= redundant_.size ();
   return {};
 }
 
@@ -339,28 +339,17 @@ CylinderFilter::decide_units (const CylinderSettings &settings, CylinderResult &
   }
 }
 
-/* How far a point may lie off what a view has there. */
-static void
-set_reach (DecidedFrame &frame, const CylinderSettings &settings,
-    const std::array<float, kMaxViews> &units_per_metre)
-{
-  for (std::size_t i = 0; i < frame.images.size (); i++) {
-    const double scale = units_per_metre[static_cast<std::size_t> (frame.images[i].view_id)];
-    frame.behind[i] = static_cast<float> (settings.hidden_gap_m * scale);
-    frame.before[i] = static_cast<float> (settings.units.layer_gap_m / 2 * scale);
-  }
-}
-
 void
-CylinderFilter::clear_losers (std::span<const RangeImage> images, const CylinderSettings &settings)
+CylinderFilter::clear_redundant (
+    std::span<const RangeImage> images, const CylinderSettings &settings)
 {
-  DecidedFrame frame{images, cloud_, runs_, column_, units_, lookups_, {}, {}};
-  losers_.list (frame);
-  if (settings.hidden_gap_m > 0) {
-    set_reach (frame, settings, rig_units_per_metre_);
-    losers_.keep_uncovered (frame);
-  }
-  losers_.clear (frame);
+  std::array<PixelLookup, kMaxViews> lookups;
+  for (std::size_t i = 0; i < images.size (); i++)
+    lookups[i] = rig_lookups_[static_cast<std::size_t> (ids_[i])];
+  const ResolvedFrame frame{images, {rays_.data (), images.size ()},
+      {lookups.data (), images.size ()}, cloud_, runs_, column_, units_};
+  redundant_.find (frame, settings.overlap, settings.threads);
+  redundant_.clear (frame);
 }
 
 } // namespace rangecast

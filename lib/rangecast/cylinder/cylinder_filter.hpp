@@ -11,19 +11,21 @@
 #include "../status.hpp"
 #include "axis.hpp"
 #include "bodies.hpp"
-#include "losers.hpp"
+#include "redundant_points.hpp"
 #include "units.hpp"
 #include "world_points.hpp"
 
 namespace rangecast {
 
+inline constexpr double kMaxOverlap = 16; ///< pixels
+
 struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
   UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
-  /** A point further behind what the winner sees, along the winner's optical axis, is hidden from
-   *  it and stays; metres, 0 .. 100; 0 = all points of losers go. */
-  double hidden_gap_m = 0.015;
+  /** How far round a point the winner's surface must cover its view's own before it goes, 0 ..
+   *  kMaxOverlap pixels of its view; 1: as far as its triangles reach, and no hole opens. */
+  double overlap = 1;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
   /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
    *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
@@ -65,13 +67,9 @@ struct CylinderResult {
  *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
- *  - Views that look squarely at opposite sides of a thin thing see different surfaces: both stay.
- *  - Points of losers stay where no winner is (hidden_gap_m > 0): a unit can be larger than what
- *    its winner sees of it, above all where the surface lies across the axis (shoulders, crown), or
- *    the winner has a hole there. A loser's point goes only if another view that competes has a
- *    point left in the pixel where it sees the loser's, at most hidden_gap_m before it and half the
- *    layer gap behind it, and in the pixels beside no such point that goes. Where two regions meet
- *    they overlap by a pixel.
+ *  - A point goes only if the winner's own surface covers what its view draws of it
+ *    (RedundantPoints): a unit can be larger than what its winner sees of it, the winner may see
+ *    something before the point, have a hole there, or see a thin thing from its other side.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
  *  - Added to |N . a| is something for the view that won the unit in the frame before (hysteresis)
  *    and for those that won its neighbours (agreement).
@@ -115,7 +113,7 @@ private:
   void look_from (int body, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_units (const CylinderSettings &settings, CylinderResult &result);
-  void clear_losers (std::span<const RangeImage> images, const CylinderSettings &settings);
+  void clear_redundant (std::span<const RangeImage> images, const CylinderSettings &settings);
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
@@ -146,7 +144,7 @@ private:
   std::vector<std::int32_t> column_;
   Units units_;
   RowRules rules_;
-  Losers losers_;
+  RedundantPoints redundant_;
 };
 
 } // namespace rangecast

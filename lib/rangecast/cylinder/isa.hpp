@@ -32,6 +32,7 @@ template <int kNumbers> struct LanesOf {
   static F &at (float *p) { return *reinterpret_cast<F *> (p); }
   static const F &at (const float *p) { return *reinterpret_cast<const F *> (p); }
   static I &at (std::int32_t *p) { return *reinterpret_cast<I *> (p); }
+  static const I &at (const std::int32_t *p) { return *reinterpret_cast<const I *> (p); }
   static U &at (std::uint32_t *p) { return *reinterpret_cast<U *> (p); }
   static const U &at (const std::uint32_t *p) { return *reinterpret_cast<const U *> (p); }
 

@@ -11,10 +11,6 @@
 
 namespace rangecast {
 
-/* Views that look at a surface more squarely than this, |N . a|, from opposite sides see two
- * surfaces. Well above what noise makes of a camera that looks along the surface. */
-constexpr float kOtherSide = 0.35f;
-
 void
 UnitRows::begin (int columns, double slice_height_m, int images, std::size_t slices)
 {
@@ -64,7 +60,7 @@ UnitRows::make_room ()
   grow (old_first_, cells);
   for (auto *plane : {&tangent_[0], &tangent_[1], &sum_[0], &sum_[1]})
     grow (*plane, cells);
-  for (auto *plane : {&first_, &next_, &second_, &held_})
+  for (auto *plane : {&first_, &next_, &held_})
     grow (*plane, cells);
   for (int w = 0; w < words_; w++) {
     grow (views_[w], cells);
@@ -315,7 +311,7 @@ template <typename L> struct UnitRows::Loops {
   }
 
   struct Best {
-    F score, facing, least, greatest;
+    F score;
     I view;
   };
 
@@ -336,34 +332,7 @@ template <typename L> struct UnitRows::Loops {
     score += bonus + __builtin_convertvector(agreeing, F) * (rules.agreement / 4);
     const I take = in & (score > best.score);
     best.score = take ? score : best.score;
-    best.facing = take ? facing : best.facing;
     best.view = take ? view + I{} : best.view;
-    const I less = in & (facing < best.least), more = in & (facing > best.greatest);
-    best.least = less ? facing : best.least;
-    best.greatest = more ? facing : best.greatest;
-  }
-
-  /* The view that sees the side which the winner does not see most squarely. */
-  void find_second (const Best &best, std::size_t here, int body, std::uint64_t views) const
-  {
-    I second = I{} - 1;
-    F most = kOtherSide + F{};
-    const I outside = best.facing < 0;
-    F squarely = best.facing;
-    L::make_positive (squarely);
-    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
-      const int view = std::countr_zero (rest);
-      const auto &optical = rules.optical[body][view];
-      I in;
-      covers (in, here, view);
-      F facing = L::at (&rows.tangent_[1][here]) * optical[0] -
-                 L::at (&rows.tangent_[0][here]) * optical[1];
-      facing = outside ? facing : -facing;
-      const I take = in & (facing > most) & (squarely > kOtherSide);
-      most = take ? facing : most;
-      second = take ? view + I{} : second;
-    }
-    L::at (&rows.second_[here]) = second;
   }
 
   void decide_block (std::size_t here, const Slice &slice, const Neighbours &around) const
@@ -376,18 +345,14 @@ template <typename L> struct UnitRows::Loops {
       I in;
       covers (in, here, view);
       L::at (&rows.next_[here]) = in ? view + I{} : I{} - 1;
-      L::at (&rows.second_[here]) = I{} - 1;
       return;
     }
-    Best best = {F{} - 1, F{}, F{}, F{}, I{} - 1};
+    Best best = {F{} - 1, I{} - 1};
     for (std::uint64_t rest = views; rest; rest &= rest - 1) {
       const int view = std::countr_zero (rest);
       compare_view (best, here, view, rules.optical[slice.body][view], around);
     }
     L::at (&rows.next_[here]) = best.view; /* not yet: the next columns ask for this one's */
-    L::at (&rows.second_[here]) = I{} - 1;
-    if (L::any ((best.least < -kOtherSide) & (best.greatest > kOtherSide)))
-      find_second (best, here, slice.body, views);
   }
 
   /* Whether some of a block's neighbours have another winner. If not, asking them changes nothing.
@@ -410,7 +375,7 @@ template <typename L> struct UnitRows::Loops {
       const std::size_t here = std::size_t{row} * rows.width_ + kPad + c;
       const F radius = L::at (&rows.radius_[here]);
       if (!L::any (radius < kNowhere)) {
-        L::at (&rows.next_[here]) = L::at (&rows.second_[here]) = I{} - 1;
+        L::at (&rows.next_[here]) = I{} - 1;
         continue;
       }
       if (pass == Pass::kAskNeighbours) {

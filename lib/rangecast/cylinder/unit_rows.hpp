@@ -80,15 +80,8 @@ public:
     if (words_ > 1)
       views_[1][cell] = static_cast<std::uint32_t> (layer.views >> 32);
   }
-  [[nodiscard]] std::uint64_t covering (std::uint32_t cell) const
-  {
-    return covering_[0][cell] | (words_ > 1 ? std::uint64_t{covering_[1][cell]} << 32 : 0);
-  }
   /** The image that won the cell; -1 if it is empty. */
   [[nodiscard]] int winner (std::uint32_t cell) const { return first_[cell]; }
-  /** The image that looks squarely at its other side and stays, too; -1 if there is none. */
-  [[nodiscard]] int second (std::uint32_t cell) const { return second_[cell]; }
-
   [[nodiscard]] const std::vector<Slice> &slices () const { return slices_; }
   [[nodiscard]] int columns () const { return columns_; }
 
@@ -133,7 +126,7 @@ private:
   Plane<float> radius_;
   std::array<Plane<float>, 2> tangent_, sum_;
   std::array<Plane<std::uint32_t>, 2> views_, covering_;
-  Plane<std::int32_t> first_, second_, held_;
+  Plane<std::int32_t> first_, held_;
   Plane<std::int32_t> next_; /* after decide(): as first_, and carry_over() leaves it alone */
   std::array<std::vector<float>, 2> wall_; /* tangent of the wall in each column */
 

@@ -39,7 +39,7 @@ const char *const kUsage =
     "                  stereo, two pictures matched as stereodepth does (default: each in turn)\n"
     "  --pose-mm MM, --pose-deg DEGREES  what the rig is told wrong of each camera's place and\n"
     "                  direction (default: nothing, 2 mm, 5 mm and 0.5 degrees in turn)\n"
-    "  --hidden-gap M, --smoothing M  of the filter (default: its own)\n"
+    "  --overlap PIXELS, --smoothing M  of the filter (default: its own)\n"
     "  --mesh FILE     the bunny's merged mesh, PLY\n"
     "  --json FILE     an array of objects. scene; views; noise; pose_mm; pose_deg; method;\n"
     "                  points: left; removed: share of the points that were there; units_double:\n"
@@ -219,7 +219,7 @@ main (int argc, char **argv)
       "--noise", [&] (const std::string &value) { return take_noise (value, truth.noise); });
   options.number ("--pose-mm", truth.pose_mm, 0.0, 100.0);
   options.number ("--pose-deg", truth.pose_deg, 0.0, 20.0);
-  options.number ("--hidden-gap", truth.settings.hidden_gap_m, 0.0, 100.0);
+  options.number ("--overlap", truth.settings.overlap, 0.0, kMaxOverlap);
   options.number ("--smoothing", truth.settings.units.smoothing_m, 0.0, 1.0);
   options.text ("--json", job.json);
   if (const auto status = options.parse (argc, argv))

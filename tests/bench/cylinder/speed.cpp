@@ -83,8 +83,6 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
   run ("cylinder, 1 thread", settings);
   settings.threads = 0;
   run ("cylinder, all cores", settings);
-  settings.hidden_gap_m = 0;
-  run ("all losers go", settings);
   settings.units.smoothing_m = 0;
   run ("and smoothing 0", settings);
   const int few = std::max (3, rounds / 10);

@@ -57,7 +57,7 @@ const char *const kUsage =
     "  --merge N       of the strips (default 1)\n"
     "  --view-gap M    of the strips, metres (default 0.012)\n"
     "  --max-gap N     of the strips, pixels (default: the element's)\n"
-    "  --hidden-gap M  of the cylinder, metres (default: the element's)\n"
+    "  --overlap PIXELS  of the cylinder (default: the element's)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
     "  --json FILE     writes the rows (but noise) there\n"
@@ -339,7 +339,7 @@ main (int argc, char **argv)
   options.number ("--merge", job.merge, 0, 100);
   options.number ("--view-gap", job.view_gap_m, 0, 1);
   options.number ("--max-gap", job.max_gap, 0, 1000);
-  options.number ("--hidden-gap", job.cylinder.hidden_gap_m, 0, 100);
+  options.number ("--overlap", job.cylinder.overlap, 0.0, kMaxOverlap);
   options.text ("--mode", job.mode);
   options.text ("--depth", job.depth);
   options.text ("--json", job.json);
