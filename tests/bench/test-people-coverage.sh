@@ -7,7 +7,7 @@ test_persons_of_a_real_recording_are_covered () {
   for python in python3 /usr/bin/python3; do
     ! "$python" -c "import cv2, numpy" 2>/dev/null || break
   done
-  RANGECAST_DATA=$data "$python" "$source_dir/tests/bench/people-coverage.py" --min-covered 48 --max-beside 60 || status=$?
+  RANGECAST_DATA=$data "$python" "$source_dir/tests/bench/people-coverage.py" --min-covered 80 --max-beside 8 || status=$?
   [ $status != 77 ] || skip "no Python module cv2 or numpy"
   [ $status = 0 ] || fail "people-coverage.py: $status"
 }

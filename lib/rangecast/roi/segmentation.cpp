@@ -303,6 +303,8 @@ Segmenter::forgive_light (int reach)
   other_.setTo (0, inverse_);
   /* A shadow that reaches the person's feet: what has no depth there has the light of the shadow
    * beside it. */
+  if (cv::countNonZero (inverse_) == 0)
+    return;
   inverse_.convertTo (dark_, CV_32F, 1.0 / kYes);
   cv::multiply (ratio_, dark_, dark_beside_);
   cv::boxFilter (dark_beside_, dark_beside_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);

@@ -10,8 +10,9 @@ namespace rangecast {
 /** What is known of a pixel: whether it shows something that stands before the background. */
 enum class Side : std::uint8_t { kUnknown, kBackground, kForeground };
 
-/** Finds unknown pixels that foreground surrounds: looks from each in eight directions for the
- * first pixel that is known. Keeps its memory between pictures. */
+/** Finds unknown pixels that foreground surrounds: looks from their block of 2x2 pixels in eight
+ *  directions for the first block of which more is known to be the one than the other. Keeps its
+ *  memory between pictures. */
 class Surroundings {
 public:
   /** @param sides  CV_8U, values of Side
@@ -27,9 +28,11 @@ private:
     Side side = Side::kUnknown;
     std::uint8_t distance = 0; /* to what is seen, pixels; 0 = the edge of the picture */
   };
-  void look (const cv::Mat &sides, int reach, int step);
+  void halve (const cv::Mat &sides);
+  void look (int reach, int step);
 
   std::vector<Sight> before_[3], row_[3]; /* of the row before, and of this one: three directions */
+  cv::Mat blocks_;                        /* CV_8U: sides of 2x2 pixels */
   cv::Mat foreground_, background_;       /* CV_8U: directions in which it is seen */
 };
 
