@@ -133,12 +133,68 @@ TEST (Background, shadow_and_light_on_the_wall_are_background)
   }
 }
 
-TEST (Background, much_darker_thing_is_no_shadow)
+TEST (Background, much_darker_thing_is_no_shadow_unless_depth_says_all_around_that_it_is_the_wall)
+{
+  for (const Cue cue : {Cue::kColour, Cue::kBoth}) {
+    Frame frame (99);
+    frame.put (20, 10, 20, 20, 20000, {20, 21, 18, 0});
+    SegmentationSettings settings;
+    settings.cue = cue;
+    segment (frame, settings);
+    EXPECT_EQ (frame.valid (), cue == Cue::kColour ? 400 : 0);
+  }
+}
+
+TEST (Background, dark_thing_beside_something_nearer_is_no_shadow)
 {
   Frame frame (99);
-  frame.put (20, 10, 20, 20, 20000, {20, 21, 18, 0});
+  frame.put (20, 10, 20, 20, 12000, {200, 60, 60, 0});
+  frame.put (40, 10, 8, 20, 20000, {20, 21, 18, 0}); /* stereo gives a rim the wall's depth */
   segment (frame);
-  EXPECT_EQ (frame.valid (), 400);
+  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
+  EXPECT_EQ (frame.valid (40, 10, 8, 20), 160);
+}
+
+TEST (Background, what_a_nearer_surface_surrounds_belongs_to_it_and_gets_its_depth)
+{
+  Frame frame (99);
+  frame.put (10, 8, 40, 34, 12000, {200, 60, 60, 0});
+  frame.put (20, 15, 14, 14, kInvalidDepth, {70, 70, 65, 0}); /* dark cloth or deep shadow */
+  segment (frame);
+  EXPECT_EQ (frame.valid (), 40 * 34);
+  for (int y = 15; y < 29; y++)
+    for (int x = 20; x < 34; x++)
+      ASSERT_NEAR (frame.depth.view ().at (x, y), 12000, 240) << x << ", " << y;
+}
+
+TEST (Background, shadow_without_depth_beside_a_person_is_open_and_no_part_of_it)
+{
+  Frame frame (99);
+  frame.put (0, 0, 30, 48, 12000, {200, 60, 60, 0});
+  frame.put (30, 0, 34, 48, 20000, {36, 37, 33, 0});
+  frame.put (30, 10, 6, 20, kInvalidDepth, {36, 37, 33, 0}); /* what one camera does not see */
+  segment (frame);
+  EXPECT_EQ (frame.valid (36, 0, 28, 48), 0);
+  EXPECT_EQ (frame.valid (0, 0, 30, 48), 30 * 48);
+}
+
+TEST (Background, depth_of_a_burnt_out_wall_is_that_of_the_wall_around_it)
+{
+  BackgroundModel model;
+  model.reset (kWidth, kHeight);
+  for (unsigned i = 0; i < 20; i++) {
+    Frame frame (i);
+    frame.put (20, 10, 20, 20, kInvalidDepth, {255, 255, 255, 0});
+    EXPECT_TRUE (model.learn (frame.image ()).ok ());
+  }
+  model.finish ();
+  EXPECT_NEAR (model.inferred_depth (20)[30], 20000, 100);
+  EXPECT_EQ (model.inferred_depth (5)[5], 0); /* it has depth of its own */
+  Frame shaded (99);
+  shaded.put (20, 10, 20, 20, 20000, {60, 60, 60, 0}); /* a shadow falls there: stereo finds it */
+  Segmenter segmenter;
+  ASSERT_TRUE (segmenter.clear_background (shaded.image (), model, 1e-4, {}).ok ());
+  EXPECT_EQ (shaded.valid (), 0);
 }
 
 TEST (Background, small_island_goes_and_small_hole_closes)

@@ -2,9 +2,11 @@
 #include "background.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "../storage_check.hpp"
 
@@ -28,6 +30,7 @@ BackgroundModel::reset (int width, int height)
   const auto pixels = static_cast<std::size_t> (width) * static_cast<std::size_t> (height);
   pixels_.assign (pixels, {});
   sums_.assign (pixels, {});
+  inferred_.assign (pixels, 0);
   taught_ms_.clear ();
 }
 
@@ -75,6 +78,7 @@ BackgroundModel::finish ()
     pixel.depth_share = frames_ ? float (sums.depth_n) / float (frames_) : 0;
   }
   measure_noise ();
+  infer_depth ();
 }
 
 void
@@ -141,6 +145,53 @@ BackgroundModel::measure_noise ()
   depth_noise_ = *middle;
 }
 
+/* Holes in a surface have the inverse depth, which is linear on a plane, of what surrounds them:
+ * halved again and again as far as some pixels are known, and doubled into the holes. */
+void
+BackgroundModel::infer_depth ()
+{
+  constexpr float kKnownShare = 0.05f; /* as for the segmenter */
+  constexpr int kLevels = 6;           /* a hole of some 64 pixels */
+  std::array<cv::Mat, kLevels + 1> sum, weight;
+  sum[0].create (height_, width_, CV_32F);
+  weight[0].create (height_, width_, CV_32F);
+  for (int y = 0; y < height_; y++) {
+    const BackgroundPixel *pixel = row (y);
+    auto s = sum[0].ptr<float> (y), w = weight[0].ptr<float> (y);
+    for (int x = 0; x < width_; x++) {
+      w[x] = pixel[x].depth_share >= kKnownShare && pixel[x].depth > 0 ? pixel[x].depth_share : 0;
+      s[x] = w[x] > 0 ? w[x] / pixel[x].depth : 0;
+    }
+  }
+  int top = 0;
+  while (top < kLevels && sum[top].cols > 1 && sum[top].rows > 1) {
+    cv::pyrDown (sum[top], sum[top + 1]);
+    cv::pyrDown (weight[top], weight[top + 1]);
+    top++;
+  }
+  constexpr float kEnough = 1e-3f;
+  cv::Mat above;
+  for (int level = top; level >= 0; level--) {
+    cv::Mat value (sum[level].size (), CV_32F);
+    cv::Mat coarse;
+    if (level < top)
+      cv::resize (above, coarse, value.size (), 0, 0, cv::INTER_LINEAR);
+    for (int y = 0; y < value.rows; y++)
+      for (int x = 0; x < value.cols; x++) {
+        const float w = weight[level].at<float> (y, x);
+        value.at<float> (y, x) = w > kEnough       ? sum[level].at<float> (y, x) / w
+                                 : coarse.empty () ? 0
+                                                   : coarse.at<float> (y, x);
+      }
+    above = value;
+  }
+  inferred_.assign (pixels_.size (), 0);
+  for (std::size_t i = 0; i < pixels_.size (); i++)
+    if (const float inverse = above.ptr<float> ()[i];
+        pixels_[i].depth_share < kKnownShare && inverse > 0)
+      inferred_[i] = 1 / inverse;
+}
+
 Status
 save_backgrounds (
     const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views)
@@ -197,6 +248,7 @@ read_background (const cv::FileNode &node, int &id, BackgroundModel &model)
   model.pixels_.assign (first, first + pixels.total ());
   model.frames_ = std::max (1, static_cast<int> (node["frames"]));
   model.measure_noise ();
+  model.infer_depth ();
   return true;
 }
 

@@ -46,6 +46,13 @@ public:
     return pixels_.data () + static_cast<std::size_t> (y) * static_cast<std::size_t> (width_);
   }
 
+  /** Depth that the background has by what lies around, depth units, where it was never valid or
+   *  seldom; 0 = nothing near enough, or it was valid. */
+  [[nodiscard]] const float *inferred_depth (int y) const
+  {
+    return inferred_.data () + static_cast<std::size_t> (y) * static_cast<std::size_t> (width_);
+  }
+
   /** Makes means and spreads of what was learnt. */
   void finish ();
 
@@ -80,6 +87,7 @@ private:
     int colour_n = 0, depth_n = 0;
   };
   void measure_noise ();
+  void infer_depth ();
   static void move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
       const float *to_model, float share);
 
@@ -87,6 +95,7 @@ private:
   double depth_noise_ = 0;
   std::vector<BackgroundPixel> pixels_;
   std::vector<Sums> sums_;
+  std::vector<float> inferred_;
   std::vector<std::uint32_t> taught_ms_; // since adapt_base_ns_, by pixel; empty before adapt()
   std::uint64_t adapt_base_ns_ = 0;
 };

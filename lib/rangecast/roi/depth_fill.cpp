@@ -115,7 +115,7 @@ private:
 
 /* What depth a pixel has if the surface beside it goes on; kInvalidDepth if none does. */
 std::uint16_t
-depth_of (const RangeImage &image, int x, int y)
+depth_of (const RangeImage &image, int x, int y, bool any_colour)
 {
   const std::uint16_t beside = likeliest (image, x, y);
   if (beside == kInvalidDepth)
@@ -131,8 +131,8 @@ depth_of (const RangeImage &image, int x, int y)
     const float away = float (d) - float (beside);
     if (d == kInvalidDepth || std::abs (away) > s.slant * float (beside))
       continue;
-    plane.add (
-        float (s.x), float (s.y), away, s.weight * weights[unlike (image.colour.at (u, v), own)]);
+    const float like = any_colour ? 1 : weights[unlike (image.colour.at (u, v), own)];
+    plane.add (float (s.x), float (s.y), away, s.weight * like);
   }
   if (plane.weight () < kEnough)
     return kInvalidDepth;
@@ -188,14 +188,14 @@ DepthFill::advance (const RangeImage &image, const cv::Mat &allowed)
 }
 
 int
-DepthFill::fill (const RangeImage &image, const cv::Mat &allowed, int reach)
+DepthFill::fill (const RangeImage &image, const cv::Mat &allowed, int reach, bool any_colour)
 {
   int filled = 0;
   begin (image, allowed);
   for (int ring = 0; ring < reach && !front_.empty (); ring++) {
     found_.clear ();
     for (const cv::Point &at : front_)
-      found_.push_back (depth_of (image, at.x, at.y));
+      found_.push_back (depth_of (image, at.x, at.y, any_colour));
     for (std::size_t i = 0; i < front_.size (); i++) {
       image.depth.at (front_[i].x, front_[i].y) = found_[i]; /* was invalid, or still is */
       filled += found_[i] != kInvalidDepth;

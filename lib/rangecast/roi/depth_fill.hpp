@@ -21,8 +21,9 @@ public:
   /** @param image  depth is written where there was none and `allowed` is other than 0
    *  @param allowed  CV_8U, of the ROI's size
    *  @param reach  pixels from what had depth, at most
+   *  @param any_colour  a surface goes on whatever the pixel looks like
    *  @return how many pixels got depth */
-  int fill (const RangeImage &image, const cv::Mat &allowed, int reach);
+  int fill (const RangeImage &image, const cv::Mat &allowed, int reach, bool any_colour = false);
 
 private:
   void begin (const RangeImage &image, const cv::Mat &allowed);

@@ -19,6 +19,10 @@ constexpr float kConfirmed = 2;
  * kLeastSpread grey levels), and within this share of its brightness. */
 constexpr float kSameFactor = 2.5f, kLeastSpread = 1.5f, kSameShare = 0.08f;
 constexpr float kBurntOut = 250; /* grey levels */
+/* Noise of brightness from which the background's colour tells nothing. */
+constexpr float kVague = 0.3f;
+/* How far around a pixel the person or the background is looked for, as a share of the width. */
+constexpr double kSight = 0.125;
 /* What teaches the background and has no depth to prove it keeps so far from what is kept, pixels.
  */
 constexpr int kGuard = 7;
@@ -38,18 +42,27 @@ struct Limits {
 enum class Where { kUnknown, kBackground, kSomewhere, kNearer };
 
 Where
-place_of (std::uint16_t depth, const BackgroundPixel &background, const Limits &limits)
+place_of (
+    std::uint16_t depth, const BackgroundPixel &background, float inferred, const Limits &limits)
 {
   if (depth == kInvalidDepth)
     return Where::kUnknown;
-  if (background.depth_share < kKnownShare)
-    return Where::kSomewhere;
+  if (background.depth_share < kKnownShare) {
+    if (inferred <= 0)
+      return Where::kSomewhere;
+    const float doubt =
+        std::max (limits.nearness, limits.noise_factor * limits.depth_noise * inferred * inferred);
+    return float (depth) < inferred - doubt   ? Where::kSomewhere
+           : float (depth) < inferred + doubt ? Where::kBackground
+                                              : Where::kUnknown;
+  }
   /* Where stereo wavers between two surfaces, their distance is no noise: only what is nearer than
    * the nearer one is new. */
   const float sensor = limits.depth_noise * background.depth * background.depth;
   const float wavers = background.depth - background.nearest + limits.noise_factor * sensor;
-  float noise =
-      std::max (limits.nearness, std::min (limits.noise_factor * background.depth_spread, wavers));
+  /* Stereo is steady where there is no texture, too, and errs by more when a shadow brings some. */
+  float noise = std::max ({limits.nearness, limits.noise_factor * sensor,
+      std::min (limits.noise_factor * background.depth_spread, wavers)});
   if (background.depth_share < kSteadyShare)
     noise *= 2; /* learnt from few */
   if (float (depth) < background.depth - noise)
@@ -86,12 +99,15 @@ compare (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
 }
 
 bool
-is_other (
-    const Comparison &c, const BackgroundPixel &background, bool confirmed, const Limits &limits)
+has_other_hue (const Comparison &c, const BackgroundPixel &background, const Limits &limits)
 {
   const float chroma = std::max (limits.colour, limits.noise_factor * background.spread);
-  if (c.distortion > chroma * chroma)
-    return true;
+  return c.distortion > chroma * chroma;
+}
+
+bool
+has_other_light (const Comparison &c, bool confirmed, const Limits &limits)
+{
   const float beyond = confirmed ? kConfirmed : 1;
   const float noise = limits.noise_factor * c.noise;
   return c.brightness < limits.shadow / beyond - noise ||
@@ -162,10 +178,12 @@ estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
   const auto usable = [] (float level) { return level >= 16 && level <= 240; };
   for (int y = 0; y < image.roi.height; y += kLightStep) {
     const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
+    const float *inferred = background.inferred_depth (image.roi.y + y) + image.roi.x;
     const Rgbx *colour = image.colour.row (y);
     for (int x = 0; x < image.roi.width; x += kLightStep) {
-      if (behind[x].spread < 0 || (limits.use_depth && place_of (image.depth.at (x, y), behind[x],
-                                                           limits) >= Where::kSomewhere))
+      if (behind[x].spread < 0 ||
+          (limits.use_depth && place_of (image.depth.at (x, y), behind[x], inferred[x], limits) >=
+                                   Where::kSomewhere))
         continue;
       const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
       for (int c = 0; c < 3; c++)
@@ -191,27 +209,35 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
   else
     light_ = {1, 1, 1};
   limits.light = light_;
-  for (cv::Mat *m : {&other_, &nearer_, &same_, &calm_})
+  for (cv::Mat *m : {&other_, &nearer_, &same_, &calm_, &lit_, &blank_, &placed_, &seen_})
     m->create (image.roi.height, image.roi.width, CV_8U);
   for (cv::Mat *m : {&ratio_, &tolerance_})
     m->create (image.roi.height, image.roi.width, CV_32F);
   for (int y = 0; y < image.roi.height; y++) {
     const BackgroundPixel *behind = background.row (image.roi.y + y) + image.roi.x;
+    const float *inferred = background.inferred_depth (image.roi.y + y) + image.roi.x;
     const std::uint16_t *depth = image.depth.row (y);
     const Rgbx *colour = image.colour.row (y);
     std::uint8_t *other = other_.ptr (y), *nearer = nearer_.ptr (y), *same = same_.ptr (y),
-                 *calm = calm_.ptr (y);
+                 *calm = calm_.ptr (y), *lit = lit_.ptr (y), *blank = blank_.ptr (y),
+                 *placed = placed_.ptr (y), *seen = seen_.ptr (y);
     auto ratio = ratio_.ptr<float> (y), tolerance = tolerance_.ptr<float> (y);
     for (int x = 0; x < image.roi.width; x++) {
-      Where where = limits.use_depth ? place_of (depth[x], behind[x], limits) : Where::kUnknown;
+      Where where =
+          limits.use_depth ? place_of (depth[x], behind[x], inferred[x], limits) : Where::kUnknown;
       const bool unseen = behind[x].spread < 0; /* as good as another colour */
       const Comparison c =
           unseen || !limits.use_colour ? Comparison{} : compare (colour[x], behind[x], limits);
       const bool alike = !unseen && has_same_hue (c, behind[x]);
-      const bool differs = unseen || is_other (c, behind[x], where == Where::kBackground, limits);
+      const bool hue = unseen || has_other_hue (c, behind[x], limits);
+      const bool light = has_other_light (c, where == Where::kBackground, limits);
       ratio[x] = c.brightness;
       tolerance[x] = kSameShare + kSameFactor * c.noise;
-      other[x] = limits.use_colour && differs ? kYes : 0;
+      other[x] = limits.use_colour && (hue || light) ? kYes : 0;
+      lit[x] = light && !hue ? kYes : 0;
+      placed[x] = where == Where::kBackground ? kYes : 0;
+      seen[x] = behind[x].depth_share >= kSteadyShare ? kYes : 0;
+      blank[x] = is_burnt_out (behind[x]) || tolerance[x] > kVague ? kYes : 0;
       same[x] = alike ? kYes : 0;
       const bool quiet = alike && std::abs (c.brightness - 1) < tolerance[x];
       /* Stereo finds something now and then where there is no texture; colour knows better. */
@@ -226,6 +252,75 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
   }
 }
 
+/* What is known by depth, and by colour where depth is unknown; then what is surrounded. Small
+ * patches of depth are as good as none. */
+void
+Segmenter::find_sides (const SegmentationSettings &settings)
+{
+  nearer_.copyTo (opened_);
+  remove_small (opened_, settings.min_area, 0);
+  sides_.create (nearer_.size (), CV_8U);
+  sides_.setTo (int (Side::kUnknown));
+  sides_.setTo (int (Side::kBackground), placed_);
+  /* Where the background never had depth, colour decides, if it says something. */
+  cv::bitwise_or (seen_, blank_, by_colour_);
+  cv::bitwise_or (by_colour_, other_, by_colour_);
+  cv::bitwise_not (by_colour_, by_colour_);
+  cv::medianBlur (by_colour_, by_colour_, 5);
+  sides_.setTo (int (Side::kBackground), by_colour_);
+  sides_.setTo (int (Side::kForeground), opened_);
+  const int reach = std::clamp (int (kSight * sides_.cols), 16, 255);
+  surroundings_.find_inside (sides_, reach, surrounded_);
+  /* What looks just like the background, where that says something, is a hole to look through.
+   * Stereo finds the depth of wide ones. */
+  const int wide = 2 * settings.fringe + 1;
+  cv::morphologyEx (surrounded_, opened_, cv::MORPH_OPEN,
+      cv::getStructuringElement (cv::MORPH_RECT, cv::Size (wide, wide)));
+  cv::bitwise_and (opened_, seen_, opened_);
+  cv::bitwise_or (opened_, blank_, opened_);
+  cv::bitwise_not (opened_, inverse_);
+  cv::bitwise_and (inverse_, calm_, inverse_);
+  cv::compare (inverse_, 0, inverse_, cv::CMP_GT);
+  cv::medianBlur (inverse_, opened_, 5);
+  cv::bitwise_or (inverse_, opened_, inverse_);
+  surrounded_.copyTo (inside_);
+  inside_.setTo (0, inverse_);
+}
+
+/* However deep a shadow or bright a light: where depth says all around that the background is
+ * there, it is the background's. */
+void
+Segmenter::forgive_light (int reach)
+{
+  const cv::Size window (2 * reach + 1, 2 * reach + 1);
+  cv::compare (sides_, int (Side::kForeground), opened_, cv::CMP_EQ);
+  cv::dilate (opened_, opened_, cv::getStructuringElement (cv::MORPH_RECT, window));
+  placed_.convertTo (behind_, CV_32F, 1.0 / kYes);
+  cv::boxFilter (behind_, behind_, CV_32F, window);
+  cv::compare (behind_, 0.5, inverse_, cv::CMP_GT);
+  cv::bitwise_and (inverse_, lit_, inverse_);
+  inverse_.setTo (0, opened_);
+  other_.setTo (0, inverse_);
+  /* A shadow that reaches the person's feet: what has no depth there has the light of the shadow
+   * beside it. */
+  if (cv::countNonZero (inverse_) == 0)
+    return;
+  inverse_.convertTo (dark_, CV_32F, 1.0 / kYes);
+  cv::multiply (ratio_, dark_, dark_beside_);
+  cv::boxFilter (dark_beside_, dark_beside_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
+  cv::boxFilter (dark_, dark_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
+  for (int y = 0; y < other_.rows; y++) {
+    std::uint8_t *other = other_.ptr (y);
+    const std::uint8_t *lit = lit_.ptr (y), *side = sides_.ptr (y), *in = surrounded_.ptr (y);
+    const auto sum = dark_beside_.ptr<float> (y), count = dark_.ptr<float> (y);
+    const auto ratio = ratio_.ptr<float> (y), tolerance = tolerance_.ptr<float> (y);
+    for (int x = 0; x < other_.cols; x++)
+      if (other[x] && lit[x] && !in[x] && Side (side[x]) != Side::kForeground && count[x] > 4.5f &&
+          std::abs (ratio[x] - sum[x] / count[x]) < tolerance[x])
+        other[x] = 0;
+  }
+}
+
 /* Of the pixels with the background's hue only those stay `same` that have the light of background
  * within reach, be it in shadow or not. What has none within reach is marked in inverse_. */
 void
@@ -233,6 +328,7 @@ Segmenter::find_same (int reach)
 {
   const cv::Size window (2 * reach + 1, 2 * reach + 1);
   cv::bitwise_or (other_, nearer_, opened_);
+  cv::bitwise_or (opened_, surrounded_, opened_);
   cv::compare (opened_, 0, opened_, cv::CMP_EQ);
   opened_.convertTo (behind_, CV_32F, 1.0 / kYes);
   cv::multiply (ratio_, behind_, light_beside_);
@@ -264,6 +360,8 @@ Segmenter::join_cues (const SegmentationSettings &settings)
   const int side = settings.fringe | 1; /* an even kernel would move things by half a pixel */
   if (kernel_.rows != side)
     kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
+  find_sides (settings);
+  forgive_light (settings.fringe);
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it goes on into the thing */
@@ -272,6 +370,7 @@ Segmenter::join_cues (const SegmentationSettings &settings)
   cv::bitwise_and (nearer_, inverse_, mask_); /* nearer, and does not look like the background */
   cv::bitwise_or (mask_, other_, mask_);
   cv::bitwise_or (mask_, opened_, mask_);
+  cv::bitwise_or (mask_, inside_, mask_);
 }
 
 /* Islands of fewer than min_area pixels go; of the others only the `keep` largest stay. */
@@ -372,6 +471,11 @@ Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &se
   if (settings.cue != Cue::kDepth)
     opened_.setTo (0, calm_);
   fill_.fill (image, opened_, settings.fill);
+  if (settings.cue == Cue::kBoth && settings.fringe > 1) {
+    cv::bitwise_and (mask_, inside_, opened_);
+    fill_.fill (image, opened_, opened_.cols);
+    fill_.fill (image, opened_, opened_.cols, true);
+  }
 }
 
 static void

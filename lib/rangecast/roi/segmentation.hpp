@@ -6,6 +6,7 @@
 
 #include "background.hpp"
 #include "depth_fill.hpp"
+#include "surroundings.hpp"
 
 namespace rangecast {
 
@@ -74,6 +75,8 @@ public:
 private:
   void classify (const ConstRangeImage &image, const BackgroundModel &background,
       double depth_unit_m, const SegmentationSettings &settings);
+  void find_sides (const SegmentationSettings &settings);
+  void forgive_light (int reach);
   void find_same (int reach);
   void join_cues (const SegmentationSettings &settings);
   void remove_small (cv::Mat &mask, int min_area, int keep);
@@ -85,10 +88,17 @@ private:
 
   std::array<float, 3> light_ = {1, 1, 1};
   cv::Mat other_, nearer_, same_, calm_, quiet_; /* classes of pixels, 255 = yes */
+  cv::Mat lit_;                                  /* of another brightness only, 255 = yes */
+  cv::Mat blank_;  /* background of which colour says nothing, 255 = yes */
+  cv::Mat seen_;   /* the background's depth is known there, 255 = yes */
+  cv::Mat placed_; /* where depth has been compared with the background's, 255 = the same */
+  cv::Mat sides_, surrounded_, inside_; /* inside_: surrounded_ without what is seen through */
+  cv::Mat dark_beside_, dark_, by_colour_;
   cv::Mat ratio_, tolerance_; /* of brightness to the background's, and how far noise moves it */
   cv::Mat behind_, light_beside_, opened_, kernel_, guard_;
   cv::Mat mask_, inverse_, labels_, stats_, centroids_, steps_, speckles_;
   DepthFill fill_;
+  Surroundings surroundings_;
   std::vector<int> areas_;
   std::vector<std::int16_t> step_of_depth_; /* for every depth, see make_steps() */
   double step_unit_m_ = 0, step_noise_ = -1;
