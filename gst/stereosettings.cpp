@@ -100,9 +100,13 @@ static const NumberRow<Settings, int> kIntegers[] = {
         "12)",
         0, 1000, kDefaults.gap_width, [] (Settings &s) -> int & { return s.core.gap_width; }},
     {"refine", "Refine",
-        "Turns in which disparities become smoother and fit the pictures better (0 = off, to 20, "
-        "default 3)",
+        "Disparity refinement iterations (0 = off, to 20, "
+        "default 2)",
         0, 20, kDefaults.refine, [] (Settings &s) -> int & { return s.core.refine; }},
+    {"average", "Average",
+        "Frames whose pictures are averaged before matching where nothing moves (1 = off, to 64, "
+        "default 10)",
+        1, 64, kDefaults.average, [] (Settings &s) -> int & { return s.core.average; }},
     {"refresh-interval", "Refresh interval",
         "When downstream wants only a part, one full picture every so many frames (0: always all, "
         "to "

@@ -16,6 +16,7 @@ constexpr int kWidth = 160, kHeight = 96, kRightX = 32;
 struct Pair {
   cv::Mat left = cv::Mat (kHeight, kWidth, CV_8U),
           right = cv::Mat (kHeight, kWidth + kRightX, CV_8U),
+          colour = cv::Mat (kHeight, kWidth, CV_8UC4, cv::Scalar (120, 100, 90, 0)),
           disparity = cv::Mat (kHeight, kWidth, CV_16S);
 
   static double truth (int x, int y) { return 12.3 + 0.03 * x - 0.02 * y; }
@@ -47,7 +48,7 @@ struct Pair {
     Pieces pieces;
     pieces.set (parts, threads);
     DisparityRefiner refiner;
-    refiner.apply ({left, right, kRightX, 16, turns}, pieces, disparity);
+    refiner.apply ({left, right, colour, kRightX, 16, turns}, pieces, disparity);
   }
   void refine (int turns, int threads = 2) { refine (turns, {{0, 0, kWidth, kHeight}}, threads); }
   /* Root of the mean square, pixels, away from the picture's edge. */
@@ -126,6 +127,34 @@ TEST (DisparityRefiner, step_between_two_surfaces_stays_a_step)
     EXPECT_NEAR (pair.disparity.at<std::int16_t> (y, 79) / 16.0, Pair::truth (79, y), 0.5);
     EXPECT_NEAR (pair.disparity.at<std::int16_t> (y, 80) / 16.0, Pair::truth (80, y) + 10, 0.5);
   }
+}
+
+/* Of columns x to x + n, pixels, against the slanted surface. */
+static double
+mean_offset (const Pair &pair, int x, int n)
+{
+  double sum = 0;
+  for (int y = 8; y < kHeight - 8; y++)
+    for (int u = x; u < x + n; u++)
+      sum += pair.disparity.at<std::int16_t> (y, u) / 16.0 - Pair::truth (u, y);
+  return sum / (n * (kHeight - 16));
+}
+
+TEST (DisparityRefiner, step_of_less_than_a_pixel_stays_where_colour_shows_it)
+{
+  Pair pair, plain;
+  for (Pair *p : {&pair, &plain}) {
+    cv::Mat near = p->disparity.colRange (80, kWidth);
+    near += 13;           /* 0.8 pixels: less than the noise of neighbours */
+    p->right.setTo (128); /* nothing to see: planes alone */
+    p->left.setTo (128);
+  }
+  pair.colour.colRange (80, kWidth).setTo (cv::Scalar (40, 40, 40, 0));
+  pair.refine (3);
+  plain.refine (3);
+  EXPECT_NEAR (mean_offset (pair, 78, 2), 0, 0.1);
+  EXPECT_NEAR (mean_offset (pair, 80, 2), 0.8125, 0.1);
+  EXPECT_GT (mean_offset (plain, 78, 2), 0.15); /* one colour: one surface */
 }
 
 TEST (DisparityRefiner, nothing_outside_of_the_parts_is_touched)

@@ -206,8 +206,8 @@ DisparityFinder::filter (const cv::Mat &left)
   if (!limited)
     filter_.clear_doubled (grey, window_[1], right_x, least, pieces_, core_);
   if (settings_.refine > 0)
-    refiner_.apply (
-        {grey, window_[1], right_x, std::max (least, far_), settings_.refine}, pieces_, core_);
+    refiner_.apply ({grey, window_[1], colour, right_x, std::max (least, far_), settings_.refine},
+        pieces_, core_);
   if (!limited && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, least, far_);
 }

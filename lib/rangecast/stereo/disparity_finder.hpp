@@ -19,10 +19,12 @@ struct StereoSettings {
   double flying_pixel_step = 0.02; ///< share of the depth that neighbours may differ; 0 = off
   int silhouette_radius = 8;       ///< pixels around that say what is beside a silhouette; 0 = off
   int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
-  int refine = 3;                  ///< turns that take the noise off disparities; 0 = off
+  int refine = 2;                  ///< turns that take the noise off disparities; 0 = off
   /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
    *  matched so as not to be taken for something nearer. */
   double search_far_m = 0;
+  /** Where nothing moves, pictures are matched that are the mean of so many; 1 = off. */
+  int average = 10;
   double steady = 0; ///< 0 (off) to 1: how much depth is held still where nothing moves
   int n_threads = 0; ///< that match one pair; 0 = as many as there are cores
 

@@ -16,8 +16,9 @@ namespace {
 /* Pixels around one that make its plane, and whose greys are compared. */
 constexpr int kPlane = 3, kPatch = 4, kPad = std::max (kPlane, kPatch);
 /* Neighbours in one surface differ by no more, pixels: beside each other, and more for each pixel
- * between them. */
-constexpr float kStep = 1, kSlant = 0.5f;
+ * between them; nor in colour, sum of R, G and B, levels. */
+constexpr float kStep = 0.5f, kSlant = 0.3f;
+constexpr int kAlike = 60;
 /* What the squares of grey's slope must come to in a patch to say more than noise does. */
 constexpr float kDull = 15;
 /* Greys that differ by more show different things, levels. */
@@ -97,8 +98,26 @@ DisparityRefiner::make_room (const cv::Size &size, const Pieces &pieces)
   steps_.setTo (1);
   valid_.create (all, CV_8U);
   valid_.setTo (0);
+  for (cv::Mat &plane : colours_) {
+    plane.create (all, CV_8U);
+    plane.setTo (0);
+  }
+  members_.assign (std::size_t (all.width) * std::size_t (all.height), 0);
   parts_ = pieces.pieces ();
   memory_.reserve (pieces.workers ());
+}
+
+void
+DisparityRefiner::take_colours (const cv::Mat &colour)
+{
+  for (int y = 0; y < colour.rows; y++) {
+    const auto from = colour.ptr<std::uint8_t> (y);
+    for (int c = 0; c < 3; c++) {
+      auto to = colours_[c].ptr<std::uint8_t> (y + kPad) + kPad;
+      for (int x = 0; x < colour.cols; x++)
+        to[x] = from[4 * x + c];
+    }
+  }
 }
 
 /* Takes over what a part of the picture has, and makes it as narrow as that. From then on parts
@@ -142,51 +161,110 @@ DisparityRefiner::mark_steps (const cv::Rect &part)
   }
 }
 
-/* The plane through what belongs to a pixel's surface, at that pixel: least squares. */
-float
-DisparityRefiner::on_plane (int x, int y) const
+/* Bits of rows, eight to each, of the last of which none counts. */
+using Members = std::uint64_t;
+constexpr int kLanes = 2 * kPlane + 2;
+static_assert (kLanes == 8 && kPlane == 3);
+using Lanes = cv::v_float32x4;
+
+/* Those of a row of members: all bits, or none. */
+struct Choice {
+  Lanes left, right;
+  Choice (Members members, int v)
+  {
+    alignas (16) static constexpr int kBits[kLanes] = {1, 2, 4, 8, 16, 32, 64, 128};
+    const cv::v_int32x4 row = cv::v_setall_s32 (int (members >> (8 * (v + kPlane)) & 255)),
+                        low = cv::v_load_aligned (kBits), high = cv::v_load_aligned (kBits + 4);
+    left = cv::v_reinterpret_as_f32 ((row & low) == low);
+    right = cv::v_reinterpret_as_f32 ((row & high) == high);
+  }
+  [[nodiscard]] const Lanes &of (int part) const { return part == 0 ? left : right; }
+};
+
+/* The pixels around one that belong to its surface, by disparity and by colour. */
+Members
+DisparityRefiner::members_of (int x, int y) const
 {
-  constexpr int kLanes = 2 * kPlane + 2; /* columns; the last one never counts */
-  static_assert (kLanes == 8 && kPlane == 3);
   constexpr float kA = kStep, kB = kStep + kSlant, kC = kStep + 2 * kSlant;
   alignas (16) static constexpr float kMostAt[kPlane + 1][kLanes] = {
       {kC, kB, kA, kA, kA, kB, kC, -1}, {kC, kB, kA, kA, kA, kB, kC, -1},
       {kC, kB, kB, kB, kB, kB, kC, -1}, {kC, kC, kC, kC, kC, kC, kC, -1}};
-  using Lanes = cv::v_float32x4;
+  const Lanes centre = cv::v_setall_f32 (now_.ptr<float> (y)[x]), zero = cv::v_setzero_f32 ();
+  cv::v_uint8x16 own[3];
+  for (int c = 0; c < 3; c++)
+    own[c] = cv::v_setall_u8 (colours_[c].ptr<std::uint8_t> (y)[x]);
+  const cv::v_uint8x16 alike = cv::v_setall_u8 (std::uint8_t (kAlike));
+  Members members = 0;
+  for (int v = -kPlane; v <= kPlane; v++) {
+    cv::v_uint8x16 differs = cv::v_setzero_u8 ();
+    for (int c = 0; c < 3; c++)
+      differs = differs + cv::v_absdiff (own[c],
+                              cv::v_load (colours_[c].ptr<std::uint8_t> (y + v) + x - kPlane));
+    int bits = cv::v_signmask (differs <= alike);
+    int near = 0;
+    for (int part = 0; part < kLanes; part += 4) {
+      const Lanes d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
+                  most = cv::v_load_aligned (kMostAt[std::abs (v)] + part);
+      near |= cv::v_signmask ((cv::v_abs (d - centre) <= most) & (d > zero)) << part;
+    }
+    members |= Members (bits & near & 127) << (8 * (v + kPlane));
+  }
+  return members;
+}
+
+/* The plane through what belongs to a pixel's surface, at that pixel: least squares. */
+float
+DisparityRefiner::on_plane (int x, int y, Members members) const
+{
   const float own = now_.ptr<float> (y)[x];
   const Lanes centre = cv::v_setall_f32 (own), zero = cv::v_setzero_f32 (),
               one = cv::v_setall_f32 (1);
-  float n = 0, sx = 0, sy = 0, sd = 0, sxx = 0, sxy = 0, syy = 0, sxd = 0, syd = 0;
-  for (int part = 0; part < kLanes; part += 4) {
-    Lanes count = zero, count_y = zero, count_yy = zero, off = zero, off_y = zero; /* by column */
-    for (int v = -kPlane; v <= kPlane; v++) {
-      const Lanes d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
-                  most = cv::v_load_aligned (kMostAt[std::abs (v)] + part), away = d - centre;
-      const Lanes belongs = (cv::v_abs (away) <= most) & (d > zero);
-      const Lanes w = belongs & one, e = belongs & away, row = cv::v_setall_f32 (float (v));
-      count += w;
-      off += e;
-      count_y = cv::v_muladd (row, w, count_y);
-      count_yy = cv::v_muladd (row * row, w, count_yy);
-      off_y = cv::v_muladd (row, e, off_y);
+  Lanes count[2] = {zero, zero}, count_y[2] = {zero, zero}, count_yy[2] = {zero, zero},
+        off[2] = {zero, zero}, off_y[2] = {zero, zero}; /* by column */
+  for (int v = -kPlane; v <= kPlane; v++) {
+    const Choice choice (members, v);
+    const Lanes row = cv::v_setall_f32 (float (v));
+    for (int k = 0; k < 2; k++) {
+      const Lanes w = choice.of (k) & one,
+                  e = choice.of (k) &
+                      (cv::v_load (now_.ptr<float> (y + v) + x - kPlane + 4 * k) - centre),
+                  wy = row * w;
+      count[k] += w;
+      off[k] += e;
+      count_y[k] += wy;
+      count_yy[k] = cv::v_muladd (row, wy, count_yy[k]);
+      off_y[k] = cv::v_muladd (row, e, off_y[k]);
     }
-    const float u = float (part - kPlane);
-    const Lanes column (u, u + 1, u + 2, u + 3);
-    n += cv::v_reduce_sum (count);
-    sx += cv::v_reduce_sum (column * count);
-    sxx += cv::v_reduce_sum (column * column * count);
-    sy += cv::v_reduce_sum (count_y);
-    sxy += cv::v_reduce_sum (column * count_y);
-    syy += cv::v_reduce_sum (count_yy);
-    sd += cv::v_reduce_sum (off);
-    sxd += cv::v_reduce_sum (column * off);
-    syd += cv::v_reduce_sum (off_y);
   }
+  const Lanes u[2] = {Lanes (-3, -2, -1, 0), Lanes (1, 2, 3, 4)};
+  const auto sum = [] (const Lanes (&l)[2]) { return cv::v_reduce_sum (l[0] + l[1]); };
+  const auto sum_x = [&u] (const Lanes (&l)[2]) {
+    return cv::v_reduce_sum (u[0] * l[0] + u[1] * l[1]);
+  };
+  const float n = sum (count), sx = sum_x (count), sy = sum (count_y), sd = sum (off),
+              sxx = cv::v_reduce_sum (u[0] * u[0] * count[0] + u[1] * u[1] * count[1]),
+              sxy = sum_x (count_y), syy = sum (count_yy), sxd = sum_x (off), syd = sum (off_y);
   const float mx = sx / n, my = sy / n, md = sd / n;
   const float few = 0.02f * n; /* pixels in a line make no plane */
   const float cxx = sxx - sx * mx + few, cyy = syy - sy * my + few, cxy = sxy - sx * my,
               cxd = sxd - sx * md, cyd = syd - sy * md, det = cxx * cyy - cxy * cxy;
   return own + md - (mx * (cxd * cyy - cyd * cxy) + my * (cyd * cxx - cxd * cxy)) / det;
+}
+
+/* Of pixels that have a step near them. */
+void
+DisparityRefiner::choose_members (const cv::Rect &part, Memory &m)
+{
+  constexpr int kSide = 2 * kPlane + 1;
+  const cv::Point first (part.x - kPlane, part.y - kPlane);
+  WindowSums<kSide, std::uint8_t> steps (steps_, first, part.width, m.steps[0], m.steps[1]);
+  for (int y = part.y; y < part.br ().y; y++) {
+    steps.next ();
+    const auto now = now_.ptr<float> (y) + part.x;
+    Members *members = members_.data () + std::size_t (y) * std::size_t (now_.cols) + part.x;
+    for (int x = 0; x < part.width; x++)
+      members[x] = now[x] > 0 && m.steps[1][std::size_t (x)] != 0 ? members_of (part.x + x, y) : 0;
+  }
 }
 
 /* From now_ to next_. In the middle of a surface the plane's disparity is the mean. */
@@ -195,18 +273,17 @@ DisparityRefiner::smooth (const cv::Rect &part, Memory &m)
 {
   constexpr int kSide = 2 * kPlane + 1;
   const cv::Point first (part.x - kPlane, part.y - kPlane);
-  WindowSums<kSide, std::uint8_t> steps (steps_, first, part.width, m.steps[0], m.steps[1]);
   WindowSums<kSide, float> sums (now_, first, part.width, m.columns[0], m.sums[0]);
   for (int y = part.y; y < part.br ().y; y++) {
-    steps.next ();
     sums.next ();
     const auto now = now_.ptr<float> (y) + part.x;
     auto next = next_.ptr<float> (y) + part.x;
+    const Members *members = members_.data () + std::size_t (y) * std::size_t (now_.cols) + part.x;
     for (int x = 0; x < part.width; x++)
-      next[x] = m.sums[0][std::size_t (x)] * (1.f / (kSide * kSide));
+      next[x] = now[x] > 0 ? m.sums[0][std::size_t (x)] * (1.f / (kSide * kSide)) : 0;
     for (int x = 0; x < part.width; x++)
-      if (m.steps[1][std::size_t (x)] != 0)
-        next[x] = now[x] > 0 ? std::max (on_plane (part.x + x, y), 1 / 16.f) : 0;
+      if (members[x] != 0)
+        next[x] = std::max (on_plane (part.x + x, y, members[x]), 1 / 16.f);
   }
 }
 
@@ -251,6 +328,39 @@ DisparityRefiner::compare (const Job &job, const cv::Rect &part, Memory &m)
   }
 }
 
+/* Sums over some pixels. */
+struct Match {
+  float product, square, slope, difference;
+};
+
+/* The shift that leaves least difference between both pictures, but for a mean difference in
+ * brightness, which cameras may have. */
+inline float
+shift_of (const Match &m, float n)
+{
+  const float mean = m.slope / n,
+              by = -(m.product - mean * m.difference) / (m.square - mean * m.slope + kDull);
+  return std::min (std::max (by, -kMost), kMost);
+}
+
+float
+DisparityRefiner::shift_of_members (int x, int y, Members members) const
+{
+  const cv::Mat *const planes[] = {&products_, &squares_, &slopes_, &differences_};
+  const Lanes zero = cv::v_setzero_f32 ();
+  Lanes sums[4] = {zero, zero, zero, zero};
+  for (int v = -kPlane; v <= kPlane; v++) {
+    const Choice choice (members, v);
+    for (int i = 0; i < 4; i++) {
+      const float *row = planes[i]->ptr<float> (y + v) + x - kPlane;
+      sums[i] += (choice.left & cv::v_load (row)) + (choice.right & cv::v_load (row + 4));
+    }
+  }
+  return shift_of ({cv::v_reduce_sum (sums[0]), cv::v_reduce_sum (sums[1]),
+                       cv::v_reduce_sum (sums[2]), cv::v_reduce_sum (sums[3])},
+      float (std::popcount (members)));
+}
+
 /* From next_ to now_: the shift that leaves least difference between both pictures, but for a mean
  * difference in brightness, which cameras may have. */
 void
@@ -263,6 +373,7 @@ DisparityRefiner::move (const cv::Rect &part, Memory &m)
       {squares_, begin, part.width, m.columns[1], m.sums[1]},
       {slopes_, begin, part.width, m.columns[2], m.sums[2]},
       {differences_, begin, part.width, m.columns[3], m.sums[3]}};
+  m.shifts.resize (std::size_t (part.width));
   WindowSums<kSide, std::uint8_t> counts (valid_, begin, part.width, m.steps[0], m.steps[1]);
   for (int y = part.y; y < part.br ().y; y++) {
     for (Sums &s : sums)
@@ -271,13 +382,19 @@ DisparityRefiner::move (const cv::Rect &part, Memory &m)
     const float *product = m.sums[0].data (), *square = m.sums[1].data (),
                 *slope = m.sums[2].data (), *difference = m.sums[3].data ();
     const std::uint8_t *count = m.steps[1].data ();
+    float *shift = m.shifts.data ();
     const auto first = first_.ptr<float> (y) + part.x, d = next_.ptr<float> (y) + part.x;
     auto to = now_.ptr<float> (y) + part.x;
+    const Members *members = members_.data () + std::size_t (y) * std::size_t (now_.cols) + part.x;
+    for (int x = 0; x < part.width; x++)
+      shift[x] = shift_of (
+          {product[x], square[x], slope[x], difference[x]}, float (std::max<int> (count[x], 1)));
+    for (int x = 0; x < part.width; x++)
+      if (members[x] != 0)
+        shift[x] = shift_of_members (part.x + x, y, members[x]);
     for (int x = 0; x < part.width; x++) {
-      const float mean = slope[x] / float (std::max<int> (count[x], 1));
-      const float by = -(product[x] - mean * difference[x]) / (square[x] - mean * slope[x] + kDull),
-                  moved = d[x] + std::min (std::max (by, -kMost), kMost),
-                  low = std::max (first[x] - kMostOfAll, 1 / 16.f), high = first[x] + kMostOfAll;
+      const float moved = d[x] + shift[x], low = std::max (first[x] - kMostOfAll, 1 / 16.f),
+                  high = first[x] + kMostOfAll;
       to[x] = d[x] > 0 ? std::min (std::max (moved, low), high) : 0;
     }
   }
@@ -302,6 +419,7 @@ DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparit
   if (job.turns <= 0 || job.right.cols < 4)
     return;
   make_room (disparity.size (), pieces);
+  take_colours (job.colour);
   const auto each = [&] (const auto &work) {
     in_parallel (parts_.size (), pieces.n_threads (), [&] (std::size_t i, std::size_t worker) {
       for_this_cpu ([&, &memory = memory_.of (worker)] { work (parts_[i], memory); });
@@ -310,6 +428,7 @@ DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparit
   each ([&] (cv::Rect &part, Memory &) { take (job, disparity, part); });
   std::erase_if (parts_, [] (const cv::Rect &part) { return part.empty (); });
   each ([&] (const cv::Rect &part, Memory &) { mark_steps (part); });
+  each ([&] (const cv::Rect &part, Memory &m) { choose_members (part, m); });
   each ([&] (const cv::Rect &part, Memory &m) { smooth (part, m); });
   for (int turn = 0; turn < job.turns; turn++) {
     each ([&] (const cv::Rect &part, Memory &m) { compare (job, part, m); });

@@ -20,9 +20,10 @@ class DisparityRefiner {
 public:
   struct Job {
     const cv::Mat &left, &right; ///< CV_8U, rectified, of the same height
+    const cv::Mat &colour;       ///< CV_8UC4, the left one's
     int right_x = 0;             ///< column of `right` that is the left picture's column 0
     int nearest = 1;             ///< 1/16 pixel; what is farther (or has none) is left alone
-    int turns = 3;               ///< 0 = nothing happens
+    int turns = 2;               ///< 0 = nothing happens
   };
 
   /** No disparity moves by more than a pixel, and none comes or goes.
@@ -33,7 +34,7 @@ public:
 private:
   /* What one thread needs: rows. */
   struct Memory {
-    std::vector<float> columns[4], sums[4];
+    std::vector<float> columns[4], sums[4], shifts;
     std::vector<std::uint8_t> steps[2];
     std::vector<std::int32_t> at;
     std::vector<std::uint32_t> greys;
@@ -45,15 +46,21 @@ private:
   void compare (const Job &job, const cv::Rect &part, Memory &memory);
   void move (const cv::Rect &part, Memory &memory);
   void put_back (const Job &job, const cv::Rect &part, cv::Mat &disparity) const;
-  [[nodiscard]] float on_plane (int x, int y) const;
+  void take_colours (const cv::Mat &colour);
+  void choose_members (const cv::Rect &part, Memory &memory);
+  [[nodiscard]] std::uint64_t members_of (int x, int y) const;
+  [[nodiscard]] float on_plane (int x, int y, std::uint64_t members) const;
+  [[nodiscard]] float shift_of_members (int x, int y, std::uint64_t members) const;
 
   /* All have a border, so that no window leaves them. */
-  cv::Mat first_, now_, next_;   /* CV_32F, pixels beyond what is just too far; 0 = none */
-  cv::Mat steps_;                /* CV_8U: 1 = none there, or a step beside it */
-  cv::Mat slopes_, differences_; /* CV_32F, of greys; 0 where there is no disparity */
-  cv::Mat products_, squares_;   /* CV_32F: slope times difference, and slope times itself */
-  cv::Mat valid_;                /* CV_8U: 1 = there is a disparity */
-  std::vector<cv::Rect> parts_;  /* of pieces: the columns that have disparities */
+  cv::Mat first_, now_, next_;         /* CV_32F, pixels beyond what is just too far; 0 = none */
+  cv::Mat steps_;                      /* CV_8U: 1 = none there, or a step beside it */
+  cv::Mat slopes_, differences_;       /* CV_32F, of greys; 0 where there is no disparity */
+  cv::Mat products_, squares_;         /* CV_32F: slope times difference, and slope times itself */
+  cv::Mat colours_[3];                 /* CV_8U: R, G, B */
+  std::vector<std::uint64_t> members_; /* 0 = all around a pixel, see members_of() */
+  cv::Mat valid_;                      /* CV_8U: 1 = there is a disparity */
+  std::vector<cv::Rect> parts_;        /* of pieces: the columns that have disparities */
   WorkerMemory<Memory> memory_;
 };
 

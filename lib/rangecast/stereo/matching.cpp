@@ -24,11 +24,13 @@ make_bm (const MatchSettings &s, int block_size, int disparities)
 static cv::Ptr<cv::StereoMatcher>
 make_sgbm (const MatchSettings &s, int block_size, int disparities)
 {
+  /* A quarter less than OpenCV's examples: steps are found where they are, and hair is less often
+   * taken for what lies behind it. */
   const int area = block_size * block_size;
   const int mode = s.algorithm == MatchAlgorithm::kSgbm ? cv::StereoSGBM::MODE_SGBM
                                                         : cv::StereoSGBM::MODE_SGBM_3WAY;
   return cv::StereoSGBM::create (
-      0, disparities, block_size, 8 * area, 32 * area, 0, 31, s.uniqueness_ratio, 0, 0, mode);
+      0, disparities, block_size, 6 * area, 24 * area, 0, 31, s.uniqueness_ratio, 0, 0, mode);
 }
 
 static int

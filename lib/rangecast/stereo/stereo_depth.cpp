@@ -44,6 +44,8 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
   view_ = view;
   settings_ = settings;
   mirror_.reset ();
+  for (StillAverage &still : still_)
+    still.set (settings.average);
   if (settings.steady > 0)
     steady_.set (
         view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
@@ -85,6 +87,8 @@ StereoDepth::take (
     rectify (1, right);
     if (has_third_)
       third_.take (as_mat (left), as_mat (third));
+    for (int i = 0; i < 2; i++)
+      matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i]) : pictures_[i];
     changes_.look (pictures_[0]);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};
@@ -174,7 +178,7 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
 {
   const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
   const auto parts = everywhere ? nullptr : occupancy_.find (changes_, image.roi);
-  Status status = finder_.find (pictures_[0], pictures_[1], image.roi, near_m, far_m, parts);
+  Status status = finder_.find (matched_[0], matched_[1], image.roi, near_m, far_m, parts);
   if (status.ok () && has_third_) {
     status = third_.find (image.roi, near_m, far_m);
     if (status.ok ()) {

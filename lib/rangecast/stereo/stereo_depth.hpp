@@ -12,6 +12,7 @@
 #include "occupancy.hpp"
 #include "rectification.hpp"
 #include "steady_filter.hpp"
+#include "still_average.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {
@@ -66,6 +67,8 @@ public:
   {
     changes_.forget ();
     steady_.forget ();
+    for (StillAverage &still : still_)
+      still.forget ();
     occupancy_.forget ();
     near_now_m_ = far_now_m_ = 0;
   }
@@ -97,6 +100,8 @@ private:
   SteadyFilter steady_;
   cv::Mat raw_[2];      /* the caller's memory */
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
+  cv::Mat matched_[2];  /* the same with less noise */
+  StillAverage still_[2];
   cv::Mat rectified_[2], before_fusion_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
