@@ -6,6 +6,7 @@
 #include <random>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/segmentation.hpp>
+#include <rangecast/roi/surroundings.hpp>
 #include <unistd.h>
 
 using namespace rangecast;
@@ -176,6 +177,45 @@ TEST (Background, shadow_without_depth_beside_a_person_is_open_and_no_part_of_it
   segment (frame);
   EXPECT_EQ (frame.valid (36, 0, 28, 48), 0);
   EXPECT_EQ (frame.valid (0, 0, 30, 48), 30 * 48);
+}
+
+TEST (Surroundings, hole_in_a_thing_is_inside_and_a_corner_beside_it_is_not)
+{
+  cv::Mat sides (60, 81, CV_8U, cv::Scalar (int (Side::kUnknown))), inside;
+  sides (cv::Rect (10, 10, 40, 8)) = int (Side::kForeground); /* a frame, */
+  sides (cv::Rect (10, 10, 8, 40)) = int (Side::kForeground);
+  sides (cv::Rect (42, 10, 8, 40)) = int (Side::kForeground);
+  sides (cv::Rect (10, 42, 40, 8)) = int (Side::kForeground);
+  Surroundings surroundings;
+  surroundings.find_inside (sides, 60, inside);
+  EXPECT_EQ (inside.at<std::uint8_t> (30, 30), 255);
+  EXPECT_EQ (inside.at<std::uint8_t> (5, 30), 0);
+  EXPECT_EQ (inside.at<std::uint8_t> (12, 30), 0) << "what is known is not asked for";
+  sides (cv::Rect (18, 18, 24, 24)) = int (Side::kBackground);
+  sides (cv::Rect (29, 29, 4, 4)) = int (Side::kUnknown);
+  surroundings.find_inside (sides, 60, inside);
+  EXPECT_EQ (inside.at<std::uint8_t> (30, 30), 0) << "background is seen through the frame";
+  sides.setTo (int (Side::kUnknown));
+  sides (cv::Rect (20, 40, 30, 10)) = int (Side::kForeground); /* an L */
+  sides (cv::Rect (20, 10, 10, 40)) = int (Side::kForeground);
+  surroundings.find_inside (sides, 20, inside);
+  EXPECT_EQ (inside.at<std::uint8_t> (36, 34), 0) << "a corner";
+}
+
+TEST (Surroundings, reach_and_picture_edge_end_what_is_seen)
+{
+  for (const auto [reach, in] : {std::pair{40, 255}, std::pair{8, 0}}) {
+    cv::Mat sides (40, 40, CV_8U, cv::Scalar (int (Side::kForeground))), inside;
+    sides (cv::Rect (6, 6, 28, 28)) = int (Side::kUnknown);
+    Surroundings ().find_inside (sides, reach, inside);
+    EXPECT_EQ (inside.at<std::uint8_t> (20, 20), in) << reach;
+  }
+  for (const cv::Size size : {cv::Size (1, 1), cv::Size (1, 7), cv::Size (7, 1)})
+    for (const Side side : {Side::kUnknown, Side::kForeground}) {
+      cv::Mat sides (size, CV_8U, cv::Scalar (int (side))), inside;
+      Surroundings ().find_inside (sides, 255, inside);
+      EXPECT_EQ (cv::countNonZero (inside), 0);
+    }
 }
 
 TEST (Background, depth_of_a_burnt_out_wall_is_that_of_the_wall_around_it)

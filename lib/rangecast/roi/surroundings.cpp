@@ -38,16 +38,14 @@ Surroundings::look (int reach, int step)
   const auto beyond = [reach] (Side side, Sight neighbour) -> Sight {
     if (side != Side::kUnknown)
       return {side, 1};
-    if (neighbour.distance == 0 || neighbour.distance >= reach)
+    if (neighbour.distance >= reach)
       return neighbour;
     return {neighbour.side, static_cast<std::uint8_t> (neighbour.distance + 1)};
   };
   const auto count = [reach] (Sight sight, std::uint8_t &foreground, std::uint8_t &background) {
-    if (sight.distance == 0)
-      return;
-    const bool found = sight.side == Side::kForeground && sight.distance < reach;
-    foreground += found;
-    background += !found;
+    const bool within = sight.distance < reach;
+    foreground += within && sight.side == Side::kForeground;
+    background += !within || sight.side == Side::kBackground;
   };
   for (auto *rows : {before_, row_})
     for (int k = 0; k < 3; k++)

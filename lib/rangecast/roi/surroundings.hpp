@@ -25,8 +25,8 @@ public:
 
 private:
   struct Sight {
-    Side side = Side::kUnknown;
-    std::uint8_t distance = 0; /* to what is seen, pixels; 0 = the edge of the picture */
+    Side side = Side::kUnknown; /* that is beyond the edge of the picture */
+    std::uint8_t distance = 1;
   };
   void halve (const cv::Mat &sides);
   void look (int reach, int step);
