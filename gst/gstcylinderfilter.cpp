@@ -63,7 +63,7 @@ enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FI
 
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultOverlap = 1, kDefaultHysteresis = 0.2,
+                        kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
                         kDefaultAgreement = 0.1;
 static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
@@ -603,7 +603,7 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
   g_object_class_install_property (object_class, PROP_OVERLAP,
       g_param_spec_double ("overlap", "Overlap",
           "How far round a point the surface of the view that stays must reach before it goes, "
-          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap (default: 1)",
+          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending (default: 8)",
           0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
 }
 

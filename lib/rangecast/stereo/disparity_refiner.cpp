@@ -17,8 +17,8 @@ namespace {
 constexpr int kPlane = 3, kPatch = 4, kPad = std::max (kPlane, kPatch);
 /* Neighbours in one surface differ by no more, pixels: beside each other, and more for each pixel
  * between them; nor in colour, sum of R, G and B, levels. */
-constexpr float kStep = 0.5f, kSlant = 0.3f;
-constexpr int kAlike = 60;
+constexpr float kStep = 1.0f, kSlant = 0.5f;
+constexpr int kAlike = 110;
 /* What the squares of grey's slope must come to in a patch to say more than noise does. */
 constexpr float kDull = 15;
 /* Greys that differ by more show different things, levels. */
