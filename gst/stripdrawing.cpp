@@ -85,7 +85,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   picture.mode = settings.strips.mode;
   picture.depth_step = settings.strips.depth_step;
   /* what one camera sees is open at the back: there is nothing else to look at from there */
-  picture.back_faces = settings.back_faces || job.scene->rig_views () == 1;
+  picture.back_faces = (settings.back_faces || job.scene->rig_views () == 1) &&
+                       picture.mode != rangecast::StripMode::kBlend;
   picture.view_gap_m = settings.view_gap_m;
   picture.blend_range_m = settings.blend_range_m;
   picture.width = width_;

@@ -319,18 +319,16 @@ row_of (const Mat4 &m, int i)
   return {m[i], m[4 + i], m[8 + i]};
 }
 
-/* What u_behind has to be. Clip z is a w + b for all points, w their distance in metres along the
- * viewer's direction: g metres farther b / w becomes b / (w + g), which never leaves the far plane
- * as a shift of z by the like would, where the near plane is close. */
-static std::array<float, 2>
-behind (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double gap_m)
+/* Clip z of all points is a w + b, w their distance along the viewer's direction: what is g farther
+ * has b / (w + g) instead of b / w, which never leaves the far plane as a shift of z by the like
+ * would, where the near plane is close. */
+static BlendTargets::DepthShift
+depth_shift (const Mat4 &m, const Mat4 &clip_from_world, double gap_m)
 {
-  const rangecast::Vec3 forward = row_of (clip_from_world, 3);
-  const double a = dot (row_of (clip_from_pixel, 2), row_of (clip_from_pixel, 3)) /
-                   dot (row_of (clip_from_pixel, 3), row_of (clip_from_pixel, 3));
-  const double b = clip_from_pixel[14] - a * clip_from_pixel[15];
-  const double g = std::max (gap_m * norm (forward), 1e-6);
-  return {float (b * g), float (g)};
+  const rangecast::Vec3 z = row_of (m, 2), w = row_of (m, 3);
+  const double a = dot (z, w) / dot (w, w);
+  const double g = std::max (gap_m * norm (row_of (clip_from_world, 3)), 1e-6);
+  return {float (a), float (m[14] - a * m[15]), float (g)};
 }
 
 /* Where the viewer stands: what the matrix makes x = y = w = 0 of. */
@@ -339,15 +337,15 @@ viewer_of (const Mat4 &m)
 {
   const rangecast::Vec3 x = row_of (m, 0), y = row_of (m, 1), w = row_of (m, 3);
   const double volume = dot (x, cross (y, w));
-  const rangecast::Vec3 sum = double (m[12]) * cross (y, w) + double (m[13]) * cross (w, x) +
-                              double (m[15]) * cross (x, y);
+  const rangecast::Vec3 sum =
+      double (m[12]) * cross (y, w) + double (m[13]) * cross (w, x) + double (m[15]) * cross (x, y);
   return (-1 / volume) * sum;
 }
 
 /* What mode blend needs to know of a view beyond the other modes. */
 static void
-set_blend_uniforms (GstGLShader *shader, const StripPainter::Picture &picture,
-    const StripPainter::Layer &layer)
+set_blend_uniforms (
+    GstGLShader *shader, const StripPainter::Picture &picture, const StripPainter::Layer &layer)
 {
   const rangecast::View &view = *layer.view;
   const rangecast::Intrinsics &lens = view.intrinsics;
@@ -377,11 +375,11 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
   const double gap_m = !blends                           ? picture.view_gap_m * (1 - along)
                        : shader == shaders_[kBlendDepth] ? picture.blend_range_m
                                                          : 0;
-  const auto moved = behind (matrix, picture.clip_from_world, gap_m);
+  const auto shift = depth_shift (matrix, picture.clip_from_world, gap_m);
   if (blends)
     set_blend_uniforms (shader, picture, layer);
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
-  gst_gl_shader_set_uniform_2f (shader, "u_behind", moved[0], moved[1]);
+  gst_gl_shader_set_uniform_2f (shader, "u_behind", shift.b * shift.g, shift.g);
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
@@ -459,7 +457,8 @@ StripPainter::draw_layers (
       show_side (gl, picture.clip_from_world, side == Side::kBack);
     for (const Layer &layer : layers)
       if (!layer.vertices.empty ())
-        draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, shader, side);
+        draw_layer (
+            objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, shader, side);
   };
   begin (picture, shader);
   draw_all (Side::kFront);
@@ -475,7 +474,8 @@ StripPainter::blend (const Picture &picture, std::span<const Layer> layers)
   targets_.begin_sum ();
   draw_layers (layers, picture, shaders_[kBlendSum]);
   context_->gl_vtable->Disable (GL_CULL_FACE);
-  targets_.resolve (picture.background);
+  targets_.resolve (picture.background,
+      depth_shift (picture.clip_from_world, picture.clip_from_world, picture.blend_range_m));
 }
 
 void

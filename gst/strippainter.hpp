@@ -28,7 +28,7 @@ public:
     float pixels_per_unit; ///< pixels that a length of 1 at a distance of 1 covers
     rangecast::StripMode mode;
     double depth_step;
-    bool back_faces = false; ///< of strips, where no front is
+    bool back_faces = false; ///< mode strips: where no front is; mode blend shows all
 
     /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
      *  between the two's directions. */
@@ -38,7 +38,7 @@ public:
     int width, height;
   };
   struct Layer {
-    rangecast::RangeImage image;
+    rangecast::ConstRangeImage image;
     const rangecast::View *view;
     std::span<const rangecast::StripVertex> vertices;
     const rangecast::BlendPlanes *planes = nullptr; ///< mode blend
@@ -68,8 +68,7 @@ private:
   enum class Side { kFront, kBack };
   void draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture,
       GstGLShader *shader, Side side);
-  void draw_layers (
-      std::span<const Layer> layers, const Picture &picture, GstGLShader *shader);
+  void draw_layers (std::span<const Layer> layers, const Picture &picture, GstGLShader *shader);
   void blend (const Picture &picture, std::span<const Layer> layers);
 
   /* glVertexAttribIPointer, which GStreamer's table of functions lacks */
@@ -78,7 +77,7 @@ private:
 
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
-  gint largest_ = 0;                       /* side of a texture, pixels */
+  gint largest_ = 0; /* side of a texture, pixels */
   /* Of strips, rectangles and points; of blended strips their depth, and their sums. */
   enum ShaderIndex { kStrips, kRectangles, kPoints, kBlendDepth, kBlendSum, kShaders };
   std::array<GstGLShader *, kShaders> shaders_{};

@@ -61,11 +61,22 @@ StripScene::build (
     std::span<const RangeImage> images, const StripRenderSettings &settings, bool same_frame_set)
 {
   const bool built = same_frame_set && is_built (images.size (), settings);
-  complete_ = false; /* memory may end halfway */
   const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
+  complete_ = false; /* memory may end halfway */
   std::array<rangecast::SurfaceView, rangecast::kMaxViews> views;
-  for (std::size_t i = 0; i < images.size (); i++)
-    views[i] = {images[i], rig_->find (images[i].view_id)};
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const rangecast::View *view = rig_->find (images[i].view_id);
+    const auto tinted = layers_[i].image.colour;
+    rangecast::ConstRangeImage image = images[i];
+    if (settings.show_units)
+      image.colour = built
+                         ? tinted
+                         : rangecast::tinted (images[i].colour,
+                               rangecast::camera_colour (std::size_t (view - rig_->views.data ())),
+                               memory_[i].tinted);
+    views[i] = {image, view};
+    layers_[i].image.colour = image.colour;
+  }
   rangecast::in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) {
     results_[i] = {};
     rangecast::BlendPlanes *planes = blends ? &memory_[i].planes : nullptr;
@@ -73,21 +84,11 @@ StripScene::build (
       rangecast::make_blend_planes (
           {views.data (), images.size ()}, i, settings.strips.depth_step, *planes);
     rangecast::build_strips (
-        images[i], settings.strips, memory_[i].vertices, results_[i], planes);
+        views[i].image, settings.strips, memory_[i].vertices, results_[i], planes);
   });
-  for (std::size_t i = 0; i < images.size (); i++) {
-    const rangecast::View *view = rig_->find (images[i].view_id);
-    StripPainter::Layer &layer = layers_[i];
-    const auto tinted = layer.image.colour;
-    layer = {images[i], view, memory_[i].vertices,
-        settings.strips.mode == rangecast::StripMode::kBlend ? &memory_[i].planes : nullptr};
-    if (settings.show_units)
-      layer.image.colour =
-          built ? tinted
-                : rangecast::tinted (images[i].colour,
-                      rangecast::camera_colour (std::size_t (view - rig_->views.data ())),
-                      memory_[i].tinted);
-  }
+  for (std::size_t i = 0; i < images.size (); i++)
+    layers_[i] = {
+        views[i].image, views[i].view, memory_[i].vertices, blends ? &memory_[i].planes : nullptr};
   count_ = images.size ();
   if (!built) {
     surround ();

@@ -60,7 +60,8 @@ static const NumberRow kNumbers[] = {
         "angle between its direction and the picture's (0 to 1, default 0.012)",
         0, 1, 0.012, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"blend-range", "Blend range",
-        "Of mode blend: metres behind the nearest surface in which what other views see is taken for "
+        "Of mode blend: metres behind the nearest surface in which what other views see is taken "
+        "for "
         "the same surface (0 to 1, default 0.02)",
         0, 1, 0.02, [] (Settings &s) -> double & { return s.blend_range_m; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",

@@ -20,14 +20,15 @@
 #define GL_DEPTH_COMPONENT24 0x81A6
 #endif
 
-/* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between what
- * two views draw. */
+/* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
+ * what two views draw. */
 static const char *const kResolveShader = R"(
 precision highp float;
 precision highp int;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
 uniform sampler2D u_depth;
 uniform vec4 u_background;
+uniform vec3 u_shift; /* a, b, g of DepthShift */
 out vec4 fragment;
 void main ()
 {
@@ -43,7 +44,9 @@ void main ()
   float coverage = sum.a > 0.0 ? 0.5 + 0.125 * covered : covered > 2.0 ? 1.0 : 0.125 * covered;
   if (sum.a <= 0.0)
     sum = west + east + north + south;
-  gl_FragDepth = texelFetch (u_depth, at, 0).r;
+  float depth = texelFetch (u_depth, at, 0).r;
+  float distance = u_shift.y / (2.0 * depth - 1.0 - u_shift.x) - u_shift.z;
+  gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
   float behind = (1.0 - coverage) * u_background.a;
   float alpha = coverage + behind;
   vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * u_background.rgb;
@@ -54,10 +57,9 @@ void main ()
 bool
 BlendTargets::start (GstGLContext *context, GError **error)
 {
-  const bool can_render_half = !is_gles (context) ||
-                               gst_gl_context_check_feature (context, "GL_EXT_color_buffer_float") ||
-                               gst_gl_context_check_feature (
-                                   context, "GL_EXT_color_buffer_half_float");
+  const bool can_render_half =
+      !is_gles (context) || gst_gl_context_check_feature (context, "GL_EXT_color_buffer_float") ||
+      gst_gl_context_check_feature (context, "GL_EXT_color_buffer_half_float");
   if (!can_render_half)
     return false;
   shader_ = make_shader (context, kCoveringVertexShader, kResolveShader, error);
@@ -154,7 +156,7 @@ BlendTargets::begin_sum ()
 }
 
 void
-BlendTargets::resolve (const float (&background)[4])
+BlendTargets::resolve (const float (&background)[4], const DepthShift &shift)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   gl->Disable (GL_BLEND);
@@ -169,6 +171,7 @@ BlendTargets::resolve (const float (&background)[4])
     gl->BindTexture (GL_TEXTURE_2D, textures_[i]);
     gst_gl_shader_set_uniform_1i (shader_, kNames[i], gint (i));
   }
+  gst_gl_shader_set_uniform_3f (shader_, "u_shift", shift.a, shift.b, shift.g);
   gst_gl_shader_set_uniform_4f (
       shader_, "u_background", background[0], background[1], background[2], background[3]);
   gl->BindVertexArray (array_);

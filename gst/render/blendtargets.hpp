@@ -5,8 +5,8 @@
 
 /** Render targets in which views of one surface are blended, and the pass that divides: first the
  *  depth of the nearest surface, then sums of colour times weight and of weights. Their memory does
- *  not depend on the number of views: 12 bytes a pixel. OpenGL 3.3, or OpenGL ES 3.0 with half-float
- *  render targets. All functions in the GL thread. */
+ *  not depend on the number of views: 12 bytes a pixel. OpenGL 3.3, or OpenGL ES 3.0 with
+ * half-float render targets. All functions in the GL thread. */
 class BlendTargets {
 public:
   /** Compiles the shader. @return false if OpenGL cannot render to half-float textures, or with
@@ -22,10 +22,15 @@ public:
   /** From here on what is drawn adds up: R, G, B times weight, and the weight. Depth is compared,
    *  not written. */
   void begin_sum ();
-  /** Divides, into the framebuffer that was bound before begin_depth(), smooths outlines, and writes
-   *  depth, too: what is drawn later stands among the surfaces.
+  /** By what surfaces were moved away from the viewer in the depth pass: their z in normalised
+   *  device coordinates, a + b / w, became a + b / (w + g). */
+  struct DepthShift {
+    float a, b, g;
+  };
+  /** Divides, into the framebuffer that was bound before begin_depth(), smooths outlines, and
+   * writes the surfaces' depth: what is drawn later stands among them.
    *  @param background  R, G, B, A, straight */
-  void resolve (const float (&background)[4]);
+  void resolve (const float (&background)[4], const DepthShift &shift);
 
 private:
   bool make (int width, int height);

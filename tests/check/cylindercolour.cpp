@@ -100,12 +100,12 @@ GST_START_TEST (test_blend_changes_colours_about_seams_and_no_depth)
 {
   const Scene scene (4, kWidth, kHeight, 1);
   std::size_t valid;
-  const Pixels winner = filtered (scene, "cylinderfilter colour-balance=off"),
-               blend = filtered (scene, "cylinderfilter colour-balance=off mode=blend"),
-               wide =
-                   filtered (scene, "cylinderfilter colour-balance=off mode=blend blend-width=0.1"),
-               none =
-                   filtered (scene, "cylinderfilter colour-balance=off mode=blend blend-width=0");
+  const Pixels winner = filtered (scene, "cylinderfilter overlap=1 colour-balance=off"),
+               blend = filtered (scene, "cylinderfilter overlap=1 colour-balance=off mode=blend"),
+               wide = filtered (
+                   scene, "cylinderfilter overlap=1 colour-balance=off mode=blend blend-width=0.1"),
+               none = filtered (
+                   scene, "cylinderfilter overlap=1 colour-balance=off mode=blend blend-width=0");
   const std::size_t some = different (winner, blend, valid);
   fail_unless (some > valid / 50 && some < valid * 7 / 10, "%zu of %zu", some, valid);
   fail_unless (different (winner, wide, valid) > some * 5 / 4);

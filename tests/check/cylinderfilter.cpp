@@ -8,7 +8,7 @@ using namespace rangecast::testing;
 
 /* A harness whose caps carry that rig. */
 static GstHarness *
-harness_for (const Rig &rig, const char *launch = "cylinderfilter")
+harness_for (const Rig &rig, const char *launch = "cylinderfilter overlap=1")
 {
   GstHarness *h = gst_harness_new_parse (launch);
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
@@ -95,7 +95,7 @@ GST_END_TEST;
 GST_START_TEST (test_mode_off_passes_everything_and_may_change_while_playing)
 {
   const Rig rig = same_place_rig (2);
-  GstHarness *h = harness_for (rig, "cylinderfilter mode=off");
+  GstHarness *h = harness_for (rig, "cylinderfilter overlap=1 mode=off");
   GstBuffer *in = make_frame_set (rig);
   const std::size_t points = points_of_view (in, 1);
   GstBuffer *out = gst_harness_push_and_pull (h, gst_buffer_ref (in));

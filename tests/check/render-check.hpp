@@ -104,6 +104,27 @@ render (GstHarness *h, GstBuffer *frame_set, int width = 320)
   return take_rendered (gst_harness_push_and_pull (h, frame_set), width);
 }
 
+/** A wall through the origin that two cameras see, 40 degrees apart, in red and in green; what the
+ * first one sees is rough. */
+inline GstBuffer *
+wall_of_two (const Rig &rig)
+{
+  GstBuffer *buffer = make_frame_set (rig);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  for (const RangeImage &image : frame.views ()) {
+    const View &view = *rig.find (image.view_id);
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const Vec3 ray = view.world_from_view.rotation * view.intrinsics.unproject (x, y, 1);
+        const double z = view.world_from_view.translation.z / -ray.z; /* to the plane z = 0 */
+        const int noise = image.view_id == 0 ? (x * 7 + y * 13) % 11 - 5 : 0;
+        image.depth.at (x, y) = guint16 (std::lround (z * 10000) + 2 * noise);
+        image.colour.at (x, y) = image.view_id == 0 ? Rgbx{255, 0, 0, 0} : Rgbx{0, 255, 0, 0};
+      }
+  }
+  return buffer;
+}
+
 inline guint64
 stats_field (GstElement *striprender, const char *name)
 {

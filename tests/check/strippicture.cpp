@@ -13,7 +13,8 @@ using namespace rangecast::testing;
 GST_START_TEST (test_default_picture_is_the_first_views_own_in_every_mode)
 {
   const Rig rig = ring_rig (4);
-  for (const char *mode : {"mode=strips", "mode=rectangles", "mode=points point-size=1.5"}) {
+  for (const char *mode :
+      {"mode=blend", "mode=strips", "mode=rectangles", "mode=points point-size=1.5"}) {
     GstHarness *h = render_harness (rig, mode);
     if (!h)
       RANGECAST_SKIP ("no OpenGL context");
@@ -207,7 +208,7 @@ disc_pixel (int x, int y, guint16 &depth, Rgbx &colour)
 GST_START_TEST (test_samples_smooth_edges_and_may_change_any_time)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "azimuth=25");
+  GstHarness *h = render_harness (rig, "mode=strips azimuth=25");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
   const auto disc = [&] { return drawn_by (rig, disc_pixel); };
@@ -233,7 +234,7 @@ GST_END_TEST;
 GST_START_TEST (test_samples_over_a_transparent_background_have_no_dark_rims)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "azimuth=25 samples=4 background=0");
+  GstHarness *h = render_harness (rig, "mode=strips azimuth=25 samples=4 background=0");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture picture = render (h, drawn_by (rig, disc_pixel));
@@ -254,7 +255,7 @@ GST_END_TEST;
 GST_START_TEST (test_samples_over_a_tinted_glass_mix_by_alpha)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "azimuth=25 samples=4 background=0x404080c0");
+  GstHarness *h = render_harness (rig, "mode=strips azimuth=25 samples=4 background=0x404080c0");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture picture = render (h, drawn_by (rig, disc_pixel));
@@ -281,7 +282,7 @@ GST_START_TEST (test_samples_over_a_tinted_glass_mix_by_alpha)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_surfaces_seen_from_behind_are_left_out_unless_wanted)
+GST_START_TEST (test_strips_leave_out_surfaces_seen_from_behind_unless_wanted)
 {
   const Rig rig = ring_rig (2); /* the scene's middle is where both look */
   const auto drawn = [&] (const char *properties) {
@@ -294,10 +295,10 @@ GST_START_TEST (test_surfaces_seen_from_behind_are_left_out_unless_wanted)
   };
   if (drawn ("") < 0)
     RANGECAST_SKIP ("no OpenGL context");
-  fail_unless_equals_int (drawn (""), 1);
-  fail_unless_equals_int (drawn ("azimuth=180"), 0);
-  fail_unless_equals_int (drawn ("azimuth=180 back-faces=true"), 1);
-  fail_unless_equals_int (drawn ("back-faces=true"), 1);
+  fail_unless_equals_int (drawn ("mode=strips"), 1);
+  fail_unless_equals_int (drawn ("mode=strips azimuth=180"), 0);
+  fail_unless_equals_int (drawn ("mode=strips azimuth=180 back-faces=true"), 1);
+  fail_unless_equals_int (drawn ("mode=strips back-faces=true"), 1);
 }
 GST_END_TEST;
 
@@ -317,27 +318,6 @@ GST_START_TEST (test_one_camera_is_drawn_from_behind_too)
 }
 GST_END_TEST;
 
-/* A wall through the origin that two cameras see, 40 degrees apart, in red and in green; what the
- * first one sees is rough. */
-static GstBuffer *
-wall_of_two (const Rig &rig)
-{
-  GstBuffer *buffer = make_frame_set (rig);
-  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-  for (const RangeImage &image : frame.views ()) {
-    const View &view = *rig.find (image.view_id);
-    for (int y = 0; y < 240; y++)
-      for (int x = 0; x < 320; x++) {
-        const Vec3 ray = view.world_from_view.rotation * view.intrinsics.unproject (x, y, 1);
-        const double z = view.world_from_view.translation.z / -ray.z; /* to the plane z = 0 */
-        const int noise = image.view_id == 0 ? (x * 7 + y * 13) % 11 - 5 : 0;
-        image.depth.at (x, y) = guint16 (std::lround (z * 10000) + 2 * noise);
-        image.colour.at (x, y) = image.view_id == 0 ? Rgbx{255, 0, 0, 0} : Rgbx{0, 255, 0, 0};
-      }
-  }
-  return buffer;
-}
-
 GST_START_TEST (test_views_of_one_surface_do_not_shine_through_each_other)
 {
   Rig rig = ring_rig (9);
@@ -354,11 +334,11 @@ GST_START_TEST (test_views_of_one_surface_do_not_shine_through_each_other)
     gst_harness_teardown (h);
     return n;
   };
-  if (green ("") < 0)
+  if (green ("mode=strips") < 0)
     RANGECAST_SKIP ("no OpenGL context");
-  fail_unless_equals_int (green (""), 0);
-  fail_unless_equals_int (green ("azimuth=40"), 120 * 120);
-  const int without = green ("view-gap=0");
+  fail_unless_equals_int (green ("mode=strips"), 0);
+  fail_unless_equals_int (green ("mode=strips azimuth=40"), 120 * 120);
+  const int without = green ("mode=strips view-gap=0");
   fail_unless (without > 1000 && without < 120 * 119, "%d", without);
 }
 GST_END_TEST;
@@ -370,7 +350,7 @@ GST_START_TEST (test_view_gap_is_metres_also_where_the_viewer_is_among_the_point
   rig.views.resize (2);
   const auto green = [&] (const char *gap, double green_nearer_m) {
     const std::string properties =
-        std::string ("azimuth=20 distance=0.3 field-of-view=40 view-gap=") + gap;
+        std::string ("mode=strips azimuth=20 distance=0.3 field-of-view=40 view-gap=") + gap;
     GstHarness *h = render_harness (rig, properties.c_str ());
     if (!h)
       return -1;
@@ -568,7 +548,7 @@ strippicture_suite ()
   tcase_add_test (tc, test_samples_smooth_edges_and_may_change_any_time);
   tcase_add_test (tc, test_samples_over_a_transparent_background_have_no_dark_rims);
   tcase_add_test (tc, test_samples_over_a_tinted_glass_mix_by_alpha);
-  tcase_add_test (tc, test_surfaces_seen_from_behind_are_left_out_unless_wanted);
+  tcase_add_test (tc, test_strips_leave_out_surfaces_seen_from_behind_unless_wanted);
   tcase_add_test (tc, test_one_camera_is_drawn_from_behind_too);
   tcase_add_test (tc, test_views_of_one_surface_do_not_shine_through_each_other);
   tcase_add_test (tc, test_view_gap_is_metres_also_where_the_viewer_is_among_the_points);

@@ -358,6 +358,7 @@ unrest (double steady)
   const auto scene = make_scene (0);
   StereoSettings settings;
   settings.steady = steady;
+  settings.average = 1;
   StereoDepth stereo;
   EXPECT_TRUE (stereo.set (scene->rig ().views[0], settings).ok ());
   Depth depth;

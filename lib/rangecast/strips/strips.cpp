@@ -74,8 +74,8 @@ class Builder {
 public:
   Builder (const ConstRangeImage &image, const StripSettings &settings,
       std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes)
-      : image_ (image), colour_ (planes ? planes->colour_plane () : image.colour),
-        planes_ (planes), settings_ (settings), to_ (to), result_ (result),
+      : image_ (image), colour_ (planes ? planes->colour_plane () : image.colour), planes_ (planes),
+        settings_ (settings), to_ (to), result_ (result),
         width_ (std::min (image.depth.width, kMaxStripSide)),
         height_ (std::min (image.depth.height, kMaxStripSide)),
         step_ (static_cast<int> (settings.depth_step * 65536)),
@@ -238,9 +238,9 @@ private:
   {
     constexpr int kFar = 40; /* of 255 */
     const auto weight = [&] (int at) {
-      return planes_->weight[static_cast<std::size_t> (y) *
-                                 static_cast<std::size_t> (planes_->width) +
-                             static_cast<std::size_t> (at)];
+      return planes_
+          ->weight[static_cast<std::size_t> (y) * static_cast<std::size_t> (planes_->width) +
+                   static_cast<std::size_t> (at)];
     };
     return planes_ && std::abs (weight (x) - weight (first)) > kFar;
   }
@@ -423,7 +423,8 @@ private:
     if (below == kInvalidDepth || below >= depth_[x] || joins_pixel_below (x))
       return;
     for (int y = row_ + 2; y < height_ && y <= row_ + 1 + kWidestHidden; y++)
-      if (const int depth = image_.depth.at (x, y); depth != kInvalidDepth && is_level (depth_[x], depth)) {
+      if (const int depth = image_.depth.at (x, y);
+          depth != kInvalidDepth && is_level (depth_[x], depth)) {
         if (joins_pixel_right (x, y))
           bridge (x, x + 1, row_, y);
         return;

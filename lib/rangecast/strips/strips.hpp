@@ -92,8 +92,8 @@ struct StripResult {
  *  The bands above and below a row leave out the same ones, so that no crack opens there. Between
  *  pixels that stay no step is larger than depth_step allows.
  *
- *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say. What at
- *  most kWidestHidden nearer pixels hide of a surface is bridged behind them (kBehind).
+ *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say. What
+ * at most kWidestHidden nearer pixels hide of a surface is bridged behind them (kBehind).
  *
  *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn

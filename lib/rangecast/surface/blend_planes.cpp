@@ -16,8 +16,8 @@ constexpr int kFarthest = kSide * kFeatherPixels;
 
 /* Metres by which a view has to see farther than a place to see through it. */
 constexpr double kClearance = 0.01;
-/* A view sees the background at an invalid pixel if there is no valid one this near: matching leaves
- * holes in surfaces, too. */
+/* A view sees the background at an invalid pixel if there is no valid one this near: matching
+ * leaves holes in surfaces, too. */
 constexpr int kBackgroundRadius = 1;
 
 /* Copies of the neighbour code may be off by its threshold, in levels of R, G and B each. */
@@ -108,7 +108,8 @@ private:
   [[nodiscard]] bool joins (int x, int y, int u, int v) const
   {
     const int a = image_.depth.at (x, y), b = image_.depth.at (u, v);
-    const auto step = static_cast<float> (std::abs (a - b)), least = static_cast<float> (std::min (a, b));
+    const auto step = static_cast<float> (std::abs (a - b)),
+               least = static_cast<float> (std::min (a, b));
     if (b == kInvalidDepth || step > depth_step_ * least)
       return false;
     return step <= steep_ * least ||
@@ -137,8 +138,9 @@ private:
     for (int x = 0; x < width_; x++) {
       const bool inside = x > 0 && y > 0 && has (x, y, kValid | kJoinsRight | kJoinsBelow) &&
                           has (x - 1, y, kJoinsRight) && has (x, y - 1, kJoinsBelow);
-      to_.weight[place (x, y)] =
-          static_cast<std::uint8_t> (inside ? kFarthest : has (x, y, kValid) ? kSide : 0);
+      to_.weight[place (x, y)] = static_cast<std::uint8_t> (inside               ? kFarthest
+                                                            : has (x, y, kValid) ? kSide
+                                                                                 : 0);
     }
   }
 
@@ -148,8 +150,8 @@ private:
     const auto sweep = [this] (int x, int y, int way) {
       std::uint8_t *at = &to_.weight[place (x, y)];
       const std::ptrdiff_t row = way * width_;
-      const int least = std::min (std::min (at[way], at[row]) + kSide,
-          std::min (at[row - 1], at[row + 1]) + kDiagonal);
+      const int least = std::min (
+          std::min (at[way], at[row]) + kSide, std::min (at[row - 1], at[row + 1]) + kDiagonal);
       *at = static_cast<std::uint8_t> (std::min<int> (*at, least));
     };
     for (int y = 1; y + 1 < height_; y++)
@@ -174,10 +176,10 @@ private:
   {
     for (int y = 0; y < height_; y++)
       for (int x = 0; x < width_; x++)
-        to_.copied[place (x, y)] = has (x, y, kValid) &&
-                                   (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
-                                       is_copy_of (x, y, x - 1, y - 1) ||
-                                       is_copy_of (x, y, x + 1, y - 1));
+        to_.copied[place (x, y)] =
+            has (x, y, kValid) &&
+            (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
+                is_copy_of (x, y, x - 1, y - 1) || is_copy_of (x, y, x + 1, y - 1));
     smooth (1, [this] (int x, int) { return std::pair (x, width_); });
     smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
   }
@@ -194,8 +196,7 @@ private:
         }
   }
 
-  [[nodiscard]] static Rgbx mean_along (
-      const Rgbx *at, std::ptrdiff_t way, int first, int last)
+  [[nodiscard]] static Rgbx mean_along (const Rgbx *at, std::ptrdiff_t way, int first, int last)
   {
     int n = 0, r = 0, g = 0, b = 0;
     for (int k = first; k <= last; k++) {
@@ -265,8 +266,8 @@ private:
 } // namespace
 
 void
-make_blend_planes (std::span<const SurfaceView> views, std::size_t which, double depth_step,
-    BlendPlanes &to)
+make_blend_planes (
+    std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
 {
   Planes (views, which, depth_step, to).make ();
 }

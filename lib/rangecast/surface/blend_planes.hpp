@@ -61,7 +61,7 @@ struct SurfaceView {
  *  @param depth_step  share of the depth
  *  @param[out] to     replaced; keeps its memory
  *  Reentrant. */
-void make_blend_planes (std::span<const SurfaceView> views, std::size_t which, double depth_step,
-    BlendPlanes &to);
+void make_blend_planes (
+    std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to);
 
 } // namespace rangecast

@@ -89,8 +89,8 @@ median (std::vector<double> values)
 
 /* striprender's own ways, beside the peers. */
 constexpr std::pair<const char *, StripMode> kModes[] = {{"blend", StripMode::kBlend},
-    {"strips", StripMode::kStrips},
-    {"rectangles", StripMode::kRectangles}, {"points", StripMode::kPoints}};
+    {"strips", StripMode::kStrips}, {"rectangles", StripMode::kRectangles},
+    {"points", StripMode::kPoints}};
 
 struct Job {
   SceneSettings scene;

@@ -13,8 +13,7 @@ public:
   StripWay (std::string name, StripPainter &painter, const FrameSet &set,
       const StripSettings &settings, bool held)
       : Way (std::move (name)), painter_ (painter), set_ (set), settings_ (settings), held_ (held),
-        vertices_ (set.images.size ()), results_ (set.images.size ()),
-        planes_ (set.images.size ())
+        vertices_ (set.images.size ()), results_ (set.images.size ()), planes_ (set.images.size ())
   {
     for (const RangeImage &image : set.images)
       views_.push_back ({image, set.rig.find (image.view_id)});
@@ -28,8 +27,8 @@ public:
       results_[i] = {};
       if (blends ())
         make_blend_planes (views_, i, settings_.depth_step, planes_[i]);
-      build_strips (set_.images[i], settings_, vertices_[i], results_[i],
-          blends () ? &planes_[i] : nullptr);
+      build_strips (
+          set_.images[i], settings_, vertices_[i], results_[i], blends () ? &planes_[i] : nullptr);
     });
   }
 

@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* striprender mode=blend: what several views of one surface give together. */
+#include <cstdlib>
+
+#include "render-check.hpp"
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+/* Two cameras 40 degrees apart. */
+static Rig
+two_of_nine ()
+{
+  Rig rig = ring_rig (9);
+  rig.views.resize (2);
+  return rig;
+}
+
+/* The mean colour of the middle of the picture. */
+static std::array<double, 3>
+middle (const RenderedPicture &picture)
+{
+  std::array<double, 3> mean{};
+  for (int y = 100; y < 140; y++)
+    for (int x = 140; x < 180; x++)
+      for (int c = 0; c < 3; c++)
+        mean[std::size_t (c)] += picture.at (x, y, c) / 1600.0;
+  return mean;
+}
+
+GST_START_TEST (test_midway_between_two_views_colours_are_their_mean)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "azimuth=20");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const auto colour = middle (render (h, wall_of_two (rig)));
+  fail_unless (std::abs (colour[0] - 127) < 20 && std::abs (colour[1] - 127) < 20, "%f %f",
+      colour[0], colour[1]);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_of_the_viewers_own_direction_counts_most)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "azimuth=0");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const auto own = middle (render (h, wall_of_two (rig)));
+  gst_harness_set (h, "striprender", "azimuth", 40.0, nullptr);
+  const auto other = middle (render (h, wall_of_two (rig)));
+  fail_unless (own[0] > 3 * own[1], "%f %f", own[0], own[1]);
+  fail_unless (other[1] > 3 * other[0], "%f %f", other[0], other[1]);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* From red to green in 40 degrees: 1 to 2 levels in a quarter of a degree, and nowhere a jump. */
+GST_START_TEST (test_colours_change_steadily_as_the_viewer_turns)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  RenderedPicture last;
+  int pixels = 0, jumps = 0;
+  for (double azimuth = 0; azimuth <= 40; azimuth += 0.25) {
+    gst_harness_set (h, "striprender", "azimuth", azimuth, nullptr);
+    const RenderedPicture picture = render (h, wall_of_two (rig));
+    for (int y = 60; azimuth > 0 && y < 180; y++)
+      for (int x = 100; x < 220; x++)
+        for (int c = 0; c < 2; c++) {
+          pixels++;
+          jumps += std::abs (picture.at (x, y, c) - last.at (x, y, c)) > 5;
+        }
+    last = picture;
+  }
+  fail_unless (jumps < pixels / 100, "%d of %d", jumps, pixels);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Moves the first view's wall back by that much. */
+static GstBuffer *
+walls_apart (const Rig &rig, double metres)
+{
+  GstBuffer *walls = wall_of_two (rig);
+  gstrange::RangeFrameMap frame (walls, GST_MAP_READWRITE);
+  const RangeImage &image = frame.views ()[0];
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++)
+      image.depth.at (x, y) += guint16 (std::lround (metres * 10000));
+  return walls;
+}
+
+GST_START_TEST (test_surface_beyond_the_blend_range_is_hidden)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "azimuth=20");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  fail_unless (middle (render (h, walls_apart (rig, 0.01)))[0] > 60);
+  fail_unless (middle (render (h, walls_apart (rig, 0.1)))[0] < 1);
+  gst_harness_set (h, "striprender", "blend-range", 0.2, nullptr);
+  fail_unless (middle (render (h, walls_apart (rig, 0.1)))[0] > 60);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Half floats hold the sums of as many views as there can be. */
+GST_START_TEST (test_64_views_of_one_colour_keep_it_to_a_level)
+{
+  Rig rig = ring_rig (64, 64, 48);
+  for (View &view : rig.views)
+    view.world_from_view = rig.views[0].world_from_view;
+  GstHarness *h = render_harness (rig, "");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstBuffer *buffer = make_frame_set (rig);
+  {
+    gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+    for (const RangeImage &image : frame.views ())
+      for (int y = 0; y < 48; y++)
+        for (int x = 0; x < 64; x++) {
+          image.depth.at (x, y) = 8000;
+          image.colour.at (x, y) = {203, 101, 7, 0};
+        }
+  }
+  const RenderedPicture picture = render (h, buffer);
+  const int expected[] = {203, 101, 7};
+  for (int y = 20; y < 220; y++)
+    for (int x = 20; x < 300; x++)
+      for (int c = 0; c < 3; c++)
+        fail_unless (std::abs (picture.at (x, y, c) - expected[c]) <= 1, "%d, %d: %d, not %d", x, y,
+            picture.at (x, y, c), expected[c]);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* A white disc on nothing. */
+static GstBuffer *
+disc (const Rig &rig)
+{
+  GstBuffer *buffer = make_frame_set (rig);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  const RangeImage &image = frame.views ()[0];
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      image.depth.at (x, y) = std::hypot (x - 159.5, y - 119.5) < 70 ? 8000 : 0;
+      image.colour.at (x, y) = {255, 255, 255, 0};
+    }
+  return buffer;
+}
+
+GST_START_TEST (test_outlines_are_antialiased_and_have_no_dark_rims)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig, "azimuth=25 background=0");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const RenderedPicture picture = render (h, disc (rig));
+  int rim = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const int alpha = picture.at (x, y, 3);
+      rim += alpha > 0 && alpha < 255;
+      for (int c = 0; c < 3; c++)
+        fail_unless (std::abs (picture.at (x, y, c) - (alpha > 0 ? 255 : 0)) <= 1);
+    }
+  fail_unless (rim > 100, "%d pixels", rim);
+  fail_unless_equals_int (picture.at (160, 120, 3), 255);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* The three passes leave OpenGL as the other modes expect it, and the other way round. */
+GST_START_TEST (test_modes_may_take_turns)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "mode=strips");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const RenderedPicture strips = render (h, wall_of_two (rig));
+  gst_harness_set (h, "striprender", "mode", 0, nullptr);
+  const RenderedPicture blend = render (h, wall_of_two (rig));
+  gst_harness_set (h, "striprender", "mode", 1, nullptr);
+  fail_unless (render (h, wall_of_two (rig)).rgba == strips.rgba);
+  gst_harness_set (h, "striprender", "mode", 0, nullptr);
+  fail_unless (render (h, wall_of_two (rig)).rgba == blend.rgba);
+  fail_unless (blend.rgba != strips.rgba);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static Suite *
+stripblend_suite (void)
+{
+  Suite *s = suite_create ("stripblend");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (s, tc);
+  tcase_add_test (tc, test_midway_between_two_views_colours_are_their_mean);
+  tcase_add_test (tc, test_view_of_the_viewers_own_direction_counts_most);
+  tcase_add_test (tc, test_colours_change_steadily_as_the_viewer_turns);
+  tcase_add_test (tc, test_surface_beyond_the_blend_range_is_hidden);
+  tcase_add_test (tc, test_64_views_of_one_colour_keep_it_to_a_level);
+  tcase_add_test (tc, test_outlines_are_antialiased_and_have_no_dark_rims);
+  tcase_add_test (tc, test_modes_may_take_turns);
+  return s;
+}
+
+GST_CHECK_MAIN (stripblend);
