@@ -14,6 +14,7 @@ bool
 StripDrawing::start (GstGLContext *context, GError **error)
 {
   context_ = context;
+  can_blend_ = BlendTargets::is_supported (context);
   if (painter_.start (context, error))
     return true;
   if (error && !*error)
@@ -91,6 +92,7 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   picture.blend_range_m = settings.blend_range_m;
   picture.width = width_;
   picture.height = height_;
+  picture.part = {place.x, place.y, place.width, place.height};
   return picture;
 }
 

@@ -87,6 +87,8 @@ draw_frame (
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
+  if (!priv->drawing.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
+    settings.strips.mode = rangecast::StripMode::kStrips;
   const bool again = frame_set == priv->drawn;
   priv->scene.build (frame.views (), settings, again);
   gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);

@@ -6,6 +6,9 @@
 
 #include "glshader.hpp"
 
+/* Up to so many views half floats keep 8 bits of colour: each addition is rounded to 11 bits. */
+constexpr std::size_t kMaxHalfFloatViews = 16;
+
 using rangecast::Mat4;
 using rangecast::StripMode;
 using rangecast::StripVertex;
@@ -40,10 +43,11 @@ uniform float u_point_size;
 uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
 #if BLEND
+invariant gl_Position; /* in both passes */
 uniform sampler2D u_weight; /* square root */
 uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
 uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
-const float kLeastAngle = 0.03; /* square root of the least weight; the cosine's power is 6 */
+const float kMinAngle = 0.03; /* square root of the least weight; the cosine's power is 6 */
 out vec4 v_colour; /* and the square root of the weight */
 #else
 out vec3 v_colour;
@@ -103,7 +107,7 @@ void main ()
 #if BLEND_SUM
   vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
   float along = dot (normalize (ray), normalize (ray * depth * u_unit - u_viewer));
-  float angle = max (along * along * along, kLeastAngle);
+  float angle = max (along * along * along, kMinAngle);
   v_colour.rgb = texelFetch (u_colour, pixel, 0).rgb;
   v_colour.a = behind ? 0.0 : texelFetch (u_weight, pixel, 0).r * angle;
 #endif
@@ -114,18 +118,18 @@ void main ()
 }
 )";
 
-/* Half floats hold the sums of 64 views of full weight, and colours of the least weight. */
+/* Half floats hold sums of 250 surfaces of full weight, and colours of the least weight. */
 static const char *const kBlendFragmentShader = R"(
 precision highp float;
 #if BLEND_SUM
 in vec4 v_colour;
 out vec4 sum;
-const float kScale = 1000.0, kLeastWeight = 2e-6;
+const float kScale = 250.0, kMinWeight = 2e-6;
 #endif
 void main ()
 {
 #if BLEND_SUM
-  float weight = max (v_colour.a * v_colour.a, kLeastWeight) * kScale;
+  float weight = max (v_colour.a * v_colour.a, kMinWeight) * kScale;
   sum = vec4 (v_colour.rgb * weight, weight);
 #endif
 }
@@ -161,11 +165,8 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
-  can_blend_ = targets_.start (context, error);
-  if (error && *error)
+  if (BlendTargets::is_supported (context) && !targets_.start (context, error))
     return false;
-  if (!can_blend_)
-    GST_WARNING ("OpenGL cannot render to half-float textures: mode blend draws strips");
   for (std::size_t i = 0; i < shaders_.size (); i++) {
     const std::string vertex = std::string (kVariants[i]) + kVertexShader;
     const std::string blended = std::string (kVariants[i]) + kBlendFragmentShader;
@@ -275,7 +276,8 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
   gl->BufferData (
       GL_ARRAY_BUFFER, layer.vertices.size_bytes (), layer.vertices.data (), GL_STREAM_DRAW);
-  return guint64 (depth.width) * guint64 (depth.height) * 6 + layer.vertices.size_bytes ();
+  return guint64 (depth.width) * guint64 (depth.height) * (planes ? 7 : 6) +
+         layer.vertices.size_bytes ();
 }
 
 /* Column-major: clip coordinates of (column, row, 1) times depth, and 1. */
@@ -376,7 +378,7 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
                        : shader == shaders_[kBlendDepth] ? picture.blend_range_m
                                                          : 0;
   const auto shift = depth_shift (matrix, picture.clip_from_world, gap_m);
-  if (blends)
+  if (shader == shaders_[kBlendSum])
     set_blend_uniforms (shader, picture, layer);
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
   gst_gl_shader_set_uniform_2f (shader, "u_behind", shift.b * shift.g, shift.g);
@@ -450,7 +452,8 @@ StripPainter::draw_layers (
     std::span<const Layer> layers, const Picture &picture, GstGLShader *shader)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  /* Noise turns many a single rectangle over: they have two sides, as points have. */
+  /* Noise turns many a single rectangle over: they have two sides, as points have. Blending gives
+   * what is seen from behind next to no weight. */
   const bool sided = picture.mode == StripMode::kStrips;
   const auto draw_all = [&] (Side side) {
     if (sided)
@@ -473,8 +476,7 @@ StripPainter::blend (const Picture &picture, std::span<const Layer> layers)
   draw_layers (layers, picture, shaders_[kBlendDepth]);
   targets_.begin_sum ();
   draw_layers (layers, picture, shaders_[kBlendSum]);
-  context_->gl_vtable->Disable (GL_CULL_FACE);
-  targets_.resolve (picture.background,
+  targets_.resolve (picture.part, picture.background,
       depth_shift (picture.clip_from_world, picture.clip_from_world, picture.blend_range_m));
 }
 
@@ -483,9 +485,10 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const float *c = picture.background;
-  if (picture.mode == StripMode::kBlend && can_blend_ &&
-      targets_.begin_depth (picture.width, picture.height)) {
-    blend (picture, layers);
+  if (picture.mode == StripMode::kBlend) {
+    const bool precise = layers.size () > kMaxHalfFloatViews && !is_gles (context_);
+    if (targets_.begin_depth (picture.width, picture.height, precise))
+      blend (picture, layers);
     end ();
     return;
   }
@@ -495,8 +498,6 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
   gl->Enable (GL_DEPTH_TEST);
   if (!is_gles (context_)) /* OpenGL ES always takes it from the shader */
     gl->Enable (GL_PROGRAM_POINT_SIZE);
-  const bool blends = picture.mode == StripMode::kBlend; /* OpenGL cannot */
-  draw_layers (
-      layers, picture, shaders_[blends ? std::size_t (kStrips) : std::size_t (picture.mode) - 1]);
+  draw_layers (layers, picture, shaders_[std::size_t (picture.mode) - 1]);
   end ();
 }

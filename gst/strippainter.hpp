@@ -35,7 +35,8 @@ public:
     double view_gap_m = 0.012;
     /** Mode blend: metres by which what a pixel shows may lie behind the nearest surface. */
     double blend_range_m = 0.02;
-    int width, height;
+    int width, height;   ///< of the framebuffer, pixels
+    rangecast::Roi part; ///< of it that the picture fills
   };
   struct Layer {
     rangecast::ConstRangeImage image;
@@ -82,7 +83,6 @@ private:
   enum ShaderIndex { kStrips, kRectangles, kPoints, kBlendDepth, kBlendSum, kShaders };
   std::array<GstGLShader *, kShaders> shaders_{};
   BlendTargets targets_;
-  bool can_blend_ = false;
   /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;

@@ -56,7 +56,8 @@ static const NumberRow kNumbers[] = {
         "to 100, default 1)",
         0, 100, kDefaults.merge, [] (Settings &s) -> double & { return s.strips.merge; }},
     {"view-gap", "View gap",
-        "Metres by which what a view sees moves behind what others see, times 1 - cosine of the "
+        "Modes other than blend: metres by which what a view sees moves behind what others see, "
+        "times 1 - cosine of the "
         "angle between its direction and the picture's (0 to 1, default 0.012)",
         0, 1, 0.012, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"blend-range", "Blend range",
@@ -87,7 +88,8 @@ static const SwitchRow kSwitches[] = {
         "false)",
         kFlags, [] (Settings &s) -> bool & { return s.show_cameras; }},
     {"back-faces", "Back faces",
-        "Strips also show surfaces from behind, from inside a body, where no front is (default "
+        "Mode strips: also show surfaces from behind, from inside a body, where no front is "
+        "(default "
         "false; always with one camera)",
         kFlags, [] (Settings &s) -> bool & { return s.back_faces; }},
     {"show-units", "Show units",
@@ -158,7 +160,7 @@ install_strip_settings (GObjectClass *object_class)
           Settings::kDefaultBackground, kFlags));
   g_object_class_install_property (object_class, PROP_MAX_GAP,
       g_param_spec_int ("max-gap", "Maximum gap",
-          "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 6)", 0, 1000,
+          "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 2)", 0, 1000,
           kDefaults.max_gap, kFlags));
   g_object_class_install_property (object_class, PROP_SAMPLES,
       g_param_spec_int ("samples", "Samples",

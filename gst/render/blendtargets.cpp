@@ -13,6 +13,9 @@
 #ifndef GL_RGBA16F
 #define GL_RGBA16F 0x881A
 #endif
+#ifndef GL_RGBA32F
+#define GL_RGBA32F 0x8814
+#endif
 #ifndef GL_HALF_FLOAT
 #define GL_HALF_FLOAT 0x140B
 #endif
@@ -25,18 +28,20 @@
 static const char *const kResolveShader = R"(
 precision highp float;
 precision highp int;
+precision highp sampler2D;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
 uniform sampler2D u_depth;
 uniform vec4 u_background;
+uniform ivec4 u_part; /* first and last pixel */
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 out vec4 fragment;
 void main ()
 {
-  ivec2 at = ivec2 (gl_FragCoord.xy), last = textureSize (u_sum, 0) - 1;
+  ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
   vec4 sum = texelFetch (u_sum, at, 0);
-  vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, 0), at.y), 0);
+  vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
   vec4 east = texelFetch (u_sum, ivec2 (min (at.x + 1, last.x), at.y), 0);
-  vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, 0)), 0);
+  vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, first.y)), 0);
   vec4 south = texelFetch (u_sum, ivec2 (at.x, min (at.y + 1, last.y)), 0);
   vec4 beside = vec4 (greaterThan (vec4 (west.a, east.a, north.a, south.a), vec4 (0.0)));
   float covered = dot (beside, vec4 (1.0));
@@ -55,13 +60,16 @@ void main ()
 )";
 
 bool
+BlendTargets::is_supported (GstGLContext *context)
+{
+  return !is_gles (context) ||
+         gst_gl_context_check_feature (context, "GL_EXT_color_buffer_float") ||
+         gst_gl_context_check_feature (context, "GL_EXT_color_buffer_half_float");
+}
+
+bool
 BlendTargets::start (GstGLContext *context, GError **error)
 {
-  const bool can_render_half =
-      !is_gles (context) || gst_gl_context_check_feature (context, "GL_EXT_color_buffer_float") ||
-      gst_gl_context_check_feature (context, "GL_EXT_color_buffer_half_float");
-  if (!can_render_half)
-    return false;
   shader_ = make_shader (context, kCoveringVertexShader, kResolveShader, error);
   if (!shader_)
     return false;
@@ -92,15 +100,16 @@ BlendTargets::stop ()
 }
 
 bool
-BlendTargets::make (int width, int height)
+BlendTargets::make (int width, int height, bool precise)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   delete_targets ();
-  static const struct {
+  const struct {
     gint internal;
     guint format, type, attachment;
-  } kFormats[] = {
-      {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, GL_COLOR_ATTACHMENT0},
+  } formats[] = {
+      {precise ? GL_RGBA32F : GL_RGBA16F, GL_RGBA, guint (precise ? GL_FLOAT : GL_HALF_FLOAT),
+          GL_COLOR_ATTACHMENT0},
       {GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, GL_DEPTH_ATTACHMENT},
   };
   gl->GenFramebuffers (1, &framebuffer_);
@@ -112,29 +121,36 @@ BlendTargets::make (int width, int height)
     gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    gl->TexImage2D (GL_TEXTURE_2D, 0, kFormats[i].internal, width, height, 0, kFormats[i].format,
-        kFormats[i].type, nullptr);
+    gl->TexImage2D (GL_TEXTURE_2D, 0, formats[i].internal, width, height, 0, formats[i].format,
+        formats[i].type, nullptr);
     gl->FramebufferTexture2D (
-        GL_FRAMEBUFFER, kFormats[i].attachment, GL_TEXTURE_2D, textures_[i], 0);
+        GL_FRAMEBUFFER, formats[i].attachment, GL_TEXTURE_2D, textures_[i], 0);
   }
   gl->BindTexture (GL_TEXTURE_2D, 0);
   if (gl->CheckFramebufferStatus (GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
     return false;
-  width_ = width;
-  height_ = height;
   return true;
 }
 
 bool
-BlendTargets::begin_depth (int width, int height)
+BlendTargets::begin_depth (int width, int height, bool precise)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &before_);
-  if (width == width_ && height == height_)
+  if (width == width_ && height == height_ && precise == precise_) {
+    if (failed_)
+      return false;
     gl->BindFramebuffer (GL_FRAMEBUFFER, framebuffer_);
-  else if (!make (width, height)) {
-    gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
-    return false;
+  } else {
+    failed_ = !make (width, height, precise);
+    width_ = width;
+    height_ = height;
+    precise_ = precise;
+    if (failed_) {
+      GST_WARNING ("mode blend: OpenGL has no float framebuffer of %dx%d pixels", width, height);
+      gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
+      return false;
+    }
   }
   gl->Viewport (0, 0, width, height);
   gl->ClearColor (0, 0, 0, 0);
@@ -156,7 +172,8 @@ BlendTargets::begin_sum ()
 }
 
 void
-BlendTargets::resolve (const float (&background)[4], const DepthShift &shift)
+BlendTargets::resolve (
+    const rangecast::Roi &part, const float (&background)[4], const DepthShift &shift)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   gl->Disable (GL_BLEND);
@@ -171,6 +188,8 @@ BlendTargets::resolve (const float (&background)[4], const DepthShift &shift)
     gl->BindTexture (GL_TEXTURE_2D, textures_[i]);
     gst_gl_shader_set_uniform_1i (shader_, kNames[i], gint (i));
   }
+  gst_gl_shader_set_uniform_4i (
+      shader_, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
   gst_gl_shader_set_uniform_3f (shader_, "u_shift", shift.a, shift.b, shift.g);
   gst_gl_shader_set_uniform_4f (
       shader_, "u_background", background[0], background[1], background[2], background[3]);

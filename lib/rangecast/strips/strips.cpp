@@ -151,7 +151,8 @@ private:
       if (const std::uint16_t depth = image_.depth.at (x, y); depth != kInvalidDepth) {
         if (y == row_ + 1 ? joins_pixel_below (x) : near (depth_[x], depth))
           return {static_cast<std::uint16_t> (y - row_), kCentre, depth};
-        return {0, y == row_ + 1 && depth < depth_[x] ? kFullAfter : kFarAfter, depth_[x]};
+        return {
+            0, !planes_ && y == row_ + 1 && depth < depth_[x] ? kFullAfter : kFarAfter, depth_[x]};
       }
     return {0, kFarAfter, depth_[x]};
   }
@@ -268,7 +269,7 @@ private:
   /* A band begins where the one above ends, or at the upper edge of its pixels. */
   [[nodiscard]] StripVertex upper (int x, StripPlace horizontal) const
   {
-    return strip_vertex (x, row_, horizontal, met_[x] ? kCentre : planes_ ? kFarBefore : kBefore);
+    return strip_vertex (x, row_, horizontal, met_[x] ? kCentre : kBefore);
   }
 
   /* The two vertices of a pixel, or of an end of the band beside it. */
@@ -385,10 +386,17 @@ private:
       }
   }
 
+  /* Whether a depth is before the surface of a pixel of this row. */
+  [[nodiscard]] bool is_hiding (int depth, int x) const
+  {
+    return depth != kInvalidDepth && depth < depth_[x] && !is_level (depth_[x], depth);
+  }
+
   /* Whether both sides of what hides a surface are that surface. */
   [[nodiscard]] bool is_level (int a, int b) const
   {
-    return std::abs (a - b) <= planes_->steep_step * std::min (a, b);
+    return std::min (a, b) != kInvalidDepth &&
+           std::abs (a - b) <= planes_->steep_step * std::min (a, b);
   }
 
   void bridge (int left, int right, int top, int bottom)
@@ -403,32 +411,28 @@ private:
   /* What nearer pixels of this row hide, between two steps down of one surface. */
   void bridge_right (int x)
   {
-    if (row_ + 1 >= height_ || depth_[x + 1] == kInvalidDepth || depth_[x + 1] >= depth_[x] ||
-        joins_pixel_right (x, row_) || !joins_pixel_below (x))
+    if (row_ + 1 >= height_ || joins_pixel_right (x, row_) || !joins_pixel_below (x))
       return;
-    for (int n = x + 2; n < width_ && n <= x + 1 + kWidestHidden; n++)
-      if (depth_[n] != kInvalidDepth && is_level (depth_[x], depth_[n])) {
-        if (joins_pixel_below (n))
-          bridge (x, n, row_, row_ + 1);
-        return;
-      }
+    const int last = std::min (width_ - 1, x + 1 + kWidestHidden);
+    int n = x + 1;
+    while (n <= last && is_hiding (depth_[n], x))
+      n++;
+    if (n > x + 1 && n <= last && is_level (depth_[x], depth_[n]) && joins_pixel_below (n))
+      bridge (x, n, row_, row_ + 1);
   }
 
   /* The same of two columns. */
   void bridge_down (int x)
   {
-    if (row_ + 1 >= height_ || !joins_pixel_right (x, row_))
+    if (row_ + 1 >= height_ || !joins_pixel_right (x, row_) || joins_pixel_below (x))
       return;
-    const std::uint16_t below = image_.depth.at (x, row_ + 1);
-    if (below == kInvalidDepth || below >= depth_[x] || joins_pixel_below (x))
-      return;
-    for (int y = row_ + 2; y < height_ && y <= row_ + 1 + kWidestHidden; y++)
-      if (const int depth = image_.depth.at (x, y);
-          depth != kInvalidDepth && is_level (depth_[x], depth)) {
-        if (joins_pixel_right (x, y))
-          bridge (x, x + 1, row_, y);
-        return;
-      }
+    const int last = std::min (height_ - 1, row_ + 1 + kWidestHidden);
+    int y = row_ + 1;
+    while (y <= last && is_hiding (image_.depth.at (x, y), x))
+      y++;
+    if (y > row_ + 1 && y <= last && is_level (depth_[x], image_.depth.at (x, y)) &&
+        joins_pixel_right (x, y))
+      bridge (x, x + 1, row_, y);
   }
 
   void pixels_of_row ()

@@ -85,7 +85,7 @@ private:
     const Vec3 from = point - view.world_from_view.translation;
     const Mat3 &r = view.world_from_view.rotation;
     const double z = dot (from, {r[2], r[5], r[8]});
-    if (z <= view.near_m)
+    if (z <= view.near_m || z >= view.far_m || other.image.roi.empty ())
       return false;
     const double u = view.intrinsics.fx * dot (from, {r[0], r[3], r[6]}) / z + view.intrinsics.cx,
                  v = view.intrinsics.fy * dot (from, {r[1], r[4], r[7]}) / z + view.intrinsics.cy;
@@ -174,12 +174,17 @@ private:
    * along columns. */
   void smooth_copies ()
   {
+    bool any = false;
     for (int y = 0; y < height_; y++)
-      for (int x = 0; x < width_; x++)
-        to_.copied[place (x, y)] =
-            has (x, y, kValid) &&
-            (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
-                is_copy_of (x, y, x - 1, y - 1) || is_copy_of (x, y, x + 1, y - 1));
+      for (int x = 0; x < width_; x++) {
+        const bool copied = has (x, y, kValid) &&
+                            (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
+                                is_copy_of (x, y, x - 1, y - 1) || is_copy_of (x, y, x + 1, y - 1));
+        to_.copied[place (x, y)] = copied;
+        any = any || copied;
+      }
+    if (!any)
+      return;
     smooth (1, [this] (int x, int) { return std::pair (x, width_); });
     smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
   }

@@ -28,15 +28,15 @@ enum BlendFlags : std::uint8_t {
 struct BlendPlanes {
   int width = 0, height = 0;
   double steep_step = 0; ///< from one pixel to the next at kSteepSlope; share of the depth
-  /** Colour, smoothed where the neighbour code copied it from a neighbour; x holds BlendFlags. */
+  /** Colour, smoothed where it equals that of a neighbour, as if the neighbour code had copied it;
+   * x holds BlendFlags. */
   std::vector<Rgbx> colour;
   /** Square root of the weight, 255 = 1: how squarely the view sees the surface (cosine), times the
    *  square root of the distance to the nearest depth edge in kFeatherPixels; 0 of invalid pixels.
    */
   std::vector<std::uint8_t> weight;
-  /** Of use while they are made. */
-  std::vector<Rgbx> scratch;
-  std::vector<std::uint8_t> copied;
+  std::vector<Rgbx> scratch;        ///< memory of make_blend_planes()
+  std::vector<std::uint8_t> copied; ///< the same
 
   [[nodiscard]] ImageView<const Rgbx> colour_plane () const
   {

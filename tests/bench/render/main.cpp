@@ -132,6 +132,7 @@ make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
   picture.view_gap_m = view_gap_m;
   picture.width = kWidth;
   picture.height = kHeight;
+  picture.part = {0, 0, kWidth, kHeight};
   return picture;
 }
 
