@@ -21,15 +21,14 @@ small="videoconvert ! videoscale method=bilinear2 ! video/x-raw,format=RGB,width
 cut () { # row, contrast, properties of roiextract
   # shellcheck disable=SC2046,SC2086
   gst-launch-1.0 -q $(side left "$2") ! tee name=picture ! queue ! depth.left $(side right "$2") ! depth.right \
-    stereodepth name=depth rig=rig.yaml block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05 \
-    ! roiextract $3 depth-threshold=0.3 min-area=1000 max-hole=400 ! rangesplit name=person person.colour ! queue \
+    stereodepth name=depth rig=rig.yaml block-size=7 uniqueness-ratio=5 \
+    ! roiextract $3 ! rangesplit name=person person.colour ! queue \
     ! $small ! filesink "location=$1.rgb" picture. ! queue ! $small ! filesink "location=picture-$1.rgb"
 }
-sun="shadow=0.1 highlight=8" # the shadows of leaves in full sun are very dark
 learn="settle-frames=17 background-frames=8 adapt-time=0"
 cut depth 1 "$learn cue=depth"
-cut both 1 "$learn $sun save-background=wall.yml.gz"
-cut dim 0.6 "$sun background-file=wall.yml.gz"
+cut both 1 "$learn save-background=wall.yml.gz"
+cut dim 0.6 "background-file=wall.yml.gz"
 mv picture-both.rgb picture.rgb
 
 python3 - $width $height "${moments[@]}" <<'END'
