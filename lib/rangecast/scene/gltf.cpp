@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <span>
 
 #include "json.hpp"
@@ -220,6 +221,13 @@ struct Skin {
   std::vector<Affine> joints; ///< world from the mesh's space, as each joint would move it
 };
 
+/** Whether a primitive follows the skin's joints; else its node's transform places it. */
+bool
+follows (const Json &attributes, const Skin &skin)
+{
+  return !skin.joints.empty () && !attributes["JOINTS_0"].is_null ();
+}
+
 /** Functions that return bool leave the reason in status_ when it is false. */
 class Reader {
 public:
@@ -263,7 +271,7 @@ private:
   bool read_materials ();
   bool read_scene ();
   bool read_node_mesh (int node);
-  bool read_skin (int index, Skin &skin);
+  bool read_skin (int index);
   bool read_primitive (const Json &primitive, const Affine &world, const Skin &skin);
   bool read_vertices (
       const Json &attributes, int coordinates, const Affine &world, const Skin &skin, Mesh &mesh);
@@ -275,21 +283,21 @@ private:
   Model &model_;
   Status status_;
   Json root_;
-  Bytes binary_; ///< the second chunk, inside file_
-  std::vector<std::uint8_t> file_;
-  std::vector<std::vector<std::uint8_t>> own_buffers_;
-  std::vector<Bytes> buffers_;
-  std::vector<Affine> world_; ///< of each node that a root reaches
+  Bytes binary_;               ///< the second chunk, inside the model's storage
+  std::vector<Bytes> buffers_; ///< inside the model's storage
+  std::vector<Affine> world_;  ///< of each node that a root reaches
   std::vector<bool> reached_;
+  std::map<int, Skin> skins_; ///< that nodes have used
   std::size_t vertices_ = 0, triangles_ = 0, elements_ = 0;
 };
 
 bool
 Reader::open ()
 {
-  if (status_ = read_file (path_, kMaxFile, "a model (glTF or OBJ)", file_); !status_.ok ())
+  auto &bytes = model_.storage.emplace_back ();
+  if (status_ = read_file (path_, kMaxFile, "a model (glTF or OBJ)", bytes); !status_.ok ())
     return false;
-  const Bytes file = file_;
+  const Bytes file = bytes;
   if (file.size () < 12 || load<std::uint32_t> (file.data ()) != kMagic)
     return parse (file);
   if (const auto version = load<std::uint32_t> (file.data () + 4); version != 2)
@@ -321,8 +329,11 @@ Reader::open ()
 bool
 Reader::parse (Bytes text)
 {
-  if (!parse_json ({reinterpret_cast<const char *> (text.data ()), text.size ()}, root_) ||
-      root_["asset"].is_null ())
+  const Status parsed =
+      parse_json ({reinterpret_cast<const char *> (text.data ()), text.size ()}, root_);
+  if (parsed.code () == StatusCode::kUnsupported)
+    return fail (parsed.code (), parsed.message ());
+  if (!parsed.ok () || root_["asset"].is_null ())
     return fail (StatusCode::kBadData, "cannot be read as a model; expected glTF 2.0");
   if (const std::string &version = root_["asset"]["version"].text; !version.starts_with ("2"))
     return fail (StatusCode::kUnsupported, "glTF of version " + version + "; expected 2.0");
@@ -366,7 +377,6 @@ bool
 Reader::load_buffers ()
 {
   const Json &buffers = root_["buffers"];
-  own_buffers_.resize (buffers.size ());
   std::size_t total = 0;
   for (std::size_t i = 0; i < buffers.size (); i++) {
     const Json &uri = buffers[i]["uri"];
@@ -376,10 +386,11 @@ Reader::load_buffers ()
     } else if (uri.is_null ()) {
       buffers_.emplace_back (); /* to be filled by an extension; told where it is used */
       continue;
-    } else if (load_uri (uri.text, "a buffer of a glTF model", own_buffers_[i])) {
-      buffers_.emplace_back (own_buffers_[i]);
     } else {
-      return false;
+      auto &bytes = model_.storage.emplace_back (); /* what lies in it stays where it is */
+      if (!load_uri (uri.text, "a buffer of a glTF model", bytes))
+        return false;
+      buffers_.emplace_back (bytes);
     }
     const std::size_t length = buffers[i]["byteLength"].size_or (0);
     if (buffers_[i].size () < length)
@@ -530,13 +541,13 @@ Reader::read_pictures ()
     picture.embedded = true;
     const Json &uri = images[i]["uri"];
     if (uri.is_null ()) {
-      Bytes bytes;
-      if (!view_bytes (images[i]["bufferView"].index (), bytes))
+      if (!view_bytes (images[i]["bufferView"].index (), picture.bytes))
         return false;
-      picture.bytes.assign (bytes.begin (), bytes.end ());
     } else if (uri.text.starts_with ("data:")) {
-      if (!load_uri (uri.text, "a picture of a glTF model", picture.bytes))
+      auto &bytes = model_.storage.emplace_back ();
+      if (!load_uri (uri.text, "a picture of a glTF model", bytes))
         return false;
+      picture.bytes = bytes;
     } else {
       picture.embedded = false;
       picture.name = (fs::path (path_).parent_path () / percent_decoded (uri.text)).string ();
@@ -643,18 +654,19 @@ Reader::read_node_mesh (int node)
   const int index = from["mesh"].index ();
   if (index < 0)
     return true;
-  Skin skin;
-  if (const int i = from["skin"].index (); i >= 0 && !read_skin (i, skin))
+  const int skin = from["skin"].index ();
+  if (skin >= 0 && !skins_.contains (skin) && !read_skin (skin))
     return false;
   for (const Json &primitive : root_["meshes"][std::size_t (index)]["primitives"].items)
-    if (!read_primitive (primitive, world_[std::size_t (node)], skin))
+    if (!read_primitive (primitive, world_[std::size_t (node)], skins_[skin]))
       return false;
   return true;
 }
 
 bool
-Reader::read_skin (int index, Skin &skin)
+Reader::read_skin (int index)
 {
+  Skin &skin = skins_[index];
   const Json &from = root_["skins"][std::size_t (index)];
   const Json &joints = from["joints"];
   Values inverse; /* absent: identities (5.28.1) */
@@ -693,9 +705,10 @@ Reader::read_primitive (const Json &primitive, const Affine &world, const Skin &
   if (position["count"].size_or (0) > kMaxModelVertices)
     return fail (StatusCode::kUnsupported, "more than 4 million vertices");
   const int coordinates = material < 0 ? 0 : model_.palette[std::size_t (material)].coordinates;
+  const bool mirrored = !follows (primitive["attributes"], skin) && world.determinant () < 0;
   Mesh mesh;
   if (!read_vertices (primitive["attributes"], coordinates, world, skin, mesh) ||
-      !read_triangles (primitive, skin.joints.empty () && world.determinant () < 0, mesh))
+      !read_triangles (primitive, mirrored, mesh))
     return false;
   drop_unused_vertices (mesh);
   vertices_ += mesh.vertices.size ();
@@ -712,7 +725,7 @@ bool
 Reader::read_weights (const Json &attributes, const Affine &world, const Skin &skin,
     std::size_t vertices, std::vector<Affine> &pose)
 {
-  if (skin.joints.empty () || attributes["JOINTS_0"].is_null ())
+  if (!follows (attributes, skin))
     return true;
   Affine none;
   for (auto &row : none.m)
