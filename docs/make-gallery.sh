@@ -35,18 +35,20 @@ record_stereo () {
   gst-launch-1.0 -q -e rangemux name=mux ! neighbourcodeparse ! "$stream" ! filesink location=stereo.rcnc "${chain[@]}"
 }
 
-# usage: sheet FILE RECORDING PANEL...: the last frame set, side by side; a panel is "cylinderfilter's mode|striprender's properties"
+# usage: sheet FILE RECORDING PANEL...: the last frame set, side by side; a panel is "cylinderfilter's properties|striprender's properties"
 sheet () {
-  local file=$1 recording=$2 i=0 panel chain=() render
+  local file=$1 recording=$2 i=0 panel chain=() filter render places=()
   shift 2
   for panel in "$@"; do
+    read -ra filter <<<"${panel%%|*}"
     read -ra render <<<"${panel#*|}"
-    chain+=(sets. ! queue ! cylinderfilter "mode=${panel%%|*}" ! striprender "${render[@]}"
+    places+=("sink_$i::xpos=$((404 * i))")
+    chain+=(sets. ! queue ! cylinderfilter "${filter[@]}" ! striprender "${render[@]}"
       ! 'video/x-raw(memory:GLMemory),width=400,height=400' ! gldownload ! queue ! "sheet.sink_$i")
     i=$((i + 1))
   done
   gst-launch-1.0 -q filesrc "location=$recording" ! neighbourcodeparse ! neighbourcodedec ! tee name=sets "${chain[@]}" \
-    compositor name=sheet sink_0::xpos=0 sink_1::xpos=404 "$([ $i -lt 3 ] || echo sink_2::xpos=808)" background=white \
+    compositor name=sheet "${places[@]}" background=white \
     ! videoconvert ! jpegenc quality=92 ! multifilesink location=sheet-%05d.jpg
   mv "$(find . -name 'sheet-*.jpg' | sort | tail -n 1)" "$out/$file"
   rm -f sheet-*.jpg
@@ -64,11 +66,12 @@ record_exact bare.rcnc motion=0
 record_exact dressed.rcnc motion=0 dress=all
 record_stereo
 near="azimuth=20 distance=0.4 elevation=8 pan-y=0.03"
-sheet gallery-overlap.jpg stereo.rcnc "off|$near" "winner|$near"
-sheet gallery-modes.jpg exact.rcnc "winner|$near mode=points" "winner|$near mode=rectangles" "winner|$near mode=strips"
-sheet gallery-bare.jpg bare.rcnc "winner|azimuth=0" "winner|azimuth=30" "winner|azimuth=150"
-sheet gallery-dressed.jpg dressed.rcnc "winner|azimuth=0" "winner|azimuth=30" "winner|azimuth=150"
-sheet gallery-units.jpg exact.rcnc "off|azimuth=20 elevation=8 show-units=true" "winner|azimuth=20 elevation=8 show-units=true"
+sheet gallery-overlap.jpg stereo.rcnc "mode=off|$near mode=strips" "overlap=1|$near mode=strips" "overlap=8|$near mode=blend"
+sheet gallery-modes.jpg exact.rcnc "overlap=1|$near mode=points" "overlap=1|$near mode=rectangles" "overlap=1|$near mode=strips" "overlap=8|$near mode=blend"
+sheet gallery-bare.jpg bare.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
+sheet gallery-dressed.jpg dressed.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
+units="azimuth=20 elevation=8 show-units=true mode=strips"
+sheet gallery-units.jpg exact.rcnc "mode=off|$units" "overlap=1|$units"
 if command -v ffmpeg >/dev/null; then
   film gallery-orbit.webp
 else
