@@ -2,6 +2,7 @@
 #include "strippainter.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <string>
 
 #include "glshader.hpp"
@@ -165,6 +166,9 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
+  const auto renderer =
+      reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
+  in_software_ = renderer && std::strstr (renderer, "llvmpipe");
   if (BlendTargets::is_supported (context) && !targets_.start (context, error))
     return false;
   for (std::size_t i = 0; i < shaders_.size (); i++) {
@@ -486,7 +490,8 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
   const GstGLFuncs *gl = context_->gl_vtable;
   const float *c = picture.background;
   if (picture.mode == StripMode::kBlend) {
-    const bool precise = layers.size () > kMaxHalfFloatViews && !is_gles (context_);
+    const bool precise =
+        !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
     if (targets_.begin_depth (picture.width, picture.height, precise))
       blend (picture, layers);
     end ();

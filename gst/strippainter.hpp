@@ -83,6 +83,8 @@ private:
   enum ShaderIndex { kStrips, kRectangles, kPoints, kBlendDepth, kBlendSum, kShaders };
   std::array<GstGLShader *, kShaders> shaders_{};
   BlendTargets targets_;
+  bool in_software_ =
+      false; /* Mesa's llvmpipe: converting half floats costs it a fifth of the time */
   /* In turns: what pictures of one frame set read may be in use while the next one is written. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;

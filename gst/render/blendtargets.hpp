@@ -20,7 +20,7 @@ public:
 
   /** Binds and clears the targets, made anew if size or precision change, to draw depth only.
    *  Scissors stay in force.
-   *  @param precise  32-bit floats instead of 16-bit ones, for many views; not with OpenGL ES
+   *  @param precise  32-bit floats instead of 16-bit ones; not with OpenGL ES
    *  @return false if OpenGL has no such framebuffer (logged once); what was bound is bound again
    */
   bool begin_depth (int width, int height, bool precise);

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
+#include <rangecast/scene/gltf.hpp>
 #include <rangecast/scene/model.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <unistd.h>
@@ -296,6 +297,53 @@ TEST (Model, test_skin_is_drawn_where_its_joints_are)
   EXPECT_EQ (shot.at (scale * -0.5, scale * -1.5), "red");
   EXPECT_EQ (shot.at (scale * 0.5, scale * 1.5), "red");
   EXPECT_EQ (shot.at (scale * 0.5, scale * -1.5), "room");
+}
+
+/* A primitive without joints stays where its node puts it, skin or not. */
+TEST (Model, test_mirrored_node_with_an_unused_skin_leaves_fronts_in_front)
+{
+  GlbWriter glb = red_square ();
+  const int blue =
+      glb.add_square (3, 0, 0, 1, glb.add_textured_material (glb.add_texture (plain_png (kBlue))));
+  glb.add_mesh_node (blue, R"(,"skin":0,"scale":[-1,1,1])");
+  glb.extra = R"("skins":[{"joints":[0]}],)";
+  Shot shot = shot_of (glb);
+  EXPECT_EQ (shot.at (-0.2, 0), "blue");
+  EXPECT_EQ (shot.at (0.2, 0), "red");
+}
+
+/* 16,384 joints times 16,400 nodes would be more elements than a file may use. */
+TEST (Model, test_nodes_that_share_a_skin_read_it_once)
+{
+  GlbWriter glb;
+  constexpr std::size_t kJoints = 16384;
+  const int inverse = glb.add_floats (std::vector<float> (16 * kJoints), "MAT4", kJoints);
+  std::string joints = "0";
+  for (std::size_t i = 1; i < kJoints; i++)
+    joints += ",0";
+  glb.extra = R"("skins":[{"joints":[)" + joints + R"(],"inverseBindMatrices":)" +
+              std::to_string (inverse) + R"(}],"meshes":[{"primitives":[]}],)";
+  for (int i = 0; i < 16400; i++)
+    glb.add_mesh_node (0, R"(,"skin":0)");
+  const Folder folder;
+  rangecast::Model model;
+  const Status status = read_gltf (folder.write ("model.glb", glb.glb ()), model);
+  EXPECT_TRUE (status.ok ()) << status.message ();
+}
+
+TEST (Model, test_pictures_of_one_view_share_its_bytes)
+{
+  GlbWriter glb;
+  const int view = glb.add_view (plain_png (kRed));
+  const std::string image = R"({"bufferView":)" + std::to_string (view) + "}";
+  glb.extra = R"("images":[)" + image + "," + image + "],";
+  const Folder folder;
+  rangecast::Model model;
+  const Status status = read_gltf (folder.write ("model.glb", glb.glb ()), model);
+  ASSERT_TRUE (status.ok ()) << status.message ();
+  ASSERT_EQ (model.pictures.size (), 2u);
+  EXPECT_EQ (model.pictures[0].bytes.data (), model.pictures[1].bytes.data ());
+  EXPECT_EQ (model.pictures[0].bytes.size (), plain_png (kRed).size ());
 }
 
 /* Left half opaque, right half clear. */
@@ -701,6 +749,16 @@ TEST (Model, test_large_texture_is_made_smaller)
   ASSERT_TRUE (load (glb, figure).ok ());
   EXPECT_EQ (figure[0].texture->level (0).height, 2048);
   EXPECT_EQ (figure[0].texture->level (0).width, 1500);
+}
+
+TEST (Model, test_file_of_too_many_json_values_says_so)
+{
+  GlbWriter glb = red_square ();
+  std::string zeros = "0";
+  for (int i = 1; i < 4'000'000; i++)
+    zeros += ",0";
+  glb.extra = R"("extras":[)" + zeros + "],";
+  expect_refused (glb, StatusCode::kUnsupported, "4 million JSON values");
 }
 
 TEST (Model, test_nodes_that_are_no_tree_are_refused)

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,8 @@ namespace rangecast {
 
 /** A picture of a model: a file, or bytes inside the model's own file. */
 struct ModelPicture {
-  std::string name; ///< path, or what an error calls it
-  std::vector<std::uint8_t> bytes;
+  std::string name;                    ///< path, or what an error calls it
+  std::span<const std::uint8_t> bytes; ///< of an embedded one, inside the model's storage
   bool embedded = false;
 };
 
@@ -31,12 +32,14 @@ struct ModelMaterial {
   TextureWrap wrap_u = TextureWrap::kRepeat, wrap_v = TextureWrap::kRepeat;
 };
 
-/** A model as its file describes it: meshes in the file's own units, without textures. */
+/** A model as its file describes it: meshes in the file's own units, without textures. A copy's
+ * pictures point into the original. */
 struct Model {
   std::vector<Mesh> meshes;
   std::vector<int> materials; ///< of each mesh, index into `palette`, -1: none
   std::vector<ModelMaterial> palette;
   std::vector<ModelPicture> pictures;
+  std::vector<std::vector<std::uint8_t>> storage; ///< what pictures' bytes lie in
 };
 
 /** More than any scan that a software rasteriser could draw live. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "json.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <climits>
 #include <cmath>
@@ -11,7 +12,7 @@ namespace rangecast {
 namespace {
 
 const Json kNothing;
-constexpr int kMaxLevels = 64;
+constexpr int kMaxLevels = 64, kMaxValues = 4'000'000;
 
 class Parser {
 public:
@@ -25,6 +26,8 @@ public:
     skip_space ();
     return parsed && at_ == end_;
   }
+
+  [[nodiscard]] bool has_too_many_values () const { return values_ > kMaxValues; }
 
 private:
   void skip_space ()
@@ -53,7 +56,7 @@ private:
   bool value (Json &value, int level)
   {
     skip_space ();
-    if (at_ == end_ || level > kMaxLevels)
+    if (at_ == end_ || level > kMaxLevels || ++values_ > kMaxValues)
       return false;
     switch (*at_) {
       case '{':
@@ -106,15 +109,43 @@ private:
 
   bool number (double &value)
   {
-    if (*at_ != '-' && (*at_ < '0' || *at_ > '9')) /* from_chars also takes "inf" and "nan" */
+    const char *from = at_;
+    const bool negative = word ("-");
+    const char *whole = at_;
+    if (!word ("0") && !digits ()) /* no digit follows a leading zero */
       return false;
-    const auto [next, error] = std::from_chars (at_, end_, value);
-    if (error == std::errc::invalid_argument || !(next > at_))
-      return false;
-    if (error == std::errc::result_out_of_range)
-      value = HUGE_VAL;
-    at_ = next;
+    auto magnitude = *whole == '0' ? 0 : at_ - whole; /* of the first digit that is not zero */
+    if (const char *point = at_; word (".")) {
+      if (!digits ())
+        return false;
+      if (magnitude == 0)
+        magnitude = point + 1 - std::find_if (point + 1, at_, [] (char c) { return c != '0'; });
+    }
+    bool negative_exponent = false;
+    std::ptrdiff_t exponent = 0;
+    if (word ("e") || word ("E")) {
+      negative_exponent = word ("-");
+      if (!negative_exponent)
+        word ("+");
+      const char *first = at_;
+      if (!digits ())
+        return false;
+      if (std::from_chars (first, at_, exponent).ec != std::errc ())
+        exponent = PTRDIFF_MAX / 2;
+    }
+    if (std::from_chars (from, at_, value).ec == std::errc::result_out_of_range) {
+      const bool large = magnitude + (negative_exponent ? -exponent : exponent) > 0;
+      value = large ? (negative ? -HUGE_VAL : HUGE_VAL) : 0;
+    }
     return true;
+  }
+
+  bool digits ()
+  {
+    const char *from = at_;
+    while (at_ < end_ && *at_ >= '0' && *at_ <= '9')
+      at_++;
+    return at_ > from;
   }
 
   bool hex (unsigned &unit)
@@ -158,6 +189,8 @@ private:
       if (!word ("\\u") || !hex (low) || low < 0xdc00 || low > 0xdfff)
         return false;
       unit = 0x10000 + ((unit - 0xd800) << 10) + (low - 0xdc00);
+    } else if (unit >= 0xdc00 && unit < 0xe000) { /* a second half alone */
+      return false;
     }
     append_utf8 (unit, text);
     return true;
@@ -179,6 +212,7 @@ private:
   }
 
   const char *at_, *end_;
+  int values_ = 0;
 };
 
 } // namespace
@@ -218,11 +252,16 @@ Json::size_or (std::size_t otherwise) const
   return whole && number == std::floor (number) ? std::size_t (number) : otherwise;
 }
 
-bool
+Status
 parse_json (std::string_view text, Json &value)
 {
   value = {};
-  return Parser (text).document (value);
+  Parser parser (text);
+  if (parser.document (value))
+    return {};
+  if (parser.has_too_many_values ())
+    return {StatusCode::kUnsupported, "more than 4 million JSON values"};
+  return {StatusCode::kBadData, "not JSON"};
 }
 
 } // namespace rangecast

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "../status.hpp"
+
 namespace rangecast {
 
 /** A JSON value. Looking up a member or item that is not there gives null, so that a chain of
@@ -31,8 +33,10 @@ struct Json {
   [[nodiscard]] std::size_t size_or (std::size_t otherwise) const;
 };
 
-/** Parses RFC 8259 text of at most 64 levels.
- *  @return false if it is not JSON; `value` is then unspecified */
-bool parse_json (std::string_view text, Json &value);
+/** Parses RFC 8259 text of at most 64 levels and 4 million values. A number too small for a double
+ *  is 0, one too large infinite.
+ *  @return kBadData if it is not JSON, kUnsupported if there are more values; `value` is then
+ *          unspecified */
+Status parse_json (std::string_view text, Json &value);
 
 } // namespace rangecast

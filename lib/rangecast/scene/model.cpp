@@ -97,7 +97,7 @@ add_picture (const aiScene &scene, const std::string &model, const char *name, M
     picture.embedded = true;
     const auto *bytes = reinterpret_cast<const std::uint8_t *> (embedded->pcData);
     if (embedded->mHeight == 0)
-      picture.bytes.assign (bytes, bytes + embedded->mWidth);
+      picture.bytes = to.storage.emplace_back (bytes, bytes + embedded->mWidth);
   } else {
     std::string text = name;
     std::ranges::replace (text, '\\', '/'); /* as programs on Windows write it */
