@@ -90,9 +90,10 @@ draw_frame (
   if (!priv->drawing.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
     settings.strips.mode = rangecast::StripMode::kStrips;
   const bool again = frame_set == priv->drawn;
-  priv->scene.build (frame.views (), settings, again);
+  const auto orbit = settings.camera.at (orbit_time (priv, running));
+  priv->scene.build (frame.views (), settings, orbit, again);
   gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
-  StripDrawingJob job = {&priv->scene, &settings, settings.camera.at (orbit_time (priv, running))};
+  StripDrawingJob job = {&priv->scene, &settings, orbit};
   if (settings.show_stats) {
     job.panel_changed = update_panel (self, frame.views ().size (), GST_BUFFER_PTS (frame_set));
     job.panel = priv->stats_panel.picture ();
