@@ -79,8 +79,10 @@ take_input_caps (GstStripRender *self, GstCaps *in)
   const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
   if (told && !status.ok ())
     return GST_FLOW_ERROR;
-  if (status.ok ())
+  if (status.ok ()) {
     priv->scene.set_rig (priv->info.rig);
+    priv->fit.reset ();
+  }
   priv->reporter.set_views (priv->info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
@@ -432,6 +434,7 @@ gst_strip_render_start (GstBaseTransform *base)
   priv->gl_error_posted = priv->no_context = priv->caps_refused = false;
   priv->live = false;
   priv->stats_text = {};
+  priv->fit.reset ();
   strip_reset_rate (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   {

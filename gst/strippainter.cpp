@@ -480,7 +480,7 @@ StripPainter::blend (const Picture &picture, std::span<const Layer> layers)
   draw_layers (layers, picture, shaders_[kBlendDepth]);
   targets_.begin_sum ();
   draw_layers (layers, picture, shaders_[kBlendSum]);
-  targets_.resolve (picture.part, picture.background,
+  targets_.resolve (picture.part, picture.background, picture.background_shade,
       depth_shift (picture.clip_from_world, picture.clip_from_world, picture.blend_range_m));
 }
 

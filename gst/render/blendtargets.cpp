@@ -4,8 +4,10 @@
 #include <gst/gl/gstglfuncs.h>
 
 #include <iterator>
+#include <string>
 
 #include "../glshader.hpp"
+#include "backgroundpainter.hpp"
 
 #ifndef GL_DRAW_FRAMEBUFFER_BINDING
 #define GL_DRAW_FRAMEBUFFER_BINDING 0x8CA6
@@ -26,17 +28,16 @@
 /* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
  * what two views draw. */
 static const char *const kResolveShader = R"(
-precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
 uniform sampler2D u_depth;
-uniform vec4 u_background;
 uniform ivec4 u_part; /* first and last pixel */
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 out vec4 fragment;
 void main ()
 {
+  vec4 ground = background (gl_FragCoord.xy);
   ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
   vec4 sum = texelFetch (u_sum, at, 0);
   vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
@@ -52,10 +53,10 @@ void main ()
   float depth = texelFetch (u_depth, at, 0).r;
   float distance = u_shift.y / (2.0 * depth - 1.0 - u_shift.x) - u_shift.z;
   gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
-  float behind = (1.0 - coverage) * u_background.a;
+  float behind = (1.0 - coverage) * ground.a;
   float alpha = coverage + behind;
-  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * u_background.rgb;
-  fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : u_background;
+  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * ground.rgb;
+  fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : ground;
 }
 )";
 
@@ -70,7 +71,8 @@ BlendTargets::is_supported (GstGLContext *context)
 bool
 BlendTargets::start (GstGLContext *context, GError **error)
 {
-  shader_ = make_shader (context, kCoveringVertexShader, kResolveShader, error);
+  shader_ = make_shader (context, kCoveringVertexShader,
+      (std::string (kBackgroundFunction) + kResolveShader).c_str (), error);
   if (!shader_)
     return false;
   context_ = context;
@@ -173,7 +175,7 @@ BlendTargets::begin_sum ()
 
 void
 BlendTargets::resolve (
-    const rangecast::Roi &part, const float (&background)[4], const DepthShift &shift)
+    const rangecast::Roi &part, const float (&background)[4], float shade, const DepthShift &shift)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   gl->Disable (GL_BLEND);
@@ -191,8 +193,7 @@ BlendTargets::resolve (
   gst_gl_shader_set_uniform_4i (
       shader_, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
   gst_gl_shader_set_uniform_3f (shader_, "u_shift", shift.a, shift.b, shift.g);
-  gst_gl_shader_set_uniform_4f (
-      shader_, "u_background", background[0], background[1], background[2], background[3]);
+  set_background_uniforms (shader_, background, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);
   gl->BindVertexArray (0);

@@ -35,8 +35,10 @@ public:
   /** Divides, into the framebuffer that was bound before begin_depth(), smooths outlines, and
    * writes the surfaces' depth: what is drawn later stands among them.
    *  @param part        pixels that this picture fills
-   *  @param background  R, G, B, A, straight */
-  void resolve (const rangecast::Roi &part, const float (&background)[4], const DepthShift &shift);
+   *  @param background  R, G, B, A, straight
+   *  @param shade       see BackgroundPainter::draw() */
+  void resolve (const rangecast::Roi &part, const float (&background)[4], float shade,
+      const DepthShift &shift);
 
 private:
   bool make (int width, int height, bool precise);
