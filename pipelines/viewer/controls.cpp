@@ -29,27 +29,29 @@ view_ids (Viewer &viewer)
   return ids;
 }
 
-/* Switches the rig's view of that number on or off; 0: all on. */
-static void
+/* Switches the rig's view of that number on or off; 0: all on. @return what to say of it */
+static std::string
 switch_view (Viewer &viewer, guint number)
 {
   const std::vector<guint> ids = view_ids (viewer);
-  guint64 mask = G_MAXUINT64;
-  if (number > ids.size ()) {
-    viewer.overlay->say ("there is no view " + std::to_string (number));
-    return;
-  }
+  guint64 mask = G_MAXUINT64, all = 0;
+  if (number > ids.size ())
+    return "there is no view " + std::to_string (number);
+  for (guint id : ids)
+    all |= guint64 (1) << id;
   if (number > 0) {
     g_object_get (viewer.render, "view-mask", &mask, nullptr);
-    const guint id = ids[number - 1];
-    mask ^= guint64 (1) << id;
-    viewer.overlay->say ("view " + std::to_string (number) +
-                         (id == number - 1 ? "" : " (view-id " + std::to_string (id) + ")") +
-                         (mask >> id & 1 ? " on" : " off"));
-  } else {
-    viewer.overlay->say ("all views on");
+    mask ^= guint64 (1) << ids[number - 1];
   }
   g_object_set (viewer.render, "view-mask", mask, nullptr);
+  if ((mask & all) == 0)
+    return "all views off, 0 shows them";
+  if (number == 0)
+    return "all views on";
+  const guint id = ids[number - 1];
+  return "view " + std::to_string (number) +
+         (id == number - 1 ? "" : " (view-id " + std::to_string (id) + ")") +
+         (mask >> id & 1 ? " on" : " off");
 }
 
 /* ---- keys ---- */
@@ -90,6 +92,13 @@ pause (Viewer &viewer)
   viewer.overlay->show_bar ();
 }
 
+template <guint number>
+static void
+view_key (Viewer &viewer)
+{
+  viewer.overlay->say (switch_view (viewer, number));
+}
+
 using KeyAction = void (*) (Viewer &viewer);
 
 struct Key {
@@ -108,16 +117,16 @@ static const Key kKeys[] = {
     {"Right", true, [] (Viewer &v) { skip (v, true); }},
     {"comma", true, [] (Viewer &v) { step (v, false); }},
     {"period", true, [] (Viewer &v) { step (v, true); }},
-    {"0", false, [] (Viewer &v) { switch_view (v, 0); }},
-    {"1", false, [] (Viewer &v) { switch_view (v, 1); }},
-    {"2", false, [] (Viewer &v) { switch_view (v, 2); }},
-    {"3", false, [] (Viewer &v) { switch_view (v, 3); }},
-    {"4", false, [] (Viewer &v) { switch_view (v, 4); }},
-    {"5", false, [] (Viewer &v) { switch_view (v, 5); }},
-    {"6", false, [] (Viewer &v) { switch_view (v, 6); }},
-    {"7", false, [] (Viewer &v) { switch_view (v, 7); }},
-    {"8", false, [] (Viewer &v) { switch_view (v, 8); }},
-    {"9", false, [] (Viewer &v) { switch_view (v, 9); }},
+    {"0", false, view_key<0>},
+    {"1", false, view_key<1>},
+    {"2", false, view_key<2>},
+    {"3", false, view_key<3>},
+    {"4", false, view_key<4>},
+    {"5", false, view_key<5>},
+    {"6", false, view_key<6>},
+    {"7", false, view_key<7>},
+    {"8", false, view_key<8>},
+    {"9", false, view_key<9>},
 };
 
 std::vector<TextRow>
@@ -126,16 +135,16 @@ key_rows (bool is_file)
   std::vector<TextRow> rows = {{"drag", "turn; with another button: move"}};
   rows.push_back ({"wheel, + -", "zoom"});
   rows.push_back (
-      is_file ? TextRow{"up, down", "look from above, from below"} : TextRow{"arrows", "turn"});
-  rows.push_back ({"r, Home", "first view again"});
-  rows.push_back ({"1 to 9, 0", "view of one camera off or on; all on"});
+      is_file ? TextRow{"up, down", "look from above or below"} : TextRow{"arrows", "turn"});
+  rows.push_back ({"r, Home", "back to the opening view"});
+  rows.push_back ({"1 to 9, 0", "hide or show a camera's view; show all"});
   if (is_file) {
-    rows.push_back ({"space", "pause"});
-    rows.push_back ({"left, right", "5 seconds back, on"});
-    rows.push_back ({", .", "a frame back, on"});
+    rows.push_back ({"space", "pause or play"});
+    rows.push_back ({"left, right", "5 seconds back or forward"});
+    rows.push_back ({", .", "one frame back or forward"});
   }
-  rows.push_back ({"s", "write the picture (PNG)"});
-  rows.push_back ({"p", "write the points (PLY)"});
+  rows.push_back ({"s", "save the picture (PNG)"});
+  rows.push_back ({"p", "save the points (PLY)"});
   rows.push_back ({"h", "show or hide these keys"});
   rows.push_back ({"q, Esc", "quit"});
   return rows;
