@@ -93,9 +93,14 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
                        picture.mode != rangecast::StripMode::kBlend;
   picture.view_gap_m = settings.view_gap_m;
   picture.blend_range_m = settings.blend_range_m;
+  picture.keeps_depth = settings.show_cameras;
   picture.width = width_;
   picture.height = height_;
   picture.part = {place.x, place.y, place.width, place.height};
+  picture.covered = picture.background_shade > 0 /* which the same pass draws */
+                        ? picture.part
+                        : rangecast::covered_part (picture.clip_from_world, job.scene->hull (),
+                              width_, height_, picture.part);
   return picture;
 }
 
@@ -105,6 +110,7 @@ struct StripDrawing::Call {
   GstBuffer *out;
   bool panel_changed;
   guint memory = 0; /* that is drawn into now */
+  bool has_targets = true;
   Result result = {};
   std::exception_ptr exception = {}; /* which must not go through C, nor end the GL thread */
 };
@@ -137,13 +143,13 @@ StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
     gl->Enable (GL_SCISSOR_TEST);
     gl->Scissor (place.x, place.y, place.width, place.height);
   }
-  painter_.draw (picture, job.scene->layers ());
+  call.has_targets = painter_.draw (picture, job.scene->layers ()) && call.has_targets;
   if (picture.background_shade > 0 && picture.mode != rangecast::StripMode::kBlend)
     background_painter_.draw (context_, picture.background, picture.background_shade, picture.part);
   if (job.settings->show_cameras)
     call.result.uploaded +=
         camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),
-            picture.back_faces ? StripPainter::in_half_of_depths (picture.clip_from_world, false)
+            picture.back_faces ? rangecast::in_half_of_depths (picture.clip_from_world, false)
                                : picture.clip_from_world);
   if (!job.panel.empty ())
     call.result.uploaded +=
@@ -215,6 +221,8 @@ StripDrawing::draw_memories (Call &call)
         framebuffer_, GST_GL_MEMORY_CAST (gst_buffer_peek_memory (call.out, i)), draw_bound, &call);
   }
   call.result.reason = drawn ? fatal_error (context_->gl_vtable) : "there is no framebuffer for it";
+  if (!call.result.reason && !call.has_targets)
+    call.result.reason = "it has no float framebuffer of that size for mode blend";
   call.result.drawn = drawn && !call.result.reason;
   GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call.out);
   if (call.result.drawn && sync) /* other contexts wait for our commands there */

@@ -115,9 +115,10 @@ draw_frame (
   if (!priv->drawing.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
     settings.strips.mode = rangecast::StripMode::kStrips;
   const bool again = frame_set == priv->drawn;
-  priv->scene.build (visible_images (priv, frame.views (), settings.view_mask), settings, again);
+  const auto orbit = settings.camera.at (orbit_time (priv, running));
+  priv->scene.build (
+      visible_images (priv, frame.views (), settings.view_mask), settings, orbit, again);
   gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
-  const rangecast::Orbit orbit = settings.camera.at (orbit_time (priv, running));
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
   StripDrawingJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {

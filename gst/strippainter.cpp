@@ -2,13 +2,10 @@
 #include "strippainter.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <rangecast/strips/view_matrices.hpp>
 #include <string>
 
 #include "glshader.hpp"
-
-/* Up to so many views half floats keep 8 bits of colour: each addition is rounded to 11 bits. */
-constexpr std::size_t kMaxHalfFloatViews = 16;
 
 using rangecast::Mat4;
 using rangecast::StripMode;
@@ -43,16 +40,7 @@ uniform float u_step;
 uniform float u_point_size;
 uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
-#if BLEND
-invariant gl_Position; /* in both passes */
-uniform sampler2D u_weight; /* square root */
-uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
-uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
-const float kMinAngle = 0.03; /* square root of the least weight; the cosine's power is 6 */
-out vec4 v_colour; /* and the square root of the weight */
-#else
 out vec3 v_colour;
-#endif
 
 #if WITH_OFFSETS
 /* What depth grows by on the way from a neighbour, if there is one on the surface. */
@@ -89,10 +77,6 @@ void main ()
   float depth = float (texelFetch (u_depth, pixel, 0).r);
 #if WITH_OFFSETS
   ivec2 place = ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u));
-#if BLEND
-  bool behind = place.x == 2; /* of what stands before the surface here: in the pixel's own place */
-  at += behind ? vec2 (0.0) : clamp (vec2 (place - 3) * 0.25, -0.5, 0.5);
-#else
   vec2 offset = vec2 (place - 3) * 0.25;
   at += offset;
   if (offset.x != 0.0)
@@ -100,50 +84,20 @@ void main ()
   if (offset.y != 0.0)
     depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
 #endif
-#endif
   gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
   /* the depth of what is u_behind.y metres farther, in the same place of the picture */
   gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
-#if BLEND
-#if BLEND_SUM
-  vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
-  float along = dot (normalize (ray), normalize (ray * depth * u_unit - u_viewer));
-  float angle = max (along * along * along, kMinAngle);
-  v_colour.rgb = texelFetch (u_colour, pixel, 0).rgb;
-  v_colour.a = behind ? 0.0 : texelFetch (u_weight, pixel, 0).r * angle;
-#endif
-#else
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
-#endif
-}
-)";
-
-/* Half floats hold sums of 250 surfaces of full weight, and colours of the least weight. */
-static const char *const kBlendFragmentShader = R"(
-precision highp float;
-#if BLEND_SUM
-in vec4 v_colour;
-out vec4 sum;
-const float kScale = 250.0, kMinWeight = 2e-6;
-#endif
-void main ()
-{
-#if BLEND_SUM
-  float weight = max (v_colour.a * v_colour.a, kMinWeight) * kScale;
-  sum = vec4 (v_colour.rgb * weight, weight);
-#endif
 }
 )";
 
 /* What shaders have beyond pixels in their places: bands reach beyond their ends, in the direction
  * away from them; rectangles have all four sides. */
 static const char *const kVariants[] = {
-    "#define BLEND 0\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
-    "#define BLEND 0\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
-    "#define BLEND 0\n#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
-    "#define BLEND 1\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n#define BLEND_SUM 0\n",
-    "#define BLEND 1\n#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n#define BLEND_SUM 1\n",
+    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
+    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
+    "#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
 };
 static_assert (int (StripMode::kStrips) == 1 && int (StripMode::kRectangles) == 2 &&
                int (StripMode::kPoints) == 3); /* draw() counts on it */
@@ -166,16 +120,11 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
-  const auto renderer =
-      reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
-  in_software_ = renderer && std::strstr (renderer, "llvmpipe");
-  if (BlendTargets::is_supported (context) && !targets_.start (context, error))
+  if (BlendTargets::is_supported (context) && !blend_painter_.start (context, error))
     return false;
   for (std::size_t i = 0; i < shaders_.size (); i++) {
     const std::string vertex = std::string (kVariants[i]) + kVertexShader;
-    const std::string blended = std::string (kVariants[i]) + kBlendFragmentShader;
-    shaders_[i] = make_shader (context, vertex.c_str (),
-        i < kBlendDepth ? kColourFragmentShader : blended.c_str (), error);
+    shaders_[i] = make_shader (context, vertex.c_str (), kColourFragmentShader, error);
     if (!shaders_[i])
       return false;
   }
@@ -191,8 +140,8 @@ StripPainter::stop ()
   for (auto &turn : objects_)
     for (ViewObjects &objects : turn) {
       if (objects.depth) {
-        const guint textures[] = {objects.depth, objects.colour, objects.weight};
-        gl->DeleteTextures (3, textures);
+        const guint textures[] = {objects.depth, objects.colour};
+        gl->DeleteTextures (2, textures);
         gl->DeleteBuffers (1, &objects.vertices);
         gl->DeleteVertexArrays (1, &objects.array);
       }
@@ -200,15 +149,16 @@ StripPainter::stop ()
     }
   for (GstGLShader *&shader : shaders_)
     gst_clear_object (&shader);
-  targets_.stop ();
+  blend_painter_.stop ();
   context_ = nullptr;
 }
 
 bool
 StripPainter::fits (std::span<const Layer> layers) const
 {
-  return std::ranges::all_of (layers, [&] (const Layer &layer) {
-    return std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
+  return std::ranges::all_of (layers, [&] (const Layer &layer) { /* mode blend has no textures */
+    return layer.vertices.empty () ||
+           std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
   });
 }
 
@@ -228,7 +178,6 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
   if (!objects.depth) {
     gl->GenTextures (1, &objects.depth);
     gl->GenTextures (1, &objects.colour);
-    gl->GenTextures (1, &objects.weight);
     gl->GenBuffers (1, &objects.vertices);
     gl->GenVertexArrays (1, &objects.array);
     gl->BindVertexArray (objects.array);
@@ -250,7 +199,6 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
   };
   allocate (objects.depth, GL_R16UI, GL_RED_INTEGER, GL_UNSIGNED_SHORT);
   allocate (objects.colour, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
-  allocate (objects.weight, GL_R8, GL_RED, GL_UNSIGNED_BYTE);
 }
 
 guint64
@@ -259,7 +207,6 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
   const auto &colour = layer.image.colour;
-  const rangecast::BlendPlanes *planes = layer.planes;
   prepare (objects, depth.width, depth.height);
   const auto copy = [&] (guint texture, int width, int height, guint format, guint type,
                         std::ptrdiff_t row_pixels, const void *data) {
@@ -270,98 +217,13 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   gl->PixelStorei (GL_UNPACK_ALIGNMENT, 1);
   copy (objects.depth, depth.width, depth.height, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
       depth.stride / 2, depth.data);
-  const auto picture = planes ? planes->colour_plane () : colour;
-  copy (objects.colour, colour.width, colour.height, GL_RGBA, GL_UNSIGNED_BYTE, picture.stride / 4,
-      picture.data);
-  if (planes)
-    copy (objects.weight, planes->width, planes->height, GL_RED, GL_UNSIGNED_BYTE, planes->width,
-        planes->weight.data ());
+  copy (objects.colour, colour.width, colour.height, GL_RGBA, GL_UNSIGNED_BYTE, colour.stride / 4,
+      colour.data);
   gl->PixelStorei (GL_UNPACK_ROW_LENGTH, 0);
   gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
   gl->BufferData (
       GL_ARRAY_BUFFER, layer.vertices.size_bytes (), layer.vertices.data (), GL_STREAM_DRAW);
-  return guint64 (depth.width) * guint64 (depth.height) * (planes ? 7 : 6) +
-         layer.vertices.size_bytes ();
-}
-
-/* Column-major: clip coordinates of (column, row, 1) times depth, and 1. */
-static Mat4
-clip_from_pixel (const Mat4 &clip_from_world, const StripPainter::Layer &layer)
-{
-  const rangecast::View &view = *layer.view;
-  const rangecast::Mat3 &r = view.world_from_view.rotation;
-  const rangecast::Vec3 &t = view.world_from_view.translation;
-  const rangecast::Intrinsics &lens = view.intrinsics;
-  const double unit = view.depth_unit_m, x = unit / lens.fx, y = unit / lens.fy;
-  const double cx = lens.cx - layer.image.roi.x, cy = lens.cy - layer.image.roi.y;
-  Mat4 product;
-  for (int i = 0; i < 4; i++) {
-    const auto clip = [&] (double wx, double wy, double wz, double w) {
-      return clip_from_world[i] * wx + clip_from_world[4 + i] * wy + clip_from_world[8 + i] * wz +
-             clip_from_world[12 + i] * w;
-    };
-    const double right = x * clip (r[0], r[3], r[6], 0), down = y * clip (r[1], r[4], r[7], 0);
-    product[i] = float (right);
-    product[4 + i] = float (down);
-    product[8 + i] = float (unit * clip (r[2], r[5], r[8], 0) - cx * right - cy * down);
-    product[12 + i] = float (clip (t.x, t.y, t.z, 1));
-  }
-  return product;
-}
-
-Mat4
-StripPainter::in_half_of_depths (Mat4 clip_matrix, bool farther)
-{
-  for (std::size_t i = 0; i < 4; i++)
-    clip_matrix[4 * i + 2] =
-        (clip_matrix[4 * i + 2] + (farther ? 1 : -1) * clip_matrix[4 * i + 3]) / 2;
-  return clip_matrix;
-}
-
-/* Row of the matrix that makes one clip coordinate. */
-static rangecast::Vec3
-row_of (const Mat4 &m, int i)
-{
-  return {m[i], m[4 + i], m[8 + i]};
-}
-
-/* Clip z of all points is a w + b, w their distance along the viewer's direction: what is g farther
- * has b / (w + g) instead of b / w, which never leaves the far plane as a shift of z by the like
- * would, where the near plane is close. */
-static BlendTargets::DepthShift
-depth_shift (const Mat4 &m, const Mat4 &clip_from_world, double gap_m)
-{
-  const rangecast::Vec3 z = row_of (m, 2), w = row_of (m, 3);
-  const double a = dot (z, w) / dot (w, w);
-  const double g = std::max (gap_m * norm (row_of (clip_from_world, 3)), 1e-6);
-  return {float (a), float (m[14] - a * m[15]), float (g)};
-}
-
-/* Where the viewer stands: what the matrix makes x = y = w = 0 of. */
-static rangecast::Vec3
-viewer_of (const Mat4 &m)
-{
-  const rangecast::Vec3 x = row_of (m, 0), y = row_of (m, 1), w = row_of (m, 3);
-  const double volume = dot (x, cross (y, w));
-  const rangecast::Vec3 sum =
-      double (m[12]) * cross (y, w) + double (m[13]) * cross (w, x) + double (m[15]) * cross (x, y);
-  return (-1 / volume) * sum;
-}
-
-/* What mode blend needs to know of a view beyond the other modes. */
-static void
-set_blend_uniforms (
-    GstGLShader *shader, const StripPainter::Picture &picture, const StripPainter::Layer &layer)
-{
-  const rangecast::View &view = *layer.view;
-  const rangecast::Intrinsics &lens = view.intrinsics;
-  const rangecast::Mat3 &r = view.world_from_view.rotation;
-  const rangecast::Vec3 from =
-      viewer_of (picture.clip_from_world) - view.world_from_view.translation;
-  gst_gl_shader_set_uniform_4f (shader, "u_lens", gfloat (lens.cx - layer.image.roi.x),
-      gfloat (lens.cy - layer.image.roi.y), gfloat (1 / lens.fx), gfloat (1 / lens.fy));
-  gst_gl_shader_set_uniform_3f (shader, "u_viewer", gfloat (dot (from, {r[0], r[3], r[6]})),
-      gfloat (dot (from, {r[1], r[4], r[7]})), gfloat (dot (from, {r[2], r[5], r[8]})));
+  return guint64 (depth.width) * guint64 (depth.height) * 6 + layer.vertices.size_bytes ();
 }
 
 void
@@ -369,29 +231,19 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
     GstGLShader *shader, Side side)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  const bool blends = shader == shaders_[kBlendDepth] || shader == shaders_[kBlendSum];
-  Mat4 matrix = clip_from_pixel (picture.clip_from_world, layer);
+  Mat4 matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
+  if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
+    matrix = rangecast::in_half_of_depths (matrix, side == Side::kBack);
   /* Where two views see one surface, the one that looks more as the viewer does is before the
    * other: what it sees has more pixels there, and noise must not let both shine through. */
-  const rangecast::Vec3 forward = row_of (picture.clip_from_world, 3);
-  const rangecast::Mat3 &r = layer.view->world_from_view.rotation;
-  const double along = dot (forward, {r[2], r[5], r[8]}) / norm (forward);
-  if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
-    matrix = in_half_of_depths (matrix, side == Side::kBack);
-  const double gap_m = !blends                           ? picture.view_gap_m * (1 - along)
-                       : shader == shaders_[kBlendDepth] ? picture.blend_range_m
-                                                         : 0;
-  const auto shift = depth_shift (matrix, picture.clip_from_world, gap_m);
-  if (shader == shaders_[kBlendSum])
-    set_blend_uniforms (shader, picture, layer);
+  const auto shift = rangecast::depth_shift (matrix, picture.clip_from_world,
+      picture.view_gap_m * (1 - view_alignment (picture.clip_from_world, *layer.view)));
   gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
   gst_gl_shader_set_uniform_2f (shader, "u_behind", shift.b * shift.g, shift.g);
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
       shader, "u_size", layer.image.depth.width, layer.image.depth.height);
-  gl->ActiveTexture (GL_TEXTURE2);
-  gl->BindTexture (GL_TEXTURE_2D, objects.weight);
   gl->ActiveTexture (GL_TEXTURE1);
   gl->BindTexture (GL_TEXTURE_2D, objects.colour);
   gl->ActiveTexture (GL_TEXTURE0);
@@ -401,15 +253,12 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
       GLsizei (layer.vertices.size ()));
 }
 
-/* Lets through one side of all surfaces. Pieces are counter-clockwise in their view's picture,
- * whose y points down; which way round that is for OpenGL follows from whether the matrix mirrors.
- */
+/* Lets through one side of all surfaces. */
 static void
-show_side (const GstGLFuncs *gl, const Mat4 &m, bool back)
+show_side (const GstGLFuncs *gl, const Mat4 &clip_from_world, bool back)
 {
-  const bool mirrors = dot (cross (row_of (m, 0), row_of (m, 1)), row_of (m, 3)) > 0;
   gl->Enable (GL_CULL_FACE);
-  gl->CullFace (mirrors != back ? GL_FRONT : GL_BACK);
+  gl->CullFace (rangecast::mirrors (clip_from_world) != back ? GL_FRONT : GL_BACK);
 }
 
 /* What all shaders of views share. */
@@ -419,7 +268,6 @@ StripPainter::begin (const Picture &picture, GstGLShader *shader)
   gst_gl_shader_use (shader);
   gst_gl_shader_set_uniform_1i (shader, "u_depth", 0);
   gst_gl_shader_set_uniform_1i (shader, "u_colour", 1);
-  gst_gl_shader_set_uniform_1i (shader, "u_weight", 2);
   gst_gl_shader_set_uniform_1f (shader, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
       shader, "u_point_size", picture.point_size * picture.pixels_per_unit);
@@ -442,6 +290,8 @@ StripPainter::end ()
 guint64
 StripPainter::upload (std::span<const Layer> layers)
 {
+  if (std::ranges::any_of (layers, [] (const Layer &l) { return !l.blend_vertices.empty (); }))
+    return blend_painter_.upload (layers);
   guint64 uploaded = 0;
   turn_ = (turn_ + 1) % objects_.size ();
   context_->gl_vtable->ActiveTexture (GL_TEXTURE0);
@@ -456,8 +306,7 @@ StripPainter::draw_layers (
     std::span<const Layer> layers, const Picture &picture, GstGLShader *shader)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  /* Noise turns many a single rectangle over: they have two sides, as points have. Blending gives
-   * what is seen from behind next to no weight. */
+  /* Noise turns many a single rectangle over: they have two sides, as points have. */
   const bool sided = picture.mode == StripMode::kStrips;
   const auto draw_all = [&] (Side side) {
     if (sided)
@@ -473,30 +322,13 @@ StripPainter::draw_layers (
     draw_all (Side::kBack);
 }
 
-/* The nearest surface of each pixel, sums over the views that see it, and their quotient. */
-void
-StripPainter::blend (const Picture &picture, std::span<const Layer> layers)
-{
-  draw_layers (layers, picture, shaders_[kBlendDepth]);
-  targets_.begin_sum ();
-  draw_layers (layers, picture, shaders_[kBlendSum]);
-  targets_.resolve (picture.part, picture.background, picture.background_shade,
-      depth_shift (picture.clip_from_world, picture.clip_from_world, picture.blend_range_m));
-}
-
-void
+bool
 StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const float *c = picture.background;
-  if (picture.mode == StripMode::kBlend) {
-    const bool precise =
-        !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
-    if (targets_.begin_depth (picture.width, picture.height, precise))
-      blend (picture, layers);
-    end ();
-    return;
-  }
+  if (picture.mode == StripMode::kBlend)
+    return blend_painter_.draw (picture, layers);
   gl->Viewport (0, 0, picture.width, picture.height);
   gl->ClearColor (c[0], c[1], c[2], c[3]);
   gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -505,4 +337,5 @@ StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
     gl->Enable (GL_PROGRAM_POINT_SIZE);
   draw_layers (layers, picture, shaders_[std::size_t (picture.mode) - 1]);
   end ();
+  return true;
 }

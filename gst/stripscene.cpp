@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <rangecast/parallel.hpp>
 #include <rangecast/strips/scene_hull.hpp>
+#include <rangecast/strips/view_matrices.hpp>
 #include <rangecast/strips/view_tint.hpp>
 #include <string>
 
@@ -56,40 +57,78 @@ StripScene::surround ()
     rangecast::append_hull (layer.image, *layer.view, hull_);
 }
 
-void
-StripScene::build (
-    std::span<const RangeImage> images, const StripRenderSettings &settings, bool same_frame_set)
+/* The views, by number of their images, that look against the viewer while another one does not. */
+guint64
+StripScene::views_against (std::span<const RangeImage> images, const StripRenderSettings &settings,
+    const rangecast::Orbit &orbit) const
 {
-  const bool built = same_frame_set && is_built (images.size (), settings);
+  constexpr double kAgainst = -0.2; /* cosine between both directions */
+  if (settings.strips.mode != rangecast::StripMode::kBlend)
+    return 0;
+  const auto matrix = rangecast::orbit_matrices (frame_, orbit, 1, false).clip_from_world;
+  guint64 against = 0;
+  bool any_along = false;
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const double along = rangecast::view_alignment (matrix, *rig_->find (images[i].view_id));
+    against |= guint64 (along < kAgainst) << i;
+    any_along = any_along || along > -kAgainst;
+  }
+  return any_along ? against : 0;
+}
+
+/* Quarters of a pixel that surfaces reach beyond their last pixels. */
+static constexpr int kReach = 2;
+
+void
+StripScene::build_view (std::size_t which, const StripRenderSettings &settings)
+{
+  ViewMemory &memory = memory_[which];
+  const rangecast::ConstRangeImage &image = views_[which].image;
+  const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
+  results_[which] = {};
+  if (blends)
+    rangecast::make_blend_planes (
+        {views_.data (), count_}, which, settings.strips.depth_step, memory.planes);
+  rangecast::build_strips (image, settings.strips, memory.vertices, results_[which],
+      blends ? &memory.planes : nullptr);
+  if (blends)
+    rangecast::make_blend_vertices (image, memory.planes, memory.vertices,
+        (reduced_ >> which & 1) ? kReach / 2 : kReach, memory.blend_vertices);
+  if (reduced_ >> which & 1)
+    results_[which].points = memory.reduced.points ();
+}
+
+void
+StripScene::build (std::span<const RangeImage> images, const StripRenderSettings &settings,
+    const rangecast::Orbit &orbit, bool same_frame_set)
+{
+  const guint64 reduced = views_against (images, settings, orbit);
+  const bool built =
+      same_frame_set && reduced == reduced_ && is_built (images.size (), settings);
   const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
   complete_ = false; /* memory may end halfway */
-  std::array<rangecast::SurfaceView, rangecast::kMaxViews> views;
+  count_ = images.size ();
+  reduced_ = reduced;
   for (std::size_t i = 0; i < images.size (); i++) {
     const rangecast::View *view = rig_->find (images[i].view_id);
-    const auto tinted = layers_[i].image.colour;
     rangecast::ConstRangeImage image = images[i];
-    if (settings.show_units)
-      image.colour = built
-                         ? tinted
-                         : rangecast::tinted (images[i].colour,
-                               rangecast::camera_colour (std::size_t (view - rig_->views.data ())),
-                               memory_[i].tinted);
-    views[i] = {image, view};
-    layers_[i].image.colour = image.colour;
+    if (settings.show_units && !built)
+      image.colour = rangecast::tinted (images[i].colour,
+          rangecast::camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
+    if (!built)
+      views_[i] = {image, view};
+    if (!built && (reduced >> i & 1))
+      views_[i] = memory_[i].reduced.reduce (views_[i]);
   }
-  rangecast::in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) {
-    results_[i] = {};
-    rangecast::BlendPlanes *planes = blends ? &memory_[i].planes : nullptr;
-    if (planes)
-      rangecast::make_blend_planes (
-          {views.data (), images.size ()}, i, settings.strips.depth_step, *planes);
-    rangecast::build_strips (
-        views[i].image, settings.strips, memory_[i].vertices, results_[i], planes);
-  });
-  for (std::size_t i = 0; i < images.size (); i++)
-    layers_[i] = {
-        views[i].image, views[i].view, memory_[i].vertices, blends ? &memory_[i].planes : nullptr};
-  count_ = images.size ();
+  rangecast::in_parallel (
+      built ? 0 : images.size (), 0, [&] (std::size_t i) { build_view (i, settings); });
+  for (std::size_t i = 0; i < images.size (); i++) {
+    layers_[i] = {views_[i].image, views_[i].view, {}};
+    if (blends)
+      layers_[i].blend_vertices = memory_[i].blend_vertices;
+    else
+      layers_[i].vertices = memory_[i].vertices;
+  }
   if (!built) {
     surround ();
     serial_++;

@@ -27,9 +27,11 @@ public:
 
   /** Makes the strips of images that check() has found good; if it is the same frame set as the
    * last time and nothing that strips depend on has changed, all is still there. Colours are of the
-   * images, or tinted (show-units). The images must stay mapped as long as the layers are used. */
+   * images, or tinted (show-units). In mode blend views that look against the viewer are reduced to
+   * half their resolution: they only fill holes. The images must stay mapped as long as the layers
+   * are used. */
   void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,
-      bool same_frame_set);
+      const rangecast::Orbit &orbit, bool same_frame_set);
   /** Another one after each build() that made something else than the one before; never 0. */
   [[nodiscard]] guint64 serial () const { return serial_; }
   /** Of all views that the rig has. */
@@ -47,8 +49,13 @@ private:
     std::vector<rangecast::StripVertex> vertices;
     std::vector<rangecast::Rgbx> tinted;
     rangecast::BlendPlanes planes;
+    std::vector<rangecast::BlendVertex> blend_vertices;
+    rangecast::ReducedView reduced;
   };
   bool is_built (std::size_t images, const StripRenderSettings &settings) const;
+  guint64 views_against (std::span<const rangecast::RangeImage> images,
+      const StripRenderSettings &settings, const rangecast::Orbit &orbit) const;
+  void build_view (std::size_t which, const StripRenderSettings &settings);
   void surround ();
 
   const rangecast::Rig *rig_ = nullptr;
@@ -56,10 +63,12 @@ private:
   std::vector<rangecast::LineVertex> lines_;
   std::array<ViewMemory, rangecast::kMaxViews> memory_; /* by number in the buffer */
   std::array<rangecast::StripResult, rangecast::kMaxViews> results_{};
+  std::array<rangecast::SurfaceView, rangecast::kMaxViews> views_;
   std::array<StripPainter::Layer, rangecast::kMaxViews> layers_;
   std::size_t count_ = 0; /* of the layers */
   std::vector<rangecast::Vec3> hull_;
   guint built_with_ = 0;  /* StripRenderSettings::strips_serial */
+  guint64 reduced_ = 0;   /* bit i: number i of the images */
   bool complete_ = false; /* the last build() was not broken off, and the rig is still that one */
   guint64 serial_ = 1;
 };

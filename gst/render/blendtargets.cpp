@@ -31,9 +31,11 @@ static const char *const kResolveShader = R"(
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
+#if WITH_DEPTH
 uniform sampler2D u_depth;
-uniform ivec4 u_part; /* first and last pixel */
 uniform vec3 u_shift; /* a, b, g of DepthShift */
+#endif
+uniform ivec4 u_part; /* first and last pixel */
 out vec4 fragment;
 void main ()
 {
@@ -50,9 +52,11 @@ void main ()
   float coverage = sum.a > 0.0 ? 0.5 + 0.125 * covered : covered > 2.0 ? 1.0 : 0.125 * covered;
   if (sum.a <= 0.0)
     sum = west + east + north + south;
+#if WITH_DEPTH
   float depth = texelFetch (u_depth, at, 0).r;
   float distance = u_shift.y / (2.0 * depth - 1.0 - u_shift.x) - u_shift.z;
   gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
+#endif
   float behind = (1.0 - coverage) * ground.a;
   float alpha = coverage + behind;
   vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * ground.rgb;
@@ -71,11 +75,14 @@ BlendTargets::is_supported (GstGLContext *context)
 bool
 BlendTargets::start (GstGLContext *context, GError **error)
 {
-  shader_ = make_shader (context, kCoveringVertexShader,
-      (std::string (kBackgroundFunction) + kResolveShader).c_str (), error);
-  if (!shader_)
-    return false;
   context_ = context;
+  for (std::size_t i = 0; i < std::size (shaders_); i++) {
+    const std::string source =
+        "#define WITH_DEPTH " + std::to_string (i) + kBackgroundFunction + kResolveShader;
+    shaders_[i] = make_shader (context, kCoveringVertexShader, source.c_str (), error);
+    if (!shaders_[i])
+      return false;
+  }
   context->gl_vtable->GenVertexArrays (1, &array_);
   return true;
 }
@@ -96,7 +103,8 @@ BlendTargets::stop ()
   if (context_) {
     delete_targets ();
     context_->gl_vtable->DeleteVertexArrays (1, &array_);
-    gst_clear_object (&shader_);
+    for (GstGLShader *&shader : shaders_)
+      gst_clear_object (&shader);
   }
   *this = {};
 }
@@ -149,7 +157,6 @@ BlendTargets::begin_depth (int width, int height, bool precise)
     height_ = height;
     precise_ = precise;
     if (failed_) {
-      GST_WARNING ("mode blend: OpenGL has no float framebuffer of %dx%d pixels", width, height);
       gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
       return false;
     }
@@ -174,30 +181,41 @@ BlendTargets::begin_sum ()
 }
 
 void
-BlendTargets::resolve (
-    const rangecast::Roi &part, const float (&background)[4], float shade, const DepthShift &shift)
+BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
+    const float (&background)[4], float shade, const rangecast::DepthShift *shift)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
+  GstGLShader *shader = shaders_[shift ? 1 : 0];
   gl->Disable (GL_BLEND);
   gl->BlendFunc (GL_ONE, GL_ZERO);
   gl->DepthMask (TRUE);
   gl->DepthFunc (GL_ALWAYS);
   gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
-  gst_gl_shader_use (shader_);
+  gl->ClearColor (background[0], background[1], background[2], background[3]);
+  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  const bool whole = part.width == width_ && part.height == height_;
+  gl->Enable (GL_SCISSOR_TEST);
+  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
+  gst_gl_shader_use (shader);
   static const char *const kNames[] = {"u_sum", "u_depth"};
-  for (std::size_t i = 0; i < std::size (textures_); i++) {
+  for (std::size_t i = 0; i < (shift ? 2 : 1); i++) {
     gl->ActiveTexture (guint (GL_TEXTURE0 + i));
     gl->BindTexture (GL_TEXTURE_2D, textures_[i]);
-    gst_gl_shader_set_uniform_1i (shader_, kNames[i], gint (i));
+    gst_gl_shader_set_uniform_1i (shader, kNames[i], gint (i));
   }
   gst_gl_shader_set_uniform_4i (
-      shader_, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
-  gst_gl_shader_set_uniform_3f (shader_, "u_shift", shift.a, shift.b, shift.g);
-  set_background_uniforms (shader_, background, shade, part);
+      shader, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
+  if (shift)
+    gst_gl_shader_set_uniform_3f (shader, "u_shift", shift->a, shift->b, shift->g);
+  set_background_uniforms (shader, background, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);
   gl->BindVertexArray (0);
   gl->BindTexture (GL_TEXTURE_2D, 0);
   gl->ActiveTexture (GL_TEXTURE0);
   gl->DepthFunc (GL_LESS);
+  if (whole)
+    gl->Disable (GL_SCISSOR_TEST);
+  else
+    gl->Scissor (part.x, part.y, part.width, part.height);
 }

@@ -4,6 +4,7 @@
 #include <gst/gl/gl.h>
 
 #include <rangecast/geometry/range_image.hpp>
+#include <rangecast/strips/view_matrices.hpp>
 
 /** Render targets in which views of one surface are blended, and the pass that divides: first the
  *  depth of the nearest surface, then sums of colour times weight and of weights. Their memory does
@@ -21,31 +22,30 @@ public:
   /** Binds and clears the targets, made anew if size or precision change, to draw depth only.
    *  Scissors stay in force.
    *  @param precise  32-bit floats instead of 16-bit ones; not with OpenGL ES
-   *  @return false if OpenGL has no such framebuffer (logged once); what was bound is bound again
+   *  @return false if OpenGL has no such framebuffer; what was bound is bound again
    */
   bool begin_depth (int width, int height, bool precise);
   /** From here on what is drawn adds up: R, G, B times weight, and the weight. Depth is compared,
    *  not written. */
   void begin_sum ();
-  /** By what surfaces were moved away from the viewer in the depth pass: their z in normalised
-   *  device coordinates, a + b / w, became a + b / (w + g). */
-  struct DepthShift {
-    float a, b, g;
-  };
-  /** Divides, into the framebuffer that was bound before begin_depth(), smooths outlines, and
-   * writes the surfaces' depth: what is drawn later stands among them.
-   *  @param part        pixels that this picture fills
+  /** Divides, into the framebuffer that was bound before begin_depth(), and smooths outlines.
+   *  @param part        pixels that this picture fills; if that is not the whole framebuffer,
+   *                     scissors keep to it, now and afterwards
+   *  @param covered     those that something may be drawn in, and one more on each side; the rest
+   *                     becomes background
    *  @param background  R, G, B, A, straight
-   *  @param shade       see BackgroundPainter::draw() */
-  void resolve (const rangecast::Roi &part, const float (&background)[4], float shade,
-      const DepthShift &shift);
+   *  @param shade       see BackgroundPainter::draw(); only what is covered is shaded
+   *  @param shift       of the depth pass; the surfaces' depth is written, too: what is drawn later
+   *                     stands among them. nullptr: none is written */
+  void resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
+      const float (&background)[4], float shade, const rangecast::DepthShift *shift);
 
 private:
   bool make (int width, int height, bool precise);
   void delete_targets ();
 
   GstGLContext *context_ = nullptr;
-  GstGLShader *shader_ = nullptr;
+  GstGLShader *shaders_[2] = {}; /* of resolve(): without depth, with it */
   guint framebuffer_ = 0, array_ = 0;
   guint textures_[2] = {}; /* sums, depth */
   int width_ = 0, height_ = 0;

@@ -279,7 +279,7 @@ GST_END_TEST;
 GST_START_TEST (test_view_mask_reaches_the_last_view_id)
 {
   Rig rig = ring_rig (64);
-  GstHarness *h = render_harness (rig, "distance=2 view-mask=0x8000000000000000");
+  GstHarness *h = render_harness (rig, "mode=strips distance=2 view-mask=0x8000000000000000");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
   const auto set = [&] { return make_frame_set (rig, 0, {120, 90, 80, 60}); };

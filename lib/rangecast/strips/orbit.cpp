@@ -212,4 +212,33 @@ in_part (const Mat4 &clip_from_world, const PicturePart &part)
   return m;
 }
 
+Roi
+covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height,
+    const Roi &part)
+{
+  constexpr int kMargin = 2;
+  const Mat4 &m = clip_from_world;
+  double left = 1, right = -1, first = 1, last = -1;
+  for (const Vec3 &p : hull) {
+    const auto clip = [&] (std::size_t i) {
+      return m[i] * p.x + m[4 + i] * p.y + m[8 + i] * p.z + m[12 + i];
+    };
+    const double w = clip (3);
+    if (!(w > 0))
+      return part;
+    const double x = std::clamp (clip (0) / w, -1.0, 1.0), y = std::clamp (clip (1) / w, -1.0, 1.0);
+    left = std::min (left, x), right = std::max (right, x);
+    first = std::min (first, y), last = std::max (last, y);
+  }
+  const auto pixels = [] (double from, double to, int size, int begin, int length) {
+    const double from_pixel = std::floor ((from + 1) / 2 * size) - kMargin,
+                 to_pixel = std::ceil ((to + 1) / 2 * size) + kMargin;
+    const int at = std::max (static_cast<int> (from_pixel), begin);
+    return std::pair (at, std::max (0, std::min (static_cast<int> (to_pixel), begin + length) - at));
+  };
+  const auto [x, columns] = pixels (left, right, width, part.x, part.width);
+  const auto [y, rows] = pixels (first, last, height, part.y, part.height);
+  return {x, y, columns, rows};
+}
+
 } // namespace rangecast

@@ -4,6 +4,7 @@
 #include <array>
 #include <span>
 
+#include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
 
 namespace rangecast {
@@ -79,5 +80,11 @@ struct PicturePart {
 /** The matrix that draws into that part what `clip_from_world` draws into the whole picture. What
  *  lies beyond the part has to be cut off by scissors. */
 Mat4 in_part (const Mat4 &clip_from_world, const PicturePart &part);
+
+/** The pixels of part of a framebuffer of width x height pixels that a hull covers, and two more on
+ *  each side; rows are counted as clip coordinates go. The whole part if some of the hull is not
+ *  before the camera. */
+Roi covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height,
+    const Roi &part);
 
 } // namespace rangecast

@@ -5,6 +5,13 @@
 
 namespace rangecast {
 
+namespace {
+
+/* Pixels: smaller tiles follow the surface more closely. */
+constexpr int kTile = 32;
+
+} // namespace
+
 DepthSpan
 depth_span (const ImageView<const std::uint16_t> &depth)
 {
@@ -23,15 +30,21 @@ depth_span (const ImageView<const std::uint16_t> &depth)
 void
 append_hull (const ConstRangeImage &image, const View &view, std::vector<Vec3> &hull)
 {
-  const DepthSpan span = depth_span (image.depth);
-  if (span.farthest == 0)
-    return;
   const Roi &roi = image.roi;
-  for (std::uint16_t depth : {span.nearest, span.farthest})
-    for (int x : {roi.x - 1, roi.x + roi.width})
-      for (int y : {roi.y - 1, roi.y + roi.height})
-        hull.push_back (
-            view.world_from_view * view.intrinsics.unproject (x, y, depth * view.depth_unit_m));
+  const auto append = [&] (const Roi &tile) {
+    const DepthSpan span =
+        depth_span (image.depth.crop (tile.x, tile.y, tile.width, tile.height));
+    if (span.farthest == 0)
+      return;
+    for (std::uint16_t depth : {span.nearest, span.farthest})
+      for (int x : {roi.x + tile.x - 1, roi.x + tile.x + tile.width})
+        for (int y : {roi.y + tile.y - 1, roi.y + tile.y + tile.height})
+          hull.push_back (
+              view.world_from_view * view.intrinsics.unproject (x, y, depth * view.depth_unit_m));
+  };
+  for (int y = 0; y < roi.height; y += kTile)
+    for (int x = 0; x < roi.width; x += kTile)
+      append ({x, y, std::min (kTile, roi.width - x), std::min (kTile, roi.height - y)});
 }
 
 } // namespace rangecast

@@ -15,8 +15,9 @@ struct DepthSpan {
 };
 DepthSpan depth_span (const ImageView<const std::uint16_t> &depth);
 
-/** Appends the eight corners of the part of a view's frustum that holds all valid points of an
- *  image, world, metres; nothing if there are none. */
+/** Appends world points, metres, whose convex hull holds all valid points of an image and one pixel
+ *  more on each side: for each tile of 32x32 pixels the corners of the part of the view's frustum
+ *  that its points lie in. Nothing if no pixel is valid. */
 void append_hull (const ConstRangeImage &image, const View &view, std::vector<Vec3> &hull);
 
 } // namespace rangecast

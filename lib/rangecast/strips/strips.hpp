@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "../geometry/range_image.hpp"
@@ -102,5 +103,20 @@ struct StripResult {
  *  Reentrant. */
 void build_strips (const ConstRangeImage &image, const StripSettings &settings,
     std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes = nullptr);
+
+/** A vertex of mode kBlend with all that is drawn of it. */
+struct BlendVertex {
+  std::int16_t x, y;    ///< quarters of a pixel; (0, 0) is the centre of the ROI's first pixel
+  std::uint16_t depth;  ///< depth units
+  std::uint16_t unused; ///< 0
+  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: as little as there is
+};
+
+/** Makes vertices of those that build_strips() made in mode kBlend.
+ *  @param planes   of the image
+ *  @param reach    quarters of a pixel that a vertex may lie beside its own, at most
+ *  @param[out] to  replaced; keeps its memory */
+void make_blend_vertices (const ConstRangeImage &image, const BlendPlanes &planes,
+    std::span<const StripVertex> strips, int reach, std::vector<BlendVertex> &to);
 
 } // namespace rangecast

@@ -6,8 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "../geometry/range_image.hpp"
-#include "../geometry/rig.hpp"
+#include "reduced_view.hpp"
 
 namespace rangecast {
 
@@ -42,12 +41,6 @@ struct BlendPlanes {
   {
     return {colour.data (), width, height, static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
   }
-};
-
-/** A range image and the camera that took it. */
-struct SurfaceView {
-  ConstRangeImage image;
-  const View *view;
 };
 
 /** Makes the planes of one view of a frame set.

@@ -33,7 +33,7 @@ const char *const kUsage =
     "camera, four places each. Depth is exact; or stereo: matched, freed of the background, coded\n"
     "and decoded, filtered by the cylinder, as in the demo; or noise: exact and 3 mm of smooth\n"
     "noise. Mode strips-merged: strips of exact depth through the neighbour code, whose runs of\n"
-    "equal pixels (colour threshold 8) become longer pieces; strips-held: strips of a frame set "
+    "equal pixels (colour threshold 8) become longer pieces; blend-held: strips of a frame set "
     "that\n"
     "is there already, as the second eye's, or while a stream stalls. Peers: grid, a plain grid\n"
     "surface, and point-cloud, GL points; both from a vertex buffer that the CPU unprojects into.\n"
@@ -115,6 +115,14 @@ struct Kind {
   std::vector<std::unique_ptr<Way>> ways;
 };
 
+Orbit
+orbit_at (double azimuth_deg)
+{
+  Orbit orbit;
+  orbit.azimuth_deg = azimuth_deg;
+  return orbit;
+}
+
 StripPainter::Picture
 make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
 {
@@ -122,9 +130,8 @@ make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
   std::vector<Vec3> hull;
   for (const RangeImage &image : set.images)
     append_hull (image, *set.rig.find (image.view_id), hull);
-  Orbit orbit;
-  orbit.azimuth_deg = azimuth_deg;
   StripPainter::Picture picture = {};
+  const Orbit orbit = orbit_at (azimuth_deg);
   picture.clip_from_world =
       orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
   picture.point_size = 1;
@@ -133,6 +140,7 @@ make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
   picture.width = kWidth;
   picture.height = kHeight;
   picture.part = {0, 0, kWidth, kHeight};
+  picture.covered = covered_part (picture.clip_from_world, hull, kWidth, kHeight, picture.part);
   return picture;
 }
 
@@ -154,7 +162,7 @@ make_ways (Job &job, Kind &kind)
     settings.merge = job.merge;
     settings.max_gap = job.max_gap;
     kind.ways.push_back (
-        make_strip_way ("strips-held", job.held_painter, kind.set, settings, true));
+        make_strip_way ("blend-held", job.held_painter, kind.set, settings, true));
   }
   for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
     GError *error = nullptr;
@@ -199,7 +207,7 @@ time_all (
       Way &way = *kind.ways[i];
       const auto begin = Clock::now ();
       const double processor_begin = processor_ms ();
-      way.build ();
+      way.build (orbit_at (azimuth_deg));
       rows[i].bytes = target.draw (way, picture);
       if (round < 0)
         continue;
@@ -220,6 +228,7 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
 {
   Score score;
   for (const Shot &shot : shots) {
+    kind.ways[i]->build (orbit_at (shot.azimuth_deg));
     target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg, job.view_gap_m));
     const cv::Mat rgba = target.read ();
     score.add (shot, rgba);
@@ -347,7 +356,7 @@ main (int argc, char **argv)
   options.text ("--pictures", job.pictures);
   if (const auto status = options.parse (argc, argv))
     return *status;
-  std::vector<const char *> modes{"strips-merged", "strips-held", "grid", "point-cloud"};
+  std::vector<const char *> modes{"strips-merged", "blend-held", "grid", "point-cloud"};
   for (const auto &[name, mode] : kModes)
     modes.push_back (name);
   if (!is_one_of ("--mode", job.mode, modes) ||

@@ -78,7 +78,7 @@ public:
     return true;
   }
 
-  void build () override /* as parallel as the strips are */
+  void build (const Orbit &) override /* as parallel as the strips are */
   {
     in_parallel (parts_.size (), 0, [&] (std::size_t i) {
       unproject (set_.images[i], *set_.rig.find (set_.images[i].view_id), parts_[i]);

@@ -17,7 +17,8 @@ public:
   Way (const Way &) = delete;
   Way &operator= (const Way &) = delete;
 
-  virtual void build () = 0;
+  /** @param orbit  from where it will be drawn */
+  virtual void build (const rangecast::Orbit &orbit) = 0;
   /** Draws into the bound framebuffer, in the GL thread. @return bytes uploaded */
   virtual guint64 draw (const StripPainter::Picture &picture) = 0;
   [[nodiscard]] virtual std::size_t vertices () const = 0;

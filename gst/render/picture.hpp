@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <rangecast/geometry/rig.hpp>
+#include <rangecast/strips/orbit.hpp>
+#include <rangecast/strips/strips.hpp>
+#include <span>
+
+/** What the painters draw: one picture of a frame set. */
+struct RenderPicture {
+  rangecast::Mat4 clip_from_world;
+  float background[4];   ///< R, G, B, A
+  float background_shade = 0; ///< see BackgroundPainter::draw()
+  float point_size;      ///< of a pixel's footprint
+  float pixels_per_unit; ///< pixels that a length of 1 at a distance of 1 covers
+  rangecast::StripMode mode;
+  double depth_step;
+  bool back_faces = false;     ///< mode strips: where no front is; mode blend shows all
+  bool keeps_depth = false;    ///< mode blend: the surfaces' depth is written, for what is drawn later
+  rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and one more on
+                               ///< each side
+
+  /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
+   *  between the two's directions. */
+  double view_gap_m = 0.012;
+  /** Mode blend: metres by which what a pixel shows may lie behind the nearest surface. */
+  double blend_range_m = 0.02;
+  int width, height;   ///< of the framebuffer, pixels
+  rangecast::Roi part; ///< of it that the picture fills
+};
+
+/** One view of the frame set. */
+struct RenderLayer {
+  rangecast::ConstRangeImage image;
+  const rangecast::View *view;
+  std::span<const rangecast::StripVertex> vertices;
+  std::span<const rangecast::BlendVertex> blend_vertices = {}; ///< mode blend, instead
+};
