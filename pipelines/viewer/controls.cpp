@@ -222,22 +222,42 @@ handle_mouse (Viewer &viewer, GstEvent *event)
   return taken;
 }
 
+/* @return whether the event is for the viewer */
+static bool
+handle_event (Viewer &viewer, GstEvent *event)
+{
+  const GstNavigationEventType type = gst_navigation_event_get_type (event);
+  if (type == GST_NAVIGATION_EVENT_KEY_PRESS || type == GST_NAVIGATION_EVENT_KEY_RELEASE)
+    return handle_key (viewer, event, type == GST_NAVIGATION_EVENT_KEY_PRESS);
+  return handle_mouse (viewer, event);
+}
+
 static GstPadProbeReturn
 on_event (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
-  auto &viewer = *static_cast<Viewer *> (user_data);
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
-  if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
-    return GST_PAD_PROBE_OK;
-  const GstNavigationEventType type = gst_navigation_event_get_type (event);
-  const bool is_press = type == GST_NAVIGATION_EVENT_KEY_PRESS;
-  const bool taken = is_press || type == GST_NAVIGATION_EVENT_KEY_RELEASE
-                         ? handle_key (viewer, event, is_press)
-                         : handle_mouse (viewer, event);
-  if (!taken)
+  if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION ||
+      !handle_event (*static_cast<Viewer *> (user_data), event))
     return GST_PAD_PROBE_OK;
   gst_event_unref (event);
   return GST_PAD_PROBE_HANDLED;
+}
+
+void
+handle_missed_event (Viewer &viewer, GstMessage *message)
+{
+  GstEvent *event = nullptr;
+  if (gst_navigation_message_get_type (message) != GST_NAVIGATION_MESSAGE_EVENT ||
+      !gst_navigation_message_parse_event (message, &event))
+    return;
+  const bool taken = handle_event (viewer, event);
+  if (!taken &&
+      gst_navigation_event_get_type (event) == GST_NAVIGATION_EVENT_MOUSE_BUTTON_RELEASE) {
+    GstPad *pad = gst_element_get_static_pad (viewer.render, "src");
+    gst_pad_send_event (pad, gst_event_ref (event)); /* else it would go on turning */
+    gst_object_unref (pad);
+  }
+  gst_event_unref (event);
 }
 
 void

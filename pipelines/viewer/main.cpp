@@ -118,6 +118,9 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       viewer.playback->seek_done ();
       viewer.overlay->set_duration (viewer.is_file ? viewer.playback->duration () : 0);
       break;
+    case GST_MESSAGE_ELEMENT:
+      handle_missed_event (viewer, message);
+      break;
     case GST_MESSAGE_LATENCY:
       gst_bin_recalculate_latency (GST_BIN (viewer.pipeline));
       break;

@@ -59,4 +59,7 @@ GstSample *take_frame_set (Viewer &viewer);
 std::vector<TextRow> key_rows (bool is_file);
 /** Takes the viewer's keys, and the mouse on the time bar, out of what goes up to striprender. */
 void watch_controls (Viewer &viewer);
+/** Of a message of the window that nobody took an event of mouse or keys. While the pipeline seeks,
+ *  events do not reach the elements: those of the viewer are handled now. Main thread. */
+void handle_missed_event (Viewer &viewer, GstMessage *message);
 /** @} */
