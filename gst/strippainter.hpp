@@ -9,7 +9,8 @@
 
 #include "render/blendpainter.hpp"
 
-/** Draws range images with OpenGL (core 3.3 or GLES 3.0), in mode blend through BlendPainter. All functions in the GL thread. */
+/** Draws range images with OpenGL (core 3.3 or GLES 3.0), in mode blend through BlendPainter. All
+ * functions in the GL thread. */
 class StripPainter {
 public:
   /** Compiles the shader. Errors come with the shader's log. */
@@ -50,7 +51,7 @@ private:
 
   AttributePointer attribute_pointer_ = nullptr;
   GstGLContext *context_ = nullptr;
-  gint largest_ = 0; /* side of a texture, pixels */
+  gint largest_ = 0;                       /* side of a texture, pixels */
   std::array<GstGLShader *, 3> shaders_{}; /* of strips, rectangles and points */
   BlendPainter blend_painter_;
   /* In turns: what pictures of one frame set read may be in use while the next one is written. */

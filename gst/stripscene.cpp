@@ -89,8 +89,8 @@ StripScene::build_view (std::size_t which, const StripRenderSettings &settings)
   if (blends)
     rangecast::make_blend_planes (
         {views_.data (), count_}, which, settings.strips.depth_step, memory.planes);
-  rangecast::build_strips (image, settings.strips, memory.vertices, results_[which],
-      blends ? &memory.planes : nullptr);
+  rangecast::build_strips (
+      image, settings.strips, memory.vertices, results_[which], blends ? &memory.planes : nullptr);
   if (blends)
     rangecast::make_blend_vertices (image, memory.planes, memory.vertices,
         (reduced_ >> which & 1) ? kReach / 2 : kReach, memory.blend_vertices);
@@ -103,8 +103,7 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
     const rangecast::Orbit &orbit, bool same_frame_set)
 {
   const guint64 reduced = views_against (images, settings, orbit);
-  const bool built =
-      same_frame_set && reduced == reduced_ && is_built (images.size (), settings);
+  const bool built = same_frame_set && reduced == reduced_ && is_built (images.size (), settings);
   const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
   complete_ = false; /* memory may end halfway */
   count_ = images.size ();

@@ -15,7 +15,6 @@ using rangecast::BlendVertex;
 using rangecast::Mat3;
 using rangecast::Vec3;
 
-
 /* Up to so many views half floats keep 8 bits of colour: each addition is rounded to 11 bits. */
 static constexpr std::size_t kMaxHalfFloatViews = 16;
 
@@ -136,9 +135,13 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
     gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
     if (is_new)
       describe_vertices (gl);
-    gl->BufferData (GL_ARRAY_BUFFER, layer.blend_vertices.size_bytes (),
-        layer.blend_vertices.data (), GL_STREAM_DRAW);
-    uploaded += layer.blend_vertices.size_bytes ();
+    const std::size_t size = layer.blend_vertices.size_bytes ();
+    if (size > objects.capacity) { /* with room for the next ones: memory is made anew seldom */
+      objects.capacity = size + size / 2;
+      gl->BufferData (GL_ARRAY_BUFFER, GLsizeiptr (objects.capacity), nullptr, GL_DYNAMIC_DRAW);
+    }
+    gl->BufferSubData (GL_ARRAY_BUFFER, 0, GLsizeiptr (size), layer.blend_vertices.data ());
+    uploaded += size;
   }
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
@@ -147,8 +150,7 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
 
 /* How a view weighs its points. */
 static void
-set_weight_uniforms (
-    GstGLShader *shader, const RenderPicture &picture, const RenderLayer &layer)
+set_weight_uniforms (GstGLShader *shader, const RenderPicture &picture, const RenderLayer &layer)
 {
   const rangecast::View &view = *layer.view;
   const rangecast::Intrinsics &lens = view.intrinsics;
@@ -173,8 +175,7 @@ BlendPainter::draw_layers (
   for (const RenderLayer &layer : layers) {
     if (layer.blend_vertices.empty ())
       continue;
-    const auto matrix =
-        clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
+    const auto matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
     const double against = -view_alignment (picture.clip_from_world, *layer.view);
     const double gap_m = (pass == kDepth ? picture.blend_range_m : 0) +
                          kInsideGap_m * std::clamp (2 * against, 0.0, 1.0);
@@ -191,15 +192,14 @@ BlendPainter::draw_layers (
 bool
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
-  const bool precise =
-      !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
+  const bool precise = !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
   if (!targets_.begin_depth (picture.width, picture.height, precise))
     return false;
   draw_layers (layers, picture, kDepth);
   targets_.begin_sum ();
   draw_layers (layers, picture, kSum);
-  const auto shift =
-      rangecast::depth_shift (picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
+  const auto shift = rangecast::depth_shift (
+      picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
   targets_.resolve (picture.part, picture.covered, picture.background, picture.background_shade,
       picture.keeps_depth ? &shift : nullptr);
   context_->gl_vtable->BindVertexArray (0);

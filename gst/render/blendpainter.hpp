@@ -9,11 +9,11 @@
 #include "blendtargets.hpp"
 #include "picture.hpp"
 
-/** Draws frame sets in mode blend: the nearest surface of each pixel, moved back by the blend range;
- *  then colour times weight of all views within that range; then their quotient (C. Buehler et al.,
- *  "Unstructured lumigraph rendering", SIGGRAPH 2001; M. Zwicker et al., "Surface splatting",
- *  SIGGRAPH 2001). OpenGL 3.3, or OpenGL ES 3.0 with half-float render targets. All functions in
- *  the GL thread. */
+/** Draws frame sets in mode blend: the nearest surface of each pixel, moved back by the blend
+ * range; then colour times weight of all views within that range; then their quotient (C. Buehler
+ * et al., "Unstructured lumigraph rendering", SIGGRAPH 2001; M. Zwicker et al., "Surface
+ * splatting", SIGGRAPH 2001). OpenGL 3.3, or OpenGL ES 3.0 with half-float render targets. All
+ * functions in the GL thread. */
 class BlendPainter {
 public:
   /** Compiles the shaders. @return false, with `error` set, if one does not compile */
@@ -30,6 +30,7 @@ public:
 private:
   struct ViewObjects { /* OpenGL names of one view */
     guint vertices = 0, array = 0;
+    std::size_t capacity = 0; /* of the buffer, bytes */
   };
   enum Pass { kDepth, kSum, kPasses };
   void draw_layers (

@@ -213,8 +213,8 @@ in_part (const Mat4 &clip_from_world, const PicturePart &part)
 }
 
 Roi
-covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height,
-    const Roi &part)
+covered_part (
+    const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height, const Roi &part)
 {
   constexpr int kMargin = 2;
   const Mat4 &m = clip_from_world;
@@ -234,7 +234,8 @@ covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width
     const double from_pixel = std::floor ((from + 1) / 2 * size) - kMargin,
                  to_pixel = std::ceil ((to + 1) / 2 * size) + kMargin;
     const int at = std::max (static_cast<int> (from_pixel), begin);
-    return std::pair (at, std::max (0, std::min (static_cast<int> (to_pixel), begin + length) - at));
+    return std::pair (
+        at, std::max (0, std::min (static_cast<int> (to_pixel), begin + length) - at));
   };
   const auto [x, columns] = pixels (left, right, width, part.x, part.width);
   const auto [y, rows] = pixels (first, last, height, part.y, part.height);

@@ -32,8 +32,7 @@ append_hull (const ConstRangeImage &image, const View &view, std::vector<Vec3> &
 {
   const Roi &roi = image.roi;
   const auto append = [&] (const Roi &tile) {
-    const DepthSpan span =
-        depth_span (image.depth.crop (tile.x, tile.y, tile.width, tile.height));
+    const DepthSpan span = depth_span (image.depth.crop (tile.x, tile.y, tile.width, tile.height));
     if (span.farthest == 0)
       return;
     for (std::uint16_t depth : {span.nearest, span.farthest})

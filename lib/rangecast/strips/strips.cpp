@@ -79,7 +79,8 @@ public:
         width_ (std::min (image.depth.width, kMaxStripSide)),
         height_ (std::min (image.depth.height, kMaxStripSide)),
         step_ (static_cast<int> (settings.depth_step * 65536)),
-        tolerance_ (tolerances (settings.merge * kMergeDepth, settings.merge * kMergeColour)),
+        tolerance_ (tolerances (settings.merge * (planes ? kMergeDepthBlend : kMergeDepth),
+            settings.merge * kMergeColour)),
         copy_tolerance_ (
             tolerances (settings.merge * kMergeCopyDepth, settings.merge * kMergeCopyColour))
   {
@@ -237,7 +238,7 @@ private:
   /* Whether weights within a piece are far from what they are at its first pixel. */
   [[nodiscard]] bool weight_steps (int first, int x, int y) const
   {
-    constexpr int kFar = 40; /* of 255 */
+    constexpr int kFar = 80; /* of 255 */
     const auto weight = [&] (int at) {
       return planes_
           ->weight[static_cast<std::size_t> (y) * static_cast<std::size_t> (planes_->width) +
@@ -485,8 +486,8 @@ make_blend_vertices (const ConstRangeImage &image, const BlendPlanes &planes,
 {
   std::array<std::int16_t, 8> offsets; /* by StripPlace */
   for (int i = 0; i < 8; i++)
-    offsets[static_cast<std::size_t> (i)] =
-        static_cast<std::int16_t> (i == kBehind ? 0 : std::clamp (i - int (kCentre), -reach, reach));
+    offsets[static_cast<std::size_t> (i)] = static_cast<std::int16_t> (
+        i == kBehind ? 0 : std::clamp (i - int (kCentre), -reach, reach));
   to.resize (strips.size ());
   for (std::size_t i = 0; i < strips.size (); i++) {
     const StripVertex v = strips[i];

@@ -29,8 +29,9 @@ struct StripSettings {
   double merge = 1;
 };
 
-inline constexpr double kMergeDepth = 0.0007; ///< share of the depth
-inline constexpr double kMergeColour = 1.5;   ///< levels
+inline constexpr double kMergeDepth = 0.0007;     ///< share of the depth
+inline constexpr double kMergeDepthBlend = 0.002; ///< mode kBlend: other views average it
+inline constexpr double kMergeColour = 1.5;       ///< levels
 inline constexpr double kMergeCopyDepth = 0.004;
 inline constexpr double kMergeCopyColour = 12;
 

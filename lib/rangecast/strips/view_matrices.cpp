@@ -26,7 +26,8 @@ clip_from_pixel (const Mat4 &clip_from_world, const View &view, const Roi &roi)
   Mat4 product;
   for (std::size_t i = 0; i < 4; i++) {
     const Vec3 row = row_of (clip_from_world, i);
-    const double right = x * dot (row, {r[0], r[3], r[6]}), down = y * dot (row, {r[1], r[4], r[7]});
+    const double right = x * dot (row, {r[0], r[3], r[6]}),
+                 down = y * dot (row, {r[1], r[4], r[7]});
     product[i] = static_cast<float> (right);
     product[4 + i] = static_cast<float> (down);
     product[8 + i] =

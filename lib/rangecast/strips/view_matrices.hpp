@@ -10,7 +10,8 @@ namespace rangecast {
 /** Clip coordinates of (column, row, 1) times depth, and 1: pixels of the ROI, depth units. */
 Mat4 clip_from_pixel (const Mat4 &clip_from_world, const View &view, const Roi &roi);
 
-/** The matrix whose depths are all in the nearer half of the depth buffer, or in the farther one. */
+/** The matrix whose depths are all in the nearer half of the depth buffer, or in the farther one.
+ */
 Mat4 in_half_of_depths (Mat4 clip_matrix, bool farther);
 
 /** Where the camera of a perspective matrix stands, world, metres. */

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "../for_this_cpu.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -43,6 +45,8 @@ public:
 
   void make ()
   {
+    if (image_.depth.empty ())
+      return;
     for (int y = 0; y < height_; y++)
       join_row (y);
     for (int y = 0; y < height_; y++)
@@ -162,31 +166,52 @@ private:
         sweep (x, y, 1);
   }
 
-  [[nodiscard]] bool is_copy_of (int x, int y, int u, int v) const
-  {
-    if (u < 0 || v < 0 || u >= width_ || image_.depth.at (x, y) != image_.depth.at (u, v))
-      return false;
-    const Rgbx a = image_.colour.at (x, y), b = image_.colour.at (u, v);
-    return a.r == b.r && a.g == b.g && a.b == b.b;
-  }
-
   /* Means of what is within the code's threshold round pixels that it copied, along rows, then
    * along columns. */
   void smooth_copies ()
   {
     bool any = false;
     for (int y = 0; y < height_; y++)
-      for (int x = 0; x < width_; x++) {
-        const bool copied = has (x, y, kValid) &&
-                            (is_copy_of (x, y, x - 1, y) || is_copy_of (x, y, x, y - 1) ||
-                                is_copy_of (x, y, x - 1, y - 1) || is_copy_of (x, y, x + 1, y - 1));
-        to_.copied[place (x, y)] = copied;
-        any = any || copied;
-      }
+      any = find_copies (y) || any;
     if (!any)
       return;
     smooth (1, [this] (int x, int) { return std::pair (x, width_); });
     smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
+  }
+
+  /* Pixels that equal the left, upper-left, upper or upper-right one. */
+  bool find_copies (int y)
+  {
+    std::uint8_t *copied = &to_.copied[place (0, y)];
+    const std::uint16_t *depth = image_.depth.row (y);
+    const Rgbx *colour = image_.colour.row (y);
+    const std::uint16_t *depth_above = y > 0 ? image_.depth.row (y - 1) : depth;
+    const Rgbx *above = y > 0 ? image_.colour.row (y - 1) : colour;
+    const bool has_above = y > 0;
+    const auto equals = [&] (int x, const std::uint16_t *d, const Rgbx *c, int u) {
+      return (depth[x] == d[u]) & (colour[x].r == c[u].r) & (colour[x].g == c[u].g) &
+             (colour[x].b == c[u].b);
+    };
+    const auto is_copy = [&] (int x, bool left, bool right) {
+      bool is = left && equals (x, depth, colour, x - 1);
+      if (has_above)
+        is = is | equals (x, depth_above, above, x) |
+             (left && equals (x, depth_above, above, x - 1)) |
+             (right && equals (x, depth_above, above, x + 1));
+      return static_cast<std::uint8_t> (is & (depth[x] != kInvalidDepth));
+    };
+    if (width_ == 1) {
+      copied[0] = is_copy (0, false, false);
+      return copied[0] != 0;
+    }
+    copied[0] = is_copy (0, false, true);
+    for (int x = 1; x < width_ - 1; x++)
+      copied[x] = is_copy (x, true, true);
+    copied[width_ - 1] = is_copy (width_ - 1, true, false);
+    int sum = 0;
+    for (int x = 0; x < width_; x++)
+      sum |= copied[x];
+    return sum != 0;
   }
 
   template <typename Along> void smooth (std::ptrdiff_t way, const Along &along)
@@ -215,48 +240,66 @@ private:
     return {mean (r), mean (g), mean (b), at->x};
   }
 
+  /* Of one pixel and those beside it. */
+  struct Steps {
+    int before, after;         /* of the depth */
+    int has_before, has_after; /* 1: joined */
+  };
   /* What depth changes by from one pixel to the next: the mean of both sides, or the steeper step,
    * if that is a steep one. */
-  [[nodiscard]] float slope (int x, int y, int dx, int dy, std::uint8_t joins) const
+  [[nodiscard]] float slope (Steps s, float steep_share) const
   {
-    const std::ptrdiff_t way = dx + dy * image_.depth.stride / 2;
-    const std::uint16_t *depth = image_.depth.row (y) + x;
-    const bool has_before = x >= dx && y >= dy && has (x - dx, y - dy, joins),
-               has_after = has (x, y, joins);
-    const int before = has_before ? depth[0] - depth[-way] : 0,
-              after = has_after ? depth[way] - depth[0] : 0;
-    const auto mean = static_cast<float> (before + after) / (has_before && has_after ? 2.f : 1.f);
-    const auto steeper = static_cast<float> (std::abs (before) > std::abs (after) ? before : after);
-    const float steepness = std::abs (steeper) / (steep_ * static_cast<float> (depth[0]));
-    return mean + std::clamp (2 * steepness - 1, 0.f, 1.f) * (steeper - mean);
+    const int before = s.has_before * s.before, after = s.has_after * s.after;
+    const float mean = static_cast<float> (before + after) *
+                       (1 - 0.5f * static_cast<float> (s.has_before & s.has_after));
+    const int steeper = std::abs (before) > std::abs (after) ? before : after;
+    const float steepness = 2 * static_cast<float> (std::abs (steeper)) * steep_share - 1;
+    const float share = steepness > 1 ? 1 : steepness, part = share > 0 ? share : 0;
+    return mean + part * (static_cast<float> (steeper) - mean);
   }
 
-  /* Cosine between the surface's normal and the ray to the camera. */
-  [[nodiscard]] float squareness (int x, int y) const
-  {
-    const float depth = image_.depth.at (x, y);
-    const float gx = slope (x, y, 1, 0, kJoinsRight), gy = slope (x, y, 0, 1, kJoinsBelow);
-    const Intrinsics &lens = view_.intrinsics;
-    const auto fx = static_cast<float> (lens.fx), fy = static_cast<float> (lens.fy);
-    const auto u = static_cast<float> (x + image_.roi.x - lens.cx),
-               v = static_cast<float> (y + image_.roi.y - lens.cy);
-    const float nx = fx * gx, ny = fy * gy, nz = depth + u * gx + v * gy;
-    const float ray = 1 + u * u / (fx * fx) + v * v / (fy * fy);
-    return std::min (depth / std::sqrt ((nx * nx + ny * ny + nz * nz) * ray), 1.f);
-  }
-
+  /* The square root of what a place weighs: of the distance to the edge, times the cosine between
+   * the surface's normal and the ray to the camera. */
   void weigh_row (int y)
   {
-    static const auto kDistanceWeights = [] {
-      std::array<float, kFarthest + 1> weights;
-      for (int i = 0; i <= kFarthest; i++)
-        weights[static_cast<std::size_t> (i)] = 255 * std::sqrt (float (i) / kFarthest);
-      return weights;
-    }();
-    for (int x = 0; x < width_; x++)
-      if (std::uint8_t &weight = to_.weight[place (x, y)]; weight > 0)
-        weight = static_cast<std::uint8_t> (
-            std::max (kDistanceWeights[weight] * squareness (x, y) + 0.5f, 1.f));
+    const std::uint16_t *depth = image_.depth.row (y);
+    const std::uint16_t *above = y > 0 ? image_.depth.row (y - 1) : depth,
+                        *below = y + 1 < height_ ? image_.depth.row (y + 1) : depth;
+    const Rgbx *flags = &to_.colour[place (0, y)], *flags_above = y > 0 ? flags - width_ : flags;
+    const int upper = y > 0 ? 1 : 0;
+    std::uint8_t *__restrict weight = &to_.weight[place (0, y)];
+    const int width = width_;
+    const Intrinsics &lens = view_.intrinsics;
+    const auto fx = static_cast<float> (lens.fx), fy = static_cast<float> (lens.fy),
+               across = static_cast<float> (image_.roi.x - lens.cx),
+               v = static_cast<float> (y + image_.roi.y - lens.cy);
+    const float fx2 = 1 / (fx * fx), ray_y = 1 + v * v / (fy * fy), steep = 1 / steep_;
+    const auto weigh = [&] (int x, int left, int right) {
+      const float z = depth[x], steep_share = steep / (z + 1e-3f);
+      const int here = flags[x].x;
+      const float gx = slope (
+                      {depth[x] - depth[x - left], depth[x + right] - depth[x],
+                          left * (flags[x - left].x / kJoinsRight & 1), here / kJoinsRight & 1},
+                      steep_share),
+                  gy = slope (
+                      {depth[x] - above[x], below[x] - depth[x],
+                          upper * (flags_above[x].x / kJoinsBelow & 1), here / kJoinsBelow & 1},
+                      steep_share);
+      const float u = static_cast<float> (x) + across;
+      const float nx = fx * gx, ny = fy * gy, nz = z + u * gx + v * gy;
+      const float ray = ray_y + u * u * fx2;
+      const float squared = z * z / ((nx * nx + ny * ny + nz * nz) * ray + 1e-6f);
+      const int distance = weight[x];
+      const float share = static_cast<float> (distance) * (1.f / kFarthest);
+      const auto root = static_cast<int> (255 * std::sqrt (share * squared) + 0.5f);
+      const int least = distance > 0 ? 1 : 0, most = root > 255 ? 255 : root;
+      weight[x] = static_cast<std::uint8_t> (most > least ? most : least);
+    };
+    weigh (0, 0, width > 1 ? 1 : 0);
+    for (int x = 1; x < width - 1; x++)
+      weigh (x, 1, 1);
+    if (width > 1)
+      weigh (width - 1, 1, 0);
   }
 
   const std::span<const SurfaceView> views_;
@@ -274,7 +317,7 @@ void
 make_blend_planes (
     std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
 {
-  Planes (views, which, depth_step, to).make ();
+  for_this_cpu ([&] { Planes (views, which, depth_step, to).make (); });
 }
 
 } // namespace rangecast

@@ -38,8 +38,8 @@ ReducedView::reduce (const SurfaceView &from)
   view_.far_m = from.view->far_m;
   SurfaceView to = {from.image, &view_};
   to.image.roi = {0, 0, width, height};
-  to.image.depth = {depth_.data (), width, height,
-      static_cast<std::ptrdiff_t> (sizeof (std::uint16_t)) * width};
+  to.image.depth = {
+      depth_.data (), width, height, static_cast<std::ptrdiff_t> (sizeof (std::uint16_t)) * width};
   to.image.colour = {
       colour_.data (), width, height, static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
   return to;

@@ -161,8 +161,7 @@ make_ways (Job &job, Kind &kind)
     StripSettings settings;
     settings.merge = job.merge;
     settings.max_gap = job.max_gap;
-    kind.ways.push_back (
-        make_strip_way ("blend-held", job.held_painter, kind.set, settings, true));
+    kind.ways.push_back (make_strip_way ("blend-held", job.held_painter, kind.set, settings, true));
   }
   for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
     GError *error = nullptr;
