@@ -138,6 +138,7 @@ gst_range_render_init (GstRangeRender *self)
   GstElement *download = add (self, "gldownload", "download");
   if (self->missing)
     return;
+  g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for people to see */
   gst_element_link_many (cylinder, render, download, nullptr);
   GstPad *sink = show_pad (self, cylinder, "sink", &sink_template);
   GST_PAD_SET_ACCEPT_INTERSECT (sink); /* caps that lack a field are for cylinderfilter to refuse */

@@ -6,7 +6,8 @@
  * Draws range images with OpenGL as bands of triangles along their rows, without building a mesh.
  * The camera orbits what the rig's cameras look at: by properties, which are controllable, and by
  * mouse, touch and keys (GstNavigation): drag to turn, drag with another button to move, wheel to
- * zoom, arrows, + and -, and the key r to go back.
+ * zoom, arrows, + and -, and the keys r and Home to go back. With #GstStripRender:fit it is centred
+ * on what is drawn.
  *
  * Where downstream asks for a frame rate of its own, the element makes it: it repeats and leaves
  * out frame sets, and in a live pipeline goes on drawing the last one when no other comes.
@@ -14,6 +15,8 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc ! cylinderfilter ! striprender auto-orbit=30 ! glimagesink
+ * gst-launch-1.0 avatartestsrc range-person-only=true ! striprender fit=true background-shade=0.5 !
+ * glimagesink
  * ]|
  *
  * Without a display: `GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device`, and gldownload behind it.
@@ -79,8 +82,10 @@ take_input_caps (GstStripRender *self, GstCaps *in)
   const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
   if (told && !status.ok ())
     return GST_FLOW_ERROR;
-  if (status.ok ())
+  if (status.ok ()) {
     priv->scene.set_rig (priv->info.rig);
+    priv->fit.reset ();
+  }
   priv->reporter.set_views (priv->info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
@@ -432,6 +437,7 @@ gst_strip_render_start (GstBaseTransform *base)
   priv->gl_error_posted = priv->no_context = priv->caps_refused = false;
   priv->live = false;
   priv->stats_text = {};
+  priv->fit.reset ();
   strip_reset_rate (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   {

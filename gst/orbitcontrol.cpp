@@ -55,6 +55,7 @@ void
 OrbitControl::go_back ()
 {
   orbit = {.fov_deg = orbit.fov_deg, .pan = {}};
+  home_requests++;
 }
 
 /* Of the screen: nobody has one as large, and what follows of larger ones is no number any more. */
@@ -184,7 +185,7 @@ bool
 OrbitControl::key (const char *name)
 {
   const std::string_view k = name;
-  if (k == "r")
+  if (k == "r" || k == "Home")
     go_back ();
   else if (k == "Left" || k == "Right")
     turn (k == "Left" ? -kKeyTurnDeg : kKeyTurnDeg, 0);

@@ -10,8 +10,9 @@
  * whoever shares it between threads does. */
 class OrbitControl {
 public:
-  rangecast::Orbit orbit; ///< as properties show it; azimuth within 360 degrees either way
-  double auto_orbit = 0;  ///< degrees a second
+  rangecast::Orbit orbit;  ///< as properties show it; azimuth within 360 degrees either way
+  double auto_orbit = 0;   ///< degrees a second
+  guint home_requests = 0; ///< how often somebody asked for the first view
 
   /** @param running_ns   time since the first picture
    *  @return the orbit at that time */

@@ -26,6 +26,7 @@ void
 StripDrawing::stop ()
 {
   painter_.stop ();
+  background_painter_.stop ();
   camera_painter_.stop ();
   panel_painter_.stop ();
   multisampler_.stop ();
@@ -63,7 +64,7 @@ StripPainter::Picture
 StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, Result &result) const
 {
   const StripRenderSettings &settings = *job.settings;
-  const rangecast::SceneFrame &frame = job.scene->frame ();
+  const rangecast::SceneFrame &frame = *job.frame;
   const rangecast::Eye eye = {place.side * settings.eye_distance_m / 2, settings.convergence_m};
   const auto matrices = rangecast::orbit_matrices (frame, job.orbit, place.aspect, true, eye,
       job.scene->hull (),
@@ -81,6 +82,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   picture.clip_from_world = rangecast::in_part (matrices.clip_from_world, part);
   for (int i = 0; i < 4; i++)
     picture.background[i] = background_channel (settings, i);
+  if (picture.background[3] >= 1)
+    picture.background_shade = float (settings.background_shade);
   picture.point_size = float (settings.point_size);
   picture.pixels_per_unit = float (place.height / (2 * std::tan (fov * M_PI / 360)));
   picture.mode = settings.strips.mode;
@@ -94,8 +97,10 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   picture.width = width_;
   picture.height = height_;
   picture.part = {place.x, place.y, place.width, place.height};
-  picture.covered = rangecast::covered_part (
-      picture.clip_from_world, job.scene->hull (), width_, height_, picture.part);
+  picture.covered = picture.background_shade > 0 /* which the same pass draws */
+                        ? picture.part
+                        : rangecast::covered_part (picture.clip_from_world, job.scene->hull (),
+                              width_, height_, picture.part);
   return picture;
 }
 
@@ -139,6 +144,8 @@ StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
     gl->Scissor (place.x, place.y, place.width, place.height);
   }
   call.has_targets = painter_.draw (picture, job.scene->layers ()) && call.has_targets;
+  if (picture.background_shade > 0 && picture.mode != rangecast::StripMode::kBlend)
+    background_painter_.draw (context_, picture.background, picture.background_shade, picture.part);
   if (job.settings->show_cameras)
     call.result.uploaded +=
         camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),

@@ -4,6 +4,7 @@
 #include "camerapainter.hpp"
 #include "multisampler.hpp"
 #include "panelpainter.hpp"
+#include "render/backgroundpainter.hpp"
 #include "stripeyes.hpp"
 #include "strippainter.hpp"
 #include "stripscene.hpp"
@@ -13,6 +14,7 @@
 struct StripDrawingJob {
   const StripScene *scene;
   const StripRenderSettings *settings;
+  const rangecast::SceneFrame *frame; ///< where the camera's home is
   rangecast::Orbit orbit;
   rangecast::ImageView<const rangecast::Rgbx> panel = {}; ///< over the picture; empty: none
   bool panel_changed = false;
@@ -60,6 +62,7 @@ private:
   EyePlaces eyes_;
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;
+  BackgroundPainter background_painter_;
   CameraPainter camera_painter_;
   PanelPainter panel_painter_;
   Multisampler multisampler_;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <algorithm>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangestatus.hpp>
 
@@ -70,6 +71,30 @@ update_panel (GstStripRender *self, std::size_t views, GstClockTime frame_set_pt
   return true;
 }
 
+/* The images of the views that are to be drawn. */
+static std::span<const rangecast::RangeImage>
+visible_images (
+    GstStripRenderPrivate *priv, std::span<const rangecast::RangeImage> images, guint64 view_mask)
+{
+  const auto end = std::ranges::copy_if (images, priv->visible.begin (),
+      [view_mask] (const rangecast::RangeImage &image) { return view_mask >> image.view_id & 1; });
+  return {priv->visible.begin (), end.out};
+}
+
+/* Where the camera's home is. */
+static const rangecast::SceneFrame &
+home_frame (GstStripRenderPrivate *priv, const StripRenderSettings &settings,
+    const rangecast::Orbit &orbit, GstClockTime pts)
+{
+  if (!settings.fit) {
+    priv->fit.reset ();
+    return priv->scene.frame ();
+  }
+  const EyePlaces eyes (priv->out);
+  return priv->fit.update (
+      priv->scene, {orbit, eyes.all ().front ().aspect, pts, settings.camera.home_requests});
+}
+
 /* May throw. */
 static GstFlowReturn
 draw_frame (
@@ -91,11 +116,14 @@ draw_frame (
     settings.strips.mode = rangecast::StripMode::kStrips;
   const bool again = frame_set == priv->drawn;
   const auto orbit = settings.camera.at (orbit_time (priv, running));
-  priv->scene.build (frame.views (), settings, orbit, again);
+  priv->scene.build (
+      visible_images (priv, frame.views (), settings.view_mask), settings, orbit, again);
   gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
-  StripDrawingJob job = {&priv->scene, &settings, orbit};
+  const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
+  StripDrawingJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {
-    job.panel_changed = update_panel (self, frame.views ().size (), GST_BUFFER_PTS (frame_set));
+    job.panel_changed =
+        update_panel (self, priv->scene.layers ().size (), GST_BUFFER_PTS (frame_set));
     job.panel = priv->stats_panel.picture ();
   }
   const auto result = priv->drawing.draw (GST_GL_BASE_FILTER (self)->context, job, out);
@@ -107,7 +135,7 @@ draw_frame (
   if (!again)
     priv->reporter.passed (GST_ELEMENT (self), frame_set);
   std::lock_guard guard (priv->lock);
-  priv->settings.camera.shown (result.matrices, priv->scene.frame (), result.width, result.height);
+  priv->settings.camera.shown (result.matrices, home, result.width, result.height);
   priv->scene.count_into (priv->stats);
   priv->stats.uploaded_bytes = result.uploaded;
   priv->stats.uploaded_total += result.uploaded;

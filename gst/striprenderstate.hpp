@@ -23,6 +23,7 @@
 #include "gststriprender.h"
 #include "picturegrid.hpp"
 #include "picturethread.hpp"
+#include "render/viewfit.hpp"
 #include "statsreporter.hpp"
 #include "stripdrawing.hpp"
 #include "stripscene.hpp"
@@ -59,6 +60,9 @@ struct GstStripRenderPrivate {
    * GL thread while whoever has them waits for it */
   StripScene scene;
   GstBuffer *drawn = nullptr; /* whose strips the scene has, if it may be drawn again */
+  ViewFit fit;
+  std::array<rangecast::RangeImage, rangecast::kMaxViews>
+      visible; /* of the frame set, by view-mask */
   StripDrawing drawing;
   StatsText stats_text;
   rangecast::StatsPanel stats_panel;

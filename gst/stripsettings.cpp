@@ -65,6 +65,10 @@ static const NumberRow kNumbers[] = {
         "for "
         "the same surface (0 to 1, default 0.02)",
         0, 1, 0.02, [] (Settings &s) -> double & { return s.blend_range_m; }},
+    {"background-shade", "Background shade",
+        "Share by which an opaque background is lighter at the top and darker at the bottom (0 to "
+        "1, default 0)",
+        0, 1, 0, [] (Settings &s) -> double & { return s.background_shade; }},
     {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
         0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
     {"eye-distance", "Eye distance",
@@ -83,6 +87,10 @@ struct SwitchRow {
   bool &(*field) (Settings &);
 };
 static const SwitchRow kSwitches[] = {
+    {"fit", "Fit",
+        "Camera properties count from a view that is centred on what is drawn and as near as it "
+        "fits, found when the stream begins and by the key r (default false: from the first view)",
+        kFlags, [] (Settings &s) -> bool & { return s.fit; }},
     {"show-cameras", "Show cameras",
         "Also draw where the rig's cameras stand, and their frusta from near to far (default "
         "false)",
@@ -109,6 +117,7 @@ enum : guint {
   PROP_SWITCHES = PROP_NUMBERS + std::size (kNumbers),
   PROP_MODE = PROP_SWITCHES + std::size (kSwitches),
   PROP_BACKGROUND,
+  PROP_VIEW_MASK,
   PROP_MAX_GAP,
   PROP_SAMPLES,
   PROP_HOLD_TIME,
@@ -158,6 +167,11 @@ install_strip_settings (GObjectClass *object_class)
       g_param_spec_uint ("background", "Background",
           "Colour behind the scene, ARGB (default 0xff20242a)", 0, G_MAXUINT32,
           Settings::kDefaultBackground, kFlags));
+  g_object_class_install_property (object_class, PROP_VIEW_MASK,
+      g_param_spec_uint64 ("view-mask", "View mask",
+          "The views that are drawn: bit n is the view with view-id n (default "
+          "0xffffffffffffffff: all; 0: the background alone)",
+          0, G_MAXUINT64, G_MAXUINT64, kFlags));
   g_object_class_install_property (object_class, PROP_MAX_GAP,
       g_param_spec_int ("max-gap", "Maximum gap",
           "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 2)", 0, 1000,
@@ -214,6 +228,8 @@ set_strip_setting (Settings &settings, guint id, const GValue *value)
     settings.strips.mode = StripMode (g_value_get_enum (value));
   else if (id == PROP_BACKGROUND)
     settings.background = g_value_get_uint (value);
+  else if (id == PROP_VIEW_MASK)
+    settings.view_mask = g_value_get_uint64 (value);
   else if (id == PROP_MAX_GAP)
     settings.strips.max_gap = g_value_get_int (value);
   else if (id == PROP_SAMPLES)
@@ -237,6 +253,8 @@ get_strip_setting (const Settings &settings, guint id, GValue *value)
     g_value_set_enum (value, int (settings.strips.mode));
   else if (id == PROP_BACKGROUND)
     g_value_set_uint (value, settings.background);
+  else if (id == PROP_VIEW_MASK)
+    g_value_set_uint64 (value, settings.view_mask);
   else if (id == PROP_MAX_GAP)
     g_value_set_int (value, settings.strips.max_gap);
   else if (id == PROP_SAMPLES)

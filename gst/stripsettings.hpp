@@ -13,7 +13,10 @@ struct StripRenderSettings {
 
   OrbitControl camera;
   guint background = kDefaultBackground; ///< ARGB
+  double background_shade = 0;           ///< share, of opaque backgrounds
   double point_size = 1;                 ///< footprints of a pixel
+  bool fit = false;                      ///< to what is drawn
+  guint64 view_mask = G_MAXUINT64;       ///< bit n: view-id n is drawn
   bool show_cameras = false;
   bool back_faces = false;
   double view_gap_m = 0.012;

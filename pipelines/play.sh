@@ -42,7 +42,7 @@ fi
 
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
 view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
-  ! striprender "auto-orbit=$orbit" ! "$picture")
+  ! striprender fit=true background-shade=0.5 "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
   drop_empty "$film" ""
   launch "${view[@]}" ! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! webmmux ! filesink "location=$film"

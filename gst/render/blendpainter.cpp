@@ -200,8 +200,8 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   draw_layers (layers, picture, kSum);
   const auto shift = rangecast::depth_shift (
       picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
-  targets_.resolve (
-      picture.part, picture.covered, picture.background, picture.keeps_depth ? &shift : nullptr);
+  targets_.resolve (picture.part, picture.covered, picture.background, picture.background_shade,
+      picture.keeps_depth ? &shift : nullptr);
   context_->gl_vtable->BindVertexArray (0);
   context_->gl_vtable->Disable (GL_DEPTH_TEST);
   gst_gl_context_clear_shader (context_);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "../glshader.hpp"
+#include "backgroundpainter.hpp"
 
 #ifndef GL_DRAW_FRAMEBUFFER_BINDING
 #define GL_DRAW_FRAMEBUFFER_BINDING 0x8CA6
@@ -27,7 +28,6 @@
 /* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
  * what two views draw. */
 static const char *const kResolveShader = R"(
-precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
@@ -35,11 +35,11 @@ uniform sampler2D u_sum; /* R, G, B times weight; weight */
 uniform sampler2D u_depth;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 #endif
-uniform vec4 u_background;
 uniform ivec4 u_part; /* first and last pixel */
 out vec4 fragment;
 void main ()
 {
+  vec4 ground = background (gl_FragCoord.xy);
   ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
   vec4 sum = texelFetch (u_sum, at, 0);
   vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
@@ -57,10 +57,10 @@ void main ()
   float distance = u_shift.y / (2.0 * depth - 1.0 - u_shift.x) - u_shift.z;
   gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
 #endif
-  float behind = (1.0 - coverage) * u_background.a;
+  float behind = (1.0 - coverage) * ground.a;
   float alpha = coverage + behind;
-  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * u_background.rgb;
-  fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : u_background;
+  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * ground.rgb;
+  fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : ground;
 }
 )";
 
@@ -77,7 +77,8 @@ BlendTargets::start (GstGLContext *context, GError **error)
 {
   context_ = context;
   for (std::size_t i = 0; i < std::size (shaders_); i++) {
-    const std::string source = "#define WITH_DEPTH " + std::to_string (i) + kResolveShader;
+    const std::string source =
+        "#define WITH_DEPTH " + std::to_string (i) + kBackgroundFunction + kResolveShader;
     shaders_[i] = make_shader (context, kCoveringVertexShader, source.c_str (), error);
     if (!shaders_[i])
       return false;
@@ -181,7 +182,7 @@ BlendTargets::begin_sum ()
 
 void
 BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
-    const float (&background)[4], const rangecast::DepthShift *shift)
+    const float (&background)[4], float shade, const rangecast::DepthShift *shift)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   GstGLShader *shader = shaders_[shift ? 1 : 0];
@@ -206,8 +207,7 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
       shader, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
   if (shift)
     gst_gl_shader_set_uniform_3f (shader, "u_shift", shift->a, shift->b, shift->g);
-  gst_gl_shader_set_uniform_4f (
-      shader, "u_background", background[0], background[1], background[2], background[3]);
+  set_background_uniforms (shader, background, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);
   gl->BindVertexArray (0);

@@ -34,10 +34,11 @@ public:
    *  @param covered     those that something may be drawn in, and one more on each side; the rest
    *                     becomes background
    *  @param background  R, G, B, A, straight
+   *  @param shade       see BackgroundPainter::draw(); only what is covered is shaded
    *  @param shift       of the depth pass; the surfaces' depth is written, too: what is drawn later
    *                     stands among them. nullptr: none is written */
   void resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
-      const float (&background)[4], const rangecast::DepthShift *shift);
+      const float (&background)[4], float shade, const rangecast::DepthShift *shift);
 
 private:
   bool make (int width, int height, bool precise);

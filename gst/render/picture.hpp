@@ -9,9 +9,10 @@
 /** What the painters draw: one picture of a frame set. */
 struct RenderPicture {
   rangecast::Mat4 clip_from_world;
-  float background[4];   ///< R, G, B, A
-  float point_size;      ///< of a pixel's footprint
-  float pixels_per_unit; ///< pixels that a length of 1 at a distance of 1 covers
+  float background[4];        ///< R, G, B, A
+  float background_shade = 0; ///< see BackgroundPainter::draw()
+  float point_size;           ///< of a pixel's footprint
+  float pixels_per_unit;      ///< pixels that a length of 1 at a distance of 1 covers
   rangecast::StripMode mode;
   double depth_step;
   bool back_faces = false;  ///< mode strips: where no front is; mode blend shows all

@@ -38,7 +38,8 @@ struct Recording {
   [[nodiscard]] std::string uri () const { return "file://" + path; }
 };
 
-/* Share of the picture's pixels that are not striprender's background. */
+/* Share of the picture's pixels that are not as their row's first one, which is the background:
+ * what is shown is centred, and the background changes from row to row. */
 static double
 drawn_share (GstSample *sample)
 {
@@ -50,8 +51,9 @@ drawn_share (GstSample *sample)
   for (int y = 0; y < info.height; y++) {
     auto pixel = static_cast<const guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0)) +
                  y * GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0);
+    const guint8 *first = pixel;
     for (int x = 0; x < info.width; x++, pixel += 4)
-      drawn += pixel[0] != 0x20 || pixel[1] != 0x24 || pixel[2] != 0x2a;
+      drawn += std::abs (pixel[0] - first[0]) > 4 || std::abs (pixel[1] - first[1]) > 4;
   }
   gst_video_frame_unmap (&frame);
   return drawn / double (info.width * info.height);

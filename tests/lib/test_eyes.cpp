@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <rangecast/strips/orbit.hpp>
+#include <rangecast/strips/scene_fit.hpp>
 #include <rangecast/strips/scene_hull.hpp>
 #include <rangecast/strips/stats_panel.hpp>
 #include <rangecast/strips/view_tint.hpp>
@@ -167,4 +168,101 @@ TEST (StatsPanel, is_as_large_as_its_text_and_no_larger_than_said)
   EXPECT_EQ (panel.picture ().width, StatsPanel::kMaxWidth);
   EXPECT_LE (panel.picture ().height, (StatsPanel::kMaxLines + 1) * 20);
   EXPECT_EQ (panel.picture ().data, memory); /* nothing new was allocated */
+}
+
+/* ---- fits ---- */
+
+namespace {
+
+struct Extent {
+  double left = 1, right = -1, top = 1, bottom = -1; /* -1 to 1 */
+
+  Extent (const Mat4 &m, std::span<const Vec3> points)
+  {
+    for (const Vec3 &p : points) {
+      const Clip c = clip (m, p);
+      left = std::min (left, c.x / c.w);
+      right = std::max (right, c.x / c.w);
+      top = std::min (top, c.y / c.w);
+      bottom = std::max (bottom, c.y / c.w);
+    }
+  }
+};
+
+/* A slanted slab of points that lies beside what the camera looks at; its corners are no noise. */
+std::vector<Vec3>
+slab ()
+{
+  std::vector<Vec3> points;
+  for (int i = 0; i < 40; i++)
+    for (int j = 0; j < 40; j++)
+      for (int k = 0; k < (i % 39 == 0 && j % 39 == 0 ? 10 : 1); k++)
+        points.push_back ({0.3 + 0.01 * i, -0.1 + 0.004 * j, 0.7 + 0.008 * i + 0.002 * j});
+  return points;
+}
+
+} // namespace
+
+TEST (Fit, points_touch_the_margins_from_any_side)
+{
+  const SceneFrame scene = scene_frame (one_camera ());
+  const std::vector<Vec3> points = slab ();
+  for (double azimuth : {0.0, 40.0, -120.0, 180.0})
+    for (double elevation : {0.0, 50.0, -89.0})
+      for (double aspect : {0.3, 1.0, 3.0})
+        for (double fov : {0.0, 20.0, 80.0}) {
+          const Orbit orbit{
+              .azimuth_deg = azimuth, .elevation_deg = elevation, .fov_deg = fov, .pan = {}};
+          const SceneFrame fitted = fitted_frame (scene, orbit, aspect, points);
+          const auto matrices = orbit_matrices (fitted, orbit, aspect, true, {}, points);
+          SCOPED_TRACE (
+              ::testing::Message () << azimuth << " " << elevation << " " << aspect << " " << fov);
+          const Extent extent (matrices.clip_from_world, points);
+          EXPECT_NEAR (
+              std::max (extent.right - extent.left, extent.bottom - extent.top), 1.7, 0.02);
+          EXPECT_NEAR (extent.left, -extent.right, 0.02);
+          EXPECT_NEAR (extent.top, -extent.bottom, 0.02);
+        }
+}
+
+TEST (Fit, target_is_in_the_middle_of_the_depth)
+{
+  const SceneFrame fitted = fitted_frame (scene_frame (one_camera ()), {}, 1, slab ());
+  EXPECT_NEAR (fitted.target.z, 0.7 + (0.008 * 39 + 0.002 * 39) / 2, 0.005);
+}
+
+TEST (Fit, one_in_a_thousand_is_noise)
+{
+  const SceneFrame scene = scene_frame (one_camera ());
+  std::vector<Vec3> points = slab ();
+  const SceneFrame before = fitted_frame (scene, {}, 1, points);
+  points.push_back ({-40, 3, 0.5});
+  const SceneFrame after = fitted_frame (scene, {}, 1, points);
+  EXPECT_NEAR (after.distance_m, before.distance_m, 0.01);
+  EXPECT_LT (norm (after.target - before.target), 0.01);
+}
+
+TEST (Fit, nothing_and_a_single_point_leave_a_view)
+{
+  const SceneFrame scene = scene_frame (one_camera ());
+  EXPECT_EQ (fitted_frame (scene, {}, 1, {}).distance_m, scene.distance_m);
+  const std::vector<Vec3> one (100, Vec3{0.2, 0.3, 0.9});
+  const SceneFrame fitted = fitted_frame (scene, {}, 1, one);
+  EXPECT_NEAR (norm (fitted.target - one[0]), 0, 1e-6);
+  EXPECT_GT (fitted.distance_m, 0);
+}
+
+TEST (Fit, a_tenth_is_about_the_same)
+{
+  SceneFrame a, b;
+  a.distance_m = 1;
+  b.distance_m = 1.09;
+  EXPECT_TRUE (is_about_same (a, b, 45));
+  b.distance_m = 1.11;
+  EXPECT_FALSE (is_about_same (a, b, 45));
+  b = a;
+  b.target.x = 0.07; /* the picture is 0.83 m high there */
+  EXPECT_TRUE (is_about_same (a, b, 45));
+  b.target.x = 0.1;
+  EXPECT_FALSE (is_about_same (a, b, 45));
 }

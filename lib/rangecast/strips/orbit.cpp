@@ -147,25 +147,43 @@ scene_frame (const Rig &rig)
   return scene;
 }
 
+/* Orbit::pan's axes in the world. */
+static Vec3
+world_from_pan (const SceneFrame &scene, Vec3 p)
+{
+  const Vec3 right = normalised (cross (scene.up, scene.to_first));
+  return p.x * right + p.y * scene.up + p.z * scene.to_first;
+}
+
+/* The camera's axes in those of Orbit::pan. */
+static OrbitAxes
+axes_in_pan (const SceneFrame &scene, const Orbit &orbit)
+{
+  const double azimuth = orbit.azimuth_deg * kDegree;
+  const double elevation =
+      std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
+  const double sa = std::sin (azimuth), ca = std::cos (azimuth);
+  const double se = std::sin (elevation), ce = std::cos (elevation);
+  return {{ca, 0, -sa}, {-se * sa, ce, -se * ca}, {ce * sa, se, ce * ca}};
+}
+
+OrbitAxes
+orbit_axes (const SceneFrame &scene, const Orbit &orbit)
+{
+  const OrbitAxes pan = axes_in_pan (scene, orbit);
+  return {world_from_pan (scene, pan.right), world_from_pan (scene, pan.up),
+      world_from_pan (scene, pan.back)};
+}
+
 OrbitMatrices
 orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool flip_y,
     const Eye &eye, std::span<const Vec3> hull, double room_m)
 {
-  const Vec3 right = normalised (cross (scene.up, scene.to_first));
-  const double azimuth = orbit.azimuth_deg * kDegree;
-  const double elevation =
-      std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
   const double distance = orbit.distance_m > 0 ? orbit.distance_m : scene.distance_m;
-  const auto world_from_pan = [&] (Vec3 p) {
-    return p.x * right + p.y * scene.up + p.z * scene.to_first;
-  };
-  /* the camera's axes, told as Orbit::pan is: to its right, up, and away from the target */
-  const double sa = std::sin (azimuth), ca = std::cos (azimuth);
-  const double se = std::sin (elevation), ce = std::cos (elevation);
-  const Vec3 pan_x{ca, 0, -sa}, pan_y{-se * sa, ce, -se * ca}, pan_z{ce * sa, se, ce * ca};
-  Stand stand{{}, world_from_pan (pan_x), world_from_pan (pan_y), world_from_pan (pan_z)};
-  stand.position =
-      scene.target + world_from_pan (orbit.pan) + distance * stand.back + eye.right_m * stand.right;
+  const OrbitAxes axes = orbit_axes (scene, orbit), pan = axes_in_pan (scene, orbit);
+  Stand stand{{}, axes.right, axes.up, axes.back};
+  stand.position = scene.target + world_from_pan (scene, orbit.pan) + distance * stand.back +
+                   eye.right_m * stand.right;
 
   const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
   const double half = std::tan (fov / 2); /* of the picture's height, at a distance of 1 */
@@ -178,8 +196,8 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
       -shift, down * scene.off_centre_y, (far + near) / (near - far), -1, 0, 0,
       2 * far * near / (near - far), 0};
   const double height = 2 * half * distance;
-  return {product (clip_from_eye, stand.eye_from_world ()), distance, height * aspect * pan_x,
-      -height * pan_y};
+  return {product (clip_from_eye, stand.eye_from_world ()), distance, height * aspect * pan.right,
+      -height * pan.up};
 }
 
 Mat4

@@ -37,6 +37,12 @@ struct Orbit {
   Vec3 pan;                 ///< moves the target: right, up, towards the first view; metres
 };
 
+/** Unit vectors of the orbiting camera, world: to its right, up, and away from what it looks at. */
+struct OrbitAxes {
+  Vec3 right, up, back;
+};
+OrbitAxes orbit_axes (const SceneFrame &scene, const Orbit &orbit);
+
 /** 4x4, column-major, as OpenGL takes it. */
 using Mat4 = std::array<float, 16>;
 

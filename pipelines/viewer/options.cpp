@@ -1,15 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "viewer-options.hpp"
+#include "options.hpp"
 
 #include <gst/gst.h>
 
 #include <cstdio>
 #include <string>
-
-const char kViewerKeys[] =
-    "drag: turn   drag with another button: move   wheel, + and -: zoom   arrows: turn\n"
-    "r: first view again   s: picture (PNG)   p: point cloud (PLY)   space: pause (files)\n"
-    "h: these keys   q, Escape: quit\n";
 
 static bool
 bad_option (const char *option, const char *expected, const char *got)
@@ -62,9 +57,9 @@ check_background (ViewerOptions &options)
 static bool
 check_mode (const ViewerOptions &options)
 {
-  const std::string mode = options.mode ? options.mode : "strips";
-  if (mode != "strips" && mode != "rectangles" && mode != "points")
-    return bad_option ("--mode", "strips, rectangles or points", options.mode);
+  const std::string mode = options.mode ? options.mode : "blend";
+  if (mode != "blend" && mode != "strips" && mode != "rectangles" && mode != "points")
+    return bad_option ("--mode", "blend, strips, rectangles or points", options.mode);
   return true;
 }
 
@@ -97,7 +92,7 @@ check_display ()
 }
 
 bool
-parse_arguments (int *argc, char ***argv, ViewerOptions &options)
+parse_arguments (int *argc, char ***argv, const char *keys, ViewerOptions &options)
 {
   const GOptionEntry entries[] = {{"listen", 0, 0, G_OPTION_ARG_INT, &options.listen,
                                       "Show the RTP stream that comes to this UDP port", "PORT"},
@@ -105,8 +100,8 @@ parse_arguments (int *argc, char ***argv, ViewerOptions &options)
           "Jitter buffer of RTP and RTSP (default 30)", "MS"},
       {"no-filter", 0, 0, G_OPTION_ARG_NONE, &options.no_filter,
           "Leave the points that several cameras saw", nullptr},
-      {"mode", 0, 0, G_OPTION_ARG_STRING, &options.mode, "strips (default), rectangles or points",
-          "MODE"},
+      {"mode", 0, 0, G_OPTION_ARG_STRING, &options.mode,
+          "blend (default), strips, rectangles or points", "MODE"},
       {"background", 0, 0, G_OPTION_ARG_STRING, &options.background, "Colour behind the scene",
           "RRGGBB"},
       {"size", 0, 0, G_OPTION_ARG_STRING, &options.size, "Picture size (default 640x480)", "WxH"},
@@ -120,7 +115,7 @@ parse_arguments (int *argc, char ***argv, ViewerOptions &options)
       {}};
   GOptionContext *context =
       g_option_context_new ("FILE | URI | --listen PORT - show frame sets in a window");
-  g_option_context_set_description (context, kViewerKeys);
+  g_option_context_set_description (context, keys);
   g_option_context_add_main_entries (context, entries, nullptr);
   g_option_context_add_group (context, gst_init_get_option_group ());
   GError *error = nullptr;

@@ -4,9 +4,6 @@
 
 #include <glib.h>
 
-/** What the keys do, for people. */
-extern const char kViewerKeys[];
-
 /** What the command line says. clear_options() frees its strings. */
 struct ViewerOptions {
   gint listen = 0; /* UDP port; 0: none */
@@ -24,9 +21,10 @@ struct ViewerOptions {
   guint background_argb = 0;     /* if background is given */
 };
 
-/** False after saying what is wrong with them. Also takes GStreamer's options, and initialises it.
- */
-bool parse_arguments (int *argc, char ***argv, ViewerOptions &options);
+/** Also takes GStreamer's options, and initialises it.
+ *  @param keys  what the keys do, for --help
+ *  @return false after saying what is wrong with them */
+bool parse_arguments (int *argc, char ***argv, const char *keys, ViewerOptions &options);
 void clear_options (ViewerOptions &options);
 
 /** Whether a window can be seen; says why not. */

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "viewfit.hpp"
+
+#include <rangecast/geometry/point_cloud.hpp>
+#include <utility>
+
+using rangecast::SceneFrame;
+using rangecast::Vec3;
+
+static constexpr GstClockTime kSettleTime = GST_SECOND / 2;
+static constexpr std::size_t kMaxPoints = 16384; /* of all views: enough for a fit */
+static constexpr std::size_t kMinPoints = 16;
+
+bool
+ViewFit::is_due (GstClockTime pts) const
+{
+  if (!fitted_)
+    return true;
+  return !settled_ && (pts < tried_ || pts - tried_ >= kSettleTime);
+}
+
+/* Whoever chooses a place for the camera wants it to stay there. */
+bool
+ViewFit::is_moved_by_hand (const rangecast::Orbit &orbit) const
+{
+  const rangecast::Orbit &before = picture_.orbit;
+  return fitted_ &&
+         (orbit.distance_m != before.distance_m || orbit.elevation_deg != before.elevation_deg ||
+             norm (orbit.pan - before.pan) > 0);
+}
+
+/* @return in how many views the points are; 0 if they are too few */
+static std::size_t
+take_points (const StripScene &scene, std::vector<Vec3> &points)
+{
+  std::size_t count = 0, views = 0;
+  for (const StripPainter::Layer &layer : scene.layers ()) {
+    const std::size_t of_view = rangecast::count_points (layer.image);
+    count += of_view;
+    views += of_view > 0;
+  }
+  points.reserve (kMaxPoints + rangecast::kMaxViews);
+  for (const StripPainter::Layer &layer : scene.layers ())
+    rangecast::append_points (layer.image, *layer.view, count / kMaxPoints + 1, points);
+  return count >= kMinPoints ? views : 0;
+}
+
+void
+ViewFit::refit (const StripScene &scene, const Picture &picture)
+{
+  std::vector<Vec3> points;
+  const std::size_t views = take_points (scene, points);
+  tried_ = picture.pts;
+  if (views == 0 || views < views_)
+    return;
+  const SceneFrame frame =
+      rangecast::fitted_frame (scene.frame (), picture.orbit, picture.aspect, points);
+  const double fov = picture.orbit.fov_deg > 0 ? picture.orbit.fov_deg : frame.fov_deg;
+  settled_ = !GST_CLOCK_TIME_IS_VALID (picture.pts) ||
+             (fitted_ && views == views_ && rangecast::is_about_same (frame, frame_, fov));
+  if (settled_ && fitted_)
+    return; /* no jump for a small difference */
+  fitted_ = true;
+  views_ = views;
+  points_ = std::move (points);
+  picture_ = picture;
+  frame_ = frame;
+}
+
+const SceneFrame &
+ViewFit::update (const StripScene &scene, const Picture &picture)
+{
+  if (std::exchange (picture_.home_requests, picture.home_requests) != picture.home_requests) {
+    fitted_ = settled_ = false;
+    views_ = 0;
+  }
+  if (is_moved_by_hand (picture.orbit))
+    settled_ = true;
+  if (is_due (picture.pts))
+    refit (scene, picture);
+  if (points_.empty ())
+    return scene.frame ();
+  if (picture.aspect != picture_.aspect || picture.orbit.fov_deg != picture_.orbit.fov_deg) {
+    picture_.aspect = picture.aspect;
+    picture_.orbit.fov_deg = picture.orbit.fov_deg;
+    frame_ = rangecast::fitted_frame (scene.frame (), picture_.orbit, picture_.aspect, points_);
+  }
+  return frame_;
+}

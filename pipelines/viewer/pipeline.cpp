@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The viewer's pipeline: a file, a URI or RTP, to the window. */
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "viewer.hpp"
+
+static const char kRtpCaps[] =
+    "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+
+static const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
+
+/* ---- frame sets ---- */
+
+/* Turns on by the time that has passed in the file, so that it neither jumps where the file begins
+ * anew nor goes on while it is paused, as striprender's auto-orbit would. */
+static void
+turn_on (Viewer &viewer, GstClockTime pts)
+{
+  const GstClockTime last = viewer.last_pts;
+  viewer.last_pts = pts;
+  if (viewer.options.auto_orbit == 0 || !GST_CLOCK_TIME_IS_VALID (last) ||
+      !GST_CLOCK_TIME_IS_VALID (pts) || pts <= last || pts - last > GST_SECOND)
+    return;
+  gdouble azimuth = 0;
+  g_object_get (viewer.render, "azimuth", &azimuth, nullptr);
+  azimuth += viewer.options.auto_orbit * double (pts - last) / GST_SECOND;
+  g_object_set (viewer.render, "azimuth", std::remainder (azimuth, 360.0), nullptr);
+}
+
+static GstPadProbeReturn
+on_frame_set (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
+  GstCaps *caps = gst_pad_get_current_caps (pad);
+  GstSample *sample = gst_sample_new (buffer, caps, nullptr, nullptr);
+  gst_clear_caps (&caps);
+  viewer.seen_frames = true;
+  if (viewer.is_file)
+    turn_on (viewer, GST_BUFFER_PTS (buffer));
+  std::unique_lock guard (viewer.lock);
+  std::swap (sample, viewer.frame_set);
+  guard.unlock ();
+  if (sample)
+    gst_sample_unref (sample);
+  return GST_PAD_PROBE_OK;
+}
+
+/* ---- from frame sets to the window ---- */
+
+static GstElement *
+add (Viewer &viewer, const char *factory)
+{
+  GstElement *element = gst_element_factory_make (factory, nullptr);
+  if (!element) {
+    g_printerr ("rangecast-viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the "
+                "plugins of "
+                "gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
+        factory);
+    std::exit (1);
+  }
+  gst_bin_add (GST_BIN (viewer.pipeline), element);
+  return element;
+}
+
+static void
+set_picture_size (Viewer &viewer, int width, int height)
+{
+  GstCaps *caps = gst_caps_new_simple (
+      "video/x-raw", "width", G_TYPE_INT, width, "height", G_TYPE_INT, height, nullptr);
+  gst_caps_set_features (caps, 0, gst_caps_features_new ("memory:GLMemory", nullptr));
+  g_object_set (viewer.size, "caps", caps, nullptr);
+  gst_caps_unref (caps);
+}
+
+struct Reshape {
+  Viewer *viewer;
+  int width, height; /* pixels */
+};
+
+static gboolean
+follow_window (gpointer user_data)
+{
+  auto reshape = static_cast<Reshape *> (user_data);
+  set_picture_size (*reshape->viewer, reshape->width, reshape->height);
+  reshape->viewer->playback->redraw_if_paused ();
+  return G_SOURCE_REMOVE;
+}
+
+/* A larger window shows a larger picture, not a stretched one. */
+static gboolean
+on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  if (viewer.seen_frames && std::min (width, height) >= 16)
+    g_idle_add_full (G_PRIORITY_DEFAULT, follow_window,
+        new Reshape{&viewer, int (width), int (height)},
+        [] (gpointer reshape) { delete static_cast<Reshape *> (reshape); });
+  return FALSE; /* glimagesink does its own part */
+}
+
+static void
+add_probe (GstElement *element, const char *pad_name, GstPadProbeType type,
+    GstPadProbeCallback probe, Viewer &viewer)
+{
+  GstPad *pad = gst_element_get_static_pad (element, pad_name);
+  gst_pad_add_probe (pad, type, probe, &viewer, nullptr);
+  gst_object_unref (pad);
+}
+
+static gboolean
+redraw_if_paused (gpointer user_data)
+{
+  static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
+  return G_SOURCE_REMOVE;
+}
+
+static void
+on_view_changed (GObject *, GParamSpec *, gpointer user_data)
+{
+  g_idle_add (redraw_if_paused, user_data);
+}
+
+static GstVideoOverlayComposition *
+on_draw (GstElement *, GstSample *sample, gpointer user_data)
+{
+  return static_cast<Viewer *> (user_data)->overlay->draw (sample);
+}
+
+/* Frame sets to the window. */
+static void
+build_view (Viewer &viewer)
+{
+  const ViewerOptions &options = viewer.options;
+  viewer.first = add (viewer, "queue");
+  viewer.render = add (viewer, "striprender");
+  viewer.size = add (viewer, "capsfilter");
+  viewer.overlay_element = add (viewer, "overlaycomposition");
+  viewer.sink = add (viewer, "glimagesink");
+  g_object_set (viewer.first, "max-size-buffers", 2, "max-size-bytes", 0, "max-size-time",
+      guint64 (0), nullptr);
+  set_picture_size (viewer, options.width, options.height);
+  g_object_set (viewer.render, "fit", TRUE, nullptr);
+  if (options.background)
+    g_object_set (viewer.render, "background", options.background_argb, nullptr);
+  else
+    g_object_set (viewer.render, "background-shade", 0.5, nullptr);
+  if (options.mode)
+    gst_util_set_object_arg (G_OBJECT (viewer.render), "mode", options.mode);
+  if (!viewer.is_file)
+    g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
+  if (!viewer.is_file) /* the view turns while the stream stalls, too */
+    g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
+  GstElement *before = viewer.first;
+  if (!options.no_filter) {
+    before = add (viewer, "cylinderfilter");
+    gst_element_link (viewer.first, before);
+  }
+  gst_element_link_many (
+      before, viewer.render, viewer.size, viewer.overlay_element, viewer.sink, nullptr);
+  add_probe (viewer.render, "sink", GST_PAD_PROBE_TYPE_BUFFER, on_frame_set, viewer);
+  watch_controls (viewer);
+  g_signal_connect (viewer.overlay_element, "draw", G_CALLBACK (on_draw), &viewer);
+  g_signal_connect (viewer.sink, "client-reshape", G_CALLBACK (on_reshape), &viewer);
+  g_signal_connect (viewer.render, "notify", G_CALLBACK (on_view_changed), &viewer);
+}
+
+static void
+build_receiver (Viewer &viewer)
+{
+  GstElement *source = add (viewer, "udpsrc"), *jitter = add (viewer, "rtpjitterbuffer"),
+             *depayloader = add (viewer, "rtpneighbourcodedepay"), *queue = add (viewer, "queue"),
+             *decoder = add (viewer, "neighbourcodedec");
+  GstCaps *caps = gst_caps_from_string (kRtpCaps);
+  g_object_set (source, "port", viewer.options.listen, "reuse", FALSE, "buffer-size", 4 << 20,
+      "caps", caps, nullptr);
+  gst_caps_unref (caps);
+  g_object_set (jitter, "latency", viewer.options.latency_ms, nullptr);
+  g_object_set (queue, "max-size-buffers", 4, nullptr);
+  gst_util_set_object_arg (G_OBJECT (queue), "leaky", "downstream");
+  gst_element_link_many (source, jitter, depayloader, queue, decoder, viewer.first, nullptr);
+}
+
+static void
+on_pad_added (GstElement *, GstPad *pad, gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  GstPad *sink = gst_element_get_static_pad (viewer.first, "sink");
+  GstCaps *caps = gst_pad_get_current_caps (pad);
+  const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
+  if (structure && gst_structure_has_name (structure, "video/x-range") && !gst_pad_is_linked (sink))
+    gst_pad_link (pad, sink);
+  gst_object_unref (sink);
+  gst_clear_caps (&caps);
+}
+
+gboolean
+refuse_input (gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  if (!viewer.failed)
+    fail (viewer, std::string (viewer.options.inputs[0]) +
+                      ": expected range frame sets (a .rcnc recording, or a stream of them)");
+  return G_SOURCE_REMOVE;
+}
+
+static void
+on_no_more_pads (GstElement *, gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  GstPad *sink = gst_element_get_static_pad (viewer.first, "sink");
+  if (!gst_pad_is_linked (sink))
+    g_idle_add (refuse_input, &viewer);
+  gst_object_unref (sink);
+}
+
+static void
+on_source_setup (GstElement *, GstElement *source, gpointer user_data)
+{
+  auto &viewer = *static_cast<Viewer *> (user_data);
+  if (g_object_class_find_property (G_OBJECT_GET_CLASS (source), "latency"))
+    g_object_set (source, "latency", viewer.options.latency_ms, nullptr);
+}
+
+static void
+build_opener (Viewer &viewer, const char *uri)
+{
+  GstElement *opener = add (viewer, "uridecodebin");
+  GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
+  g_object_set (opener, "uri", uri, "caps", caps, nullptr);
+  gst_caps_unref (caps);
+  g_signal_connect (opener, "pad-added", G_CALLBACK (on_pad_added), &viewer);
+  g_signal_connect (opener, "no-more-pads", G_CALLBACK (on_no_more_pads), &viewer);
+  g_signal_connect (opener, "source-setup", G_CALLBACK (on_source_setup), &viewer);
+}
+
+/* Whether a plugin opens such URIs; says it if not. */
+static bool
+is_supported (const char *uri)
+{
+  gchar *scheme = gst_uri_get_protocol (uri);
+  const bool supported = scheme && gst_uri_protocol_is_supported (GST_URI_SRC, scheme);
+  if (!supported)
+    g_printerr (
+        "rangecast-viewer: %s: no plugin of GStreamer opens %s://\n", uri, scheme ? scheme : "");
+  g_free (scheme);
+  return supported;
+}
+
+/* The input as a URI; nullptr after saying why there is none. */
+static gchar *
+input_uri (const char *input)
+{
+  if (gst_uri_is_valid (input))
+    return is_supported (input) ? g_strdup (input) : nullptr;
+  if (g_file_test (input, G_FILE_TEST_IS_REGULAR))
+    return gst_filename_to_uri (input, nullptr);
+  g_printerr ("rangecast-viewer: %s: %s\n", input,
+      g_file_test (input, G_FILE_TEST_IS_DIR)   ? "is a folder; expected a .rcnc recording in it"
+      : g_file_test (input, G_FILE_TEST_EXISTS) ? "is no ordinary file; expected a .rcnc recording"
+                                                : "no such file");
+  return nullptr;
+}
+
+bool
+build_pipeline (Viewer &viewer)
+{
+  viewer.pipeline = gst_pipeline_new (nullptr);
+  gchar *uri = nullptr;
+  if (viewer.options.inputs) {
+    uri = input_uri (viewer.options.inputs[0]);
+    if (!uri)
+      return false;
+    viewer.is_file = g_str_has_prefix (uri, "file:");
+  }
+  viewer.overlay.emplace (key_rows (viewer.is_file), kHint);
+  viewer.playback.emplace (viewer.pipeline, viewer.is_file);
+  build_view (viewer);
+  if (uri)
+    build_opener (viewer, uri);
+  else
+    build_receiver (viewer);
+  g_free (uri);
+  return true;
+}
