@@ -84,6 +84,12 @@ Status
 ColourBalance::set_rig (const Rig &rig)
 {
   reset ();
+  return change_rig (rig);
+}
+
+Status
+ColourBalance::change_rig (const Rig &rig)
+{
   return guarded ("rig", [&] { return cameras_.set (rig); });
 }
 

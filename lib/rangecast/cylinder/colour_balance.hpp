@@ -34,6 +34,8 @@ public:
 
   /** Takes the cameras and forgets the stream. */
   Status set_rig (const Rig &rig);
+  /** Takes other poses and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig);
   void reset ();
 
   /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
