@@ -31,7 +31,7 @@ constexpr double kEnough = 100;    ///< points that say all there is to say of a
 /* A pose is expected to be off by this, metres; the prior of no motion follows from it. */
 constexpr double kExpected = 0.003;
 /* Errors of depth are alike over large parts of a surface: so many of a pair's are independent. */
-constexpr double kIndependent = 3;
+constexpr double kIndependent = 8;
 constexpr double kMinError = 0.0003; ///< of depth, metres
 constexpr double kRadius = 0.15;   ///< metres: a turn moves the surface that much
 constexpr double kMinAgreement = 0.3, kFullAgreement = 0.6; ///< of pairs that count
@@ -157,6 +157,7 @@ void
 PoseAlignment::reset ()
 {
   corrections_.fill ({});
+  depth_error_ = 0;
   pairs_.clear ();
   started_ = false;
   frame_ = 0;
@@ -335,14 +336,18 @@ PoseAlignment::solve ()
   right_.assign (n, 0);
   for (std::size_t i = 0; i < n; i++)
     matrix_[i * n + i] = 1 / (kExpected * kExpected);
+  double squares = 0, weights = 0;
   for (const Pair &pair : pairs_) {
     const double agreed = agreement (pair.first, pair.second).share ();
     const double trust =
         std::clamp ((agreed - kMinAgreement) / (kFullAgreement - kMinAgreement), 0.0, 1.0);
     if (!(pair.weight > 0) || trust <= 0)
       continue;
+    const double square = variance (pair);
+    squares += trust * pair.weight * square;
+    weights += trust * pair.weight;
     const double scale = kIndependent * trust * std::min (1.0, pair.weight / kEnough) /
-                         (pair.weight * variance (pair));
+                         (pair.weight * square);
     const std::size_t i = 6 * number_among (views, pair.first),
                       j = 6 * number_among (views, pair.second);
     for (std::size_t k = 0, at = 0; k < 6; k++) {
@@ -360,6 +365,7 @@ PoseAlignment::solve ()
       }
     }
   }
+  depth_error_ = weights > 0 ? std::sqrt (squares / weights) : 0;
   if (!solve_cholesky (matrix_, right_))
     return; /* never: the prior makes it definite */
   set_gauge (views);

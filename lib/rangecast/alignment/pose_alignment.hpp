@@ -81,6 +81,9 @@ public:
   {
     return corrections_[static_cast<std::size_t> (view_id)];
   }
+  /** What corrections leave of the distances between views, metres (root mean square, weighted by
+   *  points): the error of depth. */
+  [[nodiscard]] double depth_error () const { return depth_error_; }
   /** The pose of a view with a correction. */
   [[nodiscard]] Pose corrected (const Pose &world_from_view, const PoseCorrection &by) const;
 
@@ -113,6 +116,7 @@ private:
   std::array<PoseCorrection, kMaxViews> corrections_{};
   ViewPairs<Pair> pairs_;
   Vec3 centre_;
+  double depth_error_ = 0;
   bool started_ = false, compares_colours_ = false;
   std::uint32_t frame_ = 0;
   std::vector<double> matrix_, right_, sorted_;

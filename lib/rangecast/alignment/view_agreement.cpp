@@ -12,12 +12,13 @@ namespace rangecast {
 namespace {
 
 constexpr std::uint32_t kLearnEvery = 3; ///< frame sets
+/* Stereo errs alike in large parts of a picture, so a pose may seem off by as much as depth is: a
+ * rig stays as it is until a view needs more than this, metres, and so many errors of depth. */
+constexpr double kNeedsCorrection = 0.001, kErrorsOff = 1;
+constexpr double kStaysCorrected = 0.6; ///< share of that
 /* A new rig makes everybody downstream negotiate again: not for less than this, metres, nor more
  * often than every so many frame sets. */
 constexpr double kMinChange = 0.0004;
-/* Less than this may well be the error of depth: a rig stays as it is until one of its views needs
- * more, metres. */
-constexpr double kNeedsCorrection = 0.0016, kStaysCorrected = 0.001;
 constexpr std::uint32_t kChangeEvery = 15;
 constexpr double kConfirmed = 30; ///< points of a pair that confirm both views
 constexpr double kMaxContradictedAgain = 0.04;
@@ -74,7 +75,8 @@ ViewAgreement::correct_rig (bool poses)
   double most = 0, change = 0;
   for (const View &view : nominal_.views)
     most = std::max (most, poses_.correction (view.id).size ());
-  const bool corrects = poses && most > (corrected_ ? kStaysCorrected : kNeedsCorrection);
+  const double needed = kNeedsCorrection + kErrorsOff * poses_.depth_error ();
+  const bool corrects = poses && most > (corrected_ ? kStaysCorrected * needed : needed);
   const auto wanted = [&] (int id) {
     return corrects ? poses_.correction (id) : PoseCorrection{};
   };
