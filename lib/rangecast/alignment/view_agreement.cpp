@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <string>
 
 #include "../guarded.hpp"
@@ -92,7 +93,8 @@ ViewAgreement::correct_rig (bool poses)
     const View &view = nominal_.views[i];
     PoseCorrection &used = of_[static_cast<std::size_t> (view.id)].correction;
     used = wanted (view.id);
-    rig_.views[i].world_from_view = poses_.corrected (view.world_from_view, used);
+    rig_.views[i].world_from_view =
+        corrects ? poses_.corrected (view.world_from_view, used) : view.world_from_view;
   }
   corrected_ = corrects;
   changed_at_ = frame_;
@@ -105,6 +107,18 @@ ViewAgreement::agreement_among (int id, std::uint64_t trusted) const
   PairAgreement sum;
   for (std::uint64_t rest = trusted & ~(std::uint64_t{1} << id); rest; rest &= rest - 1)
     sum += poses_.agreement (id, std::countr_zero (rest));
+  return sum;
+}
+
+/* Points of these views that contradict each other; each pair counts twice. */
+double
+ViewAgreement::contradictions_of (std::uint64_t views) const
+{
+  double sum = 0;
+  for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+    const PairAgreement pairs = agreement_among (std::countr_zero (rest), views);
+    sum += pairs.comparable - pairs.same;
+  }
   return sum;
 }
 
@@ -130,7 +144,8 @@ ViewAgreement::has_good_pair (std::uint64_t trusted) const
   return false;
 }
 
-/* The least consistent view goes first; what it said of the others then no longer counts. */
+/* Of the views that are contradicted the one goes first without which the others contradict each
+ * other least. */
 void
 ViewAgreement::judge_views (std::span<const RangeImage> images)
 {
@@ -139,19 +154,20 @@ ViewAgreement::judge_views (std::span<const RangeImage> images)
     all |= std::uint64_t{1} << image.view_id;
   std::uint64_t trusted = all;
   for (;;) {
-    int worst = -1;
-    double least = 1;
+    std::uint64_t rest_of_best = 0;
+    double least = std::numeric_limits<double>::max ();
     for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
-      const PairAgreement sum = agreement_among (id, trusted);
-      if (sum.share () < least &&
-          contradicts (sum, of_[static_cast<std::size_t> (id)].left_out))
-        least = sum.share (), worst = id;
+      if (!contradicts (
+              agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+        continue;
+      const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
+      if (const double left = contradictions_of (others); left < least && has_good_pair (others))
+        least = left, rest_of_best = others;
     }
-    const std::uint64_t others = worst < 0 ? 0 : trusted & ~(std::uint64_t{1} << worst);
-    if (!has_good_pair (others))
+    if (!rest_of_best)
       break;
-    trusted = others;
+    trusted = rest_of_best;
   }
   /* Who agreed with none but a bad view is no worse for it. */
   for (std::uint64_t rest = all & ~trusted; rest; rest &= rest - 1) {

@@ -72,6 +72,7 @@ private:
   void correct_rig (bool poses);
   void judge_views (std::span<const RangeImage> images);
   [[nodiscard]] PairAgreement agreement_among (int id, std::uint64_t trusted) const;
+  [[nodiscard]] double contradictions_of (std::uint64_t views) const;
   [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
   void work (std::span<const RangeImage> images, const AgreementSettings &settings);
 
