@@ -68,9 +68,8 @@ enum GstCylinderFilterAgree {
 };
 enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
-static constexpr guint kDefaultAgree = GST_CYLINDER_FILTER_AGREE_POSES |
-                                       GST_CYLINDER_FILTER_AGREE_DEPTH |
-                                       GST_CYLINDER_FILTER_AGREE_VIEWS;
+static constexpr guint kDefaultAgree =
+    GST_CYLINDER_FILTER_AGREE_POSES | GST_CYLINDER_FILTER_AGREE_VIEWS;
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
                         kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
@@ -678,7 +677,7 @@ install_agree_property (GObjectClass *object_class, GParamFlags flags)
       g_param_spec_flags ("agree", "Agree",
           "What is done so that views agree: poses (errors of some mm are estimated and corrected "
           "in the rig), depth (depths of one surface move together), views (one that contradicts "
-          "the others is left out) (default: poses+depth+views)",
+          "the others is left out) (default: poses+views)",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }
