@@ -231,18 +231,18 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
     rangecast::Status result = gstrange::parse_caps (in, info);
     gst_cylinder_filter_forget (priv);
     priv->reporter.set_views (info.rig);
+    {
+      const std::lock_guard guard (priv->lock);
+      priv->views.clear ();
+      for (const rangecast::View &view : info.rig.views)
+        priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
+    }
     if (result.ok ())
       result = priv->agreement.set_rig (info.rig);
     if (result.ok ())
       result = priv->core.set_rig (info.rig);
     return result.ok () ? priv->colours.set_rig (info.rig) : result;
   });
-  {
-    const std::lock_guard guard (priv->lock);
-    priv->views.clear ();
-    for (const rangecast::View &view : priv->agreement.rig ().views)
-      priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
-  }
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 

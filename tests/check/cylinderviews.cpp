@@ -59,6 +59,16 @@ struct Filter {
     for (int i = 0; i < count; i++)
       gst_buffer_unref (push (scene));
   }
+  GstElement *element () const /* transfer full */
+  {
+    return gst_harness_find_element (h, "cylinderfilter");
+  }
+  void set (const char *property, const char *value) const
+  {
+    GstElement *filter = element ();
+    gst_util_set_object_arg (G_OBJECT (filter), property, value);
+    gst_object_unref (filter);
+  }
   GstCaps *caps () const { return gst_pad_get_current_caps (h->sinkpad); }
 };
 
@@ -104,11 +114,11 @@ GST_START_TEST (test_without_poses_and_with_mode_off_the_rig_is_as_it_came)
     fail_unless (gst_caps_is_equal (caps, wrong), "%s", launch);
     gst_caps_unref (caps);
   }
-  Filter filter ("cylinderfilter name=c", gst_caps_ref (wrong));
+  Filter filter ("cylinderfilter", gst_caps_ref (wrong));
   filter.run (scene, 2);
   GstCaps *corrected = filter.caps ();
   fail_if (gst_caps_is_equal (corrected, wrong));
-  gst_util_set_object_arg (G_OBJECT (filter.h->element), "mode", "off");
+  filter.set ("mode", "off");
   filter.run (scene, 1);
   GstCaps *caps = filter.caps ();
   fail_unless (gst_caps_is_equal (caps, wrong));
@@ -130,7 +140,9 @@ GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_stats_say_so)
     }
     gst_buffer_unref (out);
     GstStructure *stats = nullptr;
-    g_object_get (filter.h->element, "stats", &stats, nullptr);
+    GstElement *element = filter.element ();
+    g_object_get (element, "stats", &stats, nullptr);
+    gst_object_unref (element);
     const GValue *views = gst_structure_get_value (stats, "views");
     fail_unless_equals_int (int (gst_value_array_get_size (views)), 4);
     for (guint i = 0; i < 4; i++) {
@@ -158,7 +170,7 @@ GST_START_TEST (test_corrections_begin_anew_after_a_flush)
   GstCaps *wrong = nudged_caps (scene, {0.003, 0, 0.002}, 0);
   Filter filter ("cylinderfilter", gst_caps_ref (wrong));
   filter.run (scene, 2);
-  gst_util_set_object_arg (G_OBJECT (filter.h->element), "agree", "views");
+  filter.set ("agree", "views");
   gst_harness_push_event (filter.h, gst_event_new_flush_start ());
   gst_harness_push_event (filter.h, gst_event_new_flush_stop (TRUE));
   GstSegment segment;
