@@ -193,8 +193,10 @@ clear_depth (const RangeImage &image)
 void
 ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
-  prepare (images, settings.threads);
-  if ((settings.poses || settings.views) && frame_ % kLearnEvery == 0) {
+  const bool learns = (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
+  if (learns || settings.depth)
+    prepare (images, settings.threads);
+  if (learns) {
     poses_.learn (aligned_);
     judge_views (images);
   }
