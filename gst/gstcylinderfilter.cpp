@@ -92,7 +92,7 @@ struct GstCylinderFilterPrivate {
   guint agree = kDefaultAgree; /* GstCylinderFilterAgree */
   CylinderCounts counts;
   std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
-  StatsReporter reporter; /* has locks of its own */
+  StatsReporter reporter;                                        /* has locks of its own */
 
   /* Streaming thread only. */
   rangecast::ViewAgreement agreement;
@@ -355,8 +355,8 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
     return frame.status ().ok () ? gst_cylinder_filter_process (
-                                      self, frame.views (), agree, colours, settings, result)
-                                : frame.status ();
+                                       self, frame.views (), agree, colours, settings, result)
+                                 : frame.status ();
   });
   if (status.ok ())
     gst_cylinder_filter_count (priv, result);
@@ -733,7 +733,8 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
   g_object_class_install_property (object_class, PROP_OVERLAP,
       g_param_spec_double ("overlap", "Overlap",
           "How far round a point the surface of the view that stays must reach before it goes, "
-          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending (default: 8)",
+          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending "
+          "(default: 8)",
           0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
 }
 
@@ -777,7 +778,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
-          "READY; bodies, axis-position, axis-direction, views (what agree did to each) of the last "
+          "READY; bodies, axis-position, axis-direction, views (what agree did to each) of the "
+          "last "
           "frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);

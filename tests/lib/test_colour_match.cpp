@@ -148,8 +148,8 @@ TEST (ColourBalance, cameras_that_disagree_are_made_to_agree)
   EXPECT_LT (worst_gain (balance, kWrong), 0.01);
 }
 
-/** The largest of all pairs' and channels' mean differences over what both see, levels. Exact depth,
- *  so a point of one view is looked up in the other one. */
+/** The largest of all pairs' and channels' mean differences over what both see, levels. Exact
+ * depth, so a point of one view is looked up in the other one. */
 double
 worst_mean_difference (Frame &frame)
 {
@@ -190,8 +190,8 @@ change_light (Frame &frame, const std::vector<Rgb> &gains)
   const auto changed = [] (std::uint8_t value, double gain) {
     const double v = value / 255.0,
                  linear = gain * (v <= 0.04045 ? v / 12.92 : std::pow ((v + 0.055) / 1.055, 2.4));
-    return to_byte (255 * (linear <= 0.0031308 ? 12.92 * linear
-                                               : 1.055 * std::pow (linear, 1 / 2.4) - 0.055));
+    return to_byte (
+        255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow (linear, 1 / 2.4) - 0.055));
   };
   for (std::size_t i = 0; i < gains.size (); i++)
     for (Rgbx &c : frame.colour[i])

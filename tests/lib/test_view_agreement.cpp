@@ -157,8 +157,8 @@ TEST (Poses, world_does_not_drift)
   const Rig early = agreement.rig ();
   learn (agreement, figure, kPosesOnly, 8 * kFrames);
   for (std::size_t i = 0; i < 4; i++)
-    EXPECT_LT (std::abs (displacement (figure, agreement.rig (), i) -
-                         displacement (figure, early, i)),
+    EXPECT_LT (
+        std::abs (displacement (figure, agreement.rig (), i) - displacement (figure, early, i)),
         0.0003);
 }
 
@@ -169,8 +169,8 @@ TEST (Poses, no_correction_exceeds_its_bounds)
   ASSERT_TRUE (agreement.set_rig (nudged (figure.rig, 1, {0.02, 0, 0.01}, 1)).ok ());
   learn (agreement, figure, kPosesOnly);
   for (int id = 0; id < 4; id++) {
-    EXPECT_LE (norm (agreement.view (id).correction.translation),
-        PoseAlignment::kMaxTranslation * 1.0001);
+    EXPECT_LE (
+        norm (agreement.view (id).correction.translation), PoseAlignment::kMaxTranslation * 1.0001);
     EXPECT_LE (
         norm (agreement.view (id).correction.rotation), PoseAlignment::kMaxRotation * 1.0001);
   }
@@ -295,8 +295,8 @@ TEST (Views, with_the_setting_off_nothing_is_left_out)
   Frame frame = *figure.frame;
   ASSERT_TRUE (agreement.process (frame.images (), kPosesOnly).ok ());
   EXPECT_FALSE (agreement.view (1).left_out);
-  EXPECT_EQ (frame.depth[1].view ().at (160, 120) != 0,
-      figure.frame->depth[1].view ().at (160, 120) != 0);
+  EXPECT_EQ (
+      frame.depth[1].view ().at (160, 120) != 0, figure.frame->depth[1].view ().at (160, 120) != 0);
 }
 
 /* Distance of points to the ellipsoid that they are of, root mean square, where two views overlap.
@@ -428,15 +428,17 @@ TEST (Agreement, any_images_are_survived)
     std::vector<RangeImage> images = frame.images ();
     for (RangeImage &image : images) {
       const int width = int (random () % 320), height = int (random () % 240);
-      image.roi = {int (random () % unsigned (321 - width)), int (random () % unsigned (241 - height)),
-          width, height};
+      image.roi = {int (random () % unsigned (321 - width)),
+          int (random () % unsigned (241 - height)), width, height};
       image.depth = image.depth.crop (0, 0, width, height);
       image.colour = image.colour.crop (0, 0, width, height);
       const unsigned kind = random () % 4, level = random () % 65536;
       for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
-          image.depth.at (x, y) = std::uint16_t (
-              kind == 0 ? random () : kind == 1 ? level : kind == 2 ? level + random () % 30 : 0);
+          image.depth.at (x, y) = std::uint16_t (kind == 0   ? random ()
+                                                 : kind == 1 ? level
+                                                 : kind == 2 ? level + random () % 30
+                                                             : 0);
     }
     if (round % 3 == 0)
       images[1].roi = {}, images[1].depth = {}, images[1].colour = {};

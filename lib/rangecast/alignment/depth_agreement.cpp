@@ -76,9 +76,8 @@ struct RowInOther {
       for (int k = 0; k < 3; k++)
         r[k] = ray[k] + column * transfer.right[k];
       const float d = plane[0][x], a = plane[1][x], b = plane[2][x], c = d - a * u[x] - b * v[x];
-      const float above =
-                      d * d - (a * transfer.origin[0] + b * transfer.origin[1] +
-                                  c * transfer.origin[2]),
+      const float above = d * d - (a * transfer.origin[0] + b * transfer.origin[1] +
+                                      c * transfer.origin[2]),
                   along = a * r[0] + b * r[1] + c * r[2];
       const float change = above / along - depth[x], off = change / (range * depth[x]),
                   near = closeness * depth[x] / z[x], near2 = near * near;
@@ -105,9 +104,9 @@ DepthAgreement::find_others (std::span<const FusedView> views, std::size_t which
     if (i == which || other.planes->width () == 0 ||
         a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < kMinAxes)
       continue;
-    others_.push_back ({other.planes,
-        PixelTransfer (own.rays, own.image.roi, other.lookup, other.image.roi),
-        own.unit_m / other.unit_m * std::sqrt (other.focal_px / own.focal_px)});
+    others_.push_back (
+        {other.planes, PixelTransfer (own.rays, own.image.roi, other.lookup, other.image.roi),
+            own.unit_m / other.unit_m * std::sqrt (other.focal_px / own.focal_px)});
   }
 }
 
@@ -158,9 +157,8 @@ DepthAgreement::move_row (const FusedView &own, int y)
     } else if (y > 0 && above_[at] == old && equal_colours (image, x, y - 1, x, y)) {
       row[x] = image.depth.at (x, y - 1);
     } else {
-      const float own_weight = planes[x].weight,
-                  change = own_weight / (own_weight + kHalfWay) * sum_[at] /
-                           (own_weight + weight_[at]);
+      const float own_weight = planes[x].weight, change = own_weight / (own_weight + kHalfWay) *
+                                                          sum_[at] / (own_weight + weight_[at]);
       row[x] = static_cast<std::uint16_t> (
           std::clamp (static_cast<float> (old) + change + 0.5f, 1.f, 65535.f));
     }
@@ -176,8 +174,8 @@ DepthAgreement::process (std::span<const FusedView> views, std::size_t which)
     return;
   const auto width = static_cast<std::size_t> (own.planes->width ());
   if (present_.size () < width) { /* the last to grow: all have grown */
-    for (auto *row : {&depth_, &sum_, &weight_, &u_, &v_, &z_, &plane_[0], &plane_[1], &plane_[2],
-             &plane_[3]})
+    for (auto *row :
+        {&depth_, &sum_, &weight_, &u_, &v_, &z_, &plane_[0], &plane_[1], &plane_[2], &plane_[3]})
       row->resize (width);
     above_.resize (width);
     present_.resize (width);

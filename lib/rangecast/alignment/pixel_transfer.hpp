@@ -10,8 +10,7 @@ namespace rangecast {
  *  origin + d * (corner + column * right + row * down). Planes are cut to their ROIs. */
 struct PixelTransfer {
   PixelTransfer () = default;
-  PixelTransfer (
-      const PixelRays &rays, const Roi &from, const PixelLookup &lookup, const Roi &to)
+  PixelTransfer (const PixelRays &rays, const Roi &from, const PixelLookup &lookup, const Roi &to)
   {
     const int box[] = {to.x, to.y, 0};
     const auto &rows = lookup.rows;
@@ -25,8 +24,7 @@ struct PixelTransfer {
       const double to_right = turned (rays.right), to_down = turned (rays.down);
       origin[k] =
           static_cast<float> (turned (rays.origin) + rows[k][3] - box[k] * double{rows[2][3]});
-      corner[k] =
-          static_cast<float> (turned (rays.corner) + from.x * to_right + from.y * to_down);
+      corner[k] = static_cast<float> (turned (rays.corner) + from.x * to_right + from.y * to_down);
       right[k] = static_cast<float> (to_right);
       down[k] = static_cast<float> (to_down);
     }

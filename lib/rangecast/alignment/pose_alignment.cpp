@@ -20,20 +20,20 @@ constexpr double kKept = 0.85;      ///< share of what older frames told that co
 /* Points farther apart than this, in footprints of a pixel, are not of one surface. A footprint
  * grows with z as the error of stereo does with z^2 / (focal length * baseline). */
 constexpr float kSameSurface = 6;
-constexpr float kSeenThrough = 10; ///< in footprints: farther before a surface is before it
-constexpr float kMinWeight = 0.1f; ///< SurfacePlane::weight of points that are compared
+constexpr float kSeenThrough = 10;  ///< in footprints: farther before a surface is before it
+constexpr float kMinWeight = 0.1f;  ///< SurfacePlane::weight of points that are compared
 constexpr float kMinNormals = 0.7f; ///< cosine between the normals of one surface
 /* Views more than 120 degrees apart see no surface well together. */
 constexpr double kMinAxes = -0.5;
 constexpr float kFar = 2 * kMaxImageSide; ///< pixels: no view sees as far aside
-constexpr int kSameColour = 60;    ///< levels; pixels beside an edge differ as much
-constexpr double kEnough = 100;    ///< points that say all there is to say of a pair
+constexpr int kSameColour = 60;           ///< levels; pixels beside an edge differ as much
+constexpr double kEnough = 100;           ///< points that say all there is to say of a pair
 /* A pose is expected to be off by this, metres; the prior of no motion follows from it. */
 constexpr double kExpected = 0.003;
 /* Errors of depth are alike over large parts of a surface: so many of a pair's are independent. */
 constexpr double kIndependent = 8;
 constexpr double kMinError = 0.0003; ///< of depth, metres
-constexpr double kRadius = 0.15;   ///< metres: a turn moves the surface that much
+constexpr double kRadius = 0.15;     ///< metres: a turn moves the surface that much
 constexpr double kMinAgreement = 0.3, kFullAgreement = 0.6; ///< of pairs that count
 
 std::array<double, 6>
@@ -66,8 +66,8 @@ rotation_of (Vec3 r)
   const Vec3 a = 1 / angle * r;
   const double s = std::sin (angle), c = std::cos (angle), t = 1 - c;
   return {c + t * a.x * a.x, t * a.x * a.y - s * a.z, t * a.x * a.z + s * a.y,
-      t * a.x * a.y + s * a.z, c + t * a.y * a.y, t * a.y * a.z - s * a.x,
-      t * a.x * a.z - s * a.y, t * a.y * a.z + s * a.x, c + t * a.z * a.z};
+      t * a.x * a.y + s * a.z, c + t * a.y * a.y, t * a.y * a.z - s * a.x, t * a.x * a.z - s * a.y,
+      t * a.y * a.z + s * a.x, c + t * a.z * a.z};
 }
 
 /* A camera with its pose corrected, for looking up points both ways. */
@@ -98,7 +98,8 @@ length_of (const float v[3])
 }
 
 /* Whether a view sees background at a place and round it: no pixel has depth, but others of the row
- * have (rows of a lost slice say nothing). What another view sees there cannot be. @param u, v  of the image's plane, which may be smaller than the picture */
+ * have (rows of a lost slice say nothing). What another view sees there cannot be. @param u, v  of
+ * the image's plane, which may be smaller than the picture */
 bool
 is_background (const AlignedView &view, const View &camera, float u, float v, float z)
 {
@@ -106,7 +107,8 @@ is_background (const AlignedView &view, const View &camera, float u, float v, fl
   const int round = std::max (4, static_cast<int> (camera.intrinsics.fx / 50));
   const RangeImage &image = view.image;
   const float metres = z * static_cast<float> (camera.depth_unit_m);
-  const int x = static_cast<int> (u + 0.5f) + image.roi.x, y = static_cast<int> (v + 0.5f) + image.roi.y;
+  const int x = static_cast<int> (u + 0.5f) + image.roi.x,
+            y = static_cast<int> (v + 0.5f) + image.roi.y;
   if (image.depth.empty () || x < round || y < round || x + round >= camera.width ||
       y + round >= camera.height || metres < static_cast<float> (camera.near_m) ||
       metres > static_cast<float> (camera.far_m))
@@ -242,7 +244,8 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
       if (h[0] < 0 || h[1] < 0 || h[0] > static_cast<float> (to.planes->width () - 1) * h[2] ||
           h[1] > static_cast<float> (to.planes->height () - 1) * h[2])
         continue;
-      const int u = static_cast<int> (h[0] / h[2] + 0.5f), v = static_cast<int> (h[1] / h[2] + 0.5f);
+      const int u = static_cast<int> (h[0] / h[2] + 0.5f),
+                v = static_cast<int> (h[1] / h[2] + 0.5f);
       const SurfacePlane &theirs = to.planes->at (u, v);
       if (theirs.weight < kMinWeight)
         continue;
@@ -253,8 +256,7 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
       const float behind = theirs.across * h[0] + theirs.down * h[1] +
                            theirs.constant (column, row) * h[2] - theirs.depth * theirs.depth,
                   size = length_of (n), distance = behind / size,
-                  footprint = std::max (
-                      mine.depth * own.footprint, theirs.depth * other.footprint);
+                  footprint = std::max (mine.depth * own.footprint, theirs.depth * other.footprint);
       if (distance > kSameSurface * footprint) /* hidden: nothing can be said */
         continue;
       if (distance < -kSeenThrough * footprint)
@@ -270,8 +272,7 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
       else
         pair.other_colour++;
       const float off = distance / (kSameSurface * footprint), biweight = 1 - off * off;
-      const double weight =
-          double{biweight} * biweight * std::sqrt (mine.weight * theirs.weight);
+      const double weight = double{biweight} * biweight * std::sqrt (mine.weight * theirs.weight);
       float p[3];
       own.rays.point (static_cast<float> (from.image.roi.x + x),
           static_cast<float> (from.image.roi.y + y), mine.depth, p);
@@ -346,8 +347,8 @@ PoseAlignment::solve ()
     const double square = variance (pair);
     squares += trust * pair.weight * square;
     weights += trust * pair.weight;
-    const double scale = kIndependent * trust * std::min (1.0, pair.weight / kEnough) /
-                         (pair.weight * square);
+    const double scale =
+        kIndependent * trust * std::min (1.0, pair.weight / kEnough) / (pair.weight * square);
     const std::size_t i = 6 * number_among (views, pair.first),
                       j = 6 * number_among (views, pair.second);
     for (std::size_t k = 0, at = 0; k < 6; k++) {
@@ -411,7 +412,8 @@ PoseAlignment::learn (std::span<const AlignedView> views)
       for (const AlignedView &b : views)
         if (a.image.view_id < b.image.view_id) {
           Pair &pair = pairs_.get (a.image.view_id, b.image.view_id);
-          for (double *value : {&pair.weight, &pair.square, &pair.points, &pair.same, &pair.through, &pair.other_colour})
+          for (double *value : {&pair.weight, &pair.square, &pair.points, &pair.same, &pair.through,
+                   &pair.other_colour})
             *value *= kept;
           for (double &value : pair.matrix)
             value *= kept;

@@ -57,9 +57,9 @@ struct PairAgreement {
  *  Medioni 1991). All views are solved together (as Pulli 1999 does with pairs), Gauss-Newton with
  *  Tukey's biweight. The normal equations of each pair of views are kept, and older frames fade, so
  *  noise averages out. A prior of no motion keeps directions in place that the surface does not
- *  show, such as the turn of a ball about itself. Only differences between views can be seen, so the
- *  median of all views' corrections is 0 in each component: the world stays, and one view that is
- *  off is the one that moves.
+ *  show, such as the turn of a ball about itself. Only differences between views can be seen, so
+ * the median of all views' corrections is 0 in each component: the world stays, and one view that
+ * is off is the one that moves.
  *
  *  The same comparison tells how consistent views are: see agreement(). */
 class PoseAlignment {
@@ -95,8 +95,8 @@ private:
     int first = 0, second = 0;
     std::array<double, 21> matrix{}; /* lower triangle, of jacobians' products */
     std::array<double, 6> right{};
-    double weight = 0;                              /* of what was added */
-    double square = 0;                              /* of errors with no correction at all */
+    double weight = 0; /* of what was added */
+    double square = 0; /* of errors with no correction at all */
     double points = 0, same = 0, through = 0, other_colour = 0;
   };
 

@@ -29,7 +29,8 @@ SurfacePlanes::make_row (const ConstRangeImage &image, int y, float focal_px)
                       *below = image.depth.row (y + reach_);
   SurfacePlane *to = &planes_[static_cast<std::size_t> (y) * static_cast<std::size_t> (width_)];
   std::uint8_t *smooth = &smooth_[static_cast<std::size_t> (y) * static_cast<std::size_t> (width_)];
-  const float focal2 = focal_px * focal_px, bend = kMaxBend * static_cast<float> (reach_) / focal_px,
+  const float focal2 = focal_px * focal_px,
+              bend = kMaxBend * static_cast<float> (reach_) / focal_px,
               per_pixel = 0.5f / static_cast<float> (reach_);
   const int reach = reach_, end = width_ - reach_;
   for (int x = reach; x < end; x++) {
@@ -43,8 +44,8 @@ SurfacePlanes::make_row (const ConstRangeImage &image, int y, float focal_px)
                bend_y = static_cast<float> (std::abs (a + b - 2 * d));
     const float slope = (across * across + down * down) * focal2, depth2 = depth * depth;
     const float cosine2 = depth2 / (slope + depth2 + 1e-9f);
-    const bool good = (least > 0) & (bend_x <= bend * depth) & (bend_y <= bend * depth) &
-                      (cosine2 > kMinCosine2);
+    const bool good =
+        (least > 0) & (bend_x <= bend * depth) & (bend_y <= bend * depth) & (cosine2 > kMinCosine2);
     to[x].depth = static_cast<float> (l + r + a + b + d) * 0.2f;
     to[x].across = across;
     to[x].down = down;

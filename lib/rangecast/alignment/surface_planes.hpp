@@ -25,8 +25,9 @@ struct SurfacePlane {
 class SurfacePlanes {
 public:
   /** Makes the planes of all pixels. A weight is the squared cosine between the surface's normal
-   *  and the optical axis, less what it is at 68 degrees, and fades to 0 within some pixels (3 at 320x240) of
-   *  depth edges, bends and pixels without depth. Allocates only for an image larger than all before.
+   *  and the optical axis, less what it is at 68 degrees, and fades to 0 within some pixels (3 at
+   * 320x240) of depth edges, bends and pixels without depth. Allocates only for an image larger
+   * than all before.
    *  @param focal_px  focal length, pixels */
   void make (const ConstRangeImage &image, float focal_px);
   /** Forgets them: an image without pixels. */

@@ -57,8 +57,8 @@ void
 ViewAgreement::prepare (std::span<const RangeImage> images, int threads)
 {
   in_parallel (images.size (), threads, [&] (std::size_t i) {
-    const View &view = rig_.views[static_cast<std::size_t> (
-        index_[static_cast<std::size_t> (images[i].view_id)])];
+    const View &view =
+        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
     planes_[i].make (images[i], static_cast<float> (view.intrinsics.fx));
   });
   aligned_.clear ();
@@ -78,9 +78,7 @@ ViewAgreement::correct_rig (bool poses)
     most = std::max (most, poses_.correction (view.id).size ());
   const double needed = kNeedsCorrection + kErrorsOff * poses_.depth_error ();
   const bool corrects = poses && most > (corrected_ ? kStaysCorrected * needed : needed);
-  const auto wanted = [&] (int id) {
-    return corrects ? poses_.correction (id) : PoseCorrection{};
-  };
+  const auto wanted = [&] (int id) { return corrects ? poses_.correction (id) : PoseCorrection{}; };
   for (const View &view : nominal_.views) {
     const PoseCorrection by = wanted (view.id),
                          &used = of_[static_cast<std::size_t> (view.id)].correction;
@@ -158,8 +156,7 @@ ViewAgreement::judge_views (std::span<const RangeImage> images)
     double least = std::numeric_limits<double>::max ();
     for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
-      if (!contradicts (
-              agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+      if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
         continue;
       const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
       if (const double left = contradictions_of (others); left < least && has_good_pair (others))
@@ -215,8 +212,8 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
     return;
   fused_.clear ();
   for (std::size_t i = 0; i < images.size (); i++) {
-    const View &view = rig_.views[static_cast<std::size_t> (
-        index_[static_cast<std::size_t> (images[i].view_id)])];
+    const View &view =
+        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
     fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
         static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m)});
   }

@@ -37,7 +37,8 @@ struct ViewConsistency {
  *  wrong: both stay. */
 class ViewAgreement {
 public:
-  static constexpr double kMaxContradicted = 0.08, kMinConsistency = 0.35, kConsistentAgain = 0.55, kGoodPair = 0.6;
+  static constexpr double kMaxContradicted = 0.08, kMinConsistency = 0.35, kConsistentAgain = 0.55,
+                          kGoodPair = 0.6;
 
   /** Takes the cameras, and forgets the stream. */
   Status set_rig (const Rig &rig);

@@ -18,10 +18,9 @@ namespace rangecast {
  *  where the depths agree, and both see the surface well, the ratio of both colours is taken. For
  * each pair of views and each channel the median of the ratios' logarithms tells how their gains
  * differ; least squares over all pairs, each weighted by how much it shares, makes one gain of each
- * view. Their median stays 1: nobody knows which camera is right, but one whose exposure is wrong is
- * not to change the others. A gain on values that went through
- * a camera's gamma curve stands for exposure and white balance, which are gains before it, as long
- * as the curve is near a power. */
+ * view. Their median stays 1: nobody knows which camera is right, but one whose exposure is wrong
+ * is not to change the others. A gain on values that went through a camera's gamma curve stands for
+ * exposure and white balance, which are gains before it, as long as the curve is near a power. */
 class ColourBalance {
 public:
   using Gains = std::array<float, 3>; ///< red, green, blue

@@ -90,7 +90,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
   int winner;
   float overlap;
   PixelTransfer transfer; /* to the other image */
-  float per_focal; /* of the other image */
+  float per_focal;        /* of the other image */
 
   CoverLoop (RedundantPoints &points, const ResolvedFrame &frame, std::size_t own,
       std::size_t rival, double reach)
@@ -168,10 +168,9 @@ template <typename L> struct RedundantPoints::CoverLoop {
     const F depth = L::at (&row.depth[at]);
     F seen_at[3];
     for (int k = 0; k < 3; k++)
-      seen_at[k] =
-          transfer.origin[k] + depth * (transfer.corner[k] +
-                                           static_cast<float> (y) * transfer.down[k] +
-                                           x * transfer.right[k]);
+      seen_at[k] = transfer.origin[k] +
+                   depth * (transfer.corner[k] + static_cast<float> (y) * transfer.down[k] +
+                               x * transfer.right[k]);
     const F z = seen_at[2];
     F u = seen_at[0] / z, v = seen_at[1] / z;
     const I seen = (depth > 0) & (z > 0) & (u > -kSnap) & (v > -kSnap) &
