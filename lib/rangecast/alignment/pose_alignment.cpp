@@ -148,7 +148,7 @@ PoseCorrection::size () const
 void
 PoseAlignment::set_rig (const Rig &rig)
 {
-  rig_ = rig;
+  rig_ = now_ = rig;
   index_.fill (-1);
   for (std::size_t i = 0; i < rig.views.size (); i++)
     index_[static_cast<std::size_t> (rig.views[i].id)] = static_cast<int> (i);
@@ -159,6 +159,8 @@ void
 PoseAlignment::reset ()
 {
   corrections_.fill ({});
+  for (std::size_t i = 0; i < rig_.views.size (); i++)
+    now_.views[i].world_from_view = rig_.views[i].world_from_view;
   depth_error_ = 0;
   pairs_.clear ();
   started_ = false;
@@ -195,29 +197,117 @@ PoseAlignment::find_centre (std::span<const AlignedView> views)
   started_ = count > 0;
 }
 
+/* Points of one view in another one. */
+struct PoseAlignment::Comparison {
+  const AlignedView &from, &to;
+  const View &camera; /* of `to` */
+  const Eye own, other;
+  const PixelTransfer transfer;
+  const Vec3 centre;
+  const bool compares_colours;
+  Pair &pair;
+  double sign;               /* of `from` in the difference of the pair's corrections, */
+  std::array<double, 6> now; /* which is this */
+
+  Comparison (PoseAlignment &owner, const AlignedView &a, const AlignedView &b)
+      : from (a), to (b), camera (owner.camera_of (b.image.view_id)),
+        own (owner.camera_of (a.image.view_id)), other (camera),
+        transfer (own.rays, from.image.roi, other.lookup, to.image.roi), centre (owner.centre_),
+        compares_colours (owner.compares_colours_),
+        pair (owner.pairs_.get (a.image.view_id, b.image.view_id)),
+        sign (a.image.view_id == pair.first ? 1 : -1),
+        now (as_array (owner.correction (pair.first)))
+  {
+    const std::array<double, 6> second = as_array (owner.correction (pair.second));
+    for (std::size_t k = 0; k < 6; k++)
+      now[k] -= second[k];
+  }
+
+  [[nodiscard]] bool may_overlap () const
+  {
+    const float *a = own.rays.optical_axis, *b = other.rays.optical_axis;
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= static_cast<float> (kMinAxes);
+  }
+
+  /* Looks a pixel up in the other view and counts what it finds there. */
+  void look_up (int x, int y)
+  {
+    const SurfacePlane &mine = from.planes->at (x, y);
+    if (mine.weight < kMinWeight)
+      return;
+    float h[3];
+    for (int k = 0; k < 3; k++)
+      h[k] = transfer.origin[k] +
+             mine.depth * (transfer.corner[k] + static_cast<float> (x) * transfer.right[k] +
+                              static_cast<float> (y) * transfer.down[k]);
+    pair.points++;
+    if (!(h[2] > 0) || !(std::abs (h[0]) < kFar * h[2]) || !(std::abs (h[1]) < kFar * h[2]))
+      return;
+    const float column = h[0] / h[2], row = h[1] / h[2];
+    if (is_background (to, camera, column, row, h[2]))
+      pair.through++;
+    else if (column >= 0 && row >= 0 && column <= static_cast<float> (to.planes->width () - 1) &&
+             row <= static_cast<float> (to.planes->height () - 1))
+      compare (x, y, h, static_cast<int> (column + 0.5f), static_cast<int> (row + 0.5f));
+  }
+
+  /* A pixel with the other view's pixel u, v, where it is seen at h. */
+  void compare (int x, int y, const float (&h)[3], int u, int v)
+  {
+    const SurfacePlane &mine = from.planes->at (x, y), &theirs = to.planes->at (u, v);
+    if (theirs.weight < kMinWeight)
+      return;
+    const auto column = static_cast<float> (u), row = static_cast<float> (v);
+    float n[3], m[3];
+    other.normal (theirs, column + static_cast<float> (to.image.roi.x),
+        row + static_cast<float> (to.image.roi.y), n);
+    const float behind = theirs.across * h[0] + theirs.down * h[1] +
+                         theirs.constant (column, row) * h[2] - theirs.depth * theirs.depth,
+                size = length_of (n), distance = behind / size,
+                footprint = std::max (mine.depth * own.footprint, theirs.depth * other.footprint),
+                off = distance / (kSameSurface * footprint);
+    if (distance < -kSeenThrough * footprint)
+      pair.through++;
+    if (std::abs (off) >= 1) /* behind: hidden, which says nothing */
+      return;
+    const float full_x = static_cast<float> (from.image.roi.x + x),
+                full_y = static_cast<float> (from.image.roi.y + y);
+    own.normal (mine, full_x, full_y, m);
+    if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < kMinNormals * size * length_of (m))
+      return;
+    const bool same = !compares_colours || is_same_colour (from, x, y, to, u, v);
+    (same ? pair.same : pair.other_colour)++;
+    float p[3];
+    own.rays.point (full_x, full_y, mine.depth, p);
+    const float biweight = 1 - off * off;
+    add (double{sign / size} * Vec3{n[0], n[1], n[2]}, Vec3{p[0], p[1], p[2]}, distance,
+        double{biweight} * biweight * std::sqrt (mine.weight * theirs.weight));
+  }
+
+  /* To the pair's normal equations. */
+  void add (Vec3 normal, Vec3 point, double distance, double weight)
+  {
+    const Vec3 arm = 1 / kRadius * cross (point - centre, normal);
+    const double j[] = {normal.x, normal.y, normal.z, arm.x, arm.y, arm.z};
+    double error = distance; /* with no correction at all */
+    for (std::size_t k = 0; k < 6; k++)
+      error -= j[k] * now[k];
+    pair.weight += weight;
+    pair.square += weight * error * error;
+    for (std::size_t k = 0, at = 0; k < 6; k++) {
+      pair.right[k] -= weight * j[k] * error;
+      for (std::size_t l = 0; l <= k; l++)
+        pair.matrix[at++] += weight * j[k] * j[l];
+    }
+  }
+};
+
 void
 PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int samples)
 {
-  const int a = from.image.view_id, b = to.image.view_id;
-  const auto camera = [this] (int id) {
-    View view = camera_of (id);
-    view.world_from_view = corrected (view.world_from_view, correction (id));
-    return view;
-  };
-  const Eye own (camera (a)), other (camera (b));
-  if (own.rays.optical_axis[0] * other.rays.optical_axis[0] +
-          own.rays.optical_axis[1] * other.rays.optical_axis[1] +
-          own.rays.optical_axis[2] * other.rays.optical_axis[2] <
-      static_cast<float> (kMinAxes))
+  Comparison comparison (*this, from, to);
+  if (!comparison.may_overlap ())
     return;
-  const PixelTransfer transfer (own.rays, from.image.roi, other.lookup, to.image.roi);
-  Pair &pair = pairs_.get (a, b);
-  const double sign = a < b ? 1 : -1;
-  std::array<double, 6> now = as_array (correction (pair.first));
-  const std::array<double, 6> second = as_array (correction (pair.second));
-  for (std::size_t k = 0; k < 6; k++)
-    now[k] -= second[k];
-
   const int width = from.planes->width (), height = from.planes->height ();
   const double share = double (width) * height / samples;
   const int step = std::max (1, static_cast<int> (std::ceil (std::sqrt (share))));
@@ -225,76 +315,16 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
   const int left = static_cast<int> (frame_ * 5 % steps),
             top = static_cast<int> ((frame_ * 3 + frame_ / steps) % steps);
   for (int y = top; y < height; y += step)
-    for (int x = left; x < width; x += step) {
-      const SurfacePlane &mine = from.planes->at (x, y);
-      if (mine.weight < kMinWeight)
-        continue;
-      float h[3];
-      for (int k = 0; k < 3; k++)
-        h[k] = transfer.origin[k] +
-               mine.depth * (transfer.corner[k] + static_cast<float> (x) * transfer.right[k] +
-                                static_cast<float> (y) * transfer.down[k]);
-      pair.points++;
-      if (!(h[2] > 0) || !(std::abs (h[0]) < kFar * h[2]) || !(std::abs (h[1]) < kFar * h[2]))
-        continue;
-      if (is_background (to, camera_of (b), h[0] / h[2], h[1] / h[2], h[2])) {
-        pair.through++;
-        continue;
-      }
-      if (h[0] < 0 || h[1] < 0 || h[0] > static_cast<float> (to.planes->width () - 1) * h[2] ||
-          h[1] > static_cast<float> (to.planes->height () - 1) * h[2])
-        continue;
-      const int u = static_cast<int> (h[0] / h[2] + 0.5f),
-                v = static_cast<int> (h[1] / h[2] + 0.5f);
-      const SurfacePlane &theirs = to.planes->at (u, v);
-      if (theirs.weight < kMinWeight)
-        continue;
-      const auto column = static_cast<float> (u), row = static_cast<float> (v);
-      float n[3], m[3];
-      other.normal (theirs, column + static_cast<float> (to.image.roi.x),
-          row + static_cast<float> (to.image.roi.y), n);
-      const float behind = theirs.across * h[0] + theirs.down * h[1] +
-                           theirs.constant (column, row) * h[2] - theirs.depth * theirs.depth,
-                  size = length_of (n), distance = behind / size,
-                  footprint = std::max (mine.depth * own.footprint, theirs.depth * other.footprint);
-      if (distance > kSameSurface * footprint) /* hidden: nothing can be said */
-        continue;
-      if (distance < -kSeenThrough * footprint)
-        pair.through++;
-      if (distance < -kSameSurface * footprint)
-        continue;
-      own.normal (mine, static_cast<float> (from.image.roi.x + x),
-          static_cast<float> (from.image.roi.y + y), m);
-      if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < kMinNormals * size * length_of (m))
-        continue;
-      if (!compares_colours_ || is_same_colour (from, x, y, to, u, v))
-        pair.same++;
-      else
-        pair.other_colour++;
-      const float off = distance / (kSameSurface * footprint), biweight = 1 - off * off;
-      const double weight = double{biweight} * biweight * std::sqrt (mine.weight * theirs.weight);
-      float p[3];
-      own.rays.point (static_cast<float> (from.image.roi.x + x),
-          static_cast<float> (from.image.roi.y + y), mine.depth, p);
-      const Vec3 normal = double{sign / size} * Vec3{n[0], n[1], n[2]};
-      const Vec3 arm = 1 / kRadius * cross (Vec3{p[0], p[1], p[2]} - centre_, normal);
-      const double j[] = {normal.x, normal.y, normal.z, arm.x, arm.y, arm.z};
-      double error = distance; /* with no correction at all */
-      for (std::size_t k = 0; k < 6; k++)
-        error -= j[k] * now[k];
-      pair.weight += weight;
-      pair.square += weight * error * error;
-      for (std::size_t k = 0, at = 0; k < 6; k++) {
-        pair.right[k] -= weight * j[k] * error;
-        for (std::size_t l = 0; l <= k; l++)
-          pair.matrix[at++] += weight * j[k] * j[l];
-      }
-    }
+    for (int x = left; x < width; x += step)
+      comparison.look_up (x, y);
 }
 
 void
 PoseAlignment::compare (std::span<const AlignedView> views, int samples)
 {
+  for (std::size_t i = 0; i < rig_.views.size (); i++)
+    now_.views[i].world_from_view =
+        corrected (rig_.views[i].world_from_view, correction (rig_.views[i].id));
   for (const AlignedView &from : views)
     for (const AlignedView &to : views)
       if (from.image.view_id != to.image.view_id)

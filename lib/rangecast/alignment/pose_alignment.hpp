@@ -100,9 +100,11 @@ private:
     double points = 0, same = 0, through = 0, other_colour = 0;
   };
 
+  struct Comparison;
+  /* With its correction. */
   [[nodiscard]] const View &camera_of (int view_id) const
   {
-    return rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (view_id)])];
+    return now_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (view_id)])];
   }
   void compare (std::span<const AlignedView> views, int samples);
   void compare_pair (const AlignedView &from, const AlignedView &to, int samples);
@@ -111,7 +113,7 @@ private:
   void set_gauge (std::uint64_t views);
   void find_centre (std::span<const AlignedView> views);
 
-  Rig rig_;
+  Rig rig_, now_;                      /* as it was told, and corrected */
   std::array<int, kMaxViews> index_{}; /* in rig_.views, by view-id */
   std::array<PoseCorrection, kMaxViews> corrections_{};
   ViewPairs<Pair> pairs_;
