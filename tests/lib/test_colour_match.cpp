@@ -298,6 +298,19 @@ TEST (ColourBalance, no_gain_is_larger_than_the_bound)
   EXPECT_LE (balance.gains (0)[0], ColourBalance::kMostGain);
 }
 
+TEST (ColourBalance, camera_with_another_exposure_is_lifted_and_the_others_stay)
+{
+  Frame frame = ball (kArc, {kOne, {0.6, 0.6, 0.6}, kOne, kOne});
+  ColourBalance balance;
+  ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
+  ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
+  for (std::size_t c = 0; c < 3; c++) {
+    EXPECT_NEAR (balance.gains (1)[c], 1 / 0.6, 0.02);
+    for (const int other : {0, 2, 3})
+      EXPECT_NEAR (balance.gains (other)[c], 1, 0.005);
+  }
+}
+
 TEST (ColourBalance, gains_follow_a_change_slowly_but_come_there)
 {
   ColourBalance balance;
