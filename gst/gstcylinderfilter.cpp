@@ -4,8 +4,9 @@
  * @title: cylinderfilter
  *
  * Clears the points that several views of a frame set see of the same place, all but those of the
- * view that sees it most squarely. No point ever moves. Colours of the views are made to agree, and
- * may be blended along the seams.
+ * view that sees it most squarely. Before that, errors of the rig are corrected, views that
+ * contradict the others left out, and colours made to agree (#GstCylinderFilter:agree,
+ * #GstCylinderFilter:colour-balance); points move only with agree=depth.
  *
  * ## Example launch line
  * |[
