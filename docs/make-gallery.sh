@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes the pictures of docs/gallery.md. usage: docs/make-gallery.sh [FOLDER [MODEL.glb]], by default docs/images and the
-# scanned head of the test data; without that, the built-in figure. Wants ffmpeg for the film (Debian package ffmpeg).
+# scanned head of the test data; without that, the built-in figure. Wants ffmpeg for the film (Debian package ffmpeg)
+# and python3-opencv for the bad views.
 set -euo pipefail
 docs=$(cd "$(dirname "$0")" && pwd)
 source "$docs/../pipelines/env.sh"
@@ -72,6 +73,7 @@ sheet gallery-bare.jpg bare.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "o
 sheet gallery-dressed.jpg dressed.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
 units="azimuth=20 elevation=8 show-units=true mode=strips"
 sheet gallery-units.jpg exact.rcnc "mode=off|$units" "overlap=1|$units"
+python3 "$docs/../tests/bench/bad-views.py" "$out/gallery-bad-views.jpg"
 if command -v ffmpeg >/dev/null; then
   film gallery-orbit.webp
 else

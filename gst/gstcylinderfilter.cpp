@@ -4,8 +4,9 @@
  * @title: cylinderfilter
  *
  * Clears the points that several views of a frame set see of the same place, all but those of the
- * view that sees it most squarely. No point ever moves. Colours of the views are made to agree, and
- * may be blended along the seams.
+ * view that sees it most squarely. Before that, errors of the rig are corrected, views that
+ * contradict the others left out, and colours made to agree (#GstCylinderFilter:agree,
+ * #GstCylinderFilter:colour-balance); points move only with agree=depth.
  *
  * ## Example launch line
  * |[
@@ -22,6 +23,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
 #include <rangecast/guarded.hpp>
@@ -38,6 +40,7 @@ enum {
   PROP_MODE,
   PROP_COLOUR_BALANCE,
   PROP_BLEND_WIDTH,
+  PROP_AGREE,
   PROP_AXIS,
   PROP_AXIS_POSITION,
   PROP_AXIS_DIRECTION,
@@ -59,8 +62,15 @@ enum GstCylinderFilterMode {
   GST_CYLINDER_FILTER_WINNER,
   GST_CYLINDER_FILTER_BLEND
 };
+enum GstCylinderFilterAgree {
+  GST_CYLINDER_FILTER_AGREE_POSES = 1,
+  GST_CYLINDER_FILTER_AGREE_DEPTH = 2,
+  GST_CYLINDER_FILTER_AGREE_VIEWS = 4
+};
 enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
+static constexpr guint kDefaultAgree =
+    GST_CYLINDER_FILTER_AGREE_POSES | GST_CYLINDER_FILTER_AGREE_VIEWS;
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
                         kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
@@ -80,12 +90,16 @@ struct GstCylinderFilterPrivate {
   rangecast::CylinderSettings settings;
   GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
   double blend_width = kDefaultBlendWidth;
-  rangecast::ColourMatch colours; /* streaming thread only */
+  guint agree = kDefaultAgree; /* GstCylinderFilterAgree */
   CylinderCounts counts;
-  StatsReporter reporter; /* has locks of its own */
+  std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
+  StatsReporter reporter;                                        /* has locks of its own */
 
   /* Streaming thread only. */
+  rangecast::ViewAgreement agreement;
+  rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
+  bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_off = false;
 };
@@ -117,6 +131,21 @@ gst_cylinder_filter_mode_get_type (void)
       {0, nullptr, nullptr},
   };
   static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_AGREE (gst_cylinder_filter_agree_get_type ())
+static GType
+gst_cylinder_filter_agree_get_type (void)
+{
+  static const GFlagsValue values[] = {
+      {0, "Nothing", "none"},
+      {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of poses", "poses"},
+      {GST_CYLINDER_FILTER_AGREE_DEPTH, "Move depths of one surface together", "depth"},
+      {GST_CYLINDER_FILTER_AGREE_VIEWS, "Leave out a view that contradicts the others", "views"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_flags_register_static ("GstCylinderFilterAgree", values);
   return type;
 }
 
@@ -156,6 +185,8 @@ gst_cylinder_filter_forget_scene (GstCylinderFilterPrivate *priv)
 {
   priv->core.reset ();
   priv->colours.reset ();
+  priv->agreement.reset ();
+  priv->rig_pending = true;
 }
 
 /* All that is of one stream. */
@@ -166,16 +197,49 @@ gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
   priv->last_pts = GST_CLOCK_TIME_NONE;
 }
 
+/* Gives the rig that the views have now to those who work with it, here and downstream. */
+static rangecast::Status
+gst_cylinder_filter_send_rig (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  const rangecast::Rig &rig = priv->agreement.rig ();
+  priv->rig_pending = false;
+  if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->colours.change_rig (rig); !status.ok ())
+    return status;
+  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
+  GstCaps *present = gst_pad_get_current_caps (pad);
+  if (!present)
+    return {};
+  GstCaps *caps = gstrange::with_rig (present, rig);
+  if (!gst_caps_is_equal (caps, present)) {
+    GST_DEBUG_OBJECT (self, "poses of the rig change");
+    gst_pad_push_event (pad, gst_event_new_caps (caps));
+  }
+  gst_caps_unref (caps);
+  gst_caps_unref (present);
+  return {};
+}
+
 static gboolean
 gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
 {
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
-  gst_cylinder_filter_forget (priv);
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     gstrange::RangeInfo info;
     rangecast::Status result = gstrange::parse_caps (in, info);
+    gst_cylinder_filter_forget (priv);
     priv->reporter.set_views (info.rig);
+    {
+      const std::lock_guard guard (priv->lock);
+      priv->views.clear ();
+      for (const rangecast::View &view : info.rig.views)
+        priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
+    }
+    if (result.ok ())
+      result = priv->agreement.set_rig (info.rig);
     if (result.ok ())
       result = priv->core.set_rig (info.rig);
     return result.ok () ? priv->colours.set_rig (info.rig) : result;
@@ -221,8 +285,13 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   guard.unlock ();
   if (off)
     priv->reporter.passed (GST_ELEMENT (base), buffer);
-  if (off && !priv->was_off) /* nobody looks at what the scene does meanwhile */
+  if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
     gst_cylinder_filter_forget_scene (priv);
+    const rangecast::Status status = rangecast::guarded ("cylinderfilter",
+        [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
+    if (!status.ok ())
+      GST_WARNING_OBJECT (base, "%s", status.message ().c_str ());
+  }
   priv->was_off = off;
   gst_base_transform_set_passthrough (base, off);
 }
@@ -241,6 +310,29 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.units_changed += result.units_changed;
   counts.bodies = result.bodies;
   counts.axis = result.axis;
+  for (auto &[view_id, consistency] : priv->views)
+    consistency = priv->agreement.view (view_id);
+}
+
+/* Works on the mapped views of a frame set. */
+static rangecast::Status
+gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast::RangeImage> views,
+    const rangecast::AgreementSettings &agree, const rangecast::ColourSettings &colours,
+    const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
+{
+  auto priv = self->priv;
+  for (const rangecast::RangeImage &view : views)
+    priv->agreement.set_gains (view.view_id, priv->colours.balance ().gains (view.view_id));
+  if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
+    return status;
+  if (priv->rig_pending || priv->agreement.rig_changed ())
+    if (rangecast::Status status = gst_cylinder_filter_send_rig (self); !status.ok ())
+      return status;
+  if (rangecast::Status status = priv->colours.before (views, colours); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->core.process (views, settings, result); !status.ok ())
+    return status;
+  return priv->colours.after (views, colours);
 }
 
 static GstFlowReturn
@@ -253,6 +345,9 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const rangecast::CylinderSettings settings = priv->settings;
   const rangecast::ColourSettings colours = {priv->balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
       priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
+  const rangecast::AgreementSettings agree = {(priv->agree & GST_CYLINDER_FILTER_AGREE_POSES) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_DEPTH) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_VIEWS) != 0, settings.threads};
   guard.unlock ();
   if (off)
     return GST_FLOW_OK;
@@ -260,12 +355,9 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   rangecast::CylinderResult result;
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    rangecast::Status done = frame.status ();
-    if (done.ok ())
-      done = priv->colours.before (frame.views (), colours);
-    if (done.ok ())
-      done = priv->core.process (frame.views (), settings, result);
-    return done.ok () ? priv->colours.after (frame.views (), colours) : done;
+    return frame.status ().ok () ? gst_cylinder_filter_process (
+                                       self, frame.views (), agree, colours, settings, result)
+                                 : frame.status ();
   });
   if (status.ok ())
     gst_cylinder_filter_count (priv, result);
@@ -316,6 +408,7 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
   const StreamLock lock (base);
   /* With the stream its memory goes too. */
   GST_CYLINDER_FILTER (base)->priv->core = {};
+  GST_CYLINDER_FILTER (base)->priv->agreement = {};
   GST_CYLINDER_FILTER (base)->priv->colours = {};
   return TRUE;
 }
@@ -385,6 +478,9 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     case PROP_COLOUR_BALANCE:
       self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
       break;
+    case PROP_AGREE:
+      self->priv->agree = g_value_get_flags (value);
+      break;
     case PROP_BLEND_WIDTH:
       self->priv->blend_width = g_value_get_double (value);
       break;
@@ -423,9 +519,28 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
   }
 }
 
-static GstStructure *
-gst_cylinder_filter_stats (const CylinderCounts &counts)
+static void
+add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
 {
+  GValue array = G_VALUE_INIT;
+  g_value_init (&array, GST_TYPE_ARRAY);
+  for (const auto &[view_id, view] : priv->views) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, GST_TYPE_STRUCTURE);
+    g_value_take_boxed (&value,
+        gst_structure_new ("view", "view-id", G_TYPE_INT, view_id, "moved", G_TYPE_DOUBLE,
+            1000 * norm (view.correction.translation), "turned", G_TYPE_DOUBLE,
+            180 / M_PI * norm (view.correction.rotation), "consistency", G_TYPE_DOUBLE,
+            view.consistency, "left-out", G_TYPE_BOOLEAN, gboolean (view.left_out), nullptr));
+    gst_value_array_append_and_take_value (&array, &value);
+  }
+  gst_structure_take_value (stats, "views", &array);
+}
+
+static GstStructure *
+gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
+{
+  const CylinderCounts &counts = priv->counts;
   GstStructure *stats =
       gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
           counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
@@ -440,6 +555,7 @@ gst_cylinder_filter_stats (const CylinderCounts &counts)
     set_vector (&array, vectors[i]);
     gst_structure_take_value (stats, names[i], &array);
   }
+  add_view_stats (stats, priv);
   return stats;
 }
 
@@ -455,6 +571,9 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
       break;
     case PROP_COLOUR_BALANCE:
       g_value_set_enum (value, priv->balance);
+      break;
+    case PROP_AGREE:
+      g_value_set_flags (value, priv->agree);
       break;
     case PROP_BLEND_WIDTH:
       g_value_set_double (value, priv->blend_width);
@@ -496,7 +615,7 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
       g_value_set_int (value, settings.threads);
       break;
     case PROP_STATS:
-      g_value_take_boxed (value, gst_cylinder_filter_stats (priv->counts));
+      g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
       break;
     case PROP_STATS_INTERVAL:
       g_value_set_uint (value, priv->reporter.interval ());
@@ -553,6 +672,18 @@ install_colour_properties (GObjectClass *object_class, GParamFlags flags)
 }
 
 static void
+install_agree_property (GObjectClass *object_class, GParamFlags flags)
+{
+  g_object_class_install_property (object_class, PROP_AGREE,
+      g_param_spec_flags ("agree", "Agree",
+          "What is done so that views agree: poses (errors of some mm are estimated and corrected "
+          "in the rig), depth (depths of one surface move together), views (one that contradicts "
+          "the others is left out) (default: poses+views)",
+          GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
+          GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
+}
+
+static void
 install_axis_properties (GObjectClass *object_class, GParamFlags flags)
 {
   const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
@@ -603,7 +734,8 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
   g_object_class_install_property (object_class, PROP_OVERLAP,
       g_param_spec_double ("overlap", "Overlap",
           "How far round a point the surface of the view that stays must reach before it goes, "
-          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending (default: 8)",
+          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending "
+          "(default: 8)",
           0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
 }
 
@@ -636,6 +768,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   object_class->finalize = gst_cylinder_filter_finalize;
 
   install_colour_properties (object_class, flags);
+  install_agree_property (object_class, flags);
   install_axis_properties (object_class, flags);
   install_unit_properties (object_class, flags);
   install_steadiness_properties (object_class, flags);
@@ -646,7 +779,9 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
-          "READY; bodies, axis-position, axis-direction of the last frame",
+          "READY; bodies, axis-position, axis-direction, views (what agree did to each) of the "
+          "last "
+          "frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
@@ -657,6 +792,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AGREE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_BALANCE, GstPluginAPIFlags (0));
 
   transform_class->set_caps = gst_cylinder_filter_set_caps;

@@ -84,16 +84,31 @@ make_info (Rig rig, int fps_n, int fps_d)
   return info;
 }
 
+static void
+set_rig (GstCaps *caps, const rangecast::Rig &rig)
+{
+  const std::vector<std::uint8_t> blob = rangecast::encode_rig (rig);
+  GstBuffer *buffer = gst_buffer_new_memdup (blob.data (), blob.size ());
+  gst_caps_set_simple (caps, "rig", GST_TYPE_BUFFER, buffer, nullptr);
+  gst_buffer_unref (buffer);
+}
+
 static GstCaps *
 with_common_fields (GstCaps *caps, const RangeInfo &info)
 {
-  const std::vector<std::uint8_t> blob = rangecast::encode_rig (info.rig);
-  GstBuffer *rig = gst_buffer_new_memdup (blob.data (), blob.size ());
   gst_caps_set_simple (caps, "width", G_TYPE_INT, info.width, "height", G_TYPE_INT, info.height,
       "framerate", GST_TYPE_FRACTION, info.fps_n, info.fps_d, "views", G_TYPE_INT, info.views (),
-      "rig", GST_TYPE_BUFFER, rig, nullptr);
-  gst_buffer_unref (rig);
+      nullptr);
+  set_rig (caps, info.rig);
   return caps;
+}
+
+GstCaps *
+with_rig (const GstCaps *caps, const rangecast::Rig &rig)
+{
+  GstCaps *copy = gst_caps_copy (caps);
+  set_rig (copy, rig);
+  return copy;
 }
 
 GstCaps *

@@ -30,6 +30,9 @@ GST_RANGE_API RangeInfo make_info (rangecast::Rig rig, int fps_n, int fps_d);
 /** video/x-range. Returns: (transfer full) */
 GST_RANGE_API GstCaps *make_range_caps (const RangeInfo &info);
 
+/** The same caps with another rig. Returns: (transfer full) */
+GST_RANGE_API GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
+
 /** application/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
  */
 GST_RANGE_API GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <opencv2/core/hal/hal.hpp>
 
+#include "../alignment/cholesky.hpp"
 #include "../guarded.hpp"
 #include "../parallel.hpp"
 
@@ -22,8 +22,8 @@ constexpr float kKept = 0.9f;        ///< share of what was counted that counts 
  * way, so places that it has right tell more than many that it has nearly right. */
 constexpr float kSamePlace = 0.3f;
 constexpr double kMany = 300; ///< more than so many do not count more
-/* Pulls gains towards 1 where overlaps say little: as 6 shared pixels. */
-constexpr double kPrior = 0.02;
+/* Pulls gains towards 1 where overlaps say little: as 3 shared pixels. */
+constexpr double kPrior = 0.01;
 
 const std::array<float, 256> &
 log_table ()
@@ -84,6 +84,12 @@ Status
 ColourBalance::set_rig (const Rig &rig)
 {
   reset ();
+  return change_rig (rig);
+}
+
+Status
+ColourBalance::change_rig (const Rig &rig)
+{
   return guarded ("rig", [&] { return cameras_.set (rig); });
 }
 
@@ -93,7 +99,6 @@ ColourBalance::reset ()
   started_ = 0;
   frame_ = 0;
   pairs_.clear ();
-  slots_.fill (-1);
 }
 
 /* What pairs of this frame's views counted fades; what others counted waits until they are back. */
@@ -103,19 +108,11 @@ ColourBalance::age (std::span<const RangeImage> images)
   fresh_ = false;
   for (std::size_t i = 0; i < images.size (); i++)
     for (std::size_t j = i + 1; j < images.size (); j++) {
-      const auto [first, second] = std::minmax (images[i].view_id, images[j].view_id);
-      if (first == second)
+      if (images[i].view_id == images[j].view_id)
         continue;
-      std::int16_t &slot = slots_[place_of (first, second)];
-      if (slot >= 0) {
-        for (Histogram &bins : pairs_[static_cast<std::size_t> (slot)].ratios)
-          for (float &bin : bins)
-            bin *= kKept;
-        continue;
-      }
-      fresh_ = true;
-      pairs_.push_back ({first, second, {}});
-      slot = static_cast<std::int16_t> (pairs_.size () - 1);
+      for (Histogram &bins : pairs_.get (images[i].view_id, images[j].view_id, &fresh_).ratios)
+        for (float &bin : bins)
+          bin *= kKept;
     }
 }
 
@@ -150,9 +147,7 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
       continue;
     const bool forward = image.view_id < other.view_id;
     const Rgbx &first = forward ? mine : theirs, &second = forward ? theirs : mine;
-    const std::size_t place =
-        forward ? place_of (image.view_id, other.view_id) : place_of (other.view_id, image.view_id);
-    Pair &pair = pairs_[static_cast<std::size_t> (slots_[place])];
+    Pair &pair = pairs_.get (image.view_id, other.view_id);
     const std::uint8_t a[] = {first.r, first.g, first.b}, b[] = {second.r, second.g, second.b};
     for (std::size_t c = 0; c < 3; c++) {
       if (!is_usable (a[c], b[c]))
@@ -183,18 +178,27 @@ ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t fro
       compare (images, from, x, y);
 }
 
+/* The median of what was found for the views that share surface with others: where that is 1, one
+ * camera whose exposure is wrong does not change the others. */
+double
+ColourBalance::middle_of_linked (std::uint64_t views)
+{
+  sorted_.clear ();
+  for (std::uint64_t rest = views & linked_; rest; rest &= rest - 1)
+    sorted_.push_back (right_[number_among (views, std::countr_zero (rest))]);
+  if (sorted_.empty ())
+    return 0;
+  std::ranges::sort (sorted_);
+  return (sorted_[(sorted_.size () - 1) / 2] + sorted_[sorted_.size () / 2]) / 2;
+}
+
 /* Least squares: for each pair the difference of both log gains is minus the median. The same
  * matrix for all channels, the graph's Laplacian. Of all views that were ever there: would one that
  * is missing for a frame be left out, the mean gain of the others would move. */
 void
 ColourBalance::solve ()
 {
-  std::uint64_t views = 0;
-  for (const Pair &pair : pairs_)
-    views |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
-  const auto row_of = [views] (int id) { /* view-ids without gaps */
-    return static_cast<std::size_t> (std::popcount (views & ((std::uint64_t{1} << id) - 1)));
-  };
+  const std::uint64_t views = pairs_.views ();
   const auto n = static_cast<std::size_t> (std::popcount (views));
   linked_ = 0;
   for (std::size_t c = 0; c < 3 && n > 0; c++) {
@@ -210,7 +214,7 @@ ColourBalance::solve ()
       if (count < kFewest)
         continue;
       linked_ |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
-      const std::size_t i = row_of (pair.first), j = row_of (pair.second);
+      const std::size_t i = number_among (views, pair.first), j = number_among (views, pair.second);
       const double weight = std::min (1.0, double{count} / kMany), ratio = median_of (bins, count);
       matrix_[i * n + i] += weight;
       matrix_[j * n + j] += weight;
@@ -219,12 +223,13 @@ ColourBalance::solve ()
       right_[i] -= weight * ratio;
       right_[j] += weight * ratio;
     }
-    if (!cv::hal::Cholesky64f (matrix_.data (), n * sizeof (double), static_cast<int> (n),
-            right_.data (), sizeof (double), 1))
+    if (!solve_cholesky (matrix_, right_))
       std::fill (right_.begin (), right_.end (), 0); /* never: the prior makes it definite */
+    const double middle = middle_of_linked (views);
     for (std::uint64_t rest = views; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
-      measured_[static_cast<std::size_t> (id)][c] = static_cast<float> (right_[row_of (id)]);
+      measured_[static_cast<std::size_t> (id)][c] =
+          static_cast<float> (right_[number_among (views, id)] - middle);
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "../alignment/view_pairs.hpp"
 #include "colour_cameras.hpp"
 
 namespace rangecast {
@@ -17,23 +18,25 @@ namespace rangecast {
  *  where the depths agree, and both see the surface well, the ratio of both colours is taken. For
  * each pair of views and each channel the median of the ratios' logarithms tells how their gains
  * differ; least squares over all pairs, each weighted by how much it shares, makes one gain of each
- * view. Their mean stays 1: nobody knows which camera is right. A gain on values that went through
- * a camera's gamma curve stands for exposure and white balance, which are gains before it, as long
- * as the curve is near a power. */
+ * view. Their median stays 1: nobody knows which camera is right, but one whose exposure is wrong
+ * is not to change the others. A gain on values that went through a camera's gamma curve stands for
+ * exposure and white balance, which are gains before it, as long as the curve is near a power. */
 class ColourBalance {
 public:
   using Gains = std::array<float, 3>; ///< red, green, blue
 
   /** No gain is larger than this, or smaller than its inverse. */
-  static constexpr float kMostGain = 1.5f;
+  static constexpr float kMostGain = 1.75f;
   /** A new frame counts that much. */
   static constexpr float kShareOfNew = 0.1f;
-  /** This much of a gain (3 in 1000, half a level) is left undone, so that cameras which agree are
-   *  left alone, bit by bit. */
-  static constexpr float kLeftUndone = 0.003f;
+  /** This much of a gain (2 in 1000, a quarter of a level) is left undone, so that cameras which
+   *  agree are left alone, bit by bit. */
+  static constexpr float kLeftUndone = 0.002f;
 
   /** Takes the cameras and forgets the stream. */
   Status set_rig (const Rig &rig);
+  /** Takes other poses and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig);
   void reset ();
 
   /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
@@ -61,11 +64,7 @@ private:
   void compare (std::span<const RangeImage> images, std::size_t from, int x, int y);
   void solve ();
   void follow (std::span<const RangeImage> images);
-  /* In slots_. */
-  static std::size_t place_of (int first, int second)
-  {
-    return static_cast<std::size_t> (second) * (second - 1) / 2 + static_cast<std::size_t> (first);
-  }
+  double middle_of_linked (std::uint64_t views);
 
   ColourCameras cameras_;
   std::uint64_t started_ = 0; /* bit i: the log gains of view-id i are known */
@@ -74,10 +73,9 @@ private:
   std::array<Gains, kMaxViews> log_gains_{}; /* by view-id; smoothed */
   std::array<int, kMaxViews> frames_{};      /* by view-id: that its gains were learnt from */
   std::array<Gains, kMaxViews> measured_{};  /* by view-id, of this frame */
-  std::vector<Pair> pairs_;                  /* of views that were there together */
-  std::array<std::int16_t, kMaxViews *(kMaxViews - 1) / 2> slots_; /* of each in pairs_, or -1 */
-  bool fresh_ = true;                  /* some of this frame's have counted nothing yet */
-  std::vector<double> matrix_, right_; /* of the least squares */
+  ViewPairs<Pair> pairs_;                    /* of views that were there together */
+  bool fresh_ = true; /* some of this frame's pairs have counted nothing yet */
+  std::vector<double> matrix_, right_, sorted_; /* of the least squares */
 };
 
 } // namespace rangecast

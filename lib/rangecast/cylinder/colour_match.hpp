@@ -22,6 +22,12 @@ public:
     const Status status = balance_.set_rig (rig);
     return status.ok () ? blend_.set_rig (rig) : status;
   }
+  /** Takes other poses and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig)
+  {
+    const Status status = balance_.change_rig (rig);
+    return status.ok () ? blend_.set_rig (rig) : status;
+  }
   void reset () { balance_.reset (); }
 
   Status before (std::span<const RangeImage> images, const ColourSettings &settings)

@@ -39,8 +39,14 @@ check (const CylinderSettings &settings)
 Status
 CylinderFilter::set_rig (const Rig &rig)
 {
-  rig_views_ = 0;
   reset ();
+  return change_rig (rig);
+}
+
+Status
+CylinderFilter::change_rig (const Rig &rig)
+{
+  rig_views_ = 0;
   return guarded ("rig", [&] () -> Status {
     if (Status status = validate (rig); !status.ok ())
       return status;

@@ -80,6 +80,8 @@ class CylinderFilter {
 public:
   /** Takes the cameras and forgets the stream. All views must be range views. */
   Status set_rig (const Rig &rig);
+  /** Takes other poses, or other cameras, and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig);
   /** Forgets where the axis was and who won. */
   void reset ();
 

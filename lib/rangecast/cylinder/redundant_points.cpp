@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "../alignment/pixel_transfer.hpp"
 #include "../parallel.hpp"
 #include "isa.hpp"
 
@@ -88,37 +89,18 @@ template <typename L> struct RedundantPoints::CoverLoop {
   ImageState &state, &other_state;
   int winner;
   float overlap;
-  /* Column, row and depth d of a pixel of the image are, in the other plane's pixels times depth
-   * and in its depth: origin + d * (corner + column * right + row * down). */
-  float origin[3], corner[3], right[3], down[3];
-  float per_focal; /* of the other image */
+  PixelTransfer transfer; /* to the other image */
+  float per_focal;        /* of the other image */
 
   CoverLoop (RedundantPoints &points, const ResolvedFrame &frame, std::size_t own,
       std::size_t rival, double reach)
       : owner (points), image (frame.images[own]), other (frame.images[rival]),
         state (points.images_[own]), other_state (points.images_[rival]),
-        winner (static_cast<int> (rival)), overlap (static_cast<float> (reach))
+        winner (static_cast<int> (rival)), overlap (static_cast<float> (reach)),
+        transfer (frame.rays[own], image.roi, frame.lookups[rival], other.roi)
   {
-    const PixelRays &rays = frame.rays[own];
-    const auto &rows = frame.lookups[rival].rows;
-    const int box[] = {other.roi.x, other.roi.y, 0};
-    for (int k = 0; k < 3; k++) {
-      const auto turned = [&] (const float *ray) {
-        double sum = 0;
-        for (int c = 0; c < 3; c++)
-          sum += (double{rows[k][c]} - box[k] * double{rows[2][c]}) * ray[c];
-        return sum;
-      };
-      const double to_right = turned (rays.right), to_down = turned (rays.down);
-      origin[k] =
-          static_cast<float> (turned (rays.origin) + rows[k][3] - box[k] * double{rows[2][3]});
-      corner[k] = static_cast<float> (
-          turned (rays.corner) + image.roi.x * to_right + image.roi.y * to_down);
-      right[k] = static_cast<float> (to_right);
-      down[k] = static_cast<float> (to_down);
-    }
     const auto length = [] (const float *v) { return std::hypot (v[0], v[1], v[2]); };
-    per_focal = length (frame.rays[rival].right) * length (rows[2]);
+    per_focal = length (frame.rays[rival].right) * length (frame.lookups[rival].rows[2]);
   }
 
   /* Which columns of each row have candidates. */
@@ -186,8 +168,9 @@ template <typename L> struct RedundantPoints::CoverLoop {
     const F depth = L::at (&row.depth[at]);
     F seen_at[3];
     for (int k = 0; k < 3; k++)
-      seen_at[k] =
-          origin[k] + depth * (corner[k] + static_cast<float> (y) * down[k] + x * right[k]);
+      seen_at[k] = transfer.origin[k] +
+                   depth * (transfer.corner[k] + static_cast<float> (y) * transfer.down[k] +
+                               x * transfer.right[k]);
     const F z = seen_at[2];
     F u = seen_at[0] / z, v = seen_at[1] / z;
     const I seen = (depth > 0) & (z > 0) & (u > -kSnap) & (v > -kSnap) &

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
 #include <unordered_map>
 
@@ -79,6 +80,19 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
     line (what, median_ms (set, rounds,
                     [&] { (void)filter.process (set.images (), settings, result).ok (); }));
   };
+  /* Mean times: poses are compared in each third frame set only. */
+  const auto agree = [&] (const char *what, const AgreementSettings &settings) {
+    ViewAgreement agreement;
+    if (!agreement.set_rig (set.rig).ok ())
+      return;
+    (void)agreement.process (set.images (), settings).ok (); /* the first takes longer */
+    line (what, 1.0 / 3 * median_ms (set, rounds, [&] {
+      for (int i = 0; i < 3; i++)
+        (void)agreement.process (set.images (), settings).ok ();
+    }));
+  };
+  agree ("poses + views, 1 thread", {true, false, true, 1});
+  agree ("all of agree, 1 thread", {true, true, true, 1});
   CylinderSettings settings;
   run ("cylinder, 1 thread", settings);
   settings.threads = 0;

@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "view_agreement.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <string>
+
+#include "../guarded.hpp"
+
+namespace rangecast {
+
+namespace {
+
+constexpr std::uint32_t kLearnEvery = 3; ///< frame sets
+/* Stereo errs alike in large parts of a picture, so a pose may seem off by as much as depth is: a
+ * rig stays as it is until a view needs more than this, metres, and so many errors of depth. */
+constexpr double kNeedsCorrection = 0.001, kErrorsOff = 1;
+constexpr double kStaysCorrected = 0.6; ///< share of that
+/* A new rig makes everybody downstream negotiate again: not for less than this, metres, nor more
+ * often than every so many frame sets. */
+constexpr double kMinChange = 0.0004;
+constexpr std::uint32_t kChangeEvery = 15;
+constexpr double kConfirmed = 30; ///< points of a pair that confirm both views
+constexpr double kMaxContradictedAgain = 0.04;
+
+} // namespace
+
+Status
+ViewAgreement::set_rig (const Rig &rig)
+{
+  return guarded ("rig", [&] () -> Status {
+    if (Status status = validate (rig); !status.ok ())
+      return status;
+    nominal_ = rig;
+    index_.fill (-1);
+    for (std::size_t i = 0; i < rig.views.size (); i++)
+      index_[static_cast<std::size_t> (rig.views[i].id)] = static_cast<int> (i);
+    poses_.set_rig (rig);
+    reset ();
+    return {};
+  });
+}
+
+void
+ViewAgreement::reset ()
+{
+  rig_ = nominal_;
+  poses_.reset ();
+  of_.fill ({});
+  gains_.fill ({1, 1, 1});
+  frame_ = changed_at_ = 0;
+  judged_ = corrected_ = rig_changed_ = false;
+}
+
+void
+ViewAgreement::prepare (std::span<const RangeImage> images, int threads)
+{
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
+    const View &view =
+        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
+    planes_[i].make (images[i], static_cast<float> (view.intrinsics.fx));
+  });
+  aligned_.clear ();
+  for (std::size_t i = 0; i < images.size (); i++)
+    aligned_.push_back (
+        {images[i], &planes_[i], gains_[static_cast<std::size_t> (images[i].view_id)]});
+}
+
+/* Takes what is known of the poses into use, if that matters. */
+void
+ViewAgreement::correct_rig (bool poses)
+{
+  if (judged_ && frame_ - changed_at_ < kChangeEvery)
+    return;
+  double most = 0, change = 0;
+  for (const View &view : nominal_.views)
+    most = std::max (most, poses_.correction (view.id).size ());
+  const double needed = kNeedsCorrection + kErrorsOff * poses_.depth_error ();
+  const bool corrects = poses && most > (corrected_ ? kStaysCorrected * needed : needed);
+  const auto wanted = [&] (int id) { return corrects ? poses_.correction (id) : PoseCorrection{}; };
+  for (const View &view : nominal_.views) {
+    const PoseCorrection by = wanted (view.id),
+                         &used = of_[static_cast<std::size_t> (view.id)].correction;
+    change = std::max (change,
+        PoseCorrection{by.translation - used.translation, by.rotation - used.rotation}.size ());
+  }
+  if (change < kMinChange)
+    return;
+  for (std::size_t i = 0; i < nominal_.views.size (); i++) {
+    const View &view = nominal_.views[i];
+    PoseCorrection &used = of_[static_cast<std::size_t> (view.id)].correction;
+    used = wanted (view.id);
+    rig_.views[i].world_from_view =
+        corrects ? poses_.corrected (view.world_from_view, used) : view.world_from_view;
+  }
+  corrected_ = corrects;
+  changed_at_ = frame_;
+  rig_changed_ = true;
+}
+
+PairAgreement
+ViewAgreement::agreement_among (int id, std::uint64_t trusted) const
+{
+  PairAgreement sum;
+  for (std::uint64_t rest = trusted & ~(std::uint64_t{1} << id); rest; rest &= rest - 1)
+    sum += poses_.agreement (id, std::countr_zero (rest));
+  return sum;
+}
+
+/* Points of these views that contradict each other; each pair counts twice. */
+double
+ViewAgreement::contradictions_of (std::uint64_t views) const
+{
+  double sum = 0;
+  for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+    const PairAgreement pairs = agreement_among (std::countr_zero (rest), views);
+    sum += pairs.comparable - pairs.same;
+  }
+  return sum;
+}
+
+/* Whether a view contradicts those that it is compared with. */
+static bool
+contradicts (const PairAgreement &sum, bool left_out)
+{
+  const double most = left_out ? kMaxContradictedAgain : ViewAgreement::kMaxContradicted,
+               least = left_out ? ViewAgreement::kConsistentAgain : ViewAgreement::kMinConsistency;
+  return sum.comparable - sum.same > most * sum.points && sum.share () < least;
+}
+
+/* Whether two of these views confirm each other. */
+bool
+ViewAgreement::has_good_pair (std::uint64_t trusted) const
+{
+  for (std::uint64_t a = trusted; a; a &= a - 1)
+    for (std::uint64_t b = a & (a - 1); b; b &= b - 1) {
+      const PairAgreement pair = poses_.agreement (std::countr_zero (a), std::countr_zero (b));
+      if (pair.same >= kConfirmed && pair.share () > kGoodPair)
+        return true;
+    }
+  return false;
+}
+
+/* Of the views that are contradicted the one goes first without which the others contradict each
+ * other least. */
+void
+ViewAgreement::judge_views (std::span<const RangeImage> images)
+{
+  std::uint64_t all = 0;
+  for (const RangeImage &image : images)
+    all |= std::uint64_t{1} << image.view_id;
+  std::uint64_t trusted = all;
+  for (;;) {
+    std::uint64_t rest_of_best = 0;
+    double least = std::numeric_limits<double>::max ();
+    for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
+      const int id = std::countr_zero (rest);
+      if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+        continue;
+      const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
+      if (const double left = contradictions_of (others); left < least && has_good_pair (others))
+        least = left, rest_of_best = others;
+    }
+    if (!rest_of_best)
+      break;
+    trusted = rest_of_best;
+  }
+  /* Who agreed with none but a bad view is no worse for it. */
+  for (std::uint64_t rest = all & ~trusted; rest; rest &= rest - 1) {
+    const int id = std::countr_zero (rest);
+    if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+      trusted |= std::uint64_t{1} << id;
+  }
+  for (std::uint64_t rest = all; rest; rest &= rest - 1) {
+    const int id = std::countr_zero (rest);
+    ViewConsistency &view = of_[static_cast<std::size_t> (id)];
+    view.consistency = agreement_among (id, trusted).share ();
+    view.left_out = !(trusted >> id & 1);
+  }
+}
+
+static void
+clear_depth (const RangeImage &image)
+{
+  for (int y = 0; y < image.depth.height; y++)
+    std::fill_n (image.depth.row (y), image.depth.width, kInvalidDepth);
+}
+
+void
+ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings &settings)
+{
+  const bool learns = (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
+  if (learns || settings.depth)
+    prepare (images, settings.threads);
+  if (learns) {
+    poses_.learn (aligned_);
+    judge_views (images);
+  }
+  correct_rig (settings.poses);
+  frame_++;
+  judged_ = true;
+  for (std::size_t i = 0; i < images.size (); i++) {
+    ViewConsistency &view = of_[static_cast<std::size_t> (images[i].view_id)];
+    view.left_out = view.left_out && settings.views;
+    if (!view.left_out)
+      continue;
+    clear_depth (images[i]);
+    planes_[i].clear ();
+  }
+  if (!settings.depth)
+    return;
+  fused_.clear ();
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const View &view =
+        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
+    fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
+        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m)});
+  }
+  workers_.reserve (workers_for (images.size (), settings.threads));
+  in_parallel (images.size (), settings.threads,
+      [&] (std::size_t i, std::size_t worker) { workers_.of (worker).process (fused_, i); });
+}
+
+Status
+ViewAgreement::process (std::span<const RangeImage> images, const AgreementSettings &settings)
+{
+  rig_changed_ = false;
+  if (images.size () > kMaxViews)
+    return {StatusCode::kBadSize, "frame set: more than 64 views"};
+  for (const RangeImage &image : images)
+    if (image.view_id < 0 || image.view_id >= kMaxViews ||
+        index_[static_cast<std::size_t> (image.view_id)] < 0)
+      return {StatusCode::kNotFound,
+          "rig: no view " + std::to_string (image.view_id) + ", which the frame set has"};
+  if (images.size () < 2 || !(settings.poses || settings.depth || settings.views))
+    return {};
+  return guarded ("views", [&] () -> Status {
+    work (images, settings);
+    return {};
+  });
+}
+
+} // namespace rangecast

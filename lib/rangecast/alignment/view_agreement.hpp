@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../parallel.hpp"
+#include "../status.hpp"
+#include "depth_agreement.hpp"
+#include "pose_alignment.hpp"
+
+namespace rangecast {
+
+struct AgreementSettings {
+  bool poses = true; ///< PoseAlignment
+  bool depth = true; ///< DepthAgreement
+  bool views = true; ///< leave out views that contradict the others
+  int threads = 1;   ///< views at a time; 0 = number of cores
+};
+
+/** What is known of one view. */
+struct ViewConsistency {
+  PoseCorrection correction; ///< in use
+  double consistency = 1;    ///< share of its comparable points that agree with the others, 0 .. 1
+  bool left_out = false;
+};
+
+/** Makes the views of a frame set agree before they are drawn together: corrects the rig, moves
+ *  depth of one surface together, and leaves out a view that contradicts the others.
+ *
+ *  A view is left out if other views contradict more than kMaxContradicted of its points, if less
+ *  than kMinConsistency of its comparable points agree with theirs, and if some of the others
+ *  confirm each other (kGoodPair); it is back at half of that, or at kConsistentAgain. Comparisons
+ *  of about 20 frame sets count, so views do not come and go. Of two views nobody knows which is
+ *  wrong: both stay. */
+class ViewAgreement {
+public:
+  static constexpr double kMaxContradicted = 0.08, kMinConsistency = 0.35, kConsistentAgain = 0.55,
+                          kGoodPair = 0.6;
+
+  /** Takes the cameras, and forgets the stream. */
+  Status set_rig (const Rig &rig);
+  /** Forgets the stream; corrections go. */
+  void reset ();
+
+  /** For views that are compared: what their colours are multiplied with afterwards. */
+  void set_gains (int view_id, const std::array<float, 3> &gains)
+  {
+    gains_[static_cast<std::size_t> (view_id)] = gains;
+  }
+
+  /** Changes depth in place: pixels move (AgreementSettings::depth), all pixels of a view that is
+   *  left out become invalid. Nothing is allocated once all views have been seen together, but when
+   *  the rig changes.
+   *  @return kNotFound for a view that the rig has not, kBadSize for more than kMaxViews images,
+   *  kNoSpace without memory */
+  Status process (std::span<const RangeImage> images, const AgreementSettings &settings);
+
+  /** The rig as it is now believed to be. */
+  [[nodiscard]] const Rig &rig () const { return rig_; }
+  /** Whether process() changed it in the last call. */
+  [[nodiscard]] bool rig_changed () const { return rig_changed_; }
+  /** Of a view-id of the rig. */
+  [[nodiscard]] const ViewConsistency &view (int view_id) const
+  {
+    return of_[static_cast<std::size_t> (view_id)];
+  }
+
+private:
+  void prepare (std::span<const RangeImage> images, int threads);
+  void correct_rig (bool poses);
+  void judge_views (std::span<const RangeImage> images);
+  [[nodiscard]] PairAgreement agreement_among (int id, std::uint64_t trusted) const;
+  [[nodiscard]] double contradictions_of (std::uint64_t views) const;
+  [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
+  void work (std::span<const RangeImage> images, const AgreementSettings &settings);
+
+  Rig nominal_, rig_;
+  std::array<int, kMaxViews> index_{}; /* in both rigs, by view-id */
+  std::array<ViewConsistency, kMaxViews> of_;
+  std::array<std::array<float, 3>, kMaxViews> gains_;
+  PoseAlignment poses_;
+  std::uint32_t frame_ = 0, changed_at_ = 0;
+  bool rig_changed_ = false, corrected_ = false, judged_ = false;
+  /* Of the present frame. */
+  std::vector<AlignedView> aligned_;
+  std::vector<FusedView> fused_;
+  std::array<SurfacePlanes, kMaxViews> planes_; /* by number of the image */
+  WorkerMemory<DepthAgreement> workers_;
+};
+
+} // namespace rangecast
