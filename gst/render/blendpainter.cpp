@@ -20,7 +20,7 @@ static constexpr std::size_t kMaxHalfFloatViews = 16;
 
 /* Views that look against the viewer show the inside of surfaces, which fills holes, but must not
  * hide an outside that is less than so many metres behind. */
-static constexpr double kInsideGap_m = 0.1;
+static constexpr double kInsideGap_m = 0.015;
 
 static const char *const kVertexShader = R"(
 precision highp float;

@@ -30,7 +30,7 @@ struct StripSettings {
 };
 
 inline constexpr double kMergeDepth = 0.0007;     ///< share of the depth
-inline constexpr double kMergeDepthBlend = 0.002; ///< mode kBlend: other views average it
+inline constexpr double kMergeDepthBlend = 0.001; ///< mode kBlend: other views average it
 inline constexpr double kMergeColour = 1.5;       ///< levels
 inline constexpr double kMergeCopyDepth = 0.004;
 inline constexpr double kMergeCopyColour = 12;
