@@ -97,10 +97,8 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   picture.width = width_;
   picture.height = height_;
   picture.part = {place.x, place.y, place.width, place.height};
-  picture.covered = picture.background_shade > 0 /* which the same pass draws */
-                        ? picture.part
-                        : rangecast::covered_part (picture.clip_from_world, job.scene->hull (),
-                              width_, height_, picture.part);
+  picture.covered = rangecast::covered_part (
+      picture.clip_from_world, job.scene->hull (), width_, height_, picture.part);
   return picture;
 }
 
@@ -143,9 +141,19 @@ StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
     gl->Enable (GL_SCISSOR_TEST);
     gl->Scissor (place.x, place.y, place.width, place.height);
   }
+  const bool blends = picture.mode == rangecast::StripMode::kBlend;
+  const auto shade = [&] {
+    if (picture.background_shade > 0)
+      background_painter_.draw (
+          context_, picture.background, picture.background_shade, picture.part);
+  };
+  if (blends && (picture.keeps_depth || picture.background_shade > 0))
+    gl->Clear (GL_DEPTH_BUFFER_BIT);
+  if (blends) /* over what is there; other modes leave the background's depth */
+    shade ();
   call.has_targets = painter_.draw (picture, job.scene->layers ()) && call.has_targets;
-  if (picture.background_shade > 0 && picture.mode != rangecast::StripMode::kBlend)
-    background_painter_.draw (context_, picture.background, picture.background_shade, picture.part);
+  if (!blends)
+    shade ();
   if (job.settings->show_cameras)
     call.result.uploaded +=
         camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),

@@ -193,7 +193,7 @@ bool
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
   const bool precise = !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
-  if (!targets_.begin_depth (picture.width, picture.height, precise))
+  if (!targets_.begin_depth (picture.width, picture.height, precise, picture.covered))
     return false;
   draw_layers (layers, picture, kDepth);
   targets_.begin_sum ();

@@ -143,7 +143,7 @@ BlendTargets::make (int width, int height, bool precise)
 }
 
 bool
-BlendTargets::begin_depth (int width, int height, bool precise)
+BlendTargets::begin_depth (int width, int height, bool precise, const rangecast::Roi &covered)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &before_);
@@ -162,6 +162,8 @@ BlendTargets::begin_depth (int width, int height, bool precise)
     }
   }
   gl->Viewport (0, 0, width, height);
+  gl->Enable (GL_SCISSOR_TEST); /* to clear float targets is a good part of what a picture costs */
+  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
   gl->ClearColor (0, 0, 0, 0);
   gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   gl->Enable (GL_DEPTH_TEST);
@@ -191,10 +193,10 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
   gl->DepthMask (TRUE);
   gl->DepthFunc (GL_ALWAYS);
   gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
+  gl->Scissor (part.x, part.y, part.width, part.height);
   gl->ClearColor (background[0], background[1], background[2], background[3]);
-  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  const bool whole = part.width == width_ && part.height == height_;
-  gl->Enable (GL_SCISSOR_TEST);
+  if (shade <= 0)
+    gl->Clear (GL_COLOR_BUFFER_BIT);
   gl->Scissor (covered.x, covered.y, covered.width, covered.height);
   gst_gl_shader_use (shader);
   static const char *const kNames[] = {"u_sum", "u_depth"};
@@ -203,8 +205,8 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
     gl->BindTexture (GL_TEXTURE_2D, textures_[i]);
     gst_gl_shader_set_uniform_1i (shader, kNames[i], gint (i));
   }
-  gst_gl_shader_set_uniform_4i (
-      shader, "u_part", part.x, part.y, part.x + part.width - 1, part.y + part.height - 1);
+  gst_gl_shader_set_uniform_4i (shader, "u_part", covered.x, covered.y,
+      covered.x + covered.width - 1, covered.y + covered.height - 1);
   if (shift)
     gst_gl_shader_set_uniform_3f (shader, "u_shift", shift->a, shift->b, shift->g);
   set_background_uniforms (shader, background, shade, part);
@@ -214,7 +216,7 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
   gl->BindTexture (GL_TEXTURE_2D, 0);
   gl->ActiveTexture (GL_TEXTURE0);
   gl->DepthFunc (GL_LESS);
-  if (whole)
+  if (part.width == width_ && part.height == height_)
     gl->Disable (GL_SCISSOR_TEST);
   else
     gl->Scissor (part.x, part.y, part.width, part.height);

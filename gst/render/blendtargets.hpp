@@ -20,23 +20,23 @@ public:
   void stop ();
 
   /** Binds and clears the targets, made anew if size or precision change, to draw depth only.
-   *  Scissors stay in force.
    *  @param precise  32-bit floats instead of 16-bit ones; not with OpenGL ES
-   *  @return false if OpenGL has no such framebuffer; what was bound is bound again
-   */
-  bool begin_depth (int width, int height, bool precise);
+   *  @param covered  pixels that something may be drawn in, and one more on each side: scissors
+   *                  keep to them until resolve()
+   *  @return false if OpenGL has no such framebuffer; what was bound is bound again */
+  bool begin_depth (int width, int height, bool precise, const rangecast::Roi &covered);
   /** From here on what is drawn adds up: R, G, B times weight, and the weight. Depth is compared,
    *  not written. */
   void begin_sum ();
   /** Divides, into the framebuffer that was bound before begin_depth(), and smooths outlines.
    *  @param part        pixels that this picture fills; if that is not the whole framebuffer,
    *                     scissors keep to it, now and afterwards
-   *  @param covered     those that something may be drawn in, and one more on each side; the rest
-   *                     becomes background
+   *  @param covered     those of begin_depth(); the rest becomes background
    *  @param background  R, G, B, A, straight
-   *  @param shade       see BackgroundPainter::draw(); only what is covered is shaded
-   *  @param shift       of the depth pass; the surfaces' depth is written, too: what is drawn later
-   *                     stands among them. nullptr: none is written */
+   *  @param shade       see BackgroundPainter::draw(), which has drawn it if it is not 0
+   *  @param shift       of the depth pass; the surfaces' depth is written, too, into a depth buffer
+   *                     that has been cleared: what is drawn later stands among them. nullptr: none
+   *                     is written */
   void resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
       const float (&background)[4], float shade, const rangecast::DepthShift *shift);
 
