@@ -99,6 +99,7 @@ struct GstCylinderFilterPrivate {
   rangecast::ViewAgreement agreement;
   rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
+  bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_off = false;
@@ -230,6 +231,13 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     gstrange::RangeInfo info;
     rangecast::Status result = gstrange::parse_caps (in, info);
+    /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
+    if (result.ok () && priv->has_rig &&
+        encode_rig (info.rig) == encode_rig (priv->agreement.nominal_rig ())) {
+      priv->rig_pending = true;
+      return result;
+    }
+    priv->has_rig = false;
     gst_cylinder_filter_forget (priv);
     priv->reporter.set_views (info.rig);
     {
@@ -242,7 +250,10 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
       result = priv->agreement.set_rig (info.rig);
     if (result.ok ())
       result = priv->core.set_rig (info.rig);
-    return result.ok () ? priv->colours.set_rig (info.rig) : result;
+    if (result.ok ())
+      result = priv->colours.set_rig (info.rig);
+    priv->has_rig = result.ok ();
+    return result;
   });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
@@ -407,6 +418,7 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
   GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
   const StreamLock lock (base);
   /* With the stream its memory goes too. */
+  GST_CYLINDER_FILTER (base)->priv->has_rig = false;
   GST_CYLINDER_FILTER (base)->priv->core = {};
   GST_CYLINDER_FILTER (base)->priv->agreement = {};
   GST_CYLINDER_FILTER (base)->priv->colours = {};

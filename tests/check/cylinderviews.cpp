@@ -184,6 +184,22 @@ GST_START_TEST (test_corrections_begin_anew_after_a_flush)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_corrections_outlast_a_reconfigure_from_downstream)
+{
+  const Scene scene (4, kWidth, kHeight, 1, kStill);
+  Filter filter ("cylinderfilter", nudged_caps (scene, {0.003, 0, 0.002}, 0));
+  filter.run (scene, 2);
+  GstCaps *corrected = filter.caps ();
+  filter.set ("agree", "views"); /* so that nothing is corrected anew */
+  gst_harness_push_upstream_event (filter.h, gst_event_new_reconfigure ());
+  filter.run (scene, 1);
+  GstCaps *caps = filter.caps ();
+  fail_unless (gst_caps_is_equal (caps, corrected));
+  gst_caps_unref (caps);
+  gst_caps_unref (corrected);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_agree_is_controllable_and_reads_as_it_was_set)
 {
   GstElement *element = gst_element_factory_make ("cylinderfilter", nullptr);
@@ -211,6 +227,7 @@ cylinderviews_suite ()
   tcase_add_test (tc, test_without_poses_and_with_mode_off_the_rig_is_as_it_came);
   tcase_add_test (tc, test_view_with_a_wrong_pose_is_left_out_and_stats_say_so);
   tcase_add_test (tc, test_corrections_begin_anew_after_a_flush);
+  tcase_add_test (tc, test_corrections_outlast_a_reconfigure_from_downstream);
   tcase_add_test (tc, test_agree_is_controllable_and_reads_as_it_was_set);
   return suite;
 }
