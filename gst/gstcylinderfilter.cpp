@@ -23,6 +23,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <string>
 #include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
@@ -102,6 +103,7 @@ struct GstCylinderFilterPrivate {
   bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  std::string stream_id;
   bool was_off = false;
 };
 
@@ -181,21 +183,22 @@ gst_cylinder_filter_axis_get_type (void)
 
 /* ---- streaming ---- */
 
+/* After a jump in time: people and light are others, the cameras stand where they stood. */
 static void
-gst_cylinder_filter_forget_scene (GstCylinderFilterPrivate *priv)
+gst_cylinder_filter_forget_moment (GstCylinderFilterPrivate *priv)
 {
   priv->core.reset ();
   priv->colours.reset ();
-  priv->agreement.reset ();
-  priv->rig_pending = true;
+  priv->last_pts = GST_CLOCK_TIME_NONE;
 }
 
 /* All that is of one stream. */
 static void
 gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
 {
-  gst_cylinder_filter_forget_scene (priv);
-  priv->last_pts = GST_CLOCK_TIME_NONE;
+  gst_cylinder_filter_forget_moment (priv);
+  priv->agreement.reset ();
+  priv->rig_pending = true;
 }
 
 /* Gives the rig that the views have now to those who work with it, here and downstream. */
@@ -277,7 +280,7 @@ gst_cylinder_filter_submit_input_buffer (
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   if (gst_cylinder_filter_begins_anew (priv, buffer)) {
-    gst_cylinder_filter_forget (priv);
+    gst_cylinder_filter_forget_moment (priv);
     priv->last_pts = GST_BUFFER_PTS (buffer);
   }
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
@@ -297,7 +300,8 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     priv->reporter.passed (GST_ELEMENT (base), buffer);
   if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
-    gst_cylinder_filter_forget_scene (priv);
+    gst_cylinder_filter_forget (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
     const rangecast::Status status = rangecast::guarded ("cylinderfilter",
         [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
     if (!status.ok ())
@@ -381,13 +385,21 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 static gboolean
 gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  /* Serialised with the data: axis, winners and gains start anew after a seek, or with another
-   * stream. */
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP ||
-      GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
-    gst_cylinder_filter_forget (GST_CYLINDER_FILTER (base)->priv);
+  /* Serialised with the data: axis, winners and gains start anew after a seek, what is known of the
+   * rig with another stream. */
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    gst_cylinder_filter_forget_moment (priv);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
+    const gchar *stream_id = nullptr;
+    gst_event_parse_stream_start (event, &stream_id);
+    gst_cylinder_filter_forget_moment (priv);
+    if (priv->stream_id != stream_id)
+      gst_cylinder_filter_forget (priv);
+    priv->stream_id = stream_id;
+  }
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
-    GST_CYLINDER_FILTER (base)->priv->reporter.finish ();
+    priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
 }
 
