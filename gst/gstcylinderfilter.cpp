@@ -23,7 +23,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <string>
+#include <optional>
 #include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
@@ -103,7 +103,6 @@ struct GstCylinderFilterPrivate {
   bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
-  std::string stream_id;
   bool was_off = false;
 };
 
@@ -206,7 +205,10 @@ static rangecast::Status
 gst_cylinder_filter_send_rig (GstCylinderFilter *self)
 {
   auto priv = self->priv;
-  const rangecast::Rig &rig = priv->agreement.rig ();
+  rangecast::Status good = validate (priv->agreement.rig ());
+  if (!good.ok ())
+    GST_WARNING_OBJECT (self, "the rig stays as it came; corrected, %s", good.message ().c_str ());
+  const rangecast::Rig &rig = good.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
   priv->rig_pending = false;
   if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
     return status;
@@ -219,7 +221,8 @@ gst_cylinder_filter_send_rig (GstCylinderFilter *self)
   GstCaps *caps = gstrange::with_rig (present, rig);
   if (!gst_caps_is_equal (caps, present)) {
     GST_DEBUG_OBJECT (self, "poses of the rig change");
-    gst_pad_push_event (pad, gst_event_new_caps (caps));
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "they were not taken downstream"); /* and the buffer says why */
   }
   gst_caps_unref (caps);
   gst_caps_unref (present);
@@ -336,8 +339,11 @@ gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast:
     const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
 {
   auto priv = self->priv;
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
   for (const rangecast::RangeImage &view : views)
-    priv->agreement.set_gains (view.view_id, priv->colours.balance ().gains (view.view_id));
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
   if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
     return status;
   if (priv->rig_pending || priv->agreement.rig_changed ())
@@ -393,10 +399,11 @@ gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
     const gchar *stream_id = nullptr;
     gst_event_parse_stream_start (event, &stream_id);
+    gchar *last = gst_pad_get_stream_id (base->sinkpad); /* it takes this event afterwards */
     gst_cylinder_filter_forget_moment (priv);
-    if (priv->stream_id != stream_id)
+    if (g_strcmp0 (last, stream_id) != 0)
       gst_cylinder_filter_forget (priv);
-    priv->stream_id = stream_id;
+    g_free (last);
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     priv->reporter.finish ();

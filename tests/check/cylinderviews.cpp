@@ -193,6 +193,26 @@ GST_START_TEST (test_corrections_outlast_a_flush_but_not_the_stream)
 }
 GST_END_TEST;
 
+/* A view whose colours are quite wrong. */
+GST_START_TEST (test_without_colour_balance_a_dark_view_is_no_contradiction)
+{
+  const Scene scene (8, kWidth, kHeight, 1, kStill);
+  {
+    gstrange::RangeFrameMap frame (scene.frame_sets[0], GST_MAP_READWRITE);
+    fail_unless (frame.status ().ok ());
+    const RangeImage &dark = frame.views ()[1];
+    for (int y = 0; y < dark.colour.height; y++)
+      std::fill_n (dark.colour.row (y), dark.colour.width, Rgbx{255, 0, 255});
+  }
+  Filter filter ("cylinderfilter colour-balance=off", gst_caps_ref (scene.caps));
+  filter.run (scene, 20);
+  GstBuffer *out = filter.push (scene);
+  fail_unless (std::ranges::any_of (
+      pixels_of (out, kWidth, kHeight).at (1), [] (guint64 pixel) { return pixel != 0; }));
+  gst_buffer_unref (out);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_corrections_outlast_a_reconfigure_from_downstream)
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
@@ -236,6 +256,7 @@ cylinderviews_suite ()
   tcase_add_test (tc, test_without_poses_and_with_mode_off_the_rig_is_as_it_came);
   tcase_add_test (tc, test_view_with_a_wrong_pose_is_left_out_and_stats_say_so);
   tcase_add_test (tc, test_corrections_outlast_a_flush_but_not_the_stream);
+  tcase_add_test (tc, test_without_colour_balance_a_dark_view_is_no_contradiction);
   tcase_add_test (tc, test_corrections_outlast_a_reconfigure_from_downstream);
   tcase_add_test (tc, test_agree_is_controllable_and_reads_as_it_was_set);
   return suite;
