@@ -707,9 +707,9 @@ install_agree_property (GObjectClass *object_class, GParamFlags flags)
 {
   g_object_class_install_property (object_class, PROP_AGREE,
       g_param_spec_flags ("agree", "Agree",
-          "What is done so that views agree: poses (errors of some mm are estimated and corrected "
-          "in the rig), depth (depths of one surface move together), views (one that contradicts "
-          "the others is left out) (default: poses+views)",
+          "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
+          "rig), depth (depths of one surface move together), views (one that contradicts the "
+          "others is left out), or none (default: poses+views)",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }
@@ -810,9 +810,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
-          "READY; bodies, axis-position, axis-direction, views (what agree did to each) of the "
-          "last "
-          "frame",
+          "READY; bodies, axis-position, axis-direction, views (consistency and corrections) of "
+          "the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
