@@ -73,20 +73,39 @@ gst_strip_render_fixate_caps (
   return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
 }
 
-/* May throw. */
+/* Whether both rigs are of the same cameras, however well each of them is calibrated. */
+static bool
+has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
+{
+  return std::ranges::equal (
+      a.views, b.views, [] (const rangecast::View &v, const rangecast::View &w) {
+        return v.id == w.id && v.width == w.width && v.height == w.height;
+      });
+}
+
+/* Downstream may change its mind, or cylinderfilter correct poses, at any time: a fit outlasts
+ * both. May throw. */
 static GstFlowReturn
 take_input_caps (GstStripRender *self, GstCaps *in)
 {
   GstStripRenderPrivate *priv = self->priv;
-  const Status status = gstrange::parse_caps (in, priv->info);
+  gstrange::RangeInfo info;
+  const bool same = priv->input && gst_caps_is_equal (in, priv->input);
+  const Status status = same ? Status () : gstrange::parse_caps (in, info);
   const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
+  if (same)
+    return GST_FLOW_OK;
   if (told && !status.ok ())
     return GST_FLOW_ERROR;
   if (status.ok ()) {
+    if (!has_same_cameras (info.rig, priv->info.rig))
+      priv->fit.reset ();
+    gst_clear_caps (&priv->input); /* what follows may throw */
+    priv->info = std::move (info);
     priv->scene.set_rig (priv->info.rig);
-    priv->fit.reset ();
+    priv->reporter.set_views (priv->info.rig);
+    gst_caps_replace (&priv->input, in);
   }
-  priv->reporter.set_views (priv->info.rig);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
@@ -438,6 +457,7 @@ gst_strip_render_start (GstBaseTransform *base)
   priv->live = false;
   priv->stats_text = {};
   priv->fit.reset ();
+  gst_clear_caps (&priv->input);
   strip_reset_rate (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   {
@@ -512,6 +532,7 @@ gst_strip_render_finalize (GObject *object)
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   g_clear_error (&priv->gl_error);
   g_clear_error (&priv->output_error);
+  gst_clear_caps (&priv->input);
   delete priv;
   G_OBJECT_CLASS (gst_strip_render_parent_class)->finalize (object);
 }

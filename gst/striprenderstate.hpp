@@ -51,7 +51,8 @@ struct GstStripRenderPrivate {
   bool discont = false;             /* pictures before the next one were left out */
 
   /* written with both stream locks, read with either */
-  gstrange::RangeInfo info;
+  GstCaps *input = nullptr; /* the last ones that were not refused */
+  gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
   bool live = false, live_known = false;
   bool caps_refused = false; /* the last ones, with an error */

@@ -33,21 +33,21 @@ view_ids (Viewer &viewer)
 static std::string
 switch_view (Viewer &viewer, guint number)
 {
-  const std::vector<guint> ids = view_ids (viewer);
   guint64 mask = G_MAXUINT64, all = 0;
+  if (number == 0) {
+    g_object_set (viewer.render, "view-mask", mask, nullptr);
+    return "all views on";
+  }
+  const std::vector<guint> ids = view_ids (viewer); /* none before the first frame set */
   if (number > ids.size ())
     return "there is no view " + std::to_string (number);
   for (guint id : ids)
     all |= guint64 (1) << id;
-  if (number > 0) {
-    g_object_get (viewer.render, "view-mask", &mask, nullptr);
-    mask ^= guint64 (1) << ids[number - 1];
-  }
+  g_object_get (viewer.render, "view-mask", &mask, nullptr);
+  mask ^= guint64 (1) << ids[number - 1];
   g_object_set (viewer.render, "view-mask", mask, nullptr);
   if ((mask & all) == 0)
     return "all views off, 0 shows them";
-  if (number == 0)
-    return "all views on";
   const guint id = ids[number - 1];
   return "view " + std::to_string (number) +
          (id == number - 1 ? "" : " (view-id " + std::to_string (id) + ")") +
@@ -209,7 +209,8 @@ handle_mouse (Viewer &viewer, GstEvent *event)
       taken = viewer.overlay->press (button, x, y);
       break;
     case GST_NAVIGATION_EVENT_MOUSE_BUTTON_RELEASE:
-      taken = viewer.overlay->release ();
+      gst_navigation_event_parse_mouse_button_event (event, &button, &x, &y);
+      taken = viewer.overlay->release (button);
       break;
     case GST_NAVIGATION_EVENT_MOUSE_MOVE:
       gst_navigation_event_parse_mouse_move_event (event, &x, &y);

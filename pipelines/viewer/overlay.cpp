@@ -68,7 +68,21 @@ Overlay::set_duration (GstClockTime duration)
 bool
 Overlay::is_on_bar (double y) const
 {
-  return duration_ > 0 && shown_.size.height > 0 && y >= TimeBarPlace (shown_.size).top;
+  const int top = TimeBarPlace (shown_.size).top; /* negative: there is no room for it */
+  return duration_ > 0 && shown_.size.height > 0 && top >= 0 && y >= top;
+}
+
+/* The bit of a button in pressed_; 0: of those that the bar never takes. */
+static unsigned
+button_bit (int button)
+{
+  return button >= 1 && button <= 3 ? 1U << button : 0; /* others are the wheel's */
+}
+
+bool
+Overlay::is_dragging () const
+{
+  return (pressed_ & button_bit (1)) != 0;
 }
 
 void
@@ -84,13 +98,14 @@ bool
 Overlay::press (int button, double x, double y)
 {
   std::lock_guard guard (lock_);
-  if (!is_on_bar (y) || button > 3) /* others are the wheel's */
+  const unsigned bit = button_bit (button);
+  pressed_ &= ~bit; /* a release may have been lost */
+  if (bit == 0 || !is_on_bar (y))
     return false;
   bar_until_ = g_get_monotonic_time () + kBarTime;
-  if (button == 1) {
-    dragging_ = true;
+  pressed_ |= bit;
+  if (button == 1)
     set_drag (x);
-  }
   return true;
 }
 
@@ -99,18 +114,21 @@ Overlay::move (double x, double)
 {
   std::lock_guard guard (lock_);
   bar_until_ = g_get_monotonic_time () + kBarTime;
-  if (dragging_)
+  if (is_dragging ())
     set_drag (x);
-  return dragging_;
+  return is_dragging ();
 }
 
 bool
-Overlay::release ()
+Overlay::release (int button)
 {
   std::lock_guard guard (lock_);
-  if (!dragging_)
+  const unsigned bit = button_bit (button);
+  if (!(pressed_ & bit))
     return false;
-  dragging_ = false;
+  pressed_ &= ~bit;
+  if (button != 1)
+    return true;
   position_ = dragged_to_; /* until the picture from there comes */
   drag_ = Drag{dragged_to_, true};
   return true;
@@ -134,9 +152,9 @@ Overlay::look (gint64 now) const
   if (now < message_until_)
     shown.message = message_;
   shown.hint_tenths = int (std::clamp<gint64> (10 * (hint_until_ - now) / kHintFade, 0, 10));
-  shown.bar = duration_ > 0 && (dragging_ || now < bar_until_);
+  shown.bar = duration_ > 0 && (is_dragging () || now < bar_until_);
   if (shown.bar) {
-    const GstClockTime at = std::min (dragging_ ? dragged_to_ : position_, duration_);
+    const GstClockTime at = std::min (is_dragging () ? dragged_to_ : position_, duration_);
     shown.bar_pixel = int (double (at) / double (duration_) * shown.size.width);
     shown.times = time_text (at) + " / " + time_text (duration_);
   }

@@ -33,7 +33,7 @@ public:
   /** @return whether the time bar has it: then nobody else shall */
   bool press (int button, double x, double y);
   bool move (double x, double y);
-  bool release ();
+  bool release (int button);
   /** @} */
 
   struct Drag {
@@ -62,6 +62,7 @@ private:
   };
   [[nodiscard]] Shown look (gint64 now) const;
   [[nodiscard]] bool is_on_bar (double y) const;
+  [[nodiscard]] bool is_dragging () const;
   void set_drag (double x);
 
   const std::vector<TextRow> keys_;
@@ -72,7 +73,7 @@ private:
   gint64 message_until_ = 0, bar_until_ = 0, hint_until_ = 0; /* monotonic time, us */
   bool drawn_ = false;                                        /* the first picture */
   GstClockTime duration_ = 0, position_ = 0;                  /* stream time */
-  bool dragging_ = false;
+  unsigned pressed_ = 0; /* bit i: button i, which was pressed on the time bar */
   GstClockTime dragged_to_ = 0;
   std::optional<Drag> drag_;
   Shown shown_;

@@ -114,6 +114,46 @@ GST_START_TEST (test_fit_follows_the_shape_of_the_output)
 }
 GST_END_TEST;
 
+/* It fills less than the fit does: the fit is one of another patch. */
+static void
+fail_if_fitted (const RenderedPicture &picture)
+{
+  const Drawn drawn (picture);
+  fail_if (drawn.empty ());
+  fail_unless (drawn.right - drawn.left < 0.7 * picture.width &&
+               drawn.bottom - drawn.top < 0.7 * picture.height);
+}
+
+GST_START_TEST (test_fit_outlasts_other_sizes_and_corrected_rigs)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = render_harness (rig, "fit=true background=0xff000000");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const Roi first = {100, 80, 100, 80}, other = {130, 100, 60, 40};
+  const RenderedPicture at_first = render (h, patch (rig, first, 0));
+  render (h, patch (rig, first, 600 * GST_MSECOND)); /* about the same: settled */
+  set_output_caps (h->element, "width=160,height=320");
+  fail_if_fitted (render (h, patch (rig, other, GST_SECOND), 160));
+  fail_unless_fitted (render (h, patch (rig, first, 1100 * GST_MSECOND), 160));
+  set_output_caps (h->element, "width=320,height=240");
+  fail_if_fitted (render (h, patch (rig, other, 1200 * GST_MSECOND)));
+
+  Rig corrected = rig;
+  corrected.views[0].world_from_view.translation.x += 0.004;
+  corrected.views[0].intrinsics.fx *= 1.001;
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (corrected, 30, 1)));
+  fail_if_fitted (render (h, patch (corrected, other, 1300 * GST_MSECOND)));
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  fail_unless (render (h, patch (rig, first, 1400 * GST_MSECOND)).rgba == at_first.rgba);
+
+  const Rig more = ring_rig (2); /* other cameras, another fit */
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (more, 30, 1)));
+  fail_unless_fitted (render (h, patch (more, other, 1500 * GST_MSECOND)));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_fit_holds_until_a_key_asks_for_another)
 {
   const Rig rig = ring_rig (1);
@@ -404,6 +444,7 @@ stripviews_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_fit_centres_and_fills_at_any_aspect_and_from_any_side);
   tcase_add_test (tc, test_fit_follows_the_shape_of_the_output);
+  tcase_add_test (tc, test_fit_outlasts_other_sizes_and_corrected_rigs);
   tcase_add_test (tc, test_fit_holds_until_a_key_asks_for_another);
   tcase_add_test (tc, test_fit_goes_on_until_the_view_settles);
   tcase_add_test (tc, test_fit_waits_for_all_views_that_come);

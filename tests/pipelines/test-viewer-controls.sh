@@ -133,6 +133,13 @@ moves_in_time () {
   xdotool mousemove --window "$window" 40 100
   xdotool mousemove --window "$window" 60 20 mouseup 1
   wait_for snap_equals clicked.png
+  # another button on the way is the camera's, which has its release
+  xdotool mousemove --window "$window" 3 230 mousedown 1
+  xdotool mousemove --window "$window" 60 100 mousedown 3 mouseup 3 mouseup 1
+  xdotool mousemove --window "$window" 120 60
+  wait_for snap_equals clicked.png
+  sleep 0.5
+  snap_equals clicked.png || fail "the camera still has the other button"
   # begun above the bar it is a turn, and goes over it
   xdotool mousemove --window "$window" 60 150 mousedown 1
   xdotool mousemove --window "$window" 90 200
@@ -192,6 +199,23 @@ has_no_bar () {
 test_stream_has_no_time_bar () {
   need_viewer
   in_display has_no_bar
+}
+
+has_no_room_for_a_bar () {
+  open_viewer moving.rcnc --size 320x20
+  press space
+  sleep 0.5
+  snap first.png
+  xdotool mousemove --window "$window" 60 10 click 1
+  sleep 1
+  snap_equals first.png || fail "a bar that is not there has the click"
+  quits_with q
+}
+
+test_low_picture_has_no_time_bar () {
+  need_viewer
+  record_moving
+  in_display has_no_room_for_a_bar
 }
 
 # ---- views ----
