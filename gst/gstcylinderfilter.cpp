@@ -23,6 +23,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <optional>
 #include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/colour_match.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
@@ -99,6 +100,7 @@ struct GstCylinderFilterPrivate {
   rangecast::ViewAgreement agreement;
   rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
+  bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_off = false;
@@ -180,21 +182,22 @@ gst_cylinder_filter_axis_get_type (void)
 
 /* ---- streaming ---- */
 
+/* After a jump in time: people and light are others, the cameras stand where they stood. */
 static void
-gst_cylinder_filter_forget_scene (GstCylinderFilterPrivate *priv)
+gst_cylinder_filter_forget_moment (GstCylinderFilterPrivate *priv)
 {
   priv->core.reset ();
   priv->colours.reset ();
-  priv->agreement.reset ();
-  priv->rig_pending = true;
+  priv->last_pts = GST_CLOCK_TIME_NONE;
 }
 
 /* All that is of one stream. */
 static void
 gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
 {
-  gst_cylinder_filter_forget_scene (priv);
-  priv->last_pts = GST_CLOCK_TIME_NONE;
+  gst_cylinder_filter_forget_moment (priv);
+  priv->agreement.reset ();
+  priv->rig_pending = true;
 }
 
 /* Gives the rig that the views have now to those who work with it, here and downstream. */
@@ -202,7 +205,10 @@ static rangecast::Status
 gst_cylinder_filter_send_rig (GstCylinderFilter *self)
 {
   auto priv = self->priv;
-  const rangecast::Rig &rig = priv->agreement.rig ();
+  rangecast::Status good = validate (priv->agreement.rig ());
+  if (!good.ok ())
+    GST_WARNING_OBJECT (self, "the rig stays as it came; corrected, %s", good.message ().c_str ());
+  const rangecast::Rig &rig = good.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
   priv->rig_pending = false;
   if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
     return status;
@@ -215,7 +221,8 @@ gst_cylinder_filter_send_rig (GstCylinderFilter *self)
   GstCaps *caps = gstrange::with_rig (present, rig);
   if (!gst_caps_is_equal (caps, present)) {
     GST_DEBUG_OBJECT (self, "poses of the rig change");
-    gst_pad_push_event (pad, gst_event_new_caps (caps));
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "they were not taken downstream"); /* and the buffer says why */
   }
   gst_caps_unref (caps);
   gst_caps_unref (present);
@@ -230,6 +237,13 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     gstrange::RangeInfo info;
     rangecast::Status result = gstrange::parse_caps (in, info);
+    /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
+    if (result.ok () && priv->has_rig &&
+        encode_rig (info.rig) == encode_rig (priv->agreement.nominal_rig ())) {
+      priv->rig_pending = true;
+      return result;
+    }
+    priv->has_rig = false;
     gst_cylinder_filter_forget (priv);
     priv->reporter.set_views (info.rig);
     {
@@ -242,7 +256,10 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
       result = priv->agreement.set_rig (info.rig);
     if (result.ok ())
       result = priv->core.set_rig (info.rig);
-    return result.ok () ? priv->colours.set_rig (info.rig) : result;
+    if (result.ok ())
+      result = priv->colours.set_rig (info.rig);
+    priv->has_rig = result.ok ();
+    return result;
   });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
@@ -266,7 +283,7 @@ gst_cylinder_filter_submit_input_buffer (
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   if (gst_cylinder_filter_begins_anew (priv, buffer)) {
-    gst_cylinder_filter_forget (priv);
+    gst_cylinder_filter_forget_moment (priv);
     priv->last_pts = GST_BUFFER_PTS (buffer);
   }
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
@@ -286,7 +303,8 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   if (off)
     priv->reporter.passed (GST_ELEMENT (base), buffer);
   if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
-    gst_cylinder_filter_forget_scene (priv);
+    gst_cylinder_filter_forget (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
     const rangecast::Status status = rangecast::guarded ("cylinderfilter",
         [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
     if (!status.ok ())
@@ -321,8 +339,11 @@ gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast:
     const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
 {
   auto priv = self->priv;
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
   for (const rangecast::RangeImage &view : views)
-    priv->agreement.set_gains (view.view_id, priv->colours.balance ().gains (view.view_id));
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
   if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
     return status;
   if (priv->rig_pending || priv->agreement.rig_changed ())
@@ -370,13 +391,22 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 static gboolean
 gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  /* Serialised with the data: axis, winners and gains start anew after a seek, or with another
-   * stream. */
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP ||
-      GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
-    gst_cylinder_filter_forget (GST_CYLINDER_FILTER (base)->priv);
+  /* Serialised with the data: axis, winners and gains start anew after a seek, what is known of the
+   * rig with another stream. */
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    gst_cylinder_filter_forget_moment (priv);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
+    const gchar *stream_id = nullptr;
+    gst_event_parse_stream_start (event, &stream_id);
+    gchar *last = gst_pad_get_stream_id (base->sinkpad); /* it takes this event afterwards */
+    gst_cylinder_filter_forget_moment (priv);
+    if (g_strcmp0 (last, stream_id) != 0)
+      gst_cylinder_filter_forget (priv);
+    g_free (last);
+  }
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
-    GST_CYLINDER_FILTER (base)->priv->reporter.finish ();
+    priv->reporter.finish ();
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
 }
 
@@ -407,6 +437,7 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
   GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
   const StreamLock lock (base);
   /* With the stream its memory goes too. */
+  GST_CYLINDER_FILTER (base)->priv->has_rig = false;
   GST_CYLINDER_FILTER (base)->priv->core = {};
   GST_CYLINDER_FILTER (base)->priv->agreement = {};
   GST_CYLINDER_FILTER (base)->priv->colours = {};
@@ -676,9 +707,9 @@ install_agree_property (GObjectClass *object_class, GParamFlags flags)
 {
   g_object_class_install_property (object_class, PROP_AGREE,
       g_param_spec_flags ("agree", "Agree",
-          "What is done so that views agree: poses (errors of some mm are estimated and corrected "
-          "in the rig), depth (depths of one surface move together), views (one that contradicts "
-          "the others is left out) (default: poses+views)",
+          "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
+          "rig), depth (depths of one surface move together), views (one that contradicts the "
+          "others is left out), or none (default: poses+views)",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }
@@ -779,9 +810,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
-          "READY; bodies, axis-position, axis-direction, views (what agree did to each) of the "
-          "last "
-          "frame",
+          "READY; bodies, axis-position, axis-direction, views (consistency and corrections) of "
+          "the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 

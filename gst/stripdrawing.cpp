@@ -93,6 +93,7 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
                        picture.mode != rangecast::StripMode::kBlend;
   picture.view_gap_m = settings.view_gap_m;
   picture.blend_range_m = settings.blend_range_m;
+  picture.rig_views = job.scene->rig_views ();
   picture.keeps_depth = settings.show_cameras;
   picture.width = width_;
   picture.height = height_;

@@ -192,7 +192,7 @@ BlendPainter::draw_layers (
 bool
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
-  const bool precise = !is_gles (context_) && (in_software_ || layers.size () > kMaxHalfFloatViews);
+  const bool precise = !is_gles (context_) && (in_software_ || picture.rig_views > kMaxHalfFloatViews);
   if (!targets_.begin_depth (picture.width, picture.height, precise, picture.covered))
     return false;
   draw_layers (layers, picture, kDepth);

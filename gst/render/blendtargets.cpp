@@ -213,8 +213,10 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);
   gl->BindVertexArray (0);
-  gl->BindTexture (GL_TEXTURE_2D, 0);
-  gl->ActiveTexture (GL_TEXTURE0);
+  for (guint i = std::size (textures_); i-- > 0;) { /* they are targets again next time */
+    gl->ActiveTexture (GL_TEXTURE0 + i);
+    gl->BindTexture (GL_TEXTURE_2D, 0);
+  }
   gl->DepthFunc (GL_LESS);
   if (part.width == width_ && part.height == height_)
     gl->Disable (GL_SCISSOR_TEST);

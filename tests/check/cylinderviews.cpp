@@ -164,23 +164,68 @@ GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_stats_say_so)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_corrections_begin_anew_after_a_flush)
+/* A seek moves no camera. Without poses no correction is made anew, and one goes only 15 frame sets
+ * after the last change. */
+GST_START_TEST (test_corrections_outlast_a_flush_but_not_the_stream)
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
   GstCaps *wrong = nudged_caps (scene, {0.003, 0, 0.002}, 0);
-  Filter filter ("cylinderfilter", gst_caps_ref (wrong));
+  for (const bool other_stream : {false, true}) {
+    Filter filter ("cylinderfilter", gst_caps_ref (wrong));
+    filter.run (scene, 2);
+    GstCaps *corrected = filter.caps ();
+    filter.set ("agree", "views");
+    gst_harness_push_event (filter.h, gst_event_new_flush_start ());
+    gst_harness_push_event (filter.h, gst_event_new_flush_stop (TRUE));
+    if (other_stream)
+      gst_harness_push_event (filter.h, gst_event_new_stream_start ("another"));
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    gst_harness_push_event (filter.h, gst_event_new_segment (&segment));
+    filter.run (scene, 1);
+    GstCaps *caps = filter.caps ();
+    fail_if (gst_caps_is_equal (corrected, wrong));
+    fail_unless (gst_caps_is_equal (caps, other_stream ? wrong : corrected));
+    gst_caps_unref (caps);
+    gst_caps_unref (corrected);
+  }
+  gst_caps_unref (wrong);
+}
+GST_END_TEST;
+
+/* A view whose colours are quite wrong. */
+GST_START_TEST (test_without_colour_balance_a_dark_view_is_no_contradiction)
+{
+  const Scene scene (8, kWidth, kHeight, 1, kStill);
+  {
+    gstrange::RangeFrameMap frame (scene.frame_sets[0], GST_MAP_READWRITE);
+    fail_unless (frame.status ().ok ());
+    const RangeImage &dark = frame.views ()[1];
+    for (int y = 0; y < dark.colour.height; y++)
+      std::fill_n (dark.colour.row (y), dark.colour.width, Rgbx{255, 0, 255});
+  }
+  Filter filter ("cylinderfilter colour-balance=off", gst_caps_ref (scene.caps));
+  filter.run (scene, 20);
+  GstBuffer *out = filter.push (scene);
+  fail_unless (std::ranges::any_of (
+      pixels_of (out, kWidth, kHeight).at (1), [] (guint64 pixel) { return pixel != 0; }));
+  gst_buffer_unref (out);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_corrections_outlast_a_reconfigure_from_downstream)
+{
+  const Scene scene (4, kWidth, kHeight, 1, kStill);
+  Filter filter ("cylinderfilter", nudged_caps (scene, {0.003, 0, 0.002}, 0));
   filter.run (scene, 2);
-  filter.set ("agree", "views");
-  gst_harness_push_event (filter.h, gst_event_new_flush_start ());
-  gst_harness_push_event (filter.h, gst_event_new_flush_stop (TRUE));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  gst_harness_push_event (filter.h, gst_event_new_segment (&segment));
+  GstCaps *corrected = filter.caps ();
+  filter.set ("agree", "views"); /* so that nothing is corrected anew */
+  gst_harness_push_upstream_event (filter.h, gst_event_new_reconfigure ());
   filter.run (scene, 1);
   GstCaps *caps = filter.caps ();
-  fail_unless (gst_caps_is_equal (caps, wrong));
+  fail_unless (gst_caps_is_equal (caps, corrected));
   gst_caps_unref (caps);
-  gst_caps_unref (wrong);
+  gst_caps_unref (corrected);
 }
 GST_END_TEST;
 
@@ -210,7 +255,9 @@ cylinderviews_suite ()
   tcase_add_test (tc, test_rig_that_is_off_goes_on_corrected_with_the_first_frame_set);
   tcase_add_test (tc, test_without_poses_and_with_mode_off_the_rig_is_as_it_came);
   tcase_add_test (tc, test_view_with_a_wrong_pose_is_left_out_and_stats_say_so);
-  tcase_add_test (tc, test_corrections_begin_anew_after_a_flush);
+  tcase_add_test (tc, test_corrections_outlast_a_flush_but_not_the_stream);
+  tcase_add_test (tc, test_without_colour_balance_a_dark_view_is_no_contradiction);
+  tcase_add_test (tc, test_corrections_outlast_a_reconfigure_from_downstream);
   tcase_add_test (tc, test_agree_is_controllable_and_reads_as_it_was_set);
   return suite;
 }

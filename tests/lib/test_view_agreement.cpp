@@ -210,6 +210,69 @@ TEST (Poses, corrections_go_when_they_are_no_longer_wanted_and_with_the_stream)
   EXPECT_EQ (encode_rig (agreement.rig ()), encode_rig (wrong));
 }
 
+TEST (Poses, corrections_go_when_nothing_is_wanted_any_more)
+{
+  const Figure figure;
+  const Rig wrong = nudged (figure.rig, 1, {0.003, 0, 0.002});
+  ViewAgreement agreement;
+  ASSERT_TRUE (agreement.set_rig (wrong).ok ());
+  learn (agreement, figure, kPosesOnly, 1);
+  EXPECT_NE (encode_rig (agreement.rig ()), encode_rig (wrong));
+  learn (agreement, figure, {false, false, false, 1}, 20);
+  EXPECT_EQ (encode_rig (agreement.rig ()), encode_rig (wrong));
+}
+
+TEST (Poses, view_that_shares_nothing_with_others_is_not_moved)
+{
+  Figure figure;
+  figure.frame->depth[3] = Frame (figure.rig).depth[3];
+  const Rig wrong = nudged (figure.rig, 1, {0.003, 0, 0.002});
+  ViewAgreement agreement;
+  ASSERT_TRUE (agreement.set_rig (wrong).ok ());
+  learn (agreement, figure, kPosesOnly);
+  EXPECT_EQ (agreement.view (3).correction.size (), 0);
+  EXPECT_LT (displacement (figure, agreement.rig (), 1), 0.5 * displacement (figure, wrong, 1));
+}
+
+/* Sums that fade for minutes lose all their digits. */
+TEST (Poses, corrections_come_back_after_5000_empty_comparisons)
+{
+  Figure figure;
+  const Rig wrong = nudged (figure.rig, 1, {0.003, 0, 0.002});
+  ViewAgreement agreement;
+  ASSERT_TRUE (agreement.set_rig (wrong).ok ());
+  learn (agreement, figure, kPosesOnly, 1);
+  Frame none (figure.rig);
+  std::vector<RangeImage> images = none.images ();
+  for (RangeImage &image : images)
+    image.roi = {}, image.depth = {}, image.colour = {};
+  for (int i = 0; i < 3 * 5000; i++)
+    ASSERT_TRUE (agreement.process (images, kPosesOnly).ok ());
+  EXPECT_EQ (encode_rig (agreement.rig ()), encode_rig (wrong));
+  figure.frame->depth[3] = none.depth[3]; /* its pairs stay empty */
+  learn (agreement, figure, kPosesOnly);
+  EXPECT_LT (displacement (figure, agreement.rig (), 1), 0.5 * displacement (figure, wrong, 1));
+}
+
+TEST (Poses, corrected_rotations_are_orthonormal_even_if_those_told_hardly_are)
+{
+  const Figure figure;
+  Rig wrong = nudged (figure.rig, 1, {0.003, 0, 0.002});
+  for (View &view : wrong.views)
+    for (int i = 0; i < 9; i++)
+      view.world_from_view.rotation[i] *= 1 + 4.9e-6;
+  ViewAgreement agreement;
+  ASSERT_TRUE (agreement.set_rig (wrong).ok ());
+  learn (agreement, figure, kPosesOnly, 1);
+  EXPECT_NE (encode_rig (agreement.rig ()), encode_rig (wrong));
+  for (const View &view : agreement.rig ().views) {
+    const Mat3 &r = view.world_from_view.rotation;
+    const Mat3 product = r * transposed (r);
+    for (int i = 0; i < 9; i++)
+      EXPECT_NEAR (product[i], kIdentity3[i], 1e-12);
+  }
+}
+
 /* A view whose pose is that wrong. */
 TEST (Views, view_with_a_wrong_pose_is_left_out_from_the_first_frame_set_on)
 {
@@ -262,6 +325,37 @@ TEST (Views, of_two_views_both_stay)
   for (std::size_t i = 0; i < 2; i++) {
     EXPECT_FALSE (agreement.view (int (i)).left_out);
     EXPECT_GT (frame.points (i), 1000u);
+  }
+}
+
+TEST (Views, view_that_is_left_out_is_back_when_it_comes_alone)
+{
+  const Figure figure;
+  ViewAgreement agreement;
+  ASSERT_TRUE (agreement.set_rig (nudged (figure.rig, 1, {0.03, 0.04, 0}, 5, {1, 1, 0})).ok ());
+  learn (agreement, figure, {}, 1);
+  EXPECT_TRUE (agreement.view (1).left_out);
+  Frame frame = *figure.frame;
+  const std::vector<RangeImage> images = frame.images ();
+  ASSERT_TRUE (agreement.process ({&images[1], 1}, {}).ok ());
+  EXPECT_FALSE (agreement.view (1).left_out);
+  EXPECT_GT (frame.points (1), 1000u);
+}
+
+TEST (Views, colours_tell_against_a_view_only_if_gains_are_known)
+{
+  Figure figure (8);
+  const ImageView<Rgbx> colour = figure.frame->colour[1].view ();
+  for (int y = 0; y < colour.height; y++)
+    std::fill_n (colour.row (y), colour.width, Rgbx{255, 0, 255});
+  for (const int gains : {0, 7, 8}) {
+    ViewAgreement agreement;
+    ASSERT_TRUE (agreement.set_rig (figure.rig).ok ());
+    for (int id = 0; id < 8; id++)
+      if (gains > 0 && !(gains == 7 && id == 1))
+        agreement.set_gains (id, std::array<float, 3>{1, 1, 1});
+    learn (agreement, figure, {}, 30);
+    EXPECT_EQ (agreement.view (1).left_out, gains == 8) << gains;
   }
 }
 

@@ -34,6 +34,8 @@ constexpr double kExpected = 0.003;
 constexpr double kIndependent = 8;
 constexpr double kMinError = 0.0003; ///< of depth, metres
 constexpr double kRadius = 0.15;     ///< metres: a turn moves the surface that much
+constexpr double kMinPairWeight = 1; ///< of a pair that counts, points
+constexpr double kForgotten = 1e-6;  ///< points: what has faded to this is nothing
 constexpr double kMinAgreement = 0.3, kFullAgreement = 0.6; ///< of pairs that count
 
 std::array<double, 6>
@@ -68,6 +70,18 @@ rotation_of (Vec3 r)
   return {c + t * a.x * a.x, t * a.x * a.y - s * a.z, t * a.x * a.z + s * a.y,
       t * a.x * a.y + s * a.z, c + t * a.y * a.y, t * a.y * a.z - s * a.x, t * a.x * a.z - s * a.y,
       t * a.y * a.z + s * a.x, c + t * a.z * a.z};
+}
+
+/* The rotation that a matrix nearly is (Gram and Schmidt's method, by rows). */
+Mat3
+orthonormal (const Mat3 &m)
+{
+  Vec3 a{m[0], m[1], m[2]}, b{m[3], m[4], m[5]};
+  a = 1 / norm (a) * a;
+  b = b - dot (a, b) * a;
+  b = 1 / norm (b) * b;
+  const Vec3 c = cross (a, b);
+  return {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z};
 }
 
 /* A camera with its pose corrected, for looking up points both ways. */
@@ -129,11 +143,12 @@ is_background (const AlignedView &view, const View &camera, float u, float v, fl
 bool
 is_same_colour (const AlignedView &a, int ax, int ay, const AlignedView &b, int bx, int by)
 {
-  if (!a.image.colour.same_size (a.image.depth) || !b.image.colour.same_size (b.image.depth))
+  if (!a.gains || !b.gains || !a.image.colour.same_size (a.image.depth) ||
+      !b.image.colour.same_size (b.image.depth))
     return true;
   const Rgbx p = a.image.colour.at (ax, ay), q = b.image.colour.at (bx, by);
-  const float d[] = {a.gains[0] * p.r - b.gains[0] * q.r, a.gains[1] * p.g - b.gains[1] * q.g,
-      a.gains[2] * p.b - b.gains[2] * q.b};
+  const std::array<float, 3> &f = *a.gains, &g = *b.gains;
+  const float d[] = {f[0] * p.r - g[0] * q.r, f[1] * p.g - g[1] * q.g, f[2] * p.b - g[2] * q.b};
   return std::max ({std::abs (d[0]), std::abs (d[1]), std::abs (d[2])}) < kSameColour;
 }
 
@@ -171,7 +186,9 @@ Pose
 PoseAlignment::corrected (const Pose &world_from_view, const PoseCorrection &by) const
 {
   const Mat3 turn = rotation_of (by.rotation);
-  return Pose{turn, centre_ + by.translation - turn * centre_} * world_from_view;
+  Pose pose = Pose{turn, centre_ + by.translation - turn * centre_} * world_from_view;
+  pose.rotation = orthonormal (pose.rotation);
+  return pose;
 }
 
 /* The middle of what the first frame's views see. */
@@ -204,7 +221,6 @@ struct PoseAlignment::Comparison {
   const Eye own, other;
   const PixelTransfer transfer;
   const Vec3 centre;
-  const bool compares_colours;
   Pair &pair;
   double sign;               /* of `from` in the difference of the pair's corrections, */
   std::array<double, 6> now; /* which is this */
@@ -213,7 +229,6 @@ struct PoseAlignment::Comparison {
       : from (a), to (b), camera (owner.camera_of (b.image.view_id)),
         own (owner.camera_of (a.image.view_id)), other (camera),
         transfer (own.rays, from.image.roi, other.lookup, to.image.roi), centre (owner.centre_),
-        compares_colours (owner.compares_colours_),
         pair (owner.pairs_.get (a.image.view_id, b.image.view_id)),
         sign (a.image.view_id == pair.first ? 1 : -1),
         now (as_array (owner.correction (pair.first)))
@@ -275,7 +290,7 @@ struct PoseAlignment::Comparison {
     own.normal (mine, full_x, full_y, m);
     if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < kMinNormals * size * length_of (m))
       return;
-    const bool same = !compares_colours || is_same_colour (from, x, y, to, u, v);
+    const bool same = is_same_colour (from, x, y, to, u, v);
     (same ? pair.same : pair.other_colour)++;
     float p[3];
     own.rays.point (full_x, full_y, mine.depth, p);
@@ -312,8 +327,8 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
   const double share = double (width) * height / samples;
   const int step = std::max (1, static_cast<int> (std::ceil (std::sqrt (share))));
   const auto steps = static_cast<std::uint32_t> (step);
-  const int left = static_cast<int> (frame_ * 5 % steps),
-            top = static_cast<int> ((frame_ * 3 + frame_ / steps) % steps);
+  const int left = static_cast<int> (frame_ % steps),
+            top = static_cast<int> (frame_ / steps % steps);
   for (int y = top; y < height; y += step)
     for (int x = left; x < width; x += step)
       comparison.look_up (x, y);
@@ -368,12 +383,14 @@ PoseAlignment::solve ()
   for (std::size_t i = 0; i < n; i++)
     matrix_[i * n + i] = 1 / (kExpected * kExpected);
   double squares = 0, weights = 0;
+  std::uint64_t linked = 0;
   for (const Pair &pair : pairs_) {
     const double agreed = agreement (pair.first, pair.second).share ();
     const double trust =
         std::clamp ((agreed - kMinAgreement) / (kFullAgreement - kMinAgreement), 0.0, 1.0);
-    if (!(pair.weight > 0) || trust <= 0)
+    if (pair.weight < kMinPairWeight || trust <= 0)
       continue;
+    linked |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
     const double square = variance (pair);
     squares += trust * pair.weight * square;
     weights += trust * pair.weight;
@@ -399,24 +416,27 @@ PoseAlignment::solve ()
   depth_error_ = weights > 0 ? std::sqrt (squares / weights) : 0;
   if (!solve_cholesky (matrix_, right_))
     return; /* never: the prior makes it definite */
-  set_gauge (views);
+  set_gauge (views, linked);
 }
 
-/* Moves all views alike, until the median of each component is 0. */
+/* Moves all views that share a surface with another one alike, until the median of each component
+ * is 0. Of the others nothing is known. */
 void
-PoseAlignment::set_gauge (std::uint64_t views)
+PoseAlignment::set_gauge (std::uint64_t views, std::uint64_t linked)
 {
-  const std::size_t count = right_.size () / 6;
   for (std::size_t k = 0; k < 6; k++) {
     sorted_.clear ();
-    for (std::size_t i = 0; i < count; i++)
-      sorted_.push_back (right_[6 * i + k]);
+    for (std::uint64_t rest = linked; rest; rest &= rest - 1)
+      sorted_.push_back (right_[6 * number_among (views, std::countr_zero (rest)) + k]);
     std::ranges::sort (sorted_);
-    const double median = (sorted_[(count - 1) / 2] + sorted_[count / 2]) / 2;
-    for (std::size_t i = 0; i < count; i++)
-      right_[6 * i + k] -= median;
+    const std::size_t count = sorted_.size ();
+    const double median = count > 0 ? (sorted_[(count - 1) / 2] + sorted_[count / 2]) / 2 : 0;
+    for (std::uint64_t rest = linked; rest; rest &= rest - 1)
+      right_[6 * number_among (views, std::countr_zero (rest)) + k] -= median;
   }
-  for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+  for (std::uint64_t rest = views & ~linked; rest; rest &= rest - 1)
+    corrections_[static_cast<std::size_t> (std::countr_zero (rest))] = {};
+  for (std::uint64_t rest = linked; rest; rest &= rest - 1) {
     const int id = std::countr_zero (rest);
     const double *v = &right_[6 * number_among (views, id)];
     PoseCorrection &to = corrections_[static_cast<std::size_t> (id)];
@@ -424,6 +444,22 @@ PoseAlignment::set_gauge (std::uint64_t views)
     to.translation = limited (to.translation, kMaxTranslation);
     to.rotation = limited (to.rotation, kMaxRotation);
   }
+}
+
+/* Sums never reach 0 by themselves, but lose all meaning on their way. */
+void
+PoseAlignment::fade (Pair &pair, double kept)
+{
+  const double counts = pair.points * kept < kForgotten ? 0 : kept,
+               sums = pair.weight * kept < kForgotten ? 0 : kept;
+  for (double *value : {&pair.points, &pair.same, &pair.through, &pair.other_colour})
+    *value *= counts;
+  for (double *value : {&pair.weight, &pair.square})
+    *value *= sums;
+  for (double &value : pair.matrix)
+    value *= sums;
+  for (double &value : pair.right)
+    value *= sums;
 }
 
 void
@@ -434,7 +470,6 @@ PoseAlignment::learn (std::span<const AlignedView> views)
     find_centre (views);
   if (!started_)
     return;
-  compares_colours_ = !first; /* gains are not known before */
   for (int round = 0; round < (first ? kFirstRounds : 1); round++) {
     frame_++;
     const double kept = first ? 0 : kKept;
@@ -442,13 +477,7 @@ PoseAlignment::learn (std::span<const AlignedView> views)
       for (const AlignedView &b : views)
         if (a.image.view_id < b.image.view_id) {
           Pair &pair = pairs_.get (a.image.view_id, b.image.view_id);
-          for (double *value : {&pair.weight, &pair.square, &pair.points, &pair.same, &pair.through,
-                   &pair.other_colour})
-            *value *= kept;
-          for (double &value : pair.matrix)
-            value *= kept;
-          for (double &value : pair.right)
-            value *= kept;
+          fade (pair, kept);
         }
     compare (views, first ? kFirstSamples : kSamples);
     solve ();

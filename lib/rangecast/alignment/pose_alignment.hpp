@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,7 +18,8 @@ namespace rangecast {
 struct AlignedView {
   RangeImage image;
   const SurfacePlanes *planes = nullptr;
-  std::array<float, 3> gains{1, 1, 1}; ///< what its colours are multiplied with before they compare
+  /** What its colours are multiplied with before they are compared; without, they are not. */
+  std::optional<std::array<float, 3>> gains;
 };
 
 /** A small motion of a view: a point X of its surface goes to X + translation + rotation x
@@ -58,14 +60,14 @@ struct PairAgreement {
  *  Tukey's biweight. The normal equations of each pair of views are kept, and older frames fade, so
  *  noise averages out. A prior of no motion keeps directions in place that the surface does not
  *  show, such as the turn of a ball about itself. Only differences between views can be seen, so
- * the median of all views' corrections is 0 in each component: the world stays, and one view that
- * is off is the one that moves.
+ *  the median of the corrections of all views that share a surface with another one is 0 in each
+ *  component: the world stays, and one view that is off is the one that moves. A view that shares
+ *  none has no correction.
  *
  *  The same comparison tells how consistent views are: see agreement(). */
 class PoseAlignment {
 public:
-  /** No correction moves the scene farther than this, metres, or turns it more than this, radians.
-   */
+  /** Limits, each for itself, of a correction's translation, metres, and rotation, radians. */
   static constexpr double kMaxTranslation = 0.012, kMaxRotation = 0.012;
 
   /** Takes the cameras and forgets the stream. */
@@ -110,7 +112,8 @@ private:
   void compare_pair (const AlignedView &from, const AlignedView &to, int samples);
   void solve ();
   [[nodiscard]] double variance (const Pair &pair) const;
-  void set_gauge (std::uint64_t views);
+  void set_gauge (std::uint64_t views, std::uint64_t linked);
+  static void fade (Pair &pair, double kept);
   void find_centre (std::span<const AlignedView> views);
 
   Rig rig_, now_;                      /* as it was told, and corrected */
@@ -119,7 +122,7 @@ private:
   ViewPairs<Pair> pairs_;
   Vec3 centre_;
   double depth_error_ = 0;
-  bool started_ = false, compares_colours_ = false;
+  bool started_ = false;
   std::uint32_t frame_ = 0;
   std::vector<double> matrix_, right_, sorted_;
 };

@@ -39,7 +39,8 @@ public:
   {
     return planes_.data () + static_cast<std::size_t> (y) * static_cast<std::size_t> (width_);
   }
-  /** Whether a row has a plane at all. Rows of a lost slice have none. */
+  /** Whether a row has smooth surface at all, edges of depth apart. Rows of a lost slice have none,
+   *  nor has a row of single pixels. */
   [[nodiscard]] bool is_used (int y) const { return used_[static_cast<std::size_t> (y)] != 0; }
   [[nodiscard]] const SurfacePlane &at (int x, int y) const { return row (y)[x]; }
 

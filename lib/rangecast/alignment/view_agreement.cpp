@@ -48,7 +48,7 @@ ViewAgreement::reset ()
   rig_ = nominal_;
   poses_.reset ();
   of_.fill ({});
-  gains_.fill ({1, 1, 1});
+  gains_.fill (std::nullopt);
   frame_ = changed_at_ = 0;
   judged_ = corrected_ = rig_changed_ = false;
 }
@@ -190,25 +190,27 @@ clear_depth (const RangeImage &image)
 void
 ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
-  const bool learns = (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
-  if (learns || settings.depth)
+  const bool several = images.size () > 1,
+             learns = several && (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
+  if (learns || (several && settings.depth))
     prepare (images, settings.threads);
   if (learns) {
     poses_.learn (aligned_);
     judge_views (images);
   }
   correct_rig (settings.poses);
-  frame_++;
-  judged_ = true;
+  judged_ = judged_ || learns;
+  frame_ += judged_;
+  if (!several || !settings.views)
+    for (ViewConsistency &view : of_)
+      view.left_out = false;
   for (std::size_t i = 0; i < images.size (); i++) {
-    ViewConsistency &view = of_[static_cast<std::size_t> (images[i].view_id)];
-    view.left_out = view.left_out && settings.views;
-    if (!view.left_out)
+    if (!of_[static_cast<std::size_t> (images[i].view_id)].left_out)
       continue;
     clear_depth (images[i]);
     planes_[i].clear ();
   }
-  if (!settings.depth)
+  if (!several || !settings.depth)
     return;
   fused_.clear ();
   for (std::size_t i = 0; i < images.size (); i++) {
@@ -233,8 +235,6 @@ ViewAgreement::process (std::span<const RangeImage> images, const AgreementSetti
         index_[static_cast<std::size_t> (image.view_id)] < 0)
       return {StatusCode::kNotFound,
           "rig: no view " + std::to_string (image.view_id) + ", which the frame set has"};
-  if (images.size () < 2 || !(settings.poses || settings.depth || settings.views))
-    return {};
   return guarded ("views", [&] () -> Status {
     work (images, settings);
     return {};

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace rangecast {
 
 struct AgreementSettings {
   bool poses = true; ///< PoseAlignment
-  bool depth = true; ///< DepthAgreement
+  bool depth = true; ///< DepthAgreement; cylinderfilter has it off by default
   bool views = true; ///< leave out views that contradict the others
   int threads = 1;   ///< views at a time; 0 = number of cores
 };
@@ -45,8 +46,9 @@ public:
   /** Forgets the stream; corrections go. */
   void reset ();
 
-  /** For views that are compared: what their colours are multiplied with afterwards. */
-  void set_gains (int view_id, const std::array<float, 3> &gains)
+  /** What a view's colours are multiplied with afterwards. Those of two views are compared only if
+   *  both have gains: nobody knows what unlike cameras make of one colour. */
+  void set_gains (int view_id, const std::optional<std::array<float, 3>> &gains)
   {
     gains_[static_cast<std::size_t> (view_id)] = gains;
   }
@@ -58,6 +60,8 @@ public:
    *  kNoSpace without memory */
   Status process (std::span<const RangeImage> images, const AgreementSettings &settings);
 
+  /** The rig as set_rig() was told. */
+  [[nodiscard]] const Rig &nominal_rig () const { return nominal_; }
   /** The rig as it is now believed to be. */
   [[nodiscard]] const Rig &rig () const { return rig_; }
   /** Whether process() changed it in the last call. */
@@ -80,7 +84,7 @@ private:
   Rig nominal_, rig_;
   std::array<int, kMaxViews> index_{}; /* in both rigs, by view-id */
   std::array<ViewConsistency, kMaxViews> of_;
-  std::array<std::array<float, 3>, kMaxViews> gains_;
+  std::array<std::optional<std::array<float, 3>>, kMaxViews> gains_;
   PoseAlignment poses_;
   std::uint32_t frame_ = 0, changed_at_ = 0;
   bool rig_changed_ = false, corrected_ = false, judged_ = false;

@@ -258,7 +258,7 @@ ColourBalance::Gains
 ColourBalance::gains (int view_id) const
 {
   Gains gains{1, 1, 1};
-  if (view_id < 0 || view_id >= kMaxViews || !(started_ >> view_id & 1))
+  if (!has_gains (view_id))
     return gains;
   for (std::size_t c = 0; c < 3; c++) {
     const float g = log_gains_[static_cast<std::size_t> (view_id)][c];

@@ -48,6 +48,11 @@ public:
 
   /** What the colours of a view were multiplied with in the last frame. */
   [[nodiscard]] Gains gains (int view_id) const;
+  /** Whether they have been learnt. */
+  [[nodiscard]] bool has_gains (int view_id) const
+  {
+    return view_id >= 0 && view_id < kMaxViews && (started_ >> view_id & 1);
+  }
 
 private:
   static constexpr int kBins = 640; /* of a histogram */
