@@ -15,11 +15,13 @@ void main ()
 }
 )";
 
-/** Covers the viewport with one triangle, drawn without vertex buffers. */
+/** Covers the viewport with one triangle, drawn without vertex buffers, at a depth of
+ * u_covering_depth (-1 to 1; 0 unless it is set). */
 inline constexpr const char *kCoveringVertexShader = R"(
+uniform float u_covering_depth;
 void main ()
 {
-  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, u_covering_depth, 1.0);
 }
 )";
 

@@ -109,14 +109,18 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
   count_ = images.size ();
   reduced_ = reduced;
   for (std::size_t i = 0; i < images.size (); i++) {
+    const bool is_reduced = reduced >> i & 1;
+    if (built && is_reduced)
+      continue;
     const rangecast::View *view = rig_->find (images[i].view_id);
-    rangecast::ConstRangeImage image = images[i];
-    if (settings.show_units && !built)
+    rangecast::ConstRangeImage image = images[i]; /* the same one may be mapped elsewhere by now */
+    if (settings.show_units && built)
+      image.colour = views_[i].image.colour;
+    else if (settings.show_units)
       image.colour = rangecast::tinted (images[i].colour,
           rangecast::camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
-    if (!built)
-      views_[i] = {image, view};
-    if (!built && (reduced >> i & 1))
+    views_[i] = {image, view};
+    if (is_reduced)
       views_[i] = memory_[i].reduced.reduce (views_[i]);
   }
   rangecast::in_parallel (

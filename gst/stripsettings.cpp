@@ -89,7 +89,8 @@ struct SwitchRow {
 static const SwitchRow kSwitches[] = {
     {"fit", "Fit",
         "Camera properties count from a view that is centred on what is drawn and as near as it "
-        "fits, found when the stream begins and by the key r (default false: from the first view)",
+        "fits, found when the stream begins and by the keys r and Home (default false: from the "
+        "first view)",
         kFlags, [] (Settings &s) -> bool & { return s.fit; }},
     {"show-cameras", "Show cameras",
         "Also draw where the rig's cameras stand, and their frusta from near to far (default "

@@ -30,14 +30,6 @@ void main ()
 }
 )";
 
-/* As far away as the depth buffer reaches. */
-static const char *const kVertexShader = R"(
-void main ()
-{
-  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 1.0, 1.0);
-}
-)";
-
 void
 set_background_uniforms (
     GstGLShader *shader, const float (&colour)[4], float shade, const rangecast::Roi &part)
@@ -53,7 +45,7 @@ BackgroundPainter::draw (
   const GstGLFuncs *gl = context->gl_vtable;
   if (!shader_ && !failed_) {
     GError *error = nullptr;
-    shader_ = make_shader (context, kVertexShader,
+    shader_ = make_shader (context, kCoveringVertexShader,
         (std::string (kBackgroundFunction) + kFragmentShader).c_str (), &error);
     failed_ = !shader_;
     if (failed_)
@@ -68,6 +60,7 @@ BackgroundPainter::draw (
   gl->Enable (GL_DEPTH_TEST);
   gl->DepthFunc (GL_LEQUAL);
   gst_gl_shader_use (shader_);
+  gst_gl_shader_set_uniform_1f (shader_, "u_covering_depth", 1); /* as far away as depths reach */
   set_background_uniforms (shader_, colour, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);

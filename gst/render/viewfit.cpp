@@ -8,7 +8,8 @@ using rangecast::SceneFrame;
 using rangecast::Vec3;
 
 static constexpr GstClockTime kSettleTime = GST_SECOND / 2;
-static constexpr std::size_t kMaxPoints = 16384; /* of all views: enough for a fit */
+static constexpr GstClockTime kPatience = 5 * GST_SECOND; /* with views that have no points */
+static constexpr std::size_t kMaxPoints = 16384;          /* of all views: enough for a fit */
 static constexpr std::size_t kMinPoints = 16;
 
 bool
@@ -39,22 +40,26 @@ take_points (const StripScene &scene, std::vector<Vec3> &points)
     count += of_view;
     views += of_view > 0;
   }
+  if (count < kMinPoints)
+    return 0;
+  points.clear ();
   points.reserve (kMaxPoints + rangecast::kMaxViews);
   for (const StripPainter::Layer &layer : scene.layers ())
     rangecast::append_points (layer.image, *layer.view, count / kMaxPoints + 1, points);
-  return count >= kMinPoints ? views : 0;
+  return views;
 }
 
 void
 ViewFit::refit (const StripScene &scene, const Picture &picture)
 {
-  std::vector<Vec3> points;
-  const std::size_t views = take_points (scene, points);
+  const std::size_t views = take_points (scene, candidates_);
   tried_ = picture.pts;
-  if (views == 0 || views < views_)
+  if (views >= views_ || picture.pts < complete_)
+    complete_ = picture.pts;
+  if (views == 0 || (views < views_ && picture.pts - complete_ < kPatience))
     return;
   const SceneFrame frame =
-      rangecast::fitted_frame (scene.frame (), picture.orbit, picture.aspect, points);
+      rangecast::fitted_frame (scene.frame (), picture.orbit, picture.aspect, candidates_);
   const double fov = picture.orbit.fov_deg > 0 ? picture.orbit.fov_deg : frame.fov_deg;
   settled_ = !GST_CLOCK_TIME_IS_VALID (picture.pts) ||
              (fitted_ && views == views_ && rangecast::is_about_same (frame, frame_, fov));
@@ -62,7 +67,7 @@ ViewFit::refit (const StripScene &scene, const Picture &picture)
     return; /* no jump for a small difference */
   fitted_ = true;
   views_ = views;
-  points_ = std::move (points);
+  std::swap (points_, candidates_);
   picture_ = picture;
   frame_ = frame;
 }

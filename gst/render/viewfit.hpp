@@ -10,8 +10,8 @@
 
 /** Fits the camera to the first frame sets of a stream: to the first one that has points, then
  * again every half second until the view stays about the same and every view that had points still
- * has some. From then on the fit holds, so that the picture never follows movements. Streaming
- * thread.
+ * has some, or some have had none for five seconds. From then on the fit holds, so that the picture
+ * never follows movements. Streaming thread.
  */
 class ViewFit {
 public:
@@ -37,8 +37,9 @@ private:
 
   bool fitted_ = false, settled_ = false;
   GstClockTime tried_ = GST_CLOCK_TIME_NONE; /* PTS of the last frame set that was looked at */
+  GstClockTime complete_ = 0;                /* PTS of the last one with points in all `views_` */
   std::size_t views_ = 0;                    /* with points */
-  std::vector<rangecast::Vec3> points_;
-  Picture picture_; /* that the fit is for */
+  std::vector<rangecast::Vec3> points_, candidates_; /* of the fit; of the frame set looked at */
+  Picture picture_;                                  /* that the fit is for */
   rangecast::SceneFrame frame_;
 };

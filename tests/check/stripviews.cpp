@@ -2,6 +2,9 @@
 /* What a viewer begins with and switches: striprender's fit, view-mask and background-shade. */
 #include <gst/controller/controller.h>
 
+#include <algorithm>
+#include <memory>
+
 #include "render-check.hpp"
 
 using namespace rangecast;
@@ -206,6 +209,24 @@ GST_START_TEST (test_fit_waits_for_all_views_that_come)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_fit_gives_up_on_a_view_that_is_lost)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = render_harness (rig, "fit=true background=0xff000000");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const Roi roi = {100, 80, 100, 80}, other = {130, 100, 60, 40};
+  const RenderedPicture both = render (h, make_frame_set (rig, 0));
+  fail_if (Drawn (both).empty ());
+  const Drawn waits (render (h, patch (rig, roi, 4 * GST_SECOND)));
+  fail_unless (waits.right - waits.left < 0.75 * 320 && waits.bottom - waits.top < 0.75 * 240);
+  fail_unless_fitted (render (h, patch (rig, roi, 6 * GST_SECOND)));
+  fail_unless_fitted (render (h, patch (rig, roi, 7 * GST_SECOND))); /* settled */
+  fail_if_fitted (render (h, patch (rig, other, 20 * GST_SECOND)));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_fit_takes_no_notice_of_single_points_far_away)
 {
   const Rig rig = ring_rig (1);
@@ -270,6 +291,86 @@ GST_START_TEST (test_fit_may_be_set_any_time)
   fail_unless (render (h, patch (rig, roi, 2 * GST_SECOND)).rgba == before.rgba);
   gst_object_unref (r);
   gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Memory that is somewhere else each time it is mapped, and zeros where it was. For reading. */
+struct WanderingMemory {
+  GstMemory memory;
+  std::vector<guint8> bytes;
+  std::vector<std::unique_ptr<guint8[]>> maps;
+};
+
+static gpointer
+map_elsewhere (GstMemory *memory, gsize, GstMapFlags)
+{
+  auto self = reinterpret_cast<WanderingMemory *> (memory);
+  auto &map = self->maps.emplace_back (std::make_unique<guint8[]> (self->bytes.size ()));
+  std::ranges::copy (self->bytes, map.get ());
+  return map.get ();
+}
+
+static void
+unmap_to_zeros (GstMemory *memory)
+{
+  auto self = reinterpret_cast<WanderingMemory *> (memory);
+  for (auto &map : self->maps) /* planes are unmapped together */
+    std::fill_n (map.get (), self->bytes.size (), guint8 (0));
+}
+
+struct WanderingAllocator {
+  GstAllocator parent;
+};
+struct WanderingAllocatorClass {
+  GstAllocatorClass parent;
+};
+G_DEFINE_TYPE (WanderingAllocator, wandering_allocator, GST_TYPE_ALLOCATOR)
+
+static void
+wandering_allocator_init (WanderingAllocator *self)
+{
+  self->parent.mem_map = map_elsewhere;
+  self->parent.mem_unmap = unmap_to_zeros;
+}
+
+static void
+wandering_allocator_class_init (WanderingAllocatorClass *klass)
+{
+  klass->parent.free = [] (GstAllocator *, GstMemory *memory) {
+    delete reinterpret_cast<WanderingMemory *> (memory);
+  };
+}
+
+static void
+let_wander (GstBuffer *buffer)
+{
+  auto allocator = static_cast<GstAllocator *> (
+      gst_object_ref_sink (g_object_new (wandering_allocator_get_type (), nullptr)));
+  auto wandering = new WanderingMemory;
+  wandering->bytes.resize (gst_buffer_get_size (buffer));
+  gst_buffer_extract (buffer, 0, wandering->bytes.data (), wandering->bytes.size ());
+  gst_memory_init (&wandering->memory, GST_MEMORY_FLAG_READONLY, allocator, nullptr,
+      wandering->bytes.size (), 0, 0, wandering->bytes.size ());
+  gst_buffer_replace_all_memory (buffer, &wandering->memory);
+  gst_object_unref (allocator); /* its memory has it */
+}
+
+/* A frame set that is drawn again is mapped again. From the side, a patch is less wide. */
+GST_START_TEST (test_fit_of_a_held_frame_set)
+{
+  Live live ("fit=true background=0xff000000 mode=strips");
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstBuffer *set = patch (live.rig, {40, 90, 200, 60});
+  GST_BUFFER_DURATION (set) = 200 * GST_MSECOND;
+  let_wander (set);
+  fail_unless_equals_int (gst_harness_push (live.h, set), GST_FLOW_OK);
+  fail_unless_fitted (live.next ());
+  press_key (live.h, "r"); /* azimuth 0 */
+  g_object_set (live.r, "azimuth", 50.0, nullptr);
+  const Drawn aside (live.next ()); /* 0.62 with the fit from before */
+  fail_unless (aside.right - aside.left > 0.75 * 320, "%d to %d", aside.left, aside.right);
+  fail_unless_equals_uint64 (stats_field (live.r, "repeated"), 1);
 }
 GST_END_TEST;
 
@@ -448,9 +549,11 @@ stripviews_suite ()
   tcase_add_test (tc, test_fit_holds_until_a_key_asks_for_another);
   tcase_add_test (tc, test_fit_goes_on_until_the_view_settles);
   tcase_add_test (tc, test_fit_waits_for_all_views_that_come);
+  tcase_add_test (tc, test_fit_gives_up_on_a_view_that_is_lost);
   tcase_add_test (tc, test_fit_takes_no_notice_of_single_points_far_away);
   tcase_add_test (tc, test_hand_and_properties_go_before_the_fit);
   tcase_add_test (tc, test_fit_may_be_set_any_time);
+  tcase_add_test (tc, test_fit_of_a_held_frame_set);
   tcase_add_test (tc, test_view_mask_draws_those_views_alone);
   tcase_add_test (tc, test_view_mask_reaches_the_last_view_id);
   tcase_add_test (tc, test_view_mask_changes_a_held_picture_and_can_be_controlled);
