@@ -180,11 +180,14 @@ has_no_bar () {
   gst-launch-1.0 -q avatartestsrc is-live=true motion=0 noise=0 range-person-only=true ! video/x-range,width=160,height=120,framerate=10/1 \
     ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink host=127.0.0.1 port=$((ports + 212)) &
   sender=$!
+  trap 'kill $sender 2>/dev/null || true' EXIT
   open_viewer --listen $((ports + 212)) --size 320x240
   settle
   xdotool mousemove --window "$window" 100 230
   sleep 1
   looks_like settled.png || fail "something came with the mouse"
+  press r # fits what is there by now
+  sleep 3
   snap first.png
   press Right # turns
   wait_for snap_differs first.png
@@ -192,7 +195,6 @@ has_no_bar () {
   press 0
   press r
   wait_for snap_equals first.png
-  kill $sender
   quits_with q
 }
 
