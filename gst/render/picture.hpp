@@ -15,8 +15,8 @@ struct RenderPicture {
   float pixels_per_unit;      ///< pixels that a length of 1 at a distance of 1 covers
   rangecast::StripMode mode;
   double depth_step;
-  bool back_faces = false;  ///< mode strips: where no front is; mode blend shows all
-  std::size_t rig_views = 1;   ///< that a frame set may have
+  bool back_faces = false;   ///< mode strips: where no front is; mode blend shows all
+  std::size_t rig_views = 1; ///< that a frame set may have
   bool keeps_depth = false; ///< mode blend: the surfaces' depth is written, for what is drawn later
   rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and one more on
                                ///< each side

@@ -8,7 +8,7 @@ using namespace rangecast::testing;
 constexpr int kWidth = 320, kHeight = 240;
 constexpr const char *kStill = "motion=0 noise=0";
 
-/* The caps of a rig whose view 1 is told wrong. */
+/* The caps of a rig in which the pose of view 1 is wrong. */
 static GstCaps *
 nudged_caps (const Scene &scene, Vec3 metres, double degrees)
 {

@@ -295,7 +295,7 @@ TEST (ColourBalance, no_gain_is_larger_than_the_bound)
   ASSERT_TRUE (balance.set_rig (frame.rig).ok ());
   ASSERT_TRUE (balance.process (frame.images (), 1).ok ());
   EXPECT_GT (balance.gains (0)[0], 1.4);
-  EXPECT_LE (balance.gains (0)[0], ColourBalance::kMostGain);
+  EXPECT_LE (balance.gains (0)[0], ColourBalance::kMaxGain);
 }
 
 TEST (ColourBalance, camera_with_another_exposure_is_lifted_and_the_others_stay)

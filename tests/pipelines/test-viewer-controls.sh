@@ -247,8 +247,8 @@ survives () {
   status=0
   timeout 30 rangecast-viewer --once cut.rcnc >cut.txt 2>&1 || status=$?
   [ $status -le 1 ] || fail "cut off: $status: $(cat cut.txt)"
-  head -c 40 moving.rcnc >stub.rcnc
-  expect_error "stub.rcnc: " rangecast-viewer stub.rcnc
+  head -c 40 moving.rcnc >cut.rcnc
+  expect_error "cut.rcnc: " rangecast-viewer cut.rcnc
   # as many views as there may be, and a rig with more than there are keys
   gst-launch-1.0 -q -e avatartestsrc views=64 num-buffers=6 range-person-only=true ! video/x-range,width=32,height=24,framerate=5/1 \
     ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=many.rcnc

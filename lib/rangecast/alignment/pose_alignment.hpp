@@ -116,7 +116,7 @@ private:
   static void fade (Pair &pair, double kept);
   void find_centre (std::span<const AlignedView> views);
 
-  Rig rig_, now_;                      /* as it was told, and corrected */
+  Rig rig_, now_;                      /* nominal, and corrected */
   std::array<int, kMaxViews> index_{}; /* in rig_.views, by view-id */
   std::array<PoseCorrection, kMaxViews> corrections_{};
   ViewPairs<Pair> pairs_;

@@ -60,7 +60,7 @@ public:
    *  kNoSpace without memory */
   Status process (std::span<const RangeImage> images, const AgreementSettings &settings);
 
-  /** The rig as set_rig() was told. */
+  /** The rig of set_rig(), uncorrected. */
   [[nodiscard]] const Rig &nominal_rig () const { return nominal_; }
   /** The rig as it is now believed to be. */
   [[nodiscard]] const Rig &rig () const { return rig_; }

@@ -237,7 +237,7 @@ ColourBalance::solve ()
 void
 ColourBalance::follow (std::span<const RangeImage> images)
 {
-  const float most = std::log (kMostGain);
+  const float most = std::log (kMaxGain);
   for (const RangeImage &image : images) {
     const auto id = static_cast<std::size_t> (image.view_id);
     if (!(linked_ >> id & 1)) /* what it shared before still holds */
@@ -285,7 +285,7 @@ multiply_row (Rgbx *pixels, int count, const std::uint16_t (&factors)[4])
 static void
 multiply (const RangeImage &image, const ColourBalance::Gains &gains)
 {
-  static_assert (ColourBalance::kMostGain < 2);
+  static_assert (ColourBalance::kMaxGain < 2);
   if (gains == ColourBalance::Gains{1, 1, 1})
     return;
   std::uint16_t factors[4] = {};

@@ -26,7 +26,7 @@ public:
   using Gains = std::array<float, 3>; ///< red, green, blue
 
   /** No gain is larger than this, or smaller than its inverse. */
-  static constexpr float kMostGain = 1.75f;
+  static constexpr float kMaxGain = 1.75f;
   /** A new frame counts that much. */
   static constexpr float kShareOfNew = 0.1f;
   /** This much of a gain (2 in 1000, a quarter of a level) is left undone, so that cameras which
