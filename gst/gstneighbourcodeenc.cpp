@@ -706,7 +706,7 @@ install_properties (GObjectClass *object_class)
       0, 65535, kDefaults.depth_threshold, steered);
   install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
       "Neighbours replace a pixel if also R, G and B each differ by no more than so many codes (0 "
-      "to 255, default 10)",
+      "to 255, default 5)",
       0, 255, kDefaults.colour_threshold, steered);
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
       "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,

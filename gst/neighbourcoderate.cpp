@@ -129,13 +129,12 @@ NeighbourCodeRate::reset ()
   told_one_of_ = 1;
 }
 
-/* What a point of noisy cameras comes to, about, and how that falls with the colour threshold. The
- * first frame set then tells. */
+/* What a point of noisy cameras comes to, about, at a colour threshold of 10, and how that falls
+ * with the threshold. The first frame set then tells. */
 static double
 usual_bits_per_point (Profile profile, int colour_threshold)
 {
-  const EncoderSettings defaults;
-  const double finer = (defaults.colour_threshold + 0.5) / (colour_threshold + 0.5);
+  const double finer = 10.5 / (colour_threshold + 0.5);
   switch (profile) {
     case Profile::kPlain:
       return 13 * std::cbrt (finer);

@@ -166,7 +166,7 @@ test_rendered_figure_moves () {
 test_own_settings_are_run () {
   make_pictures
   codec_bench "${pair0[@]}" "${quick[@]}" --only "RVL + JPEG" --try "profile=packed depth-bits=9 colour-bits=5" --json out.json >/dev/null
-  check_json out.json "of('packed')[0]['settings'] == 'depth-bits=9 depth-threshold=8 colour-threshold=10 colour-bits=5'" "--try"
+  check_json out.json "of('packed')[0]['settings'] == 'depth-bits=9 depth-threshold=8 colour-threshold=5 colour-bits=5'" "--try"
   refuse 2 "profile=plain, packed or entropy" "${pair0[@]}" --try "profile=best"
   refuse 2 "expected values in range: depth bits, expected 6 to 16" "${pair0[@]}" --try "depth-bits=99"
   refuse 2 "depth-bits=NUMBER" "${pair0[@]}" --try "depth-bits=many"

@@ -23,7 +23,7 @@ constexpr double kClearance = 0.01;
 constexpr int kBackgroundRadius = 1;
 
 /* Copies of the neighbour code may be off by its threshold, in levels of R, G and B each. */
-constexpr int kCopyRange = 12, kCopyReach = 2;
+constexpr int kCopyRange = 7, kCopyReach = 2;
 
 class Planes {
 public:
