@@ -51,18 +51,21 @@ void main ()
 }
 )";
 
-/* Half floats hold sums of 250 surfaces of full weight, and colours of the least weight. */
+/* Weights of full, least and inside surfaces. Half floats hold the sum of 250 surfaces of full
+ * weight, and colours of the least one. The inside of a surface, which no camera saw, is told by
+ * its weight. */
+static constexpr float kMaxWeight = 250, kMinWeight = 5e-4f, kInsideWeight = 1e-4f;
+
 static const char *const kFragmentShader = R"(
 precision highp float;
 #if SUM
 in vec4 v_colour;
 out vec4 sum;
-const float kScale = 250.0, kMinWeight = 2e-6;
 #endif
 void main ()
 {
 #if SUM
-  float weight = max (v_colour.a * v_colour.a, kMinWeight) * kScale;
+  float weight = gl_FrontFacing ? max (v_colour.a * v_colour.a * MAX_WEIGHT, MIN_WEIGHT) : INSIDE_WEIGHT;
   sum = vec4 (v_colour.rgb * weight, weight);
 #endif
 }
@@ -76,7 +79,10 @@ BlendPainter::start (GstGLContext *context, GError **error)
       reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
   in_software_ = renderer && std::strstr (renderer, "llvmpipe");
   for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string variant = "#define SUM " + std::to_string (i);
+    const std::string variant = "#define SUM " + std::to_string (i) + "\n#define MAX_WEIGHT " +
+                                std::to_string (kMaxWeight) + "\n#define MIN_WEIGHT " +
+                                std::to_string (kMinWeight) + "\n#define INSIDE_WEIGHT " +
+                                std::to_string (kInsideWeight);
     const std::string vertex = variant + kVertexShader, fragment = variant + kFragmentShader;
     shaders_[i] = make_shader (context, vertex.c_str (), fragment.c_str (), error);
     if (!shaders_[i])
@@ -192,16 +198,19 @@ BlendPainter::draw_layers (
 bool
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
-  const bool precise = !is_gles (context_) && (in_software_ || picture.rig_views > kMaxHalfFloatViews);
+  const bool precise =
+      !is_gles (context_) && (in_software_ || picture.rig_views > kMaxHalfFloatViews);
   if (!targets_.begin_depth (picture.width, picture.height, precise, picture.covered))
     return false;
   draw_layers (layers, picture, kDepth);
   targets_.begin_sum ();
+  context_->gl_vtable->FrontFace (rangecast::mirrors (picture.clip_from_world) ? GL_CW : GL_CCW);
   draw_layers (layers, picture, kSum);
   const auto shift = rangecast::depth_shift (
       picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
   targets_.resolve (picture.part, picture.covered, picture.background, picture.background_shade,
-      picture.keeps_depth ? &shift : nullptr);
+      shift, 0.9f * kMinWeight, picture.keeps_depth);
+  context_->gl_vtable->FrontFace (GL_CCW);
   context_->gl_vtable->BindVertexArray (0);
   context_->gl_vtable->Disable (GL_DEPTH_TEST);
   gst_gl_context_clear_shader (context_);

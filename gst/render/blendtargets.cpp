@@ -3,6 +3,7 @@
 
 #include <gst/gl/gstglfuncs.h>
 
+#include <algorithm>
 #include <iterator>
 #include <string>
 
@@ -26,22 +27,64 @@
 #endif
 
 /* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
- * what two views draw. */
+ * what two views draw. Where no camera saw the outside of a surface, so that the inside of one
+ * behind shows through (beside a nose, round glasses), small gaps take the colours around them,
+ * from the farther surfaces: what a nearer one hides is theirs. Depth-image-based rendering fills
+ * disocclusions so (C. Fehn, "Depth-image-based rendering (DIBR), compression, and transmission for
+ * a new approach on 3D-TV", SPIE 5291, 2004, has the problem). */
 static const char *const kResolveShader = R"(
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D u_sum; /* R, G, B times weight; weight */
-#if WITH_DEPTH
 uniform sampler2D u_depth;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
-#endif
 uniform ivec4 u_part; /* first and last pixel */
+uniform float u_outside; /* weight of the least outside, less rounding */
+uniform int u_reach; /* pixels that a gap is closed over */
 out vec4 fragment;
+float distance_at (ivec2 at)
+{
+  return u_shift.y / (2.0 * texelFetch (u_depth, at, 0).r - 1.0 - u_shift.x) - u_shift.z;
+}
+/* Weighted mean of the farthest outsides in eight directions, and its share, which is nothing if
+ * one of them has none and falls where one is just within reach. */
+vec4 fill (ivec2 at)
+{
+  const float kSameSurface = 0.02; /* metres */
+  vec4 sum = vec4 (0.0);
+  float farthest = 0.0;
+  int longest = 0;
+  for (int k = 0; k < 9; k++) {
+    ivec2 way = ivec2 (k % 3 - 1, k / 3 - 1), place = at;
+    if (k == 4)
+      continue;
+    vec4 there = vec4 (0.0);
+    for (int r = 1; r <= u_reach && there.a < u_outside; r += 1 + r / 4) {
+      longest = max (longest, r);
+      place = clamp (at + r * way, u_part.xy, u_part.zw);
+      there = texelFetch (u_sum, place, 0);
+    }
+    if (there.a < u_outside)
+      return vec4 (0.0);
+    vec2 apart = vec2 (place - at);
+    float distance = distance_at (place);
+    if (distance > farthest + kSameSurface)
+      sum = vec4 (0.0);
+    if (distance > farthest - kSameSurface)
+      sum += vec4 (there.rgb / there.a, 1.0) / dot (apart, apart);
+    farthest = max (farthest, distance);
+  }
+  return vec4 (sum.rgb / sum.a, min (2.0 - 2.0 * float (longest) / float (u_reach + 1), 1.0));
+}
 void main ()
 {
   vec4 ground = background (gl_FragCoord.xy);
   ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
   vec4 sum = texelFetch (u_sum, at, 0);
+  if (sum.a > 0.0 && sum.a < u_outside) {
+    vec4 filled = fill (at);
+    sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
+  }
   vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
   vec4 east = texelFetch (u_sum, ivec2 (min (at.x + 1, last.x), at.y), 0);
   vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, first.y)), 0);
@@ -53,8 +96,7 @@ void main ()
   if (sum.a <= 0.0)
     sum = west + east + north + south;
 #if WITH_DEPTH
-  float depth = texelFetch (u_depth, at, 0).r;
-  float distance = u_shift.y / (2.0 * depth - 1.0 - u_shift.x) - u_shift.z;
+  float depth = texelFetch (u_depth, at, 0).r, distance = distance_at (at);
   gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
 #endif
   float behind = (1.0 - coverage) * ground.a;
@@ -184,10 +226,11 @@ BlendTargets::begin_sum ()
 
 void
 BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
-    const float (&background)[4], float shade, const rangecast::DepthShift *shift)
+    const float (&background)[4], float shade, const rangecast::DepthShift &shift, float outside,
+    bool keeps_depth)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  GstGLShader *shader = shaders_[shift ? 1 : 0];
+  GstGLShader *shader = shaders_[keeps_depth ? 1 : 0];
   gl->Disable (GL_BLEND);
   gl->BlendFunc (GL_ONE, GL_ZERO);
   gl->DepthMask (TRUE);
@@ -200,15 +243,16 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
   gl->Scissor (covered.x, covered.y, covered.width, covered.height);
   gst_gl_shader_use (shader);
   static const char *const kNames[] = {"u_sum", "u_depth"};
-  for (std::size_t i = 0; i < (shift ? 2 : 1); i++) {
+  for (std::size_t i = 0; i < std::size (kNames); i++) {
     gl->ActiveTexture (guint (GL_TEXTURE0 + i));
     gl->BindTexture (GL_TEXTURE_2D, textures_[i]);
     gst_gl_shader_set_uniform_1i (shader, kNames[i], gint (i));
   }
   gst_gl_shader_set_uniform_4i (shader, "u_part", covered.x, covered.y,
       covered.x + covered.width - 1, covered.y + covered.height - 1);
-  if (shift)
-    gst_gl_shader_set_uniform_3f (shader, "u_shift", shift->a, shift->b, shift->g);
+  gst_gl_shader_set_uniform_3f (shader, "u_shift", shift.a, shift.b, shift.g);
+  gst_gl_shader_set_uniform_1f (shader, "u_outside", outside);
+  gst_gl_shader_set_uniform_1i (shader, "u_reach", std::max (part.height / 20, 1));
   set_background_uniforms (shader, background, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);

@@ -34,11 +34,14 @@ public:
    *  @param covered     those of begin_depth(); the rest becomes background
    *  @param background  R, G, B, A, straight
    *  @param shade       see BackgroundPainter::draw(), which has drawn it if it is not 0
-   *  @param shift       of the depth pass; the surfaces' depth is written, too, into a depth buffer
-   *                     that has been cleared: what is drawn later stands among them. nullptr: none
-   *                     is written */
+   *  @param shift       of the depth pass
+   *  @param outside     pixels of less weight show only the inside of surfaces, and take the
+   * colours of what surrounds them where that is near
+   *  @param keeps_depth the surfaces' depth is written, too, into a depth buffer that has been
+   *                     cleared: what is drawn later stands among them */
   void resolve (const rangecast::Roi &part, const rangecast::Roi &covered,
-      const float (&background)[4], float shade, const rangecast::DepthShift *shift);
+      const float (&background)[4], float shade, const rangecast::DepthShift &shift, float outside,
+      bool keeps_depth);
 
 private:
   bool make (int width, int height, bool precise);

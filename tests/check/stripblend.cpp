@@ -178,6 +178,42 @@ GST_START_TEST (test_outlines_are_antialiased_and_have_no_dark_rims)
 }
 GST_END_TEST;
 
+/* Two opposite cameras: a red wall with a round hole, and a green one behind it, seen by the other.
+ */
+static GstBuffer *
+wall_with_hole (const Rig &rig, double radius)
+{
+  GstBuffer *buffer = make_frame_set (rig);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  for (const RangeImage &image : frame.views ()) {
+    const bool front = image.view_id == 0;
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const bool hole = front && std::hypot (x - 159.5, y - 119.5) < radius;
+        image.depth.at (x, y) = hole ? 0 : 7000;
+        image.colour.at (x, y) = front ? Rgbx{255, 0, 0, 0} : Rgbx{0, 255, 0, 0};
+      }
+  }
+  return buffer;
+}
+
+GST_START_TEST (test_inside_shows_through_large_gaps_only)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = render_harness (rig, "azimuth=0");
+  if (!h)
+    RANGECAST_SKIP ("no OpenGL context");
+  const auto centre = [&] (double radius) {
+    const RenderedPicture picture = render (h, wall_with_hole (rig, radius));
+    return std::pair (picture.at (160, 120, 0), picture.at (160, 120, 1));
+  };
+  const auto small = centre (3), large = centre (60);
+  fail_unless (small.first > 250 && small.second < 5, "%d %d", small.first, small.second);
+  fail_unless (large.first < 5 && large.second > 250, "%d %d", large.first, large.second);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 /* The three passes leave OpenGL as the other modes expect it, and the other way round. */
 GST_START_TEST (test_modes_may_take_turns)
 {
@@ -209,6 +245,7 @@ stripblend_suite (void)
   tcase_add_test (tc, test_surface_beyond_the_blend_range_is_hidden);
   tcase_add_test (tc, test_64_views_of_one_colour_keep_it_to_a_level);
   tcase_add_test (tc, test_outlines_are_antialiased_and_have_no_dark_rims);
+  tcase_add_test (tc, test_inside_shows_through_large_gaps_only);
   tcase_add_test (tc, test_modes_may_take_turns);
   return s;
 }
