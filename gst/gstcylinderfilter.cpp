@@ -66,12 +66,14 @@ enum GstCylinderFilterMode {
 enum GstCylinderFilterAgree {
   GST_CYLINDER_FILTER_AGREE_POSES = 1,
   GST_CYLINDER_FILTER_AGREE_DEPTH = 2,
-  GST_CYLINDER_FILTER_AGREE_VIEWS = 4
+  GST_CYLINDER_FILTER_AGREE_VIEWS = 4,
+  GST_CYLINDER_FILTER_AGREE_POINTS = 8
 };
 enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
-static constexpr guint kDefaultAgree =
-    GST_CYLINDER_FILTER_AGREE_POSES | GST_CYLINDER_FILTER_AGREE_VIEWS;
+static constexpr guint kDefaultAgree = GST_CYLINDER_FILTER_AGREE_POSES |
+                                       GST_CYLINDER_FILTER_AGREE_VIEWS |
+                                       GST_CYLINDER_FILTER_AGREE_POINTS;
 static constexpr double kDefaultBlendWidth = 0.02;
 static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
                         kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
@@ -145,6 +147,8 @@ gst_cylinder_filter_agree_get_type (void)
       {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of poses", "poses"},
       {GST_CYLINDER_FILTER_AGREE_DEPTH, "Move depths of one surface together", "depth"},
       {GST_CYLINDER_FILTER_AGREE_VIEWS, "Leave out a view that contradicts the others", "views"},
+      {GST_CYLINDER_FILTER_AGREE_POINTS,
+          "Clear points that another view sees through, in another colour", "points"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_flags_register_static ("GstCylinderFilterAgree", values);
@@ -368,7 +372,8 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
       priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
   const rangecast::AgreementSettings agree = {(priv->agree & GST_CYLINDER_FILTER_AGREE_POSES) != 0,
       (priv->agree & GST_CYLINDER_FILTER_AGREE_DEPTH) != 0,
-      (priv->agree & GST_CYLINDER_FILTER_AGREE_VIEWS) != 0, settings.threads};
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_VIEWS) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_POINTS) != 0, settings.threads};
   guard.unlock ();
   if (off)
     return GST_FLOW_OK;
@@ -709,7 +714,8 @@ install_agree_property (GObjectClass *object_class, GParamFlags flags)
       g_param_spec_flags ("agree", "Agree",
           "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
           "rig), depth (depths of one surface move together), views (one that contradicts the "
-          "others is left out), or none (default: poses+views)",
+          "others is left out), points (those that another view sees through, in another colour, "
+          "are cleared), or none (default: poses+views+points)",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }

@@ -234,8 +234,8 @@ GST_START_TEST (test_agree_is_controllable_and_reads_as_it_was_set)
   GstElement *element = gst_element_factory_make ("cylinderfilter", nullptr);
   GParamSpec *spec = g_object_class_find_property (G_OBJECT_GET_CLASS (element), "agree");
   fail_unless (spec && spec->flags & GST_PARAM_CONTROLLABLE);
-  for (const auto &[text, expected] :
-      std::map<const char *, guint>{{"none", 0}, {"poses", 1}, {"depth", 2}, {"poses+views", 5}}) {
+  for (const auto &[text, expected] : std::map<const char *, guint>{
+           {"none", 0}, {"poses", 1}, {"depth", 2}, {"poses+views", 5}, {"points", 8}}) {
     guint value = 99;
     gst_util_set_object_arg (G_OBJECT (element), "agree", text);
     g_object_get (element, "agree", &value, nullptr);

@@ -108,8 +108,16 @@ learn (ViewAgreement &agreement, const Figure &figure, const AgreementSettings &
   }
 }
 
-constexpr AgreementSettings kPosesOnly = {true, false, false, 1};
-constexpr AgreementSettings kDepthOnly = {false, true, false, 1};
+constexpr AgreementSettings kPosesOnly = {true, false, false, false, 1};
+constexpr AgreementSettings kDepthOnly = {false, true, false, false, 1};
+constexpr AgreementSettings kPointsOnly = {false, false, false, true, 1};
+
+void
+set_gains_of_one (ViewAgreement &agreement, const Rig &rig)
+{
+  for (const View &view : rig.views)
+    agreement.set_gains (view.id, std::array<float, 3>{1, 1, 1});
+}
 
 } // namespace
 
@@ -509,6 +517,85 @@ TEST (Depth, all_processors_give_the_same_bits)
     EXPECT_TRUE (result == results[0]);
 }
 
+/* A block of view 0, on the figure's face, 50 mm nearer; the whole figure has one colour. */
+struct Floating {
+  Floating (Rgbx colour)
+  {
+    for (const RangeImage &image : figure.frame->images ())
+      for (int y = 0; y < image.depth.height; y++)
+        std::fill_n (image.colour.row (y), image.depth.width, Rgbx{200, 150, 120, 0});
+    frame = *figure.frame;
+    const RangeImage image = frame.images ()[0];
+    for (int y = kTop; y < kTop + kSize; y++)
+      for (int x = kLeft; x < kLeft + kSize; x++) {
+        EXPECT_NE (image.depth.at (x, y), 0);
+        image.depth.at (x, y) -= std::uint16_t (0.05 / figure.rig.views[0].depth_unit_m);
+        image.colour.at (x, y) = colour;
+      }
+    before = frame;
+  }
+  /* Points that went, in the block and elsewhere. */
+  std::pair<int, int> cleared (bool with_gains)
+  {
+    ViewAgreement agreement;
+    EXPECT_TRUE (agreement.set_rig (figure.rig).ok ());
+    if (with_gains)
+      set_gains_of_one (agreement, figure.rig);
+    EXPECT_TRUE (agreement.process (frame.images (), kPointsOnly).ok ());
+    const auto old = before.images (), now = frame.images ();
+    int in = 0, out = 0;
+    for (std::size_t i = 0; i < now.size (); i++)
+      for (int y = 0; y < now[i].depth.height; y++)
+        for (int x = 0; x < now[i].depth.width; x++)
+          if (old[i].depth.at (x, y) != now[i].depth.at (x, y)) {
+            EXPECT_EQ (now[i].depth.at (x, y), 0);
+            const bool is_in =
+                i == 0 && x >= kLeft && x < kLeft + kSize && y >= kTop && y < kTop + kSize;
+            (is_in ? in : out)++;
+          }
+    return {in, out};
+  }
+
+  static constexpr int kLeft = 155, kTop = 90, kSize = 10;
+  Figure figure{8};
+  Frame frame = *figure.frame, before = frame;
+};
+
+TEST (Points, point_that_others_see_through_in_another_colour_goes)
+{
+  Floating green ({0, 255, 0, 0});
+  const auto [in, out] = green.cleared (true);
+  EXPECT_GT (in, 0.6 * Floating::kSize * Floating::kSize);
+  EXPECT_EQ (out, 0);
+}
+
+TEST (Points, points_of_the_same_colour_stay)
+{
+  Floating same ({220, 150, 120, 0});
+  EXPECT_EQ (same.cleared (true), std::pair (0, 0));
+}
+
+TEST (Points, colours_of_unlike_cameras_are_not_compared)
+{
+  Floating green ({0, 255, 0, 0});
+  EXPECT_EQ (green.cleared (false), std::pair (0, 0));
+}
+
+TEST (Points, a_right_figure_keeps_999_of_1000)
+{
+  for (const unsigned dress : {0u, unsigned (kDressAll)}) {
+    const Figure figure (6, dress);
+    ViewAgreement agreement;
+    ASSERT_TRUE (agreement.set_rig (figure.rig).ok ());
+    set_gains_of_one (agreement, figure.rig);
+    Frame frame = *figure.frame;
+    ASSERT_TRUE (agreement.process (frame.images (), kPointsOnly).ok ());
+    for (std::size_t i = 0; i < frame.depth.size (); i++)
+      EXPECT_GT (double (frame.points (i)), 0.999 * double (figure.frame->points (i)))
+          << dress << i;
+  }
+}
+
 TEST (Agreement, any_images_are_survived)
 {
   Rig rig = ring_rig (5);
@@ -517,6 +604,7 @@ TEST (Agreement, any_images_are_survived)
   std::mt19937 random (7);
   ViewAgreement agreement;
   ASSERT_TRUE (agreement.set_rig (rig).ok ());
+  set_gains_of_one (agreement, rig);
   for (int round = 0; round < 60; round++) {
     Frame frame (rig);
     std::vector<RangeImage> images = frame.images ();
@@ -537,7 +625,7 @@ TEST (Agreement, any_images_are_survived)
     if (round % 3 == 0)
       images[1].roi = {}, images[1].depth = {}, images[1].colour = {};
     images.resize (random () % 6);
-    ASSERT_TRUE (agreement.process (images, {true, true, true, 2}).ok ());
+    ASSERT_TRUE (agreement.process (images, {true, true, true, true, 2}).ok ());
     ASSERT_TRUE (validate (agreement.rig ()).ok ());
   }
 }
@@ -560,12 +648,13 @@ TEST (Agreement, nothing_is_allocated_once_a_frame_set_has_been_seen)
   const Figure figure;
   ViewAgreement agreement;
   ASSERT_TRUE (agreement.set_rig (figure.rig).ok ());
+  set_gains_of_one (agreement, figure.rig);
   Frame frame = *figure.frame;
   const std::vector<RangeImage> images = frame.images ();
   for (int i = 0; i < 4; i++)
-    ASSERT_TRUE (agreement.process (images, {true, true, true, 1}).ok ());
+    ASSERT_TRUE (agreement.process (images, {true, true, true, true, 1}).ok ());
   const int before = allocations;
   for (int i = 0; i < 6; i++)
-    ASSERT_TRUE (agreement.process (images, {true, true, true, 1}).ok ());
+    ASSERT_TRUE (agreement.process (images, {true, true, true, true, 1}).ok ());
   EXPECT_EQ (allocations, before);
 }

@@ -53,13 +53,18 @@ ViewAgreement::reset ()
   judged_ = corrected_ = rig_changed_ = false;
 }
 
+const View &
+ViewAgreement::view_of (const RangeImage &image) const
+{
+  const int index = index_[static_cast<std::size_t> (image.view_id)];
+  return rig_.views[static_cast<std::size_t> (index)];
+}
+
 void
 ViewAgreement::prepare (std::span<const RangeImage> images, int threads)
 {
   in_parallel (images.size (), threads, [&] (std::size_t i) {
-    const View &view =
-        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
-    planes_[i].make (images[i], static_cast<float> (view.intrinsics.fx));
+    planes_[i].make (images[i], static_cast<float> (view_of (images[i]).intrinsics.fx));
   });
   aligned_.clear ();
   for (std::size_t i = 0; i < images.size (); i++)
@@ -188,6 +193,34 @@ clear_depth (const RangeImage &image)
 }
 
 void
+ViewAgreement::clear_contradicted (std::span<const RangeImage> images, int threads)
+{
+  seen_.clear ();
+  for (const RangeImage &image : images) {
+    const View &view = view_of (image);
+    seen_.push_back ({image, PixelRays (view), PixelLookup (view),
+        gains_[static_cast<std::size_t> (image.view_id)]});
+  }
+  in_parallel (images.size (), threads, [&] (std::size_t i) { contradicted_[i].find (seen_, i); });
+  for (std::size_t i = 0; i < images.size (); i++)
+    contradicted_[i].clear (images[i]);
+}
+
+void
+ViewAgreement::move_depth (std::span<const RangeImage> images, int threads)
+{
+  fused_.clear ();
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const View &view = view_of (images[i]);
+    fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
+        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m)});
+  }
+  workers_.reserve (workers_for (images.size (), threads));
+  in_parallel (images.size (), threads,
+      [&] (std::size_t i, std::size_t worker) { workers_.of (worker).process (fused_, i); });
+}
+
+void
 ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
   const bool several = images.size () > 1,
@@ -210,18 +243,10 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
     clear_depth (images[i]);
     planes_[i].clear ();
   }
-  if (!several || !settings.depth)
-    return;
-  fused_.clear ();
-  for (std::size_t i = 0; i < images.size (); i++) {
-    const View &view =
-        rig_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (images[i].view_id)])];
-    fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
-        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m)});
-  }
-  workers_.reserve (workers_for (images.size (), settings.threads));
-  in_parallel (images.size (), settings.threads,
-      [&] (std::size_t i, std::size_t worker) { workers_.of (worker).process (fused_, i); });
+  if (several && settings.points)
+    clear_contradicted (images, settings.threads);
+  if (several && settings.depth)
+    move_depth (images, settings.threads);
 }
 
 Status

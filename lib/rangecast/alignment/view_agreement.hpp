@@ -9,16 +9,18 @@
 
 #include "../parallel.hpp"
 #include "../status.hpp"
+#include "contradicted_points.hpp"
 #include "depth_agreement.hpp"
 #include "pose_alignment.hpp"
 
 namespace rangecast {
 
 struct AgreementSettings {
-  bool poses = true; ///< PoseAlignment
-  bool depth = true; ///< DepthAgreement; cylinderfilter has it off by default
-  bool views = true; ///< leave out views that contradict the others
-  int threads = 1;   ///< views at a time; 0 = number of cores
+  bool poses = true;  ///< PoseAlignment
+  bool depth = true;  ///< DepthAgreement; cylinderfilter has it off by default
+  bool views = true;  ///< leave out views that contradict the others
+  bool points = true; ///< ContradictedPoints
+  int threads = 1;    ///< views at a time; 0 = number of cores
 };
 
 /** What is known of one view. */
@@ -29,7 +31,8 @@ struct ViewConsistency {
 };
 
 /** Makes the views of a frame set agree before they are drawn together: corrects the rig, moves
- *  depth of one surface together, and leaves out a view that contradicts the others.
+ *  depth of one surface together, clears points that other views contradict, and leaves out a view
+ *  that contradicts the others.
  *
  *  A view is left out if other views contradict more than kMaxContradicted of its points, if less
  *  than kMinConsistency of its comparable points agree with theirs, and if some of the others
@@ -53,9 +56,9 @@ public:
     gains_[static_cast<std::size_t> (view_id)] = gains;
   }
 
-  /** Changes depth in place: pixels move (AgreementSettings::depth), all pixels of a view that is
-   *  left out become invalid. Nothing is allocated once all views have been seen together, but when
-   *  the rig changes.
+  /** Changes depth in place: pixels move (AgreementSettings::depth), points that other views
+   *  contradict and all pixels of a view that is left out become invalid. Nothing is allocated once
+   *  all views have been seen together, but when the rig changes.
    *  @return kNotFound for a view that the rig has not, kBadSize for more than kMaxViews images,
    *  kNoSpace without memory */
   Status process (std::span<const RangeImage> images, const AgreementSettings &settings);
@@ -79,6 +82,9 @@ private:
   [[nodiscard]] PairAgreement agreement_among (int id, std::uint64_t trusted) const;
   [[nodiscard]] double contradictions_of (std::uint64_t views) const;
   [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
+  [[nodiscard]] const View &view_of (const RangeImage &image) const;
+  void clear_contradicted (std::span<const RangeImage> images, int threads);
+  void move_depth (std::span<const RangeImage> images, int threads);
   void work (std::span<const RangeImage> images, const AgreementSettings &settings);
 
   Rig nominal_, rig_;
@@ -91,8 +97,10 @@ private:
   /* Of the present frame. */
   std::vector<AlignedView> aligned_;
   std::vector<FusedView> fused_;
+  std::vector<SeenView> seen_;
   std::array<SurfacePlanes, kMaxViews> planes_; /* by number of the image */
   WorkerMemory<DepthAgreement> workers_;
+  std::array<ContradictedPoints, kMaxViews> contradicted_; /* by number of the image */
 };
 
 } // namespace rangecast

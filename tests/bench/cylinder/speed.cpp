@@ -85,14 +85,17 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
     ViewAgreement agreement;
     if (!agreement.set_rig (set.rig).ok ())
       return;
+    for (const View &view : set.rig.views)
+      agreement.set_gains (view.id, std::array<float, 3>{1, 1, 1});
     (void)agreement.process (set.images (), settings).ok (); /* the first takes longer */
     line (what, 1.0 / 3 * median_ms (set, rounds, [&] {
       for (int i = 0; i < 3; i++)
         (void)agreement.process (set.images (), settings).ok ();
     }));
   };
-  agree ("poses + views, 1 thread", {true, false, true, 1});
-  agree ("all of agree, 1 thread", {true, true, true, 1});
+  agree ("poses + views, 1 thread", {true, false, true, false, 1});
+  agree ("poses + views + points, 1 thread", {true, false, true, true, 1});
+  agree ("all of agree, 1 thread", {true, true, true, true, 1});
   CylinderSettings settings;
   run ("cylinder, 1 thread", settings);
   settings.threads = 0;
