@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../for_this_cpu.hpp"
-
 namespace rangecast {
 namespace {
+
+/* Views more than 120 degrees apart see no surface well together. */
+constexpr float kMinAxes = -0.5f;
 
 bool
 has_colours (const SeenView &view)
@@ -46,39 +47,47 @@ sees_other (const SeenView &view, int x, int y, float beyond, const std::array<f
 
 } // namespace
 
+/* Whether another view contradicts one pixel. */
+bool
+ContradictedPoints::is_contradicted (
+    const SeenView &own, const SeenView &seen, const PixelTransfer &t, int x, int y)
+{
+  const std::uint16_t depth = own.image.depth.at (x, y);
+  float place[3];
+  for (int k = 0; k < 3; k++)
+    place[k] = t.origin[k] +
+               static_cast<float> (depth) * (t.corner[k] + static_cast<float> (x) * t.right[k] +
+                                                static_cast<float> (y) * t.down[k]);
+  if (depth == kInvalidDepth || !(place[2] > 0))
+    return false;
+  const float u = place[0] / place[2] + 0.5f, v = place[1] / place[2] + 0.5f;
+  const ImageView<std::uint16_t> &to = seen.image.depth;
+  if (!((u >= 0) & (v >= 0) & (u < static_cast<float> (to.width)) &
+          (v < static_cast<float> (to.height))))
+    return false;
+  const int column = static_cast<int> (u), row = static_cast<int> (v);
+  const float beyond = (1 + kMargin) * place[2];
+  return static_cast<float> (to.at (column, row)) > beyond &&
+         sees_other (seen, column, row, beyond, colour_of (own, x, y));
+}
+
+/* Of a row every other pixel, and those around one that is contradicted. */
 void
 ContradictedPoints::check_row (std::span<const SeenView> views, std::size_t which, int y)
 {
-  const RangeImage &image = views[which].image;
-  const std::uint16_t *depth = image.depth.row (y);
-  const auto width = static_cast<std::size_t> (image.depth.width);
+  const SeenView &own = views[which];
+  const int width = own.image.depth.width, height = own.image.depth.height;
   for (const Other &other : others_) {
-    const PixelTransfer &t = other.transfer;
-    float ray[3];
-    for (int k = 0; k < 3; k++)
-      ray[k] = t.corner[k] + static_cast<float> (y) * t.down[k];
-    for (std::size_t x = 0; x < width; x++) {
-      const auto d = static_cast<float> (depth[x]), column = static_cast<float> (x);
-      float place[3];
-      for (int k = 0; k < 3; k++)
-        place[k] = t.origin[k] + d * (ray[k] + column * t.right[k]);
-      z_[x] = place[2];
-      u_[x] = place[0] / place[2] + 0.5f;
-      v_[x] = place[1] / place[2] + 0.5f;
-    }
-    const SeenView &seen = views[other.which];
-    const RangeImage &to = seen.image;
-    const auto right = static_cast<float> (to.depth.width),
-               bottom = static_cast<float> (to.depth.height);
-    for (std::size_t x = 0; x < width; x++) {
-      if (depth[x] == kInvalidDepth ||
-          !((z_[x] > 0) & (u_[x] >= 0) & (v_[x] >= 0) & (u_[x] < right) & (v_[x] < bottom)))
+    const auto contradicts = [&] (int u, int v) {
+      return is_contradicted (own, views[other.which], other.transfer, u, v);
+    };
+    for (int x = 0; x < width; x += 2) {
+      if (!contradicts (x, y))
         continue;
-      const int u = static_cast<int> (u_[x]), v = static_cast<int> (v_[x]);
-      const float beyond = (1 + kMargin) * z_[x];
-      if (static_cast<float> (to.depth.at (u, v)) > beyond &&
-          sees_other (seen, u, v, beyond, colour_of (views[which], static_cast<int> (x), y)))
-        found_.push_back (static_cast<std::uint32_t> (static_cast<std::size_t> (y) * width + x));
+      for (int v = std::max (y - 1, 0); v <= std::min (y + 1, height - 1); v++)
+        for (int u = std::max (x - 1, 0); u <= std::min (x + 1, width - 1); u++)
+          if (contradicts (u, v))
+            found_.push_back (static_cast<std::uint32_t> (v * width + u));
     }
   }
 }
@@ -91,30 +100,24 @@ ContradictedPoints::find (std::span<const SeenView> views, std::size_t which)
   const SeenView &own = views[which];
   if (!has_colours (own))
     return;
-  for (std::size_t i = 0; i < views.size (); i++)
-    if (i != which && has_colours (views[i]))
+  for (std::size_t i = 0; i < views.size (); i++) {
+    const float *a = own.rays.optical_axis, *b = views[i].rays.optical_axis;
+    if (i != which && has_colours (views[i]) && a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= kMinAxes)
       others_.push_back (
           {i, PixelTransfer (own.rays, own.image.roi, views[i].lookup, views[i].image.roi)});
-  const auto width = static_cast<std::size_t> (own.image.depth.width);
-  if (others_.empty ())
-    return;
-  if (z_.size () < width) /* the last to grow: all have grown */
-    for (auto *row : {&u_, &v_, &z_})
-      row->resize (width);
-  for_this_cpu ([&] {
-    for (int y = 0; y < own.image.depth.height; y++)
+  }
+  if (!others_.empty ())
+    for (int y = 0; y < own.image.depth.height; y += 2)
       check_row (views, which, y);
-  });
 }
 
-std::size_t
+void
 ContradictedPoints::clear (const RangeImage &image) const
 {
   for (const std::uint32_t at : found_) {
     const int width = image.depth.width, pixel = static_cast<int> (at);
     image.depth.at (pixel % width, pixel / width) = kInvalidDepth;
   }
-  return found_.size ();
 }
 
 } // namespace rangecast

@@ -33,15 +33,17 @@ public:
   /** Grey levels by which one of R, G, B has to differ, from all of 3 x 3 pixels. */
   static constexpr float kOtherColour = 40;
 
-  /** Nothing is allocated once as many points have been found in an image as wide.
+  /** Looks at every other pixel of every other row, and around those that are found. Nothing is
+   *  allocated once as many have been.
    *  @param which  number of the image that is checked; images of other numbers may be checked in
    *                parallel by other objects */
   void find (std::span<const SeenView> views, std::size_t which);
-  /** Makes the points that find() found invalid. To be called when all images have been checked.
-   *  @return how many they are */
-  std::size_t clear (const RangeImage &image) const;
+  /** Makes the points that find() found invalid. To be called when all images have been checked. */
+  void clear (const RangeImage &image) const;
 
 private:
+  [[nodiscard]] static bool is_contradicted (
+      const SeenView &own, const SeenView &seen, const PixelTransfer &transfer, int x, int y);
   void check_row (std::span<const SeenView> views, std::size_t which, int y);
 
   struct Other {
@@ -49,7 +51,6 @@ private:
     PixelTransfer transfer;
   };
   std::vector<Other> others_;
-  std::vector<float> u_, v_, z_;     /* of a row, in another view */
   std::vector<std::uint32_t> found_; /* pixels, counted row by row */
 };
 

@@ -81,6 +81,11 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
                     [&] { (void)filter.process (set.images (), settings, result).ok (); }));
   };
   /* Mean times: poses are compared in each third frame set only. */
+  if (set.fresh_colour.empty ()) { /* colours of one kind: points are looked up all the same */
+    for (const auto &depth : set.fresh)
+      set.fresh_colour.emplace_back (depth.size (), Rgbx{200, 150, 120, 0});
+    set.restore ();
+  }
   const auto agree = [&] (const char *what, const AgreementSettings &settings) {
     ViewAgreement agreement;
     if (!agreement.set_rig (set.rig).ok ())
