@@ -59,7 +59,8 @@ static const NumberRow<Settings, int> kIntegers[] = {
         [] (Settings &s) -> int & { return s.segmentation.max_people; }},
     {"fill", "Fill",
         "Depth is extended so many pixels to what has none, where colour says that it is no "
-        "background (0 to 1000, default 4; 0: no depth is made)",
+        "background, and four times as many more where its hue says so (0 to 1000, default 4; 0: "
+        "no depth is made)",
         0, 1000, kDefaults.segmentation.fill,
         [] (Settings &s) -> int & { return s.segmentation.fill; }},
     {"fringe", "Fringe",

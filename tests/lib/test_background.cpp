@@ -179,6 +179,20 @@ TEST (Background, shadow_without_depth_beside_a_person_is_open_and_no_part_of_it
   EXPECT_EQ (frame.valid (0, 0, 30, 48), 30 * 48);
 }
 
+/* Of 18 columns without depth beside a person. */
+TEST (Background, depth_goes_on_farther_where_the_hue_differs)
+{
+  for (const bool hue : {true, false}) {
+    Frame frame (99);
+    const Rgbx colour = hue ? Rgbx{200, 60, 60, 0} : Rgbx{220, 229, 201, 0};
+    frame.put (0, 0, 30, 48, 12000, colour);
+    frame.put (30, 10, 18, 28, kInvalidDepth, colour);
+    segment (frame);
+    EXPECT_EQ (frame.valid (30, 12, 3, 24), 3 * 24) << hue;
+    EXPECT_EQ (frame.valid (38, 12, 9, 24), hue ? 9 * 24 : 0) << hue;
+  }
+}
+
 TEST (Surroundings, hole_in_a_thing_is_inside_and_a_corner_beside_it_is_not)
 {
   cv::Mat sides (60, 81, CV_8U, cv::Scalar (int (Side::kUnknown))), inside;

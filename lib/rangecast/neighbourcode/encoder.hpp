@@ -26,7 +26,7 @@ struct EncoderSettings {
   int depth_bits = 12;       ///< 6 to 16
   int colour_bits = 8;       ///< 4 to 8
   int depth_threshold = 8;   ///< codes; 0 to 65535
-  int colour_threshold = 5;   ///< codes of each of R, G, B; 0 to 255
+  int colour_threshold = 5;  ///< codes of each of R, G, B; 0 to 255
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
   Profile profile = Profile::kPlain;
   NeighbourChoice choice = NeighbourChoice::kFirst;

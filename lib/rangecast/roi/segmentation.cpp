@@ -460,7 +460,8 @@ Segmenter::remove_small_in_space (
 }
 
 /* Not to single pixels that stick out of the silhouette, which may be chance; nor, with colour, to
- * what looks just like the background: a hole that was closed may be one. */
+ * what looks just like the background: a hole that was closed may be one. Farther where the hue
+ * differs, as a shadow's does not. */
 void
 Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &settings)
 {
@@ -471,6 +472,12 @@ Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &se
   if (settings.cue != Cue::kDepth)
     opened_.setTo (0, calm_);
   fill_.fill (image, opened_, settings.fill);
+  if (settings.cue != Cue::kDepth) {
+    constexpr int kFarther = 4;
+    opened_.setTo (0, lit_);
+    cv::bitwise_and (opened_, other_, opened_);
+    fill_.fill (image, opened_, kFarther * settings.fill);
+  }
   if (settings.cue == Cue::kBoth && settings.fringe > 1) {
     cv::bitwise_and (mask_, inside_, opened_);
     fill_.fill (image, opened_, opened_.cols);

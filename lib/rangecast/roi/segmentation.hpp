@@ -25,7 +25,9 @@ struct SegmentationSettings {
   int min_area = 150;              ///< smaller islands go, pixels
   int max_hole = 100;              ///< smaller holes close, pixels
   int max_people = 0;              ///< only so many of the largest islands stay; 0 = all
-  int fill = 4; ///< pixels that depth is extended where colour speaks for a pixel; 0 = off
+  /** Pixels that depth is extended where colour speaks for a pixel, and four times as many more
+   * where its hue does; 0 = off. */
+  int fill = 4;
 };
 
 /** Separates what has come into the scene from its background. Keeps its memory between frames.
