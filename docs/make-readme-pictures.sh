@@ -7,11 +7,17 @@ set -euo pipefail
 docs=$(cd "$(dirname "$0")" && pwd)
 out=$(realpath "${1:-$docs/images}")
 model=${2:-${RANGECAST_DATA:-$docs/../../shared/data}/dressed_head/dressed_head.glb}
-[ ! -f "$model" ] || input=avatar=$(realpath "$model")
+input=avatar
+if [ -f "$model" ]; then
+  input=avatar=$(realpath "$model")
+elif [ -n "${2:-}" ]; then
+  echo "make-readme-pictures.sh: no model '$model'" >&2
+  exit 1
+fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 command -v ffmpeg >/dev/null || { echo "make-readme-pictures.sh: no ffmpeg (Debian package ffmpeg)" >&2; exit 1; }
 
-"$docs/../pipelines/demo.sh" --input "${input:-avatar}" --size 640x480 --fps 1 --latency 3000 --frames 48 --out "$work"
+"$docs/../pipelines/demo.sh" --input "$input" --size 640x480 --fps 1 --latency 3000 --frames 48 --out "$work"
 cp "$work/avatar.png" "$out/avatar.png"
 ffmpeg -v error -y -i "$work/avatar.webm" -vf 'setpts=N/(8*TB),scale=400:300' -r 8 -c:v libwebp_anim -quality 80 -loop 0 "$out/avatar.webp"

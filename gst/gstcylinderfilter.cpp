@@ -5,8 +5,9 @@
  *
  * Clears the points that several views of a frame set see of the same place, all but those of the
  * view that sees it most squarely. Before that, errors of the rig are corrected, views that
- * contradict the others left out, and colours made to agree (#GstCylinderFilter:agree,
- * #GstCylinderFilter:colour-balance); points move only with agree=depth.
+ * contradict the others left out, points that another view contradicts cleared, and colours made to
+ * agree (#GstCylinderFilter:agree, #GstCylinderFilter:colour-balance); points move only with
+ * agree=depth.
  *
  * ## Example launch line
  * |[
@@ -81,8 +82,9 @@ static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
 static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
 
 struct CylinderCounts {
-  guint64 frames = 0, points_in = 0, points_out = 0, units = 0, units_shared = 0, units_held = 0,
-          units_changed = 0, untouched = 0; /* frame sets while the mode is off */
+  guint64 frames = 0, points_contradicted = 0, points_in = 0, points_out = 0, units = 0,
+          units_shared = 0, units_held = 0, units_changed = 0,
+          untouched = 0; /* frame sets while the mode is off */
   int bodies = 0;
   rangecast::Axis axis;
 };
@@ -324,6 +326,7 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   const std::lock_guard guard (priv->lock);
   CylinderCounts &counts = priv->counts;
   counts.frames++;
+  counts.points_contradicted += priv->agreement.contradicted_points ();
   counts.points_in += result.points_in;
   counts.points_out += result.points_out;
   counts.units += result.units;
@@ -579,7 +582,8 @@ gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
   const CylinderCounts &counts = priv->counts;
   GstStructure *stats =
       gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
-          counts.frames, "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.frames, "points-contradicted", G_TYPE_UINT64, counts.points_contradicted,
+          "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
           counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
           counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
           G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
@@ -715,7 +719,7 @@ install_agree_property (GObjectClass *object_class, GParamFlags flags)
           "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
           "rig), depth (depths of one surface move together), views (one that contradicts the "
           "others is left out), points (those that another view sees through, in another colour, "
-          "are cleared), or none (default: poses+views+points)",
+          "are cleared; needs colour-balance=auto), or none (default: poses+views+points)",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }
@@ -815,7 +819,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
           0, 64, 0, flags));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "frames, points-in, points-out, units, units-shared, units-held, units-changed since "
+          "frames, points-contradicted, points-in, points-out, units, units-shared, units-held, "
+          "units-changed since "
           "READY; bodies, axis-position, axis-direction, views (consistency and corrections) of "
           "the last frame",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));

@@ -51,21 +51,35 @@ void main ()
 }
 )";
 
-/* Weights of full, least and inside surfaces. Half floats hold the sum of 250 surfaces of full
- * weight, and colours of the least one. The inside of a surface, which no camera saw, is told by
- * its weight. */
-static constexpr float kMaxWeight = 250, kMinWeight = 5e-4f, kInsideWeight = 1e-4f;
+/* Largest weight, so that half floats (up to 65504) hold the sum of four surfaces of each view, and
+ * the least one as a share of it. The inside of a surface weighs so little that a pixel in which
+ * all views show one is known by its sum. */
+static constexpr float kMaxWeight = 1000, kMaxSum = 64000, kMinShare = 2e-6f;
+
+struct Weights {
+  float largest, least, inside;
+};
+
+static Weights
+weights_for (std::size_t views, bool precise)
+{
+  const auto n = static_cast<float> (std::max<std::size_t> (views, 1));
+  const float largest = precise ? kMaxWeight : std::min (kMaxWeight, kMaxSum / (4 * n)),
+              least = kMinShare * largest;
+  return {largest, least, least / (2.5f * n)};
+}
 
 static const char *const kFragmentShader = R"(
 precision highp float;
 #if SUM
 in vec4 v_colour;
+uniform vec3 u_weights; /* largest, least, inside */
 out vec4 sum;
 #endif
 void main ()
 {
 #if SUM
-  float weight = gl_FrontFacing ? max (v_colour.a * v_colour.a * MAX_WEIGHT, MIN_WEIGHT) : INSIDE_WEIGHT;
+  float weight = gl_FrontFacing ? max (v_colour.a * v_colour.a * u_weights.x, u_weights.y) : u_weights.z;
   sum = vec4 (v_colour.rgb * weight, weight);
 #endif
 }
@@ -79,10 +93,7 @@ BlendPainter::start (GstGLContext *context, GError **error)
       reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
   in_software_ = renderer && std::strstr (renderer, "llvmpipe");
   for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string variant = "#define SUM " + std::to_string (i) + "\n#define MAX_WEIGHT " +
-                                std::to_string (kMaxWeight) + "\n#define MIN_WEIGHT " +
-                                std::to_string (kMinWeight) + "\n#define INSIDE_WEIGHT " +
-                                std::to_string (kInsideWeight);
+    const std::string variant = "#define SUM " + std::to_string (i);
     const std::string vertex = variant + kVertexShader, fragment = variant + kFragmentShader;
     shaders_[i] = make_shader (context, vertex.c_str (), fragment.c_str (), error);
     if (!shaders_[i])
@@ -204,12 +215,16 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
     return false;
   draw_layers (layers, picture, kDepth);
   targets_.begin_sum ();
+  const Weights weights = weights_for (picture.rig_views, precise);
+  gst_gl_shader_use (shaders_[kSum]);
+  gst_gl_shader_set_uniform_3f (
+      shaders_[kSum], "u_weights", weights.largest, weights.least, weights.inside);
   context_->gl_vtable->FrontFace (rangecast::mirrors (picture.clip_from_world) ? GL_CW : GL_CCW);
   draw_layers (layers, picture, kSum);
   const auto shift = rangecast::depth_shift (
       picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
   targets_.resolve (picture.part, picture.covered, picture.background, picture.background_shade,
-      shift, 0.9f * kMinWeight, picture.keeps_depth);
+      shift, 0.9f * weights.least, picture.keeps_depth);
   context_->gl_vtable->FrontFace (GL_CCW);
   context_->gl_vtable->BindVertexArray (0);
   context_->gl_vtable->Disable (GL_DEPTH_TEST);

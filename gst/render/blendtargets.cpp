@@ -29,9 +29,7 @@
 /* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
  * what two views draw. Where no camera saw the outside of a surface, so that the inside of one
  * behind shows through (beside a nose, round glasses), small gaps take the colours around them,
- * from the farther surfaces: what a nearer one hides is theirs. Depth-image-based rendering fills
- * disocclusions so (C. Fehn, "Depth-image-based rendering (DIBR), compression, and transmission for
- * a new approach on 3D-TV", SPIE 5291, 2004, has the problem). */
+ * from the farther surfaces: what a nearer one hides is theirs. */
 static const char *const kResolveShader = R"(
 precision highp int;
 precision highp sampler2D;
@@ -40,61 +38,87 @@ uniform sampler2D u_depth;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 uniform ivec4 u_part; /* first and last pixel */
 uniform float u_outside; /* weight of the least outside, less rounding */
-uniform int u_reach; /* pixels that a gap is closed over */
+uniform int u_reach; /* gaps so wide are left, pixels */
 out vec4 fragment;
 float distance_at (ivec2 at)
 {
   return u_shift.y / (2.0 * texelFetch (u_depth, at, 0).r - 1.0 - u_shift.x) - u_shift.z;
 }
-/* Weighted mean of the farthest outsides in eight directions, and its share, which is nothing if
- * one of them has none and falls where one is just within reach. */
+/* The first outside in a direction, and how many steps away; 0: none within reach. */
+int trace (ivec2 at, ivec2 step, out vec4 outside)
+{
+  outside = vec4 (0.0);
+  int last = 0;
+  for (int r = 1; r <= u_reach; r += 1 + r / 4) {
+    outside = texelFetch (u_sum, clamp (at + r * step, u_part.xy, u_part.zw), 0);
+    if (outside.a >= u_outside) {
+      for (int back = r - 1; back > last; back--) { /* the strides grow */
+        vec4 nearer = texelFetch (u_sum, clamp (at + back * step, u_part.xy, u_part.zw), 0);
+        if (nearer.a < u_outside)
+          break;
+        outside = nearer;
+        r = back;
+      }
+      return r;
+    }
+    last = r;
+  }
+  return 0;
+}
+ivec2 direction (int k) /* 0 to 7; k and 7 - k are opposite */
+{
+  int q = k < 4 ? k : k + 1; /* of 3 x 3, without the centre */
+  return ivec2 (q % 3 - 1, q / 3 - 1);
+}
+/* Weighted mean of the farthest outsides in eight directions, and its share: all of it in gaps up to
+ * half the reach wide, less in wider ones; nothing where a direction ends in none. */
 vec4 fill (ivec2 at)
 {
   const float kSameSurface = 0.02; /* metres */
-  vec4 sum = vec4 (0.0);
+  vec4 outside;
   float farthest = 0.0;
-  int longest = 0;
-  for (int k = 0; k < 9; k++) {
-    ivec2 way = ivec2 (k % 3 - 1, k / 3 - 1), place = at;
-    if (k == 4)
-      continue;
-    vec4 there = vec4 (0.0);
-    for (int r = 1; r <= u_reach && there.a < u_outside; r += 1 + r / 4) {
-      longest = max (longest, r);
-      place = clamp (at + r * way, u_part.xy, u_part.zw);
-      there = texelFetch (u_sum, place, 0);
-    }
-    if (there.a < u_outside)
+  int widest = 0;
+  for (int k = 0; k < 4; k++) {
+    int there = trace (at, direction (k), outside), opposite = trace (at, direction (7 - k), outside);
+    if (there == 0 || opposite == 0)
       return vec4 (0.0);
-    vec2 apart = vec2 (place - at);
-    float distance = distance_at (place);
-    if (distance > farthest + kSameSurface)
-      sum = vec4 (0.0);
-    if (distance > farthest - kSameSurface)
-      sum += vec4 (there.rgb / there.a, 1.0) / dot (apart, apart);
-    farthest = max (farthest, distance);
+    widest = max (widest, there + opposite);
+    farthest = max (farthest, max (distance_at (at + there * direction (k)),
+                                  distance_at (at + opposite * direction (7 - k))));
   }
-  return vec4 (sum.rgb / sum.a, min (2.0 - 2.0 * float (longest) / float (u_reach + 1), 1.0));
+  float share = clamp (2.0 - 2.0 * float (widest) / float (u_reach), 0.0, 1.0);
+  if (share <= 0.0)
+    return vec4 (0.0);
+  vec4 sum = vec4 (0.0);
+  for (int k = 0; k < 8; k++) {
+    ivec2 way = trace (at, direction (k), outside) * direction (k);
+    if (distance_at (at + way) > farthest - kSameSurface)
+      sum += vec4 (outside.rgb / outside.a, 1.0) / float (way.x * way.x + way.y * way.y);
+  }
+  return vec4 (sum.rgb / sum.a, share);
 }
 void main ()
 {
   vec4 ground = background (gl_FragCoord.xy);
   ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
   vec4 sum = texelFetch (u_sum, at, 0);
-  if (sum.a > 0.0 && sum.a < u_outside) {
-    vec4 filled = fill (at);
-    sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
-  }
   vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
   vec4 east = texelFetch (u_sum, ivec2 (min (at.x + 1, last.x), at.y), 0);
   vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, first.y)), 0);
   vec4 south = texelFetch (u_sum, ivec2 (at.x, min (at.y + 1, last.y)), 0);
-  vec4 beside = vec4 (greaterThan (vec4 (west.a, east.a, north.a, south.a), vec4 (0.0)));
-  float covered = dot (beside, vec4 (1.0));
+  vec4 weights = vec4 (west.a, east.a, north.a, south.a);
+  float covered = dot (vec4 (greaterThan (weights, vec4 (0.0))), vec4 (1.0));
   /* a pixel that is drawn: from 1/2 where none beside it is; one that is not: up to 1/2, or a crack */
   float coverage = sum.a > 0.0 ? 0.5 + 0.125 * covered : covered > 2.0 ? 1.0 : 0.125 * covered;
-  if (sum.a <= 0.0)
+  float heaviest = sum.a;
+  if (sum.a <= 0.0) {
     sum = west + east + north + south;
+    heaviest = max (max (west.a, east.a), max (north.a, south.a));
+  }
+  if (heaviest > 0.0 && heaviest < u_outside) {
+    vec4 filled = fill (at);
+    sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
+  }
 #if WITH_DEPTH
   float depth = texelFetch (u_depth, at, 0).r, distance = distance_at (at);
   gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
@@ -252,7 +276,7 @@ BlendTargets::resolve (const rangecast::Roi &part, const rangecast::Roi &covered
       covered.x + covered.width - 1, covered.y + covered.height - 1);
   gst_gl_shader_set_uniform_3f (shader, "u_shift", shift.a, shift.b, shift.g);
   gst_gl_shader_set_uniform_1f (shader, "u_outside", outside);
-  gst_gl_shader_set_uniform_1i (shader, "u_reach", std::max (part.height / 20, 1));
+  gst_gl_shader_set_uniform_1i (shader, "u_reach", std::max (part.height / 15, 2));
   set_background_uniforms (shader, background, shade, part);
   gl->BindVertexArray (array_);
   gl->DrawArrays (GL_TRIANGLES, 0, 3);

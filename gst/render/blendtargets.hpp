@@ -35,8 +35,9 @@ public:
    *  @param background  R, G, B, A, straight
    *  @param shade       see BackgroundPainter::draw(), which has drawn it if it is not 0
    *  @param shift       of the depth pass
-   *  @param outside     pixels of less weight show only the inside of surfaces, and take the
-   * colours of what surrounds them where that is near
+   *  @param outside     pixels of less weight show only the inside of surfaces; in gaps up to a
+   * 30th of the height of `part` they take the colours around them, and less of those in gaps up to
+   * a 15th
    *  @param keeps_depth the surfaces' depth is written, too, into a depth buffer that has been
    *                     cleared: what is drawn later stands among them */
   void resolve (const rangecast::Roi &part, const rangecast::Roi &covered,

@@ -517,30 +517,32 @@ TEST (Depth, all_processors_give_the_same_bits)
     EXPECT_TRUE (result == results[0]);
 }
 
-/* A block of view 0, on the figure's face, 50 mm nearer; the whole figure has one colour. */
+/* A block of view 0, on the figure's face, nearer than it is; the whole figure has one colour. */
 struct Floating {
-  Floating (Rgbx colour)
+  explicit Floating (Rgbx colour, double metres = 0.05, Rgbx figures = {200, 150, 120, 0})
   {
     for (const RangeImage &image : figure.frame->images ())
       for (int y = 0; y < image.depth.height; y++)
-        std::fill_n (image.colour.row (y), image.depth.width, Rgbx{200, 150, 120, 0});
+        std::fill_n (image.colour.row (y), image.depth.width, figures);
     frame = *figure.frame;
     const RangeImage image = frame.images ()[0];
     for (int y = kTop; y < kTop + kSize; y++)
       for (int x = kLeft; x < kLeft + kSize; x++) {
         EXPECT_NE (image.depth.at (x, y), 0);
-        image.depth.at (x, y) -= std::uint16_t (0.05 / figure.rig.views[0].depth_unit_m);
+        image.depth.at (x, y) -= std::uint16_t (metres / figure.rig.views[0].depth_unit_m);
         image.colour.at (x, y) = colour;
       }
     before = frame;
   }
   /* Points that went, in the block and elsewhere. */
-  std::pair<int, int> cleared (bool with_gains)
+  std::pair<int, int> cleared (bool with_gains, float first_gain = 1)
   {
     ViewAgreement agreement;
     EXPECT_TRUE (agreement.set_rig (figure.rig).ok ());
     if (with_gains)
       set_gains_of_one (agreement, figure.rig);
+    if (with_gains)
+      agreement.set_gains (0, std::array<float, 3>{first_gain, first_gain, first_gain});
     EXPECT_TRUE (agreement.process (frame.images (), kPointsOnly).ok ());
     const auto old = before.images (), now = frame.images ();
     int in = 0, out = 0;
@@ -553,6 +555,7 @@ struct Floating {
                 i == 0 && x >= kLeft && x < kLeft + kSize && y >= kTop && y < kTop + kSize;
             (is_in ? in : out)++;
           }
+    EXPECT_EQ (agreement.contradicted_points (), std::size_t (in + out));
     return {in, out};
   }
 
@@ -575,7 +578,19 @@ TEST (Points, points_of_the_same_colour_stay)
   EXPECT_EQ (same.cleared (true), std::pair (0, 0));
 }
 
-TEST (Points, colours_of_unlike_cameras_are_not_compared)
+TEST (Points, what_is_nearer_by_less_than_the_margin_stays)
+{
+  Floating green ({0, 255, 0, 0}, 0.003);
+  EXPECT_EQ (green.cleared (true), std::pair (0, 0));
+}
+
+TEST (Points, white_is_white_whatever_the_gains)
+{
+  Floating white ({255, 255, 255, 0}, 0.05, {255, 255, 255, 0});
+  EXPECT_EQ (white.cleared (true, 1.5f), std::pair (0, 0));
+}
+
+TEST (Points, without_gains_none_goes)
 {
   Floating green ({0, 255, 0, 0});
   EXPECT_EQ (green.cleared (false), std::pair (0, 0));
@@ -654,7 +669,10 @@ TEST (Agreement, nothing_is_allocated_once_a_frame_set_has_been_seen)
   for (int i = 0; i < 4; i++)
     ASSERT_TRUE (agreement.process (images, {true, true, true, true, 1}).ok ());
   const int before = allocations;
-  for (int i = 0; i < 6; i++)
+  for (int i = 0; i < 6; i++) {
+    for (int y = 60; y < 60 + 10 * i; y++) /* more and more is contradicted */
+      std::fill_n (images[0].colour.row (y), images[0].colour.width, Rgbx{0, 255, 0, 0});
     ASSERT_TRUE (agreement.process (images, {true, true, true, true, 1}).ok ());
+  }
   EXPECT_EQ (allocations, before);
 }

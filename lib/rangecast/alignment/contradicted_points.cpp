@@ -2,31 +2,34 @@
 #include "contradicted_points.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace rangecast {
 namespace {
 
-/* Views more than 120 degrees apart see no surface well together. */
-constexpr float kMinAxes = -0.5f;
-
 bool
-has_colours (const SeenView &view)
+has_colours (const FusedView &view)
 {
   return view.gains && view.image.colour.same_size (view.image.depth) && !view.image.depth.empty ();
 }
 
+/* Clipped, as colour balance clips it: what was white in both pictures stays equal. */
 std::array<float, 3>
-colour_of (const SeenView &view, int x, int y)
+colour_of (const FusedView &view, int x, int y)
 {
   const Rgbx c = view.image.colour.at (x, y);
   const auto &gains = *view.gains;
-  return {gains[0] * c.r, gains[1] * c.g, gains[2] * c.b};
+  const auto level = [] (float gain, std::uint8_t value) {
+    return std::min (gain * static_cast<float> (value), 255.f);
+  };
+  return {level (gains[0], c.r), level (gains[1], c.g), level (gains[2], c.b)};
 }
 
-/* Whether a view sees past a place, everywhere around pixel (x, y), what has not that colour. */
+/* Whether a view sees, in all of 3 x 3 pixels around (x, y), a farther surface of another colour.
+ * An invalid pixel is not farther than anything. */
 bool
-sees_other (const SeenView &view, int x, int y, float beyond, const std::array<float, 3> &colour)
+sees_other (const FusedView &view, int x, int y, float beyond, const std::array<float, 3> &colour)
 {
   const RangeImage &image = view.image;
   if (x < 1 || y < 1 || x >= image.depth.width - 1 || y >= image.depth.height - 1)
@@ -34,90 +37,96 @@ sees_other (const SeenView &view, int x, int y, float beyond, const std::array<f
   for (int v = y - 1; v <= y + 1; v++)
     for (int u = x - 1; u <= x + 1; u++) {
       const std::array<float, 3> other = colour_of (view, u, v);
-      float apart = 0;
+      float difference = 0;
       for (std::size_t k = 0; k < 3; k++)
-        apart = std::max (apart, std::abs (other[k] - colour[k]));
-      /* an invalid pixel is not farther than anything */
+        difference = std::max (difference, std::abs (other[k] - colour[k]));
       if (static_cast<float> (image.depth.at (u, v)) <= beyond ||
-          apart < ContradictedPoints::kOtherColour)
+          difference < ContradictedPoints::kOtherColour)
         return false;
     }
   return true;
 }
 
-} // namespace
-
-/* Whether another view contradicts one pixel. */
 bool
-ContradictedPoints::is_contradicted (
-    const SeenView &own, const SeenView &seen, const PixelTransfer &t, int x, int y)
+is_contradicted (
+    const FusedView &own, const FusedView &other, const PixelTransfer &transfer, int x, int y)
 {
   const std::uint16_t depth = own.image.depth.at (x, y);
   float place[3];
-  for (int k = 0; k < 3; k++)
-    place[k] = t.origin[k] +
-               static_cast<float> (depth) * (t.corner[k] + static_cast<float> (x) * t.right[k] +
-                                                static_cast<float> (y) * t.down[k]);
+  transfer.find (x, y, depth, place);
   if (depth == kInvalidDepth || !(place[2] > 0))
     return false;
   const float u = place[0] / place[2] + 0.5f, v = place[1] / place[2] + 0.5f;
-  const ImageView<std::uint16_t> &to = seen.image.depth;
+  const ImageView<std::uint16_t> &to = other.image.depth;
   if (!((u >= 0) & (v >= 0) & (u < static_cast<float> (to.width)) &
           (v < static_cast<float> (to.height))))
     return false;
   const int column = static_cast<int> (u), row = static_cast<int> (v);
-  const float beyond = (1 + kMargin) * place[2];
+  const float beyond = (1 + ContradictedPoints::kMargin) * place[2];
   return static_cast<float> (to.at (column, row)) > beyond &&
-         sees_other (seen, column, row, beyond, colour_of (own, x, y));
+         sees_other (other, column, row, beyond, colour_of (own, x, y));
 }
 
-/* Of a row every other pixel, and those around one that is contradicted. */
+} // namespace
+
+/* Every other pixel of a row, and those around one that is contradicted. */
 void
-ContradictedPoints::check_row (std::span<const SeenView> views, std::size_t which, int y)
+ContradictedPoints::check_row (std::span<const FusedView> views, std::size_t which, int y)
 {
-  const SeenView &own = views[which];
+  const FusedView &own = views[which];
   const int width = own.image.depth.width, height = own.image.depth.height;
-  for (const Other &other : others_) {
-    const auto contradicts = [&] (int u, int v) {
-      return is_contradicted (own, views[other.which], other.transfer, u, v);
-    };
-    for (int x = 0; x < width; x += 2) {
-      if (!contradicts (x, y))
-        continue;
-      for (int v = std::max (y - 1, 0); v <= std::min (y + 1, height - 1); v++)
-        for (int u = std::max (x - 1, 0); u <= std::min (x + 1, width - 1); u++)
-          if (contradicts (u, v))
-            found_.push_back (static_cast<std::uint32_t> (v * width + u));
-    }
-  }
+  const auto check = [&] (const Other &other, int u, int v) {
+    std::uint8_t &found = found_[static_cast<std::size_t> (v) * static_cast<std::size_t> (width) +
+                                 static_cast<std::size_t> (u)];
+    if (!found && is_contradicted (own, views[other.which], other.transfer, u, v))
+      found = 1, any_ = true;
+    return found != 0;
+  };
+  for (const Other &other : others_)
+    for (int x = 0; x < width; x += 2)
+      if (check (other, x, y))
+        for (int v = std::max (y - 1, 0); v <= std::min (y + 1, height - 1); v++)
+          for (int u = std::max (x - 1, 0); u <= std::min (x + 1, width - 1); u++)
+            check (other, u, v);
 }
 
 void
-ContradictedPoints::find (std::span<const SeenView> views, std::size_t which)
+ContradictedPoints::find (std::span<const FusedView> views, std::size_t which)
 {
-  found_.clear ();
+  any_ = false;
   others_.clear ();
-  const SeenView &own = views[which];
+  const FusedView &own = views[which];
   if (!has_colours (own))
     return;
-  for (std::size_t i = 0; i < views.size (); i++) {
-    const float *a = own.rays.optical_axis, *b = views[i].rays.optical_axis;
-    if (i != which && has_colours (views[i]) && a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= kMinAxes)
+  for (std::size_t i = 0; i < views.size (); i++)
+    if (i != which && has_colours (views[i]) && may_share_surfaces (own, views[i]))
       others_.push_back (
           {i, PixelTransfer (own.rays, own.image.roi, views[i].lookup, views[i].image.roi)});
-  }
+  const auto pixels = static_cast<std::size_t> (own.image.depth.width) *
+                      static_cast<std::size_t> (own.image.depth.height);
+  if (found_.size () < pixels)
+    found_.resize (pixels);
+  std::fill_n (found_.begin (), pixels, std::uint8_t{0});
   if (!others_.empty ())
     for (int y = 0; y < own.image.depth.height; y += 2)
       check_row (views, which, y);
 }
 
-void
-ContradictedPoints::clear (const RangeImage &image) const
+std::size_t
+ContradictedPoints::clear (const RangeImage &image, SurfacePlanes &planes)
 {
-  for (const std::uint32_t at : found_) {
-    const int width = image.depth.width, pixel = static_cast<int> (at);
-    image.depth.at (pixel % width, pixel / width) = kInvalidDepth;
-  }
+  if (!any_)
+    return 0;
+  std::size_t cleared = 0;
+  const auto width = static_cast<std::size_t> (image.depth.width);
+  for (int y = 0; y < image.depth.height; y++)
+    for (int x = 0; x < image.depth.width; x++)
+      if (found_[static_cast<std::size_t> (y) * width + static_cast<std::size_t> (x)]) {
+        image.depth.at (x, y) = kInvalidDepth;
+        planes.clear (x, y);
+        cleared++;
+      }
+  return cleared;
 }
 
 } // namespace rangecast

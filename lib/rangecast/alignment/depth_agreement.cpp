@@ -94,15 +94,11 @@ struct RowInOther {
 void
 DepthAgreement::find_others (std::span<const FusedView> views, std::size_t which)
 {
-  /* Views more than 120 degrees apart see no surface well together. */
-  constexpr float kMinAxes = -0.5f;
   const FusedView &own = views[which];
   others_.clear ();
   for (std::size_t i = 0; i < views.size (); i++) {
     const FusedView &other = views[i];
-    const float *a = own.rays.optical_axis, *b = other.rays.optical_axis;
-    if (i == which || other.planes->width () == 0 ||
-        a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < kMinAxes)
+    if (i == which || other.planes->width () == 0 || !may_share_surfaces (own, other))
       continue;
     others_.push_back (
         {other.planes, PixelTransfer (own.rays, own.image.roi, other.lookup, other.image.roi),

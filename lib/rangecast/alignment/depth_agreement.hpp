@@ -5,21 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "../geometry/range_image.hpp"
-#include "pixel_transfer.hpp"
-#include "surface_planes.hpp"
+#include "fused_view.hpp"
 
 namespace rangecast {
-
-/** One view of a frame set, its planes and its camera. */
-struct FusedView {
-  RangeImage image;
-  const SurfacePlanes *planes = nullptr;
-  PixelRays rays;
-  PixelLookup lookup;
-  float focal_px = 1; ///< pixels
-  float unit_m = 1;   ///< metres per depth unit
-};
 
 /** Moves the depth of pixels towards what other views measured of the same surface.
  *

@@ -30,6 +30,15 @@ struct PixelTransfer {
     }
   }
 
+  /** @param[out] place  column and row times depth, and depth, of the other plane */
+  void find (int x, int y, std::uint16_t depth, float place[3]) const
+  {
+    for (int k = 0; k < 3; k++)
+      place[k] =
+          origin[k] + static_cast<float> (depth) * (corner[k] + static_cast<float> (x) * right[k] +
+                                                       static_cast<float> (y) * down[k]);
+  }
+
   float origin[3] = {}, corner[3] = {}, right[3] = {}, down[3] = {};
 };
 

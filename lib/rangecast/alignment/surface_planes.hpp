@@ -30,6 +30,14 @@ public:
    * than all before.
    *  @param focal_px  focal length, pixels */
   void make (const ConstRangeImage &image, float focal_px);
+  /** Makes a pixel one without a plane. Does nothing outside the image. */
+  void clear (int x, int y)
+  {
+    if (x < width_ && y < height_)
+      planes_[static_cast<std::size_t> (y) * static_cast<std::size_t> (width_) +
+              static_cast<std::size_t> (x)]
+          .weight = 0;
+  }
   /** Forgets them: an image without pixels. */
   void clear () { width_ = height_ = 0; }
 

@@ -195,28 +195,27 @@ clear_depth (const RangeImage &image)
 void
 ViewAgreement::clear_contradicted (std::span<const RangeImage> images, int threads)
 {
-  seen_.clear ();
-  for (const RangeImage &image : images) {
-    const View &view = view_of (image);
-    seen_.push_back ({image, PixelRays (view), PixelLookup (view),
-        gains_[static_cast<std::size_t> (image.view_id)]});
-  }
-  in_parallel (images.size (), threads, [&] (std::size_t i) { contradicted_[i].find (seen_, i); });
+  in_parallel (images.size (), threads, [&] (std::size_t i) { contradicted_[i].find (fused_, i); });
   for (std::size_t i = 0; i < images.size (); i++)
-    contradicted_[i].clear (images[i]);
+    contradicted_points_ += contradicted_[i].clear (images[i], planes_[i]);
 }
 
 void
-ViewAgreement::move_depth (std::span<const RangeImage> images, int threads)
+ViewAgreement::fuse (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
   fused_.clear ();
   for (std::size_t i = 0; i < images.size (); i++) {
     const View &view = view_of (images[i]);
     fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
-        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m)});
+        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m),
+        gains_[static_cast<std::size_t> (images[i].view_id)]});
   }
-  workers_.reserve (workers_for (images.size (), threads));
-  in_parallel (images.size (), threads,
+  if (settings.points)
+    clear_contradicted (images, settings.threads);
+  if (!settings.depth)
+    return;
+  workers_.reserve (workers_for (images.size (), settings.threads));
+  in_parallel (images.size (), settings.threads,
       [&] (std::size_t i, std::size_t worker) { workers_.of (worker).process (fused_, i); });
 }
 
@@ -243,16 +242,15 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
     clear_depth (images[i]);
     planes_[i].clear ();
   }
-  if (several && settings.points)
-    clear_contradicted (images, settings.threads);
-  if (several && settings.depth)
-    move_depth (images, settings.threads);
+  if (several && (settings.points || settings.depth))
+    fuse (images, settings);
 }
 
 Status
 ViewAgreement::process (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
   rig_changed_ = false;
+  contradicted_points_ = 0;
   if (images.size () > kMaxViews)
     return {StatusCode::kBadSize, "frame set: more than 64 views"};
   for (const RangeImage &image : images)

@@ -69,6 +69,8 @@ public:
   [[nodiscard]] const Rig &rig () const { return rig_; }
   /** Whether process() changed it in the last call. */
   [[nodiscard]] bool rig_changed () const { return rig_changed_; }
+  /** Points that process() cleared in the last call because another view contradicts them. */
+  [[nodiscard]] std::size_t contradicted_points () const { return contradicted_points_; }
   /** Of a view-id of the rig. */
   [[nodiscard]] const ViewConsistency &view (int view_id) const
   {
@@ -84,7 +86,7 @@ private:
   [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
   [[nodiscard]] const View &view_of (const RangeImage &image) const;
   void clear_contradicted (std::span<const RangeImage> images, int threads);
-  void move_depth (std::span<const RangeImage> images, int threads);
+  void fuse (std::span<const RangeImage> images, const AgreementSettings &settings);
   void work (std::span<const RangeImage> images, const AgreementSettings &settings);
 
   Rig nominal_, rig_;
@@ -97,10 +99,10 @@ private:
   /* Of the present frame. */
   std::vector<AlignedView> aligned_;
   std::vector<FusedView> fused_;
-  std::vector<SeenView> seen_;
   std::array<SurfacePlanes, kMaxViews> planes_; /* by number of the image */
   WorkerMemory<DepthAgreement> workers_;
   std::array<ContradictedPoints, kMaxViews> contradicted_; /* by number of the image */
+  std::size_t contradicted_points_ = 0;
 };
 
 } // namespace rangecast

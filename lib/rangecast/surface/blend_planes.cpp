@@ -22,7 +22,8 @@ constexpr double kClearance = 0.01;
  * leaves holes in surfaces, too. */
 constexpr int kBackgroundRadius = 1;
 
-/* Copies of the neighbour code may be off by its threshold, in levels of R, G and B each. */
+/* Copies of the neighbour code may be off by its threshold, 5 levels of R, G and B each by default.
+ */
 constexpr int kCopyRange = 7, kCopyReach = 2;
 
 class Planes {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <random>
 #include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/cylinder/cylinder_filter.hpp>
 #include <unordered_map>
@@ -80,12 +81,14 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
     line (what, median_ms (set, rounds,
                     [&] { (void)filter.process (set.images (), settings, result).ok (); }));
   };
-  /* Mean times: poses are compared in each third frame set only. */
-  if (set.fresh_colour.empty ()) { /* colours of one kind: points are looked up all the same */
+  if (set.fresh_colour.empty ()) { /* all are unlike: of what others see farther all is compared */
+    std::minstd_rand random;
     for (const auto &depth : set.fresh)
-      set.fresh_colour.emplace_back (depth.size (), Rgbx{200, 150, 120, 0});
+      for (auto &colour = set.fresh_colour.emplace_back (depth.size ()); Rgbx & c : colour)
+        c = {std::uint8_t (random ()), std::uint8_t (random ()), std::uint8_t (random ()), 0};
     set.restore ();
   }
+  /* Mean times: poses are compared in each third frame set only. */
   const auto agree = [&] (const char *what, const AgreementSettings &settings) {
     ViewAgreement agreement;
     if (!agreement.set_rig (set.rig).ok ())
