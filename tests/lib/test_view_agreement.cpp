@@ -578,10 +578,12 @@ TEST (Points, points_of_the_same_colour_stay)
   EXPECT_EQ (same.cleared (true), std::pair (0, 0));
 }
 
-TEST (Points, what_is_nearer_by_less_than_the_margin_stays)
+TEST (Points, what_is_nearer_by_less_than_the_margin_stays_but_for_edges)
 {
   Floating green ({0, 255, 0, 0}, 0.003);
-  EXPECT_EQ (green.cleared (true), std::pair (0, 0));
+  const auto [in, out] = green.cleared (true);
+  EXPECT_LT (in, 0.1 * Floating::kSize * Floating::kSize);
+  EXPECT_EQ (out, 0);
 }
 
 TEST (Points, white_is_white_whatever_the_gains)
