@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "../geometry/range_image.hpp"
+#include "pixel_transfer.hpp"
+#include "surface_planes.hpp"
+
+namespace rangecast {
+
+/** One view of a frame set, its planes and its camera. */
+struct FusedView {
+  RangeImage image;
+  const SurfacePlanes *planes = nullptr;
+  PixelRays rays;
+  PixelLookup lookup;
+  float focal_px = 1; ///< pixels
+  float unit_m = 1;   ///< metres per depth unit
+  /** What its colours are multiplied with; none: they are not compared with those of other views.
+   */
+  std::optional<std::array<float, 3>> gains;
+};
+
+/** Whether two views may see one surface well: they are at most 120 degrees apart. */
+inline bool
+may_share_surfaces (const FusedView &a, const FusedView &b)
+{
+  constexpr float kMinAxes = -0.5f;
+  const float *p = a.rays.optical_axis, *q = b.rays.optical_axis;
+  return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= kMinAxes;
+}
+
+} // namespace rangecast
