@@ -49,7 +49,8 @@ def main():
         print(f"{name:26}{value:28}{published}".rstrip())
     print(f"CPU seconds by host: {cpu}")
     if whole < 0.9 * report["frames"]:
-        print("warning: this machine is too slow for that size and rate: views came late and were left out of frame sets")
+        slower = max(1, int(report["fps"] / 2))
+        print(f"warning: this machine is too slow for that size and rate: views came late and were left out of frame sets; try --fps {slower}")
     names = (os.path.join(out, name) for name in ("avatar.png", "avatar.webm", "report.json"))
     print("  ".join(name for name in names if os.path.exists(name)))
 

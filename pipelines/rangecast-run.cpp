@@ -142,7 +142,7 @@ finish (Runner &runner)
   if (!runner.failed && options.report)
     runner.failed = !write_report (*runner.measure, options.report);
   if (!runner.failed && options.snapshot)
-    runner.failed = !write_snapshot (runner.pipeline, options.snapshot);
+    runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
   if (options.drop_empty)
     remove_empty (options.drop_empty);

@@ -135,6 +135,9 @@ RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   if (self->seen_points_) {
     self->decoded_++;
     self->whole_ += whole;
+    if (whole)
+      self->whole_captures_[self->whole_ % self->whole_captures_.size ()] =
+          gst_range_buffer_get_capture_time (buffer);
   }
   self->views_now_ = seen;
   return self->seen_points_ ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
@@ -163,14 +166,36 @@ RunMeasure::note_rendered (GstClockTime capture, gint &frames)
   return true;
 }
 
+void
+RunMeasure::keep_if_whole (GstPad *pad, GstBuffer *picture)
+{
+  const GstClockTime capture = gst_range_buffer_get_capture_time (picture);
+  std::lock_guard guard (lock_);
+  if (!options_.snapshot || !GST_CLOCK_TIME_IS_VALID (capture) ||
+      std::ranges::find (whole_captures_, capture) == whole_captures_.end ())
+    return;
+  g_clear_pointer (&whole_picture_, gst_sample_unref);
+  GstCaps *caps = gst_pad_get_current_caps (pad);
+  whole_picture_ = gst_sample_new (picture, caps, nullptr, nullptr);
+  gst_caps_unref (caps);
+}
+
+GstSample *
+RunMeasure::last_whole_picture ()
+{
+  std::lock_guard guard (lock_);
+  return whole_picture_ ? gst_sample_ref (whole_picture_) : nullptr;
+}
+
 GstPadProbeReturn
-RunMeasure::count_rendered (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+RunMeasure::count_rendered (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
 {
   auto self = static_cast<RunMeasure *> (user_data);
   gint frames = 0;
   if (!self->note_rendered (
           gst_range_buffer_get_capture_time (GST_PAD_PROBE_INFO_BUFFER (info)), frames))
     return GST_PAD_PROBE_DROP;
+  self->keep_if_whole (pad, GST_PAD_PROBE_INFO_BUFFER (info));
   const gint wanted = self->options_.frames;
   if (wanted > 0 && frames == wanted)
     self->on_last_ ();
@@ -203,6 +228,7 @@ RunMeasure::RunMeasure (
 RunMeasure::~RunMeasure ()
 {
   gst_clear_object (&turned_);
+  g_clear_pointer (&whole_picture_, gst_sample_unref);
   if (frame_log_)
     std::fclose (frame_log_);
 }

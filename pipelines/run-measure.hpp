@@ -3,6 +3,7 @@
 
 #include <gst/gst.h>
 
+#include <array>
 #include <cstdio>
 #include <functional>
 #include <mutex>
@@ -42,12 +43,16 @@ public:
   [[nodiscard]] double latency_ms (double p);
   /** Of so many frame sets, as many as have had points in all views. */
   [[nodiscard]] guint64 whole_of (guint64 frames);
+  /** The last picture of a frame set that had points in all views; transfer full. nullptr if there
+   *  was none, or without the option snapshot. */
+  [[nodiscard]] GstSample *last_whole_picture ();
 
 private:
   static GstPadProbeReturn count_views (GstPad *, GstPadProbeInfo *info, gpointer self);
   static GstPadProbeReturn count_rendered (GstPad *, GstPadProbeInfo *info, gpointer self);
   void add_probe (const char *element_name, GstPadProbeCallback probe);
   bool note_rendered (GstClockTime capture, gint &frames);
+  void keep_if_whole (GstPad *pad, GstBuffer *picture);
 
   GstElement *pipeline_;
   const RunOptions &options_;
@@ -60,6 +65,8 @@ private:
   bool seen_points_ = false;
   guint64 decoded_ = 0, whole_ = 0; /* frame sets; those in which all views have points */
   gint views_now_ = 0;              /* that have points in the last one decoded */
+  std::array<GstClockTime, 8> whole_captures_{}; /* of the latest whole ones, in turns */
+  GstSample *whole_picture_ = nullptr;
   std::FILE *frame_log_ = nullptr;
   gint64 first_points_us_ = 0; /* monotonic; 0: none yet */
 };

@@ -36,7 +36,7 @@ RunOptions::parse (int *argc, char ***argv)
           "Write when each buffer passed each pad (the first 4 million)", "FILE"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &snapshot,
-          "Write the last picture of the sink named snapshot", "PNG"},
+          "Write the last picture of all views, or of the sink named snapshot", "PNG"},
       {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &frame_log,
           "Write a line for each frame: its time, latency and views with points", "CSV"},
       {"memory-log", 0, 0, G_OPTION_ARG_FILENAME, &memory_log,

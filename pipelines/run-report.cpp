@@ -71,12 +71,14 @@ write_report (RunMeasure &measure, const char *path)
 
 /* ---- the last picture ---- */
 
-/* @return transfer full; null if there is none, or it cannot be converted */
+/* One with all views, if there was one. @return transfer full; null if there is none, or it cannot
+ * be converted */
 static GstSample *
-last_picture (GstElement *pipeline, const char *path, GError **error)
+last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GError **error)
 {
-  GstSample *sample = nullptr;
-  if (GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "snapshot")) {
+  GstSample *sample = measure.last_whole_picture ();
+  GstElement *sink = sample ? nullptr : gst_bin_get_by_name (GST_BIN (pipeline), "snapshot");
+  if (sink) {
     g_object_get (sink, "last-sample", &sample, nullptr);
     gst_object_unref (sink);
   }
@@ -94,10 +96,10 @@ last_picture (GstElement *pipeline, const char *path, GError **error)
 }
 
 bool
-write_snapshot (GstElement *pipeline, const char *path)
+write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path)
 {
   GError *error = nullptr;
-  GstSample *picture = last_picture (pipeline, path, &error);
+  GstSample *picture = last_picture (pipeline, measure, path, &error);
   g_clear_error (&error);
   if (!picture)
     return false;

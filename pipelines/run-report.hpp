@@ -10,8 +10,9 @@
 void print_progress (RunMeasure &measure);
 /** Writes what was measured, JSON; pipelines/demo-report.py reads it. */
 bool write_report (RunMeasure &measure, const char *path);
-/** Writes the last picture of the sink named "snapshot" as a PNG. */
-bool write_snapshot (GstElement *pipeline, const char *path);
+/** Writes the last picture that shows all views, or else the last one of the sink named "snapshot",
+ *  as a PNG. */
+bool write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path);
 /** Appends a line: seconds, KiB that the process holds of its heap, without what the allocator
  *  keeps of what was given back. */
 void log_memory (const char *path);
