@@ -108,6 +108,7 @@ struct GstCylinderFilterPrivate {
   bool rig_pending = false; /* the source's caps may have another one than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_off = false;
+  guint64 left_out = 0; /* views that a warning was posted for, a bit each */
 };
 
 struct _GstCylinderFilter {
@@ -363,6 +364,24 @@ gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast:
   return priv->colours.after (views, colours);
 }
 
+/* One warning for each view that is left out from now on. */
+static void
+gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  for (const auto &[view_id, view] : priv->views) {
+    const guint64 bit = guint64{1} << view_id;
+    if (view.left_out && !(priv->left_out & bit))
+      GST_ELEMENT_WARNING (self, STREAM, FAILED,
+          ("View %d contradicts the other views and is left out.", view_id),
+          ("%.0f %% of its points agree with theirs; check its pose in the rig and its depth",
+              100 * view.consistency));
+    else if (!view.left_out && (priv->left_out & bit))
+      GST_INFO_OBJECT (self, "view %d agrees again", view_id);
+    priv->left_out = view.left_out ? priv->left_out | bit : priv->left_out & ~bit;
+  }
+}
+
 static GstFlowReturn
 gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
@@ -388,8 +407,10 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
                                        self, frame.views (), agree, colours, settings, result)
                                  : frame.status ();
   });
-  if (status.ok ())
+  if (status.ok ()) {
     gst_cylinder_filter_count (priv, result);
+    gst_cylinder_filter_warn_left_out (self);
+  }
   GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
       result.points_out, result.points_in);
   priv->reporter.passed (GST_ELEMENT (self), buffer);
@@ -433,6 +454,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   gst_cylinder_filter_forget (priv);
   priv->was_off = false;
+  priv->left_out = 0;
   priv->reporter.start (GST_ELEMENT (base), gst_cylinder_filter_collect);
   const std::lock_guard guard (priv->lock);
   priv->counts = {};

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What cylinderfilter does so that views agree: the corrected rig in its caps, views left out. */
+#include <cstring>
+
 #include "scene-check.hpp"
 
 using namespace rangecast;
@@ -127,13 +129,30 @@ GST_START_TEST (test_without_poses_and_with_mode_off_the_rig_is_as_it_came)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_stats_say_so)
+GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_a_warning_and_stats_say_so)
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
   for (const bool leaves_out : {true, false}) {
     Filter filter (leaves_out ? "cylinderfilter" : "cylinderfilter agree=poses+depth",
         nudged_caps (scene, {0.03, 0.04, 0}, 5));
+    GstElement *cylinder = filter.element ();
+    GstBus *bus = gst_bus_new ();
+    gst_element_set_bus (cylinder, bus);
     GstBuffer *out = filter.push (scene);
+    gst_buffer_unref (filter.push (scene));
+    int warnings = 0;
+    while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_WARNING)) {
+      GError *warning = nullptr;
+      gst_message_parse_warning (message, &warning, nullptr);
+      fail_unless (std::strstr (warning->message, "View 1") != nullptr, "%s", warning->message);
+      g_error_free (warning);
+      gst_message_unref (message);
+      warnings++;
+    }
+    fail_unless_equals_int (warnings, leaves_out ? 1 : 0);
+    gst_element_set_bus (cylinder, nullptr);
+    gst_object_unref (bus);
+    gst_object_unref (cylinder);
     for (const auto &[view, plane] : pixels_of (out, kWidth, kHeight)) {
       const bool empty = std::ranges::all_of (plane, [] (guint64 pixel) { return pixel == 0; });
       fail_unless_equals_int (empty, leaves_out && view == 1);
@@ -254,7 +273,7 @@ cylinderviews_suite ()
   tcase_add_test (tc, test_rig_that_is_right_goes_on_as_it_came);
   tcase_add_test (tc, test_rig_that_is_off_goes_on_corrected_with_the_first_frame_set);
   tcase_add_test (tc, test_without_poses_and_with_mode_off_the_rig_is_as_it_came);
-  tcase_add_test (tc, test_view_with_a_wrong_pose_is_left_out_and_stats_say_so);
+  tcase_add_test (tc, test_view_with_a_wrong_pose_is_left_out_and_a_warning_and_stats_say_so);
   tcase_add_test (tc, test_corrections_outlast_a_flush_but_not_the_stream);
   tcase_add_test (tc, test_without_colour_balance_a_dark_view_is_no_contradiction);
   tcase_add_test (tc, test_corrections_outlast_a_reconfigure_from_downstream);
