@@ -69,8 +69,10 @@ static const NumberRow<Settings, int> kIntegers[] = {
     {"view-id", "View id", "View of the rig, and view-id of the output (0 to 63, default 0)", 0,
         rangecast::kMaxViews - 1, 0, [] (Settings &s) -> int & { return s.view_id; }},
     {"block-size", "Block size",
-        "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for the others)", 0, 51,
-        kDefaults.match.block_size, [] (Settings &s) -> int & { return s.core.match.block_size; }},
+        "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for sgbm and sgbm-3way; "
+        "sgm has none)",
+        0, 51, kDefaults.match.block_size,
+        [] (Settings &s) -> int & { return s.core.match.block_size; }},
     {"uniqueness-ratio", "Uniqueness ratio",
         "Per cent by which the best match must beat the second (0 to 100, default 5)", 0, 100,
         kDefaults.match.uniqueness_ratio,
@@ -132,6 +134,8 @@ gst_stereo_depth_algorithm_get_type (void)
     static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "Block matching", "bm"},
         {int (MatchAlgorithm::kSgbm), "Semi-global matching, five directions", "sgbm"},
         {int (MatchAlgorithm::kSgbm3Way), "Semi-global matching, three directions", "sgbm-3way"},
+        {int (MatchAlgorithm::kSgm),
+            "Semi-global matching of clipped differences, rows and columns", "sgm"},
         {}};
     return g_enum_register_static ("GstStereoDepthAlgorithm", values);
   }();

@@ -75,7 +75,6 @@ private:
   void cut_window (int camera, const cv::Mat &picture);
   void choose_parts (const std::vector<cv::Rect> *parts);
   Status match ();
-  Status match_window (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
   void filter (const cv::Mat &left);
   void know_background (const cv::Mat &grey, int right_x);
   void take (const Roi &roi);
