@@ -12,9 +12,9 @@ namespace rangecast {
 enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way, kSgm };
 
 struct MatchSettings {
-  MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
+  MatchAlgorithm algorithm = MatchAlgorithm::kSgm;
   int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for kSgbm...; not for kSgm
-  int uniqueness_ratio = 5;          ///< per cent by which the best match must beat the second
+  int uniqueness_ratio = 0;          ///< per cent by which the best match must beat the second
   int speckle_window_size = 100;     ///< pixels; smaller patches of like disparity go; 0 = off
   int speckle_range = 2;             ///< pixels of disparity within a patch
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
