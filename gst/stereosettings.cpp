@@ -45,7 +45,7 @@ static const NumberRow<Settings, double> kReals[] = {
         0, 1, 0, [] (Settings &s) -> double & { return s.depth_unit; }},
     {"flying-pixel-step", "Flying pixel step",
         "Points that fewer than 4 of 8 neighbours follow within this share of their depth are "
-        "cleared (0 = off, to 1, default 0.02)",
+        "cleared (0 = off, to 1, default 0.03)",
         0, 1, kDefaults.flying_pixel_step,
         [] (Settings &s) -> double & { return s.core.flying_pixel_step; }},
     {"patch-tolerance", "Patch tolerance",
@@ -69,10 +69,12 @@ static const NumberRow<Settings, int> kIntegers[] = {
     {"view-id", "View id", "View of the rig, and view-id of the output (0 to 63, default 0)", 0,
         rangecast::kMaxViews - 1, 0, [] (Settings &s) -> int & { return s.view_id; }},
     {"block-size", "Block size",
-        "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for the others)", 0, 51,
-        kDefaults.match.block_size, [] (Settings &s) -> int & { return s.core.match.block_size; }},
+        "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for sgbm and sgbm-3way; "
+        "sgm has none)",
+        0, 51, kDefaults.match.block_size,
+        [] (Settings &s) -> int & { return s.core.match.block_size; }},
     {"uniqueness-ratio", "Uniqueness ratio",
-        "Per cent by which the best match must beat the second (0 to 100, default 5)", 0, 100,
+        "Per cent by which the best match must beat the second (0 to 100, default 0)", 0, 100,
         kDefaults.match.uniqueness_ratio,
         [] (Settings &s) -> int & { return s.core.match.uniqueness_ratio; }},
     {"speckle-window-size", "Speckle window size",
@@ -132,6 +134,8 @@ gst_stereo_depth_algorithm_get_type (void)
     static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "Block matching", "bm"},
         {int (MatchAlgorithm::kSgbm), "Semi-global matching, five directions", "sgbm"},
         {int (MatchAlgorithm::kSgbm3Way), "Semi-global matching, three directions", "sgbm-3way"},
+        {int (MatchAlgorithm::kSgm),
+            "Semi-global matching of clipped differences, rows and columns", "sgm"},
         {}};
     return g_enum_register_static ("GstStereoDepthAlgorithm", values);
   }();
@@ -148,7 +152,7 @@ install_stereo_settings (GObjectClass *object_class)
           "Rig file with the stereo pair that view-id names (default: none, see focal-length)",
           nullptr, kFlags));
   g_object_class_install_property (object_class, PROP_ALGORITHM,
-      g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgbm-3way)",
+      g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgm)",
           GST_TYPE_STEREO_DEPTH_ALGORITHM, int (kDefaults.match.algorithm), kFlags));
   g_object_class_install_property (object_class, PROP_QOS,
       g_param_spec_boolean ("qos", "QoS",

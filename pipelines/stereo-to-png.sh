@@ -12,7 +12,7 @@ usage: stereo-to-png.sh LEFT RIGHT PNG --focal-length PX --baseline M --near M -
   --near M --far M   depths to look for, metres
   --turn DEG         how far the view is turned from the camera's own (default 20)
   --size WxH         size of the rendered picture (default 960x720)
-  --algorithm NAME   bm, sgbm, sgbm-3way (default: stereodepth's)
+  --algorithm NAME   bm, sgbm, sgbm-3way, sgm (default: stereodepth's)
 END
 }
 

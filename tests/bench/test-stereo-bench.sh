@@ -77,11 +77,11 @@ test_json_has_the_promised_keys_and_all_matchers () {
   stereo_bench "${pair[@]}" "${known[@]}" --ground-truth truth8.png --scale 4 "${quick[@]}" --json out.json >table.txt
   check_json out.json 'all(list(r) == ["matcher", "density", "bad1", "bad2", "median_px", "ms"] for r in rows)' keys
   check_json out.json 'all(0 <= r[k] <= 1 for r in rows for k in ("density", "bad1", "bad2")) and all(r["ms"] > 0 for r in rows)' numbers
-  for matcher in "stereodepth sgbm-3way" "OpenCV BM" "OpenCV SGBM" "OpenCV SGBM 3-way"; do
+  for matcher in "stereodepth sgm" "stereodepth sgbm-3way" "OpenCV BM" "OpenCV SGBM" "OpenCV SGBM 3-way"; do
     check_json out.json "'$matcher' in of" "$matcher"
     grep -q "^$matcher  " table.txt || fail "$matcher is not in the table: $(cat table.txt)"
   done
-  check_json out.json 'of["stereodepth sgbm-3way"]["density"] > 0.8 and of["stereodepth sgbm-3way"]["bad2"] < 0.03' "our depth"
+  check_json out.json 'of["stereodepth sgm"]["density"] > 0.8 and of["stereodepth sgm"]["bad2"] < 0.03' "our depth"
   check_json out.json 'all(r["median_px"] < 0.3 for r in rows)' "median"
 }
 
@@ -139,7 +139,7 @@ views:
             translation: [ -0.1, 0., 0. ]
 END
   stereo_bench "${pair[@]}" --rig rig.yaml --view-id 3 --ground-truth truth.pfm "${quick[@]}" --json rig.json >/dev/null
-  check_json rig.json 'of["stereodepth sgbm-3way"]["density"] > 0.8 and of["stereodepth sgbm-3way"]["bad2"] < 0.03' rig
+  check_json rig.json 'of["stereodepth sgm"]["density"] > 0.8 and of["stereodepth sgm"]["bad2"] < 0.03' rig
   refuse 1 "rig.yaml: has no view 2" "${pair[@]}" --rig rig.yaml --view-id 2
   refuse 1 "rig.yaml" --left small.png --right small.png --rig rig.yaml --view-id 3
   refuse 1 "nowhere.yaml" "${pair[@]}" --rig nowhere.yaml
@@ -194,9 +194,9 @@ test_ours_is_denser_and_better_than_opencv_on_motorcycle () {
   local m=$data/stereo_motorcycle
   stereo_bench --left "$m/motorcycle_left.png" --right "$m/motorcycle_right.png" --ground-truth "$m/motorcycle_disp.npz" \
     --focal-length 994.978 --baseline 0.193001 --doffs 31.086 "${quick[@]}" --json out.json >/dev/null
-  check_json out.json '(of["stereodepth sgbm-3way"]["density"] > of["OpenCV SGBM 3-way"]["density"] + 0.03 and
-    of["stereodepth sgbm-3way"]["bad2"] < of["OpenCV SGBM 3-way"]["bad2"] - 0.01 and
-    of["stereodepth sgbm-3way"]["bad2"] < of["OpenCV SGBM 3-way, widened"]["bad2"] - 0.01)' motorcycle
+  check_json out.json '(of["stereodepth sgm"]["density"] > of["OpenCV SGBM 3-way"]["density"] + 0.03 and
+    of["stereodepth sgm"]["bad2"] < of["OpenCV SGBM 3-way"]["bad2"] - 0.01 and
+    of["stereodepth sgm"]["bad2"] < of["OpenCV SGBM 3-way, widened"]["bad2"] - 0.01)' motorcycle
 }
 
 test_scene_is_rendered_and_matched_whole_and_in_part () {

@@ -166,8 +166,8 @@ TEST (ThirdPair, opinions_that_agree_are_weighed_and_those_that_do_not_are_count
 
 TEST (Matching, every_algorithm_finds_the_disparity_of_displaced_dots)
 {
-  for (MatchAlgorithm algorithm :
-      {MatchAlgorithm::kBm, MatchAlgorithm::kSgbm, MatchAlgorithm::kSgbm3Way}) {
+  for (MatchAlgorithm algorithm : {MatchAlgorithm::kBm, MatchAlgorithm::kSgbm,
+           MatchAlgorithm::kSgbm3Way, MatchAlgorithm::kSgm}) {
     StereoSettings settings;
     settings.match.algorithm = algorithm;
     StereoDepth stereo;

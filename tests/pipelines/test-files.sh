@@ -119,7 +119,7 @@ test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   local input=$data/luxonis_people_stereo empty n
   rig-convert luxonis "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
   "$pipelines/stereo-to-cutout.sh" "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 \
-    --fps 5 --settle 17 --learn 8 --stereo "block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05" \
+    --fps 5 --settle 17 --learn 8 --stereo "algorithm=sgbm-3way block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05" \
     --roi "shadow=0.1 highlight=8 depth-threshold=0.3 min-area=1000 max-hole=400"
   empty=$(stat -c %s out/00001.png) # learning: all black
   for n in 00020 00027 00100; do

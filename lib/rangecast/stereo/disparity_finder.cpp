@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace rangecast {
@@ -103,23 +102,6 @@ DisparityFinder::choose_parts (const std::vector<cv::Rect> *parts)
   pieces_.set (parts_, settings_.n_threads);
 }
 
-/* OpenCV splits a picture among all cores by itself, but not within a parallel loop: so one thread
- * is a loop of one. Some threads get stripes, which overlap so that no seam is seen. */
-Status
-DisparityFinder::match_window (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity)
-{
-  const int cores = cv::getNumThreads (), wanted = settings_.n_threads;
-  if (wanted == 0 || wanted >= std::max (cores, 2))
-    return matcher_->match (left, right, disparity);
-  if (wanted == 1) {
-    Status status;
-    cv::parallel_for_ (cv::Range (0, 1),
-        [&] (const cv::Range &) { status = matcher_->match (left, right, disparity); });
-    return status;
-  }
-  return matcher_->match_stripes (left, right, wanted, disparity);
-}
-
 /* Matches each part with some rows around it, and puts it into the core. */
 Status
 DisparityFinder::match ()
@@ -131,13 +113,13 @@ DisparityFinder::match ()
     core.setTo (16 * least_ - 16);
   }
   const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
-            above = kMargin - 2, below = 2;
-  /* no path of three goes up */ /* no path of three goes up */
+            above = kMargin - 2, below = matcher_->looks_down () ? above : 2;
   for (const cv::Rect &part : parts_) {
     const int top = std::max (0, part.y - above),
               bottom = std::min (all.height, part.br ().y + below);
     const cv::Rect window (part.x, top, part.width + beside, bottom - top);
-    if (Status s = match_window (window_[0](window), window_[1](window), raw_); !s.ok ())
+    const cv::Mat left = window_[0](window), right = window_[1](window);
+    if (Status s = matcher_->match (left, right, settings_.n_threads, raw_); !s.ok ())
       return s;
     raw_ (cv::Rect (reach, part.y - top, part.width, part.height)).copyTo (core_ (part));
   }

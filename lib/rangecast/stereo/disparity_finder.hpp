@@ -16,7 +16,7 @@ namespace rangecast {
 struct StereoSettings {
   MatchSettings match;
   double patch_tolerance = 1;      ///< share of its contrast that a patch may differ by; 0 = off
-  double flying_pixel_step = 0.02; ///< share of the depth that neighbours may differ; 0 = off
+  double flying_pixel_step = 0.03; ///< share of the depth that neighbours may differ; 0 = off
   int silhouette_radius = 8;       ///< pixels around that say what is beside a silhouette; 0 = off
   int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
   int refine = 2;                  ///< turns that take the noise off disparities; 0 = off
@@ -75,7 +75,6 @@ private:
   void cut_window (int camera, const cv::Mat &picture);
   void choose_parts (const std::vector<cv::Rect> *parts);
   Status match ();
-  Status match_window (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
   void filter (const cv::Mat &left);
   void know_background (const cv::Mat &grey, int right_x);
   void take (const Roi &roi);

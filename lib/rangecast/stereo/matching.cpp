@@ -61,6 +61,7 @@ Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
                                        ", expected an odd number" +
                                        (bm ? " from 5 to 51" : " up to 51")};
   settings_ = s;
+  sgm_.set ({s.uniqueness_ratio, s.left_right_max_difference});
   matcher_.release ();
   more_.clear ();
   return set_range (min_disparity, max_disparity);
@@ -76,6 +77,8 @@ Matcher::set_range (int min_disparity, int max_disparity)
                                        " pixels, expected less than 2000; is near too near?"};
   min_disparity_ = min_disparity;
   disparities_ = (max_disparity - min_disparity + 1 + 15) / 16 * 16;
+  if (settings_.algorithm == MatchAlgorithm::kSgm)
+    return {};
   try {
     if (!matcher_)
       matcher_ = make (settings_, min_disparity_, disparities_);
@@ -92,8 +95,27 @@ Matcher::set_range (int min_disparity, int max_disparity)
   return {};
 }
 
+/* OpenCV splits a picture among all cores by itself, but not within a parallel loop: so one thread
+ * is a loop of one. Some threads get stripes, which overlap so that no seam is seen. */
 Status
-Matcher::match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity)
+Matcher::match (const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity)
+{
+  if (settings_.algorithm == MatchAlgorithm::kSgm) {
+    sgm_.match (left, right, min_disparity_, disparities_, n_threads, disparity);
+    return {};
+  }
+  if (n_threads == 0 || n_threads >= std::max (cv::getNumThreads (), 2))
+    return match_whole (left, right, disparity);
+  if (n_threads > 1)
+    return match_stripes (left, right, n_threads, disparity);
+  Status status;
+  cv::parallel_for_ (
+      cv::Range (0, 1), [&] (const cv::Range &) { status = match_whole (left, right, disparity); });
+  return status;
+}
+
+Status
+Matcher::match_whole (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity)
 {
   try {
     matcher_->compute (left, right, disparity);

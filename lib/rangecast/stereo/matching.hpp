@@ -5,15 +5,16 @@
 #include <vector>
 
 #include "../status.hpp"
+#include "semi_global_matcher.hpp"
 
 namespace rangecast {
 
-enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way };
+enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way, kSgm };
 
 struct MatchSettings {
-  MatchAlgorithm algorithm = MatchAlgorithm::kSgbm3Way;
-  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for the others
-  int uniqueness_ratio = 5;          ///< per cent by which the best match must beat the second
+  MatchAlgorithm algorithm = MatchAlgorithm::kSgm;
+  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for kSgbm...; not for kSgm
+  int uniqueness_ratio = 0;          ///< per cent by which the best match must beat the second
   int speckle_window_size = 100;     ///< pixels; smaller patches of like disparity go; 0 = off
   int speckle_range = 2;             ///< pixels of disparity within a patch
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
@@ -23,7 +24,7 @@ struct MatchSettings {
 
 /** Matches rectified pairs with OpenCV's block matching (K. Konolige, "Small vision systems", 1998)
  *  or semi-global matching (H. Hirschmueller, "Stereo processing by semiglobal matching and mutual
- *  information", PAMI 30, 2008), in all five or three directions. */
+ *  information", PAMI 30, 2008), in all five or three directions, or with SemiGlobalMatcher. */
 class Matcher {
 public:
   /** @param min_disparity, max_disparity  pixels, inclusive; left x minus right x; may be negative
@@ -43,17 +44,23 @@ public:
   /** Columns right of a pixel that its match can need: for negative disparities. */
   [[nodiscard]] int reach_right () const { return min_disparity_ < 0 ? -min_disparity_ : 0; }
 
+  /** Whether matches depend on the rows below a pixel as they do on those above. */
+  [[nodiscard]] bool looks_down () const { return settings_.algorithm == MatchAlgorithm::kSgm; }
+
   /** @param left, right  8 bit grey, the same size, rows agree
+   *  @param n_threads  0 = as many as there are cores. OpenCV's algorithms with some, but fewer:
+   *  each has a part of the rows and some beyond
    *  @param[out] disparity  CV_16S, 1/16 pixel; below 16 * min_disparity() = no match
    *  @return kNoSpace if OpenCV failed */
-  Status match (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
+  Status match (const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity);
 
-  /** The same in so many threads, each of which has a part of the rows and some beyond. */
+private:
+  Status match_whole (const cv::Mat &left, const cv::Mat &right, cv::Mat &disparity);
   Status match_stripes (
       const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity);
 
-private:
   MatchSettings settings_;
+  SemiGlobalMatcher sgm_;
   cv::Ptr<cv::StereoMatcher> matcher_;
   std::vector<cv::Ptr<cv::StereoMatcher>> more_; /* one a stripe */
   std::vector<cv::Mat> stripes_;

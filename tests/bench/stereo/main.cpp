@@ -212,9 +212,10 @@ make_view (const Job &job, const Pair &pair, View &view)
 Status
 measure (const Job &job, const Pair &pair)
 {
-  std::vector<Row> rows (3);
+  std::vector<Row> rows (4);
   StereoSettings settings = job.rendered.settings;
   const std::pair<MatchAlgorithm, const char *> kOurs[] = {
+      {MatchAlgorithm::kSgm, "stereodepth sgm"},
       {MatchAlgorithm::kSgbm3Way, "stereodepth sgbm-3way"},
       {MatchAlgorithm::kSgbm, "stereodepth sgbm"}, {MatchAlgorithm::kBm, "stereodepth bm"}};
   for (std::size_t i = 0; i < rows.size (); i++) {
