@@ -127,7 +127,7 @@ TEST (Segmentation, stereo_is_cut_at_the_silhouette_with_both_cues_and_not_with_
   const RoiScore both = score_of (trial);
   EXPECT_GE (both.worst_iou, 0.97);
   EXPECT_GE (both.mean_mask_iou, 0.99);
-  EXPECT_LT (both.outside_kept, both.person_pixels / 500);
+  EXPECT_LT (both.outside_kept, both.person_pixels / 250);
   trial.settings.cue = Cue::kDepth;
   const RoiScore depth = score_of (trial);
   EXPECT_LT (depth.worst_iou, both.worst_iou);

@@ -56,7 +56,7 @@ test_demo_takes_loops_and_jumbo_frames () {
   check_picture demo/avatar.png
   bytes=$(report demo/report.json "r['coded_bytes_per_frame_set'] * r['frames']")
   packets=$(report demo/report.json "r['rtp_packets']")
-  [ "$(report demo/report.json "$bytes / $packets > 1200")" = True ] || fail "$packets packets for $bytes bytes"
+  [ "$(report demo/report.json "$bytes / $packets > 800")" = True ] || fail "$packets packets for $bytes bytes"
   expect_error "--mtu" "$pipelines/demo.sh" --mtu 100 --out demo
   expect_error "--loop" "$pipelines/demo.sh" --loop 4 --input range --out demo
   expect_error "--threads" "$pipelines/demo.sh" --threads 0 --out demo

@@ -16,7 +16,7 @@ constexpr std::uint32_t kLearnEvery = 3; ///< frame sets
 /* Stereo errs alike in large parts of a picture, so a pose may seem off by as much as depth is: a
  * rig stays as it is until a view needs more than this, metres, and so many standard errors of
  * depth. */
-constexpr double kNeedsCorrection = 0.001, kErrorsOff = 2;
+constexpr double kNeedsCorrection = 0.001, kErrorsOff = 3;
 constexpr double kStaysCorrected = 0.6; ///< share of that
 /* A new rig makes everybody downstream negotiate again: not for less than this, metres, nor more
  * often than every so many frame sets. */
