@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs one file of shell tests: every function test_* in it, in a temporary folder of its own.
-# usage: run-test.sh FILE. A test fails when a command in it fails; `skip REASON` skips it.
+# usage: run-test.sh FILE [TEST...]; without TEST, all of them. A test fails when a command in it fails; `skip REASON` skips it.
 set -uo pipefail
 
 source_dir=${RANGECAST_SOURCE:-$(cd "$(dirname "$0")/../.." && pwd)}
@@ -42,9 +42,10 @@ need_data () { [ -e "$data/$1" ] || skip "no test data $1"; }
 ports=$((20000 + $$ % 48 * 250))
 
 file=$1
+shift
 source "$file" || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 passed=0 failed=0 skipped=0
-for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do
+for name in ${*:-$(declare -F | awk '$3 ~ /^test_/ { print $3 }')}; do
   folder=$(mktemp -d)
   set -m # a process group of its own, so that nothing of a test that failed goes on
   (set -e; cd "$folder"; "$name") & # not in a condition: bash would ignore the -e

@@ -185,8 +185,8 @@ test_multicast_reaches_two_hosts () {
   until_true 30 grep -q '^serving' server.log
   watch_by_multicast near &
   near=$!
-  watch_by_multicast far
-  wait "$near"
+  watch_by_multicast far || fail "$(tail -n 5 far.log)"
+  wait "$near" || fail "$(tail -n 5 near.log)"
   grep -q 'Got EOS' near.log || fail "$(tail -n 5 near.log)"
   grep -q 'Got EOS' far.log || fail "$(tail -n 5 far.log)"
   stop_server
