@@ -728,7 +728,8 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
-      "Codec/Parser/Video", "Parses and writes files of coded range frame sets", "gst-rangecast");
+      "Codec/Parser/Video", "Converts between neighbour code byte streams and access units",
+      "gst-rangecast");
 
   parse_class->start = gst_neighbour_code_parse_start;
   parse_class->stop = gst_neighbour_code_parse_stop;

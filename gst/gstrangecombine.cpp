@@ -124,8 +124,10 @@ gst_range_combine_into_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (RegisterInto::kDepth), "The depth camera's: depth stays as measured", "depth"},
-        {int (RegisterInto::kColour), "The colour camera's: colour stays as seen", "colour"}, {}};
+        {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
+        {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured",
+            "colour"},
+        {}};
     return g_enum_register_static ("GstRangeCombineInto", values);
   }();
   return type;
@@ -644,45 +646,39 @@ install_properties (GObjectClass *object_class)
   };
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
-          "Rig file with the view that view-id names (default: none, a camera at the origin that "
-          "focal-length describes)",
+          "Rig file with the calibration of the view (unset = a pinhole camera at the origin with "
+          "focal-length)",
           nullptr, ready));
   g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View id",
-          "View of the depth camera, and of the output unless that is the colour camera's (0 to "
-          "63, "
-          "default 0)",
-          0, rangecast::kMaxViews - 1, 0, ready));
+      g_param_spec_int ("view-id", "View ID",
+          "view-id of the depth camera, and of the output unless into=colour", 0,
+          rangecast::kMaxViews - 1, 0, ready));
   g_object_class_install_property (object_class, PROP_COLOUR_VIEW_ID,
-      g_param_spec_int ("colour-view-id", "Colour view id",
-          "View of the rig that is the colour camera, if it stands elsewhere than the depth camera "
-          "(-1 to 63, default -1: it is the same camera)",
-          -1, rangecast::kMaxViews - 1, -1, ready));
+      g_param_spec_int ("colour-view-id", "Colour view ID",
+          "view-id of the colour camera in the rig (-1 = colour and depth are registered)", -1,
+          rangecast::kMaxViews - 1, -1, ready));
   g_object_class_install_property (object_class, PROP_INTO,
-      g_param_spec_enum ("into", "Into",
-          "Whose view comes out if colour and depth are not registered (default: depth)",
+      g_param_spec_enum ("into", "Output view",
+          "Output view if colour and depth come from different cameras",
           GST_TYPE_RANGE_COMBINE_INTO, int (RegisterInto::kDepth), ready));
   install_double (PROP_FOCAL_LENGTH, "focal-length", "Focal length",
-      "Without a rig: focal length in pixels (default 0: 0.82 of the width)", 0, 1e6, 0);
+      "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, 0);
   install_double (PROP_PRINCIPAL_X, "principal-x", "Principal point x",
-      "Without a rig: principal point in pixels from the left (default -1: the centre)", -1, 1e6,
-      -1);
+      "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
   install_double (PROP_PRINCIPAL_Y, "principal-y", "Principal point y",
-      "Without a rig: principal point in pixels from the top (default -1: the centre)", -1, 1e6,
-      -1);
+      "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
   install_double (PROP_DEPTH_SCALE, "depth-scale", "Depth scale",
-      "Metres per unit of pad depth (1e-7 to 1, default 0.001: millimetres)", 1e-7, 1,
-      kDefaultDepthScale);
+      "Metres per unit of the input depth", 1e-7, 1, kDefaultDepthScale);
   install_double (PROP_DEPTH_UNIT, "depth-unit", "Depth unit",
-      "Metres per depth unit of the output (0 to 1, default 0: the rig's, or 0.0001)", 0, 1, 0);
+      "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, 0);
   install_double (PROP_NEAR, "near", "Near",
-      "Nearest valid depth in metres (default 0: the rig's, or 0.3)", 0, 1e4, 0);
-  install_double (PROP_FAR, "far", "Far",
-      "Farthest valid depth in metres (default 0: the rig's, or 6)", 0, 1e4, 0);
+      "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, 0);
+  install_double (
+      PROP_FAR, "far", "Far", "Farthest valid depth in metres (0 = from the rig, or 6)", 0, 1e4, 0);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, dropped-colour, dropped-depth", GST_TYPE_STRUCTURE,
-          GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          "Counters since the element was started: frames, dropped-colour, dropped-depth",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 }
 
 static void
@@ -704,7 +700,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
-      "Combines colour and depth of a depth camera into range images", "gst-rangecast");
+      "Combines the colour and depth images of a depth camera into range images", "gst-rangecast");
 
   gst_type_mark_as_plugin_api (GST_TYPE_RANGE_COMBINE_INTO, GstPluginAPIFlags (0));
 

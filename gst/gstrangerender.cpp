@@ -157,7 +157,7 @@ gst_range_render_class_init (GstRangeRenderClass *klass)
   gst_element_class_add_static_pad_template (element_class, &src_template);
   /* decodebin looks for a Decoder; nothing else that turns something into raw video is tried. */
   gst_element_class_set_static_metadata (element_class, "Range image renderer",
-      "Codec/Decoder/Video", "Draws range images as ordinary video, for playbin and decodebin",
+      "Codec/Decoder/Video", "Renders range images as raw video, for playbin and decodebin",
       "gst-rangecast");
   element_class->change_state = gst_range_render_change_state;
 

@@ -670,8 +670,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   install_calibration_properties (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters of moments since start: examined, taken, skipped (live, while busy), and "
-          "pictures dropped (no partner)",
+          "Counters since the element was started: examined, taken, skipped, dropped",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   install_signals (klass);
 
@@ -680,7 +679,8 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Rig calibration", "Analyzer/Video",
-      "Calibrates cameras and their poses from pictures of a board", "gst-rangecast");
+      "Calibrates cameras, stereo pairs and their poses from images of a calibration board",
+      "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
 
   element_class->change_state = gst_rig_calibrate_change_state;

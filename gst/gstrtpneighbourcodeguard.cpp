@@ -577,19 +577,19 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
 
   g_object_class_install_property (object_class, PROP_TIMEOUT,
       g_param_spec_uint64 ("timeout", "Timeout",
-          "Another sender takes over when the one that passes has been silent for so long, in "
-          "nanoseconds, 0 to 2^64 - 1 (never); default 500000000 (500 ms)",
+          "Silence of the current sender in nanoseconds after which another sender is accepted "
+          "(G_MAXUINT64 = never)",
           0, G_MAXUINT64, kDefaultTimeout,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: packets passed, packets foreign (dropped), senders that passed",
+          "Counters since the element was started: passed and foreign packets, and senders",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code guard",
-      "Filter/Network/RTP", "Lets one sender of coded range frame sets through and nothing else",
+      "Filter/Network/RTP", "Passes the RTP packets of one sender and drops those of all others",
       "gst-rangecast");
   element_class->change_state = gst_rtp_neighbour_code_guard_change_state;
 

@@ -463,7 +463,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->finalize = gst_stereo_cam_src_finalize;
   CamSourceSettings::install (object_class);
   g_object_class_install_property (object_class, kStats,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was last started",
+      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, kStatsInterval);
   install_capture (klass);
@@ -472,7 +472,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Stereo camera source",
       "Source/Video/Hardware",
-      "Two or three GigE or USB3 Vision cameras that take their pictures together",
+      "Captures synchronised images from two or three GigE Vision or USB3 Vision cameras",
       "gst-rangecast");
 
   element_class->send_event = gst_stereo_cam_src_send_event;

@@ -747,8 +747,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   prop_stats = install_stereo_settings (object_class) + 1;
   g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
-          "dropped-right, dropped-third, dropped-late, match-time (ns)",
+          "Counters since the element was started: frames, restricted-frames, third-frames, "
+          "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, prop_stats + 1);
 
@@ -757,7 +757,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
     gst_element_class_add_static_pad_template_with_gtype (
         element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Stereo depth", "Filter/Video",
-      "Makes range images of a stereo pair of cameras, or of three cameras", "gst-rangecast");
+      "Computes range images from a stereo pair of cameras, or from three cameras",
+      "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_STEREO_DEPTH_ALGORITHM, GstPluginAPIFlags (0));
 
   element_class->release_pad = gst_stereo_depth_release_pad;
