@@ -281,7 +281,7 @@ CamSourceSettings::find_names (CameraNames &found) const
     return {StatusCode::kNotFound,
         std::string ("no ") + (found[0].empty () ? "left" : "right") + " camera: property " +
             (found[0].empty () ? "right" : "left") +
-            " names one, so rig is not asked; expected both left and right, or neither and rig"};
+            " names one, so rig is ignored; expected both left and right, or neither and rig"};
   if (found[0].empty () || found[1].empty ())
     return {StatusCode::kNotFound, std::string ("no ") + (found[0].empty () ? "left" : "right") +
                                        " camera: expected property " +
@@ -303,7 +303,7 @@ CamSourceSettings::check () const
     return {StatusCode::kBadValue,
         std::string ("single-shot with trigger=") +
             (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware") +
-            ": the cameras are not fired by this element; expected trigger=software or action"};
+            ": this element does not trigger the cameras; expected trigger=software or action"};
   return {};
 }
 

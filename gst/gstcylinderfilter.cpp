@@ -376,7 +376,8 @@ gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
     if (view.left_out && !(priv->left_out & bit))
       GST_ELEMENT_WARNING (self, STREAM, FAILED,
           ("View %d contradicts the other views and is left out.", view_id),
-          ("%.0f %% of its points agree with theirs; check its pose in the rig and its depth",
+          ("%.0f %% of its points agree with the other views; check its pose in the rig and its "
+           "depth",
               100 * view.consistency));
     else if (!view.left_out && (priv->left_out & bit))
       GST_INFO_OBJECT (self, "view %d agrees again", view_id);

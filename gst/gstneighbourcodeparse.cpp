@@ -417,8 +417,9 @@ static GstFlowReturn
 drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  GST_WARNING_OBJECT (base, "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are no access unit",
-      size, guint64 (frame->offset));
+  GST_WARNING_OBJECT (base,
+      "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
+      guint64 (frame->offset));
   if (priv->seen == Seen::kNothing) {
     priv->stream.leading_rubbish += size;
     if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
@@ -560,7 +561,7 @@ warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
   if (!at_end || !GST_BASE_PARSE_DRAINING (base) || part.length >= expected)
     return;
   GST_ELEMENT_WARNING (base, STREAM, DECODE,
-      ("The stream ends within an access unit: it lacks %" G_GSIZE_FORMAT " bytes",
+      ("The stream ends within an access unit: missing %" G_GSIZE_FORMAT " bytes",
           expected - part.length),
       ("expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT, expected, part.length));
 }

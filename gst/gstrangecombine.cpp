@@ -197,7 +197,7 @@ make_colour_view (
 {
   if (settings.colour_view_id >= 0 && settings.rig.empty ())
     return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
-                                   "that says how the cameras stand"};
+                                   "with the poses of both cameras"};
   if (settings.colour_view_id >= 0)
     return view_from_rig (
         settings.rig, settings.colour_view_id, "colour-view-id", width, height, view);
@@ -365,7 +365,7 @@ combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
     rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
   if (!convert_colour (priv, colour, image.colour))
-    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
   const double unit = priv->view.depth_unit_m;
   return rangecast::rescale_depth (depth, priv->depth_scale / unit,
       rangecast::depth_units (priv->view.near_m, unit),
@@ -378,11 +378,11 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
 {
   GstMapInfo map;
   if (!gst_buffer_map (priv->straight, &map, GST_MAP_READWRITE))
-    return {StatusCode::kNoSpace, "pad colour: no memory"};
+    return {StatusCode::kNoSpace, "pad colour: out of memory"};
   const rangecast::ImageView<rangecast::Rgbx> straight = {
       reinterpret_cast<rangecast::Rgbx *> (map.data), GST_VIDEO_INFO_WIDTH (&priv->rgbx),
       GST_VIDEO_INFO_HEIGHT (&priv->rgbx), GST_VIDEO_INFO_PLANE_STRIDE (&priv->rgbx, 0)};
-  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
   if (convert_colour (priv, colour, straight))
     status = priv->registration.process (depth, priv->depth_scale, straight, image);
   gst_buffer_unmap (priv->straight, &map);
@@ -397,7 +397,7 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
     return frame.status ();
   GstVideoFrame from;
   if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
-    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps say"};
+    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps require"};
   const rangecast::ImageView<const std::uint16_t> picture = {
       static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)),
       GST_VIDEO_FRAME_WIDTH (&from), GST_VIDEO_FRAME_HEIGHT (&from),

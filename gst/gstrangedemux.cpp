@@ -365,7 +365,7 @@ complain_without_pads (GstRangeDemux *self)
 {
   if (!self->priv->any_pad)
     GST_ELEMENT_ERROR (self, STREAM, DEMUX,
-        ("The stream ends before its caps: expected a rig, which names the views"), (nullptr));
+        ("The stream ended before caps with a rig, which names the views"), (nullptr));
 }
 
 static gboolean

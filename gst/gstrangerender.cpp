@@ -124,7 +124,7 @@ gst_range_render_change_state (GstElement *element, GstStateChange transition)
   auto self = GST_RANGE_RENDER (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && self->missing) {
     GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN, ("There is no element %s", self->missing),
-        ("expected it among the plugins of GStreamer and gst-rangecast"));
+        ("expected it in the plugins of GStreamer and gst-rangecast"));
     return GST_STATE_CHANGE_FAILURE;
   }
   return GST_ELEMENT_CLASS (gst_range_render_parent_class)->change_state (element, transition);

@@ -374,8 +374,8 @@ warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
 {
   gchar *rival = text_of (packet.address), *sender = text_of (self->priv->address);
   GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-      ("Two senders at one port: packets of SSRC %08x from %s are dropped, expected those of "
-       "%08x from %s",
+      ("Two senders at one port: dropping packets of SSRC %08x from %s, accepting those of %08x "
+       "from %s",
           packet.ssrc, rival, *self->priv->ssrc, sender),
       (nullptr));
   g_free (sender);
@@ -387,15 +387,15 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
 {
   if (verdict == Verdict::kUnsound)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%" G_GUINT64_FORMAT " packets came and none is sound: expected coded frame sets of "
-         "version %d; they are another codec's, or encrypted (--key)",
+        ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
+                              "version %d; they belong to another codec, or are encrypted (--key)",
             unsound, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
     warn_of_rival (self, packet);
   if (verdict == Verdict::kOtherVersion)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("A sender's packets are of version %d of the neighbour code: dropped; expected version %d",
+        ("A sender uses version %d of the neighbour code: dropped; expected version %d",
             packet.version, rangecast::kBitstreamVersion),
         (nullptr));
 }

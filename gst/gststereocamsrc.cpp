@@ -305,8 +305,7 @@ start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
   setup.previous = self->priv->current ();
   auto session = CamSourceSession::begin (std::move (setup));
   if (!session) {
-    GST_ELEMENT_ERROR (
-        self, RESOURCE, FAILED, ("The system gives no thread for the cameras"), (nullptr));
+    GST_ELEMENT_ERROR (self, RESOURCE, FAILED, ("Could not start the camera thread"), (nullptr));
     return false;
   }
   std::lock_guard guard (self->priv->lock);
@@ -328,7 +327,7 @@ close (GstStereoCamSrc *self)
 {
   const auto session = self->priv->current ();
   if (session && !session->wait_for_cameras (kGiveBack))
-    GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
+    GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
 }
 
 static GstStateChangeReturn

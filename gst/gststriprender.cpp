@@ -116,7 +116,8 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
   GstStripRenderPrivate *priv = self->priv;
   if (strip_has_flags_as_text (out)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("The caps' multiview-flags are text, expected (GstVideoMultiviewFlagsSet)"), (nullptr));
+        ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
+        (nullptr));
     return FALSE;
   }
   if (strip_guarded (self, [&] { return take_input_caps (self, in); }) != GST_FLOW_OK ||
@@ -195,7 +196,7 @@ choose_pool (GstStripRender *self, GstQuery *query)
   PoolSizes sizes = offer;
   if (!is_usable (pool, context) || !configure_pool (pool, query, sizes)) {
     if (pool)
-      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " does not suit us: a pool of our own", pool);
+      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " cannot be used; creating a pool", pool);
     gst_clear_object (&pool);
     pool = gst_gl_buffer_pool_new (context);
     sizes = {least, offer.min, 0};
