@@ -210,7 +210,8 @@ test_launch_strings_of_the_docs_run () {
   net_need
   net_open
   net_host here
-  awk '/^```$/ { inside = !inside; next } inside' "$source_dir/docs/guide/streaming.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' >lines
+  awk '/^## / { section = $0 } section != "## Launch strings" { next } /^```$/ { inside = !inside; next } inside' \
+    "$source_dir/docs/guide/streaming.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' >lines
   [ "$(wc -l <lines)" = 6 ] || fail "expected three receivers and three senders: $(wc -l <lines)"
   while read -r line; do
     net_on here timeout -k 5 100 bash -c "exec $line" >>launch.log 2>&1 &
