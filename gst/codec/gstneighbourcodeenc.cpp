@@ -4,7 +4,7 @@
  * @title: neighbourcodeenc
  *
  * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
- * decode without one another. The format is specified in docs/bitstream.md.
+ * decode without one another. The format is specified in docs/formats/bitstream.md.
  *
  * With temporal=true pixels may also equal those of the frame set before; this takes half the bytes
  * or less where a person moves before a still camera. Key frame sets, which need no earlier one,

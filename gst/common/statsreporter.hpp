@@ -2,7 +2,7 @@
 #pragma once
 
 /* What all elements tell of their streams, at regular times: the element message `rangecast-stats`
- * of docs/statistics.md. */
+ * of docs/guide/statistics.md. */
 
 #include <gst/gst.h>
 
@@ -15,7 +15,7 @@
 /** Counters since start, of an element or of one of its pads. Those that it does not have are left
  *  out of the message. */
 struct StreamCounters {
-  guint64 frames = 0; ///< what one of these is, and what is lost or late: docs/statistics.md
+  guint64 frames = 0; ///< what one of these is, and what is lost or late: docs/guide/statistics.md
   std::optional<guint64> points = {}, bytes = {}, packets = {}, lost = {}, late = {};
 };
 

@@ -5,7 +5,7 @@
  *
  * Puts coded frame sets into RTP packets. Each packet holds whole units, so that it decodes alone.
  * With alignment=slice a packet leaves as soon as its slice comes.
- * The format is specified in docs/rtp-payload.md.
+ * The format is specified in docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[

@@ -337,7 +337,7 @@ read_named (const Format &format, const std::vector<std::string> &paths, const O
     throw BadInput{paths[0] + ": " + bad.what};
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
-    throw BadInput{paths[0] + ": is not what the format has; see docs/rig.md"};
+    throw BadInput{paths[0] + ": is not what the format has; see docs/formats/rig.md"};
   }
 }
 
@@ -449,7 +449,7 @@ main (int argc, char **argv)
     status = bad.exit_status;
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
-    g_printerr ("rig-convert: the calibration is not what its format has; see docs/rig.md\n");
+    g_printerr ("rig-convert: the calibration is not what its format has; see docs/formats/rig.md\n");
     status = 1;
   }
   g_free (options.name);

@@ -70,7 +70,7 @@ struct CameraSettings {
       0; ///< GigE: bytes with IP and UDP headers; 0: the largest that gets through; -1: as set
   std::int64_t packet_delay_ns = -1; ///< GigE: pause between packets; -1: as set
   /** GigE: packets come through a memory-mapped packet socket, where the process may have one
-   *  (CAP_NET_RAW): less work, but later (see docs/cameras.md). */
+   *  (CAP_NET_RAW): less work, but later (see docs/guide/cameras.md). */
   bool packet_socket = false;
   bool packet_resend = true; ///< GigE: missing packets are asked for again
   int socket_buffer = 0;     ///< GigE: receive buffer, bytes; 0: two pictures, at least 1 MiB. The

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Recorded files: the byte stream of docs/bitstream.md, decoded. */
+/* Recorded files: the byte stream of docs/formats/bitstream.md, decoded. */
 #include <fstream>
 #include <iterator>
 #include <rangecast/neighbourcode/access_unit.hpp>

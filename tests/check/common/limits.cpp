@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One over each limit of docs/limits.md that no other test goes over: one error or a drop that is
+/* One over each limit of docs/engineering/limits.md that no other test goes over: one error or a drop that is
  * counted, and no more memory. */
 #include "../coded-check.hpp"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Profile plain on every rung of cpu.hpp that this machine has, beside the rules of
- * docs/bitstream.md written straight. */
+ * docs/formats/bitstream.md written straight. */
 #include <map>
 #include <memory>
 #include <optional>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Finds access units in the byte stream that files hold. The format: docs/bitstream.md. */
+/* Finds access units in the byte stream that files hold. The format: docs/formats/bitstream.md. */
 #pragma once
 
 #include <cstdint>

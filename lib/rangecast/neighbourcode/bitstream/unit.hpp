@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The units that a coded stream consists of. The format is specified in docs/bitstream.md. */
+/* The units that a coded stream consists of. The format is specified in docs/formats/bitstream.md. */
 #pragma once
 
 #include <array>

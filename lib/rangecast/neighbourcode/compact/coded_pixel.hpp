@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* What encoder and decoder of the profiles packed and entropy know of a pixel, and how they predict
- * one. docs/bitstream.md specifies it. */
+ * one. docs/formats/bitstream.md specifies it. */
 #pragma once
 
 #include <algorithm>

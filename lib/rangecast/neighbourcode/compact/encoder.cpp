@@ -82,7 +82,7 @@ Steps
 steps_within (int depth_threshold, int colour_threshold)
 {
   /* A rounded residual may be wrong by half its step. A wrong Y changes R, G and B as much; wrong
-   * Co and Cg together, by the larger of them plus 1 (docs/bitstream.md, "How an encoder chooses").
+   * Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an encoder chooses").
    * Coarse depth steps save more than they cost; a third for Y leaves chroma the rest. */
   const int depth = (3 * depth_threshold + 2) / 4;
   const int luma = (9 * colour_threshold + 12) / 25;

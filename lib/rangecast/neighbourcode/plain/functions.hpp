@@ -93,7 +93,7 @@ struct PlainFunctions {
   /** Quantises a row; `to` may be written up to 15 pixels behind the columns. */
   PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
       const Rgbx *colour, int columns, PlainPixel *to);
-  /** Codes a band as docs/bitstream.md says an encoder chooses. */
+  /** Codes a band as docs/formats/bitstream.md says an encoder chooses. */
   void (*code_band) (const PlainBand &band);
   /** Gathers the full pixels of a row. @return how many */
   std::size_t (*gather_full) (const PlainRow &row, PlainPixel *to);
