@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
@@ -54,9 +54,6 @@ struct MomentsLoop {
           total[k] += s;
     }
   }
-
-  [[RANGECAST_CYLINDER_ANY]] void run_any (double (&total)[9]) const { run (total); }
-  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 (double (&total)[9]) const { run (total); }
 };
 
 void
@@ -65,7 +62,7 @@ Moments::add (const WorldPoints &points, WorldPoints::Part part)
   const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
       points.z.data () + part.begin, part.size ()};
   double total[9] = {};
-  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 (total) : loop.run_any (total);
+  for_this_cpu ([&] { loop.run (total); });
   for (int k = 0; k < 9; k++)
     (k < 3 ? sum[k] : product[k - 3]) += total[k];
   n += static_cast<double> (part.size ());
