@@ -3,14 +3,14 @@
 
 #include <gst/gst.h>
 
-#include <array>
 #include "camera/aravis/frame.hpp"
 #include "camera/aravis/settings.hpp"
+#include <array>
 #include <mutex>
 #include <optional>
 #include <rangecast/sync/camera_clock.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/frame_associator.hpp>
+#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/trigger_matcher.hpp>
 
 using rangecast::kMaxCameras;
@@ -95,7 +95,7 @@ private:
     GstClockTime time = 0;
     std::int64_t fired_ns = 0;
   };
-  static constexpr int kHeld = 40, kTicks = 64, kMostLoneShots = 8;
+  static constexpr int kHeld = 40, kTicks = 64, kMaxLoneShots = 8;
 
   Held *hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns);
   void let_go (Held *held);

@@ -405,7 +405,7 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
       g_param_spec_uint ("max-receivers", "Maximum receivers",
           "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
           "quarter of it",
-          1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost,
+          1, RtcpReceivers::kMax, RtcpReceivers::kDefaultMost,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",

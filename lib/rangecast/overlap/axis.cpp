@@ -10,7 +10,7 @@
 namespace rangecast {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
-constexpr double kLeastSpreadRatio = 1.3;
+constexpr double kMinSpreadRatio = 1.3;
 /* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
  * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
 struct Follow {
@@ -144,7 +144,7 @@ axis_of_points (AxisMode mode, const Moments &moments, std::span<const PixelRays
   double values[3];
   Vec3 vectors[3];
   eigen_symmetric (covariance, values, vectors);
-  if (!(values[0] > kLeastSpreadRatio * values[1]) || !(values[0] > 1e-12))
+  if (!(values[0] > kMinSpreadRatio * values[1]) || !(values[0] > 1e-12))
     return axis;
   const Vec3 direction = vectors[0].y < 0 ? -1.0 * vectors[0] : vectors[0];
   const double along = end_on (direction, cameras);

@@ -26,7 +26,7 @@ constexpr float kDull = 15;
 /* Greys that differ by more show different things, levels. */
 constexpr float kUnlike = 20;
 /* No turn moves a disparity farther, nor do all turns, pixels. */
-constexpr float kMost = 0.5f, kMostOfAll = 1;
+constexpr float kMax = 0.5f, kMaxOfAll = 1;
 
 /* Where bytes that follow each other in memory lie in a word. */
 constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
@@ -188,7 +188,7 @@ Members
 DisparityRefiner::members_of (int x, int y) const
 {
   constexpr float kA = kStep, kB = kStep + kSlant, kC = kStep + 2 * kSlant;
-  alignas (16) static constexpr float kMostAt[kPlane + 1][kLanes] = {
+  alignas (16) static constexpr float kMaxAt[kPlane + 1][kLanes] = {
       {kC, kB, kA, kA, kA, kB, kC, -1}, {kC, kB, kA, kA, kA, kB, kC, -1},
       {kC, kB, kB, kB, kB, kB, kC, -1}, {kC, kC, kC, kC, kC, kC, kC, -1}};
   const Floats centre = cv::v_setall_f32 (now_.ptr<float> (y)[x]), zero = cv::v_setzero_f32 ();
@@ -206,7 +206,7 @@ DisparityRefiner::members_of (int x, int y) const
     int near = 0;
     for (int part = 0; part < kLanes; part += 4) {
       const Floats d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
-                   most = cv::v_load_aligned (kMostAt[std::abs (v)] + part);
+                   most = cv::v_load_aligned (kMaxAt[std::abs (v)] + part);
       near |= cv::v_signmask ((cv::v_abs (d - centre) <= most) & (d > zero)) << part;
     }
     members |= Members (bits & near & 127) << (8 * (v + kPlane));
@@ -342,7 +342,7 @@ shift_of (const Match &m, float n)
 {
   const float mean = m.slope / n,
               by = -(m.product - mean * m.difference) / (m.square - mean * m.slope + kDull);
-  return std::min (std::max (by, -kMost), kMost);
+  return std::min (std::max (by, -kMax), kMax);
 }
 
 float
@@ -395,8 +395,8 @@ DisparityRefiner::move (const cv::Rect &part, Memory &m)
       if (members[x] != 0)
         shift[x] = shift_of_members (part.x + x, y, members[x]);
     for (int x = 0; x < part.width; x++) {
-      const float moved = d[x] + shift[x], low = std::max (first[x] - kMostOfAll, 1 / 16.f),
-                  high = first[x] + kMostOfAll;
+      const float moved = d[x] + shift[x], low = std::max (first[x] - kMaxOfAll, 1 / 16.f),
+                  high = first[x] + kMaxOfAll;
       to[x] = d[x] > 0 ? std::min (std::max (moved, low), high) : 0;
     }
   }

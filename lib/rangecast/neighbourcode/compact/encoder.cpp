@@ -9,7 +9,7 @@ namespace rangecast {
 namespace {
 
 /* What one pixel may add to a slice at most, whatever its code; and one run. */
-constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
+constexpr std::size_t kMaxBytesOfPixel = 512, kMaxBytesOfRun = 64;
 
 /* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
  * residuals come to on average in recordings; their price was found by trying. */
@@ -183,7 +183,7 @@ CompactEncoder::resize (int columns)
   runs_.reserve (n + 1);
   /* A row is coded whole before anybody looks whether it fits. */
   const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
-                           (kMostBytesOfPixel + kMostBytesOfRun) * (n + 1);
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
   bytes_.resize (std::max (bytes_.size (), most));
 }
 
