@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "../glshader.hpp"
+#include "glshader.hpp"
 #include "backgroundpainter.hpp"
 
 #ifndef GL_DRAW_FRAMEBUFFER_BINDING

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "rig.hpp"
 
 namespace rangecast {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "camera.hpp"
 #include "range_image.hpp"
 

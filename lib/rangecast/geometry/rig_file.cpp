@@ -7,7 +7,7 @@
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 
-#include "../storage_check.hpp"
+#include "../base/storage_check.hpp"
 
 namespace rangecast {
 namespace {

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <iterator>
 #include <rangecast/neighbourcode/access_unit.hpp>
-#include <rangecast/neighbourcode/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 
 #include "input.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 #include <map>
-#include <rangecast/neighbourcode/unit.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
 
 using rangecast::Status;
 using rangecast::StatusCode;

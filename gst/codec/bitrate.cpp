@@ -1,0 +1,214 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bitrate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <gstrange/gstrange.h>
+
+using rangecast::EncoderSettings;
+using rangecast::Profile;
+
+enum {
+  PROP_0,
+  PROP_TARGET_BITRATE,
+  PROP_MAX_DEPTH_THRESHOLD,
+  PROP_MAX_COLOUR_THRESHOLD,
+  PROP_ADAPTIVE_BITRATE,
+  PROP_MIN_BITRATE,
+  PROP_MIN_FRAMERATE,
+  N_PROPS
+};
+static_assert (N_PROPS <= NeighbourCodeRateSettings::kFirstFreeId);
+
+void
+NeighbourCodeRateSettings::install (GObjectClass *klass)
+{
+  const NeighbourCodeRateSettings defaults;
+  const auto live = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                 GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (klass, PROP_TARGET_BITRATE,
+      g_param_spec_uint ("target-bitrate", "Target bit rate",
+          "Bits per second of coded frame sets, which thresholds between those configured and the "
+          "max- ones are steered to (0 to 4294967295, default 0: thresholds are as configured)",
+          0, G_MAXUINT, defaults.target_bitrate, live));
+  g_object_class_install_property (klass, PROP_MAX_DEPTH_THRESHOLD,
+      g_param_spec_int ("max-depth-threshold", "Maximum depth threshold",
+          "With target-bitrate the depth threshold is at most so many codes, or depth-threshold if "
+          "that is more (0 to 65535, default 32)",
+          0, 65535, defaults.max_depth_threshold, live));
+  g_object_class_install_property (klass, PROP_MAX_COLOUR_THRESHOLD,
+      g_param_spec_int ("max-colour-threshold", "Maximum colour threshold",
+          "With target-bitrate the colour threshold is at most so many codes, or colour-threshold "
+          "if that is more (0 to 255, default 32)",
+          0, 255, defaults.max_colour_threshold, live));
+  g_object_class_install_property (klass, PROP_ADAPTIVE_BITRATE,
+      g_param_spec_boolean ("adaptive-bitrate", "Adaptive bit rate",
+          "The rate follows what receivers report (RTPTWCCPackets and RangecastReceiverReport "
+          "events from downstream), from min-bitrate to target-bitrate or, if that is 0, without "
+          "limit (default false)",
+          defaults.adaptive, GParamFlags (live & ~GST_PARAM_CONTROLLABLE)));
+  g_object_class_install_property (klass, PROP_MIN_BITRATE,
+      g_param_spec_uint ("min-bitrate", "Minimum bit rate",
+          "With adaptive-bitrate, bits per second of coded frame sets at least, or target-bitrate "
+          "if that is less (1000 to 4294967295, default 200000)",
+          1000, G_MAXUINT, defaults.min_bitrate, live));
+  g_object_class_install_property (klass, PROP_MIN_FRAMERATE,
+      gst_param_spec_fraction ("min-framerate", "Minimum frame rate",
+          "With adaptive-bitrate, where the max- thresholds still take more than there is, whole "
+          "frame sets are left out, evenly, but so many a second are kept (0/1 to 2147483647/1, "
+          "default 5/1)",
+          0, 1, G_MAXINT, 1, defaults.min_fps_n, defaults.min_fps_d,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+}
+
+bool
+NeighbourCodeRateSettings::set (guint id, const GValue *value)
+{
+  switch (id) {
+    case PROP_TARGET_BITRATE:
+      target_bitrate = g_value_get_uint (value);
+      return true;
+    case PROP_MAX_DEPTH_THRESHOLD:
+      max_depth_threshold = g_value_get_int (value);
+      return true;
+    case PROP_MAX_COLOUR_THRESHOLD:
+      max_colour_threshold = g_value_get_int (value);
+      return true;
+    case PROP_ADAPTIVE_BITRATE:
+      adaptive = g_value_get_boolean (value);
+      return true;
+    case PROP_MIN_BITRATE:
+      min_bitrate = g_value_get_uint (value);
+      return true;
+    case PROP_MIN_FRAMERATE:
+      min_fps_n = gst_value_get_fraction_numerator (value);
+      min_fps_d = gst_value_get_fraction_denominator (value);
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool
+NeighbourCodeRateSettings::get (guint id, GValue *value) const
+{
+  switch (id) {
+    case PROP_TARGET_BITRATE:
+      g_value_set_uint (value, target_bitrate);
+      return true;
+    case PROP_MAX_DEPTH_THRESHOLD:
+      g_value_set_int (value, max_depth_threshold);
+      return true;
+    case PROP_MAX_COLOUR_THRESHOLD:
+      g_value_set_int (value, max_colour_threshold);
+      return true;
+    case PROP_ADAPTIVE_BITRATE:
+      g_value_set_boolean (value, adaptive);
+      return true;
+    case PROP_MIN_BITRATE:
+      g_value_set_uint (value, min_bitrate);
+      return true;
+    case PROP_MIN_FRAMERATE:
+      gst_value_set_fraction (value, min_fps_n, min_fps_d);
+      return true;
+    default:
+      return false;
+  }
+}
+
+void
+NeighbourCodeRate::reset ()
+{
+  control_.reset ();
+  meter_.reset ();
+  thinning_.reset ();
+  receivers.reset ();
+  is_on_ = false;
+  time_ = interval_ = 0;
+  told_bits_per_s_ = -1;
+  told_one_of_ = 1;
+}
+
+/* What a point of noisy cameras comes to, about, at a colour threshold of 10, and how that falls
+ * with the threshold. The first frame set then tells. */
+static double
+usual_bits_per_point (Profile profile, int colour_threshold)
+{
+  const double finer = 10.5 / (colour_threshold + 0.5);
+  switch (profile) {
+    case Profile::kPlain:
+      return 13 * std::cbrt (finer);
+    case Profile::kPacked:
+      return 3.5 * std::sqrt (finer);
+    default:
+      return 2.5 * std::sqrt (finer);
+  }
+}
+
+bool
+NeighbourCodeRate::begin (
+    const NeighbourCodeRateSettings &rate, GstBuffer *input, GstClockTime interval)
+{
+  const GstClockTime capture = gst_range_buffer_get_capture_time (input),
+                     time = GST_CLOCK_TIME_IS_VALID (capture) ? capture : GST_BUFFER_PTS (input);
+  time_ = GST_CLOCK_TIME_IS_VALID (time) ? time : time_ + interval;
+  interval_ = interval;
+  rate_ = rate;
+  if (!rate.adaptive) {
+    thinning_.reset ();
+    return true;
+  }
+  const double bits_per_s = receivers.next (
+      {double (rate.min_bitrate), double (rate.target_bitrate)}, meter_.bits_per_s (interval));
+  rate_.target_bitrate = guint (std::min (bits_per_s, double (G_MAXUINT)));
+  return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.least_bits () : 0,
+      double (rate.min_fps_n) / rate.min_fps_d});
+}
+
+EncoderSettings
+NeighbourCodeRate::next (const EncoderSettings &configured, guint64 pixels)
+{
+  if (rate_.target_bitrate == 0) {
+    if (is_on_)
+      control_.reset ();
+    is_on_ = false;
+    return configured;
+  }
+  is_on_ = true;
+  control_.configure (
+      {double (rate_.target_bitrate), {configured.depth_threshold, configured.colour_threshold},
+          {rate_.max_depth_threshold, rate_.max_colour_threshold},
+          usual_bits_per_point (configured.profile, configured.colour_threshold),
+          double (interval_) / GST_SECOND});
+  EncoderSettings settings = configured;
+  const rangecast::Thresholds thresholds = control_.next (time_, pixels);
+  settings.depth_threshold = thresholds.depth;
+  settings.colour_threshold = thresholds.colour;
+  return settings;
+}
+
+void
+NeighbourCodeRate::coded (const rangecast::CodedFrame &frame)
+{
+  meter_.add (time_, frame.bytes);
+  if (is_on_)
+    control_.coded (frame);
+}
+
+/* A tenth of the bit rate is what an application may want to know of. */
+GstMessage *
+NeighbourCodeRate::take_news (GstObject *source)
+{
+  constexpr double kMuch = 0.1;
+  const double now = rate_.adaptive ? receivers.bits_per_s () : 0;
+  if (told_bits_per_s_ < 0)
+    told_bits_per_s_ = now;
+  if (std::abs (now - told_bits_per_s_) <= kMuch * told_bits_per_s_ && one_of () == told_one_of_)
+    return nullptr;
+  told_bits_per_s_ = now;
+  told_one_of_ = one_of ();
+  GstStructure *news = gst_structure_new (
+      "neighbourcodeenc-adaptive-bitrate", "one-of", G_TYPE_INT, told_one_of_, nullptr);
+  receivers.describe (news);
+  return gst_message_new_element (source, news);
+}

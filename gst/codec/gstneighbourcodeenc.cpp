@@ -1,0 +1,781 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-neighbourcodeenc
+ * @title: neighbourcodeenc
+ *
+ * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
+ * decode without one another. The format is specified in docs/formats/bitstream.md.
+ *
+ * With temporal=true pixels may also equal those of the frame set before; this takes half the bytes
+ * or less where a person moves before a still camera. Key frame sets, which need no earlier one,
+ * come first, at least every key-interval, and when somebody asks (GstForceKeyUnit, from up- or
+ * downstream; RTP: PLI, FIR); all others have the DELTA_UNIT flag. What a loss damaged is whole
+ * again after refresh-period at the latest, also without key frame sets.
+ *
+ * A buffer is a frame set, or a slice of one where downstream asks for alignment=slice: then the
+ * last of a frame set has the MARKER flag.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
+ * multifilesink location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstneighbourcodeenc.h"
+
+#include <gst/base/base.h>
+
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/neighbourcode/access_unit.hpp>
+
+#include "common/controlledvalues.hpp"
+#include "keyunitrequests.hpp"
+#include "enums.hpp"
+#include "bitrate.hpp"
+#include "common/bufferpools.hpp"
+#include "common/statsreporter.hpp"
+#include "common/streamlock.hpp"
+
+using rangecast::EncoderResult;
+using rangecast::EncoderSettings;
+using rangecast::Status;
+
+GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
+#define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
+
+enum {
+  PROP_PROFILE = NeighbourCodeRateSettings::kFirstFreeId,
+  PROP_CHOICE,
+  PROP_DEPTH_BITS,
+  PROP_DEPTH_SCALE,
+  PROP_COLOUR_BITS,
+  PROP_DEPTH_THRESHOLD,
+  PROP_COLOUR_THRESHOLD,
+  PROP_MAX_SLICE_SIZE,
+  PROP_TEMPORAL,
+  PROP_REFRESH_PERIOD,
+  PROP_KEY_INTERVAL,
+  PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
+  PROP_N_THREADS,
+  PROP_MAX_DEPTH_ERROR,
+  PROP_ESTIMATED_BITRATE,
+  PROP_STATS,
+  PROP_STATS_INTERVAL
+};
+
+static constexpr EncoderSettings kDefaults;
+
+/* When there are key frame sets. */
+struct KeySettings {
+  guint interval_ms = 0;                /* at most between two; 0: no limit */
+  GstClockTime min_forced_interval = 0; /* at least before one that somebody asked for */
+};
+
+struct GstNeighbourCodeEncPrivate {
+  std::mutex lock; /* guards what follows; never held across a push or message */
+  EncoderSettings settings;
+  NeighbourCodeRateSettings rate_settings;
+  int n_threads = 0;
+  KeySettings key_settings;
+  double max_depth_error_m = 0;
+  guint64 frames = 0, coded_bytes = 0, left_out = 0;
+  EncoderResult totals;
+  EncoderSettings latest; /* of the latest frame set */
+  double bits_per_s = 0;
+
+  KeyUnitRequests key_requests;
+  StatsReporter reporter; /* has locks of its own */
+
+  /* streaming thread only */
+  gstrange::RangeInfo info;
+  rangecast::AccessUnitEncoder encoder;
+  EncoderSettings configured;
+  bool is_configured = false;
+  NeighbourCodeRate rate; /* what its receivers say: any thread */
+  std::uint32_t frame_number = 0;
+  bool is_key = true;                          /* the frame set in encoder */
+  GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
+  RecycledBytes buffers;
+  bool by_slices = false;     /* alignment of the output */
+  GstBuffer *input = nullptr; /* what encoder holds is of this one, and not yet all pushed */
+  std::size_t part = 0;
+  rangecast::UnitReader units{{}}; /* of the part before */
+  std::span<const guint8> slice;   /* the next one; before the first: empty */
+};
+
+struct _GstNeighbourCodeEnc {
+  GstBaseTransform parent;
+  GstNeighbourCodeEncPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
+
+G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
+
+/* ---- caps ---- */
+
+static GstCaps *
+gst_neighbour_code_enc_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
+{
+  return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
+}
+
+static void
+forget_input (GstNeighbourCodeEncPrivate *priv)
+{
+  gst_clear_buffer (&priv->input);
+}
+
+static gboolean
+gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  const GstStructure *structure = gst_caps_get_structure (out, 0);
+  const Status status = gstrange::parse_caps (in, priv->info);
+  priv->is_configured = false;
+  priv->reporter.set_views (priv->info.rig);
+  priv->encoder.request_key (); /* decoders begin anew with new caps */
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  forget_input (priv);
+  return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
+}
+
+/* ---- data ---- */
+
+/* Takes over settings that changed. Thresholds may with every frame set: they cost nothing. */
+static Status
+configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
+{
+  if (priv->is_configured && settings == priv->configured)
+    return {};
+  EncoderSettings same = priv->configured;
+  same.depth_threshold = settings.depth_threshold;
+  same.colour_threshold = settings.colour_threshold;
+  if (priv->is_configured && settings == same)
+    priv->encoder.set_thresholds (settings.depth_threshold, settings.colour_threshold);
+  else if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
+    return s;
+  priv->configured = settings;
+  priv->is_configured = true;
+  std::lock_guard guard (priv->lock);
+  priv->max_depth_error_m = priv->encoder.max_depth_error_m ();
+  return {};
+}
+
+struct FrameSettings {
+  EncoderSettings encoder;
+  NeighbourCodeRateSettings rate;
+  int n_threads;
+  KeySettings key;
+};
+
+static GstClockTime
+frame_interval (const gstrange::RangeInfo &info)
+{
+  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
+                        : GST_SECOND / 30;
+}
+
+static Status
+encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSettings &settings,
+    EncoderResult &result)
+{
+  gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  guint64 pixels = 0;
+  for (const rangecast::RangeImage &image : frame.views ())
+    pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
+  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
+  if (settings.encoder.temporal && !(priv->is_configured && priv->configured.temporal))
+    priv->frame_number = g_random_int ();
+  if (Status s = configure (priv, priv->rate.next (settings.encoder, pixels)); !s.ok ())
+    return s;
+  const Status status =
+      priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
+  if (status.ok ())
+    priv->rate.coded (
+        {priv->encoder.size (), result.points, pixels, result.delta_slices == 0 && !priv->is_key});
+  return status;
+}
+
+static void
+count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
+{
+  std::lock_guard guard (priv->lock);
+  priv->latest = priv->configured;
+  priv->bits_per_s = priv->rate.bits_per_s ();
+  priv->frames++;
+  priv->coded_bytes += size;
+  priv->totals += result;
+}
+
+static GstClockTime
+running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  return gst_segment_to_running_time (
+      &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
+}
+
+/* Asks the encoder for a key frame set where one is due. Requests that come too soon after one
+ * wait, as with GstVideoEncoder. */
+static void
+prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const KeySettings &settings)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
+  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
+  /* The next frame set would come too late. */
+  const GstClockTime until = now + frame_interval (priv->info);
+  const bool is_old = settings.interval_ms > 0 && has_times &&
+                      (now < last || until - last > settings.interval_ms * GST_MSECOND);
+  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_interval) &&
+                       now >= last && now - last < settings.min_forced_interval;
+  if (is_old || (!is_soon && priv->key_requests.is_due (now)))
+    priv->encoder.request_key ();
+}
+
+/* Any key frame set answers those who asked for one, and is announced to them. */
+static void
+note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &result)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime pts = GST_BUFFER_PTS (input), now = running_time_of (self, input);
+  priv->is_key = result.delta_slices == 0;
+  if (!priv->is_key)
+    return;
+  priv->last_key = now;
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  if (GstEvent *announcement = priv->key_requests.answer (pts, stream_time, now))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
+}
+
+/* Downstream learns that nothing comes for this time. */
+static void
+leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->left_out++;
+  }
+  const GstClockTime pts = GST_BUFFER_PTS (input), duration = GST_BUFFER_DURATION (input);
+  forget_input (self->priv);
+  if (GST_CLOCK_TIME_IS_VALID (pts))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (pts, duration));
+}
+
+static void
+tell_news (GstNeighbourCodeEnc *self)
+{
+  GstMessage *news = self->priv->rate.take_news (GST_OBJECT (self));
+  if (!news)
+    return;
+  gst_element_post_message (GST_ELEMENT (self), news);
+  g_object_notify (G_OBJECT (self), "estimated-bitrate");
+}
+
+/* The frame set in `input`; forgets it if it is left out. */
+static GstFlowReturn
+encode_input (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *input = priv->input;
+  sync_controlled_values (GST_BASE_TRANSFORM (self), input);
+  FrameSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_settings};
+  }
+  settings.encoder.frame_interval_ns = frame_interval (priv->info);
+  const bool keeps = priv->rate.begin (settings.rate, input, settings.encoder.frame_interval_ns);
+  tell_news (self);
+  if (!keeps) {
+    leave_out (self, input);
+    return GST_FLOW_OK;
+  }
+  prepare_key (self, input, settings.key);
+  EncoderResult result;
+  const Status status = encode_frame (priv, input, settings, result);
+  if (!status.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), status);
+  note_key (self, input, result);
+  count_frame (priv, result, priv->encoder.size ());
+  priv->reporter.passed (GST_ELEMENT (self), input);
+  return GST_FLOW_OK;
+}
+
+/* A buffer with times and flags of the input. */
+static GstBuffer *
+make_output (GstNeighbourCodeEnc *self, gsize size)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = priv->buffers.acquire (GST_ELEMENT (self), size, "a coded frame set");
+  if (!buffer)
+    return nullptr;
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
+      GST_BASE_TRANSFORM (self), priv->input, buffer);
+  const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (buffer, capture);
+  if (priv->is_key)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  else
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  return buffer;
+}
+
+static GstBuffer *
+take_access_unit (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = make_output (self, priv->encoder.size ());
+  gsize offset = 0;
+  for (std::size_t i = 0; buffer && i < priv->encoder.parts (); i++) {
+    const auto part = priv->encoder.part (i);
+    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
+  }
+  forget_input (priv);
+  return buffer;
+}
+
+/* The encoder's next slice; nothing after the last one. */
+static std::span<const guint8>
+next_slice (GstNeighbourCodeEncPrivate *priv)
+{
+  rangecast::UnitHeader header;
+  while (true) {
+    if (const auto unit = priv->units.next (header))
+      return *unit;
+    if (priv->part == priv->encoder.parts ())
+      return {};
+    priv->units = rangecast::UnitReader (priv->encoder.part (priv->part++));
+  }
+}
+
+static GstBuffer *
+take_slice (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const bool is_first = priv->slice.empty ();
+  if (is_first)
+    priv->slice = next_slice (priv);
+  GstBuffer *buffer = make_output (self, priv->slice.size ());
+  if (!buffer)
+    return nullptr;
+  gst_buffer_fill (buffer, 0, priv->slice.data (), priv->slice.size ());
+  if (!is_first)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT | GST_BUFFER_FLAG_RESYNC);
+  priv->slice = next_slice (priv);
+  if (priv->slice.empty ()) {
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_MARKER);
+    forget_input (priv);
+  } else {
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_MARKER);
+  }
+  return buffer;
+}
+
+/* Called until it has no more to give; a new input comes where the rest of the last one failed to
+ * be pushed, too. */
+static GstFlowReturn
+gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_ENC (base);
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  if (base->queued_buf) {
+    forget_input (priv);
+    priv->input = g_steal_pointer (&base->queued_buf);
+    const GstFlowReturn flow = encode_input (self);
+    if (flow != GST_FLOW_OK) {
+      forget_input (priv);
+      return flow;
+    }
+    priv->part = 0;
+    priv->units = rangecast::UnitReader ({});
+    priv->slice = {};
+  }
+  if (!priv->input)
+    return GST_FLOW_OK;
+  *output = priv->by_slices ? take_slice (self) : take_access_unit (self);
+  return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/* Never called, but without it GstBaseTransform would be passthrough. */
+static GstFlowReturn
+gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_ERROR;
+}
+
+static gboolean
+gst_neighbour_code_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+/* ---- events ---- */
+
+static gboolean
+gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event)) { /* goes on with the frame set that answers it */
+    gst_event_unref (event);
+    return TRUE;
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
+    priv->encoder.request_key ();
+    priv->key_requests.forget ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
+    priv->reporter.finish ();
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event) || priv->rate.receivers.note (event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->src_event (base, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {
+               .frames = priv->frames, .points = priv->totals.points, .bytes = priv->coded_bytes}}};
+}
+
+static gboolean
+gst_neighbour_code_enc_start (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->rate.reset ();
+  priv->last_key = GST_CLOCK_TIME_NONE;
+  priv->encoder.request_key ();
+  priv->key_requests.forget ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
+  std::lock_guard guard (priv->lock);
+  priv->frame_number = 0;
+  priv->bits_per_s = 0;
+  priv->frames = priv->coded_bytes = priv->left_out = 0;
+  priv->totals = {};
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_enc_stop (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->reporter.stop ();
+  const StreamLock lock (base);
+  priv->is_configured = false;
+  forget_input (priv);
+  priv->buffers.drop ();
+  return TRUE;
+}
+
+static void
+gst_neighbour_code_enc_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
+  std::lock_guard guard (priv->lock);
+  EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.set (id, value))
+    return;
+  switch (id) {
+    case PROP_PROFILE:
+      settings.profile = rangecast::Profile (g_value_get_enum (value));
+      break;
+    case PROP_CHOICE:
+      settings.choice = rangecast::NeighbourChoice (g_value_get_enum (value));
+      break;
+    case PROP_DEPTH_BITS:
+      settings.depth_bits = g_value_get_int (value);
+      break;
+    case PROP_DEPTH_SCALE:
+      settings.depth_scale = rangecast::DepthScale (g_value_get_enum (value));
+      break;
+    case PROP_COLOUR_BITS:
+      settings.colour_bits = g_value_get_int (value);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      settings.depth_threshold = g_value_get_int (value);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      settings.colour_threshold = g_value_get_int (value);
+      break;
+    case PROP_MAX_SLICE_SIZE:
+      settings.max_slice_size = g_value_get_int (value);
+      break;
+    case PROP_TEMPORAL:
+      settings.temporal = g_value_get_boolean (value);
+      break;
+    case PROP_REFRESH_PERIOD:
+      settings.refresh_period_ns = g_value_get_uint (value) * GST_MSECOND;
+      break;
+    case PROP_KEY_INTERVAL:
+      priv->key_settings.interval_ms = g_value_get_uint (value);
+      break;
+    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
+      priv->key_settings.min_forced_interval = g_value_get_uint64 (value);
+      break;
+    case PROP_N_THREADS:
+      priv->n_threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static GstStructure *
+make_stats (const GstNeighbourCodeEncPrivate *priv)
+{
+  GstStructure *stats = gst_structure_new ("application/x-neighbourcodeenc-stats", "frames",
+      G_TYPE_UINT64, priv->frames, "left-out", G_TYPE_UINT64, priv->left_out, "points",
+      G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels", G_TYPE_UINT64,
+      guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64, guint64{priv->totals.slices},
+      "delta-slices", G_TYPE_UINT64, guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
+      guint64{priv->totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes,
+      "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
+      priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
+      nullptr);
+  priv->rate.receivers.describe (stats);
+  return stats;
+}
+
+static void
+gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  const EncoderSettings &settings = priv->settings;
+  if (priv->rate_settings.get (id, value))
+    return;
+  switch (id) {
+    case PROP_PROFILE:
+      g_value_set_enum (value, int (settings.profile));
+      break;
+    case PROP_CHOICE:
+      g_value_set_enum (value, int (settings.choice));
+      break;
+    case PROP_DEPTH_BITS:
+      g_value_set_int (value, settings.depth_bits);
+      break;
+    case PROP_DEPTH_SCALE:
+      g_value_set_enum (value, int (settings.depth_scale));
+      break;
+    case PROP_COLOUR_BITS:
+      g_value_set_int (value, settings.colour_bits);
+      break;
+    case PROP_DEPTH_THRESHOLD:
+      g_value_set_int (value, settings.depth_threshold);
+      break;
+    case PROP_COLOUR_THRESHOLD:
+      g_value_set_int (value, settings.colour_threshold);
+      break;
+    case PROP_MAX_SLICE_SIZE:
+      g_value_set_int (value, settings.max_slice_size);
+      break;
+    case PROP_TEMPORAL:
+      g_value_set_boolean (value, settings.temporal);
+      break;
+    case PROP_REFRESH_PERIOD:
+      g_value_set_uint (value, guint (settings.refresh_period_ns / GST_MSECOND));
+      break;
+    case PROP_KEY_INTERVAL:
+      g_value_set_uint (value, priv->key_settings.interval_ms);
+      break;
+    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
+      g_value_set_uint64 (value, priv->key_settings.min_forced_interval);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, priv->n_threads);
+      break;
+    case PROP_MAX_DEPTH_ERROR:
+      g_value_set_double (value, priv->max_depth_error_m);
+      break;
+    case PROP_ESTIMATED_BITRATE:
+      g_value_set_uint64 (value, guint64 (priv->rate.receivers.bits_per_s () + 0.5));
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_neighbour_code_enc_finalize (GObject *object)
+{
+  delete GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  G_OBJECT_CLASS (gst_neighbour_code_enc_parent_class)->finalize (object);
+}
+
+static void
+gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
+{
+  self->priv = new GstNeighbourCodeEncPrivate;
+}
+
+static void
+install_results (GObjectClass *object_class)
+{
+  const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
+      g_param_spec_double ("max-depth-error", "Maximum depth error",
+          "Metres by which a decoded depth differs from the one that came in at most, of any view, "
+          "with the settings of the latest frame set; 0 before the first",
+          0, G_MAXDOUBLE, 0, readable));
+  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
+      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
+          "Bits per second that receivers let the encoder have with adaptive-bitrate; 0: not known "
+          "(0 to 18446744073709551615, default 0)",
+          0, G_MAXUINT64, 0, readable));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "Counters since start: frames, left-out, points, full-pixels, slices, delta-slices, "
+          "raw-bytes, coded-bytes; bitrate over the last 2 s; depth-threshold, colour-threshold of "
+          "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
+          "receiver-loss, receiver-queue",
+          GST_TYPE_STRUCTURE, readable));
+}
+
+static void
+install_properties (GObjectClass *object_class)
+{
+  /* Those with which tables, references or threads begin anew are none for a controller, which may
+   * set them with every frame set. */
+  const auto live =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const auto steered = GParamFlags (live | GST_PARAM_CONTROLLABLE);
+  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                               int minimum, int maximum, int fallback, GParamFlags flags) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, flags));
+  };
+  g_object_class_install_property (object_class, PROP_PROFILE,
+      g_param_spec_enum ("profile", "Profile",
+          "How pixels are written (plain, packed, entropy, default plain)",
+          GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (kDefaults.profile), live));
+  g_object_class_install_property (object_class, PROP_CHOICE,
+      g_param_spec_enum ("choice", "Choice",
+          "Which neighbour within the thresholds replaces a pixel, if any; plain always takes the "
+          "first (first, best, default first)",
+          GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), steered));
+  install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
+      "Bits of a depth code, of depths between the view's near and far (6 to 16, default 12)", 6,
+      16, kDefaults.depth_bits, live);
+  g_object_class_install_property (object_class, PROP_DEPTH_SCALE,
+      g_param_spec_enum ("depth-scale", "Depth scale",
+          "What depth codes are linear in: depth, or 1/depth, where codes stand for more depth the "
+          "further it is (linear, inverse, default linear)",
+          GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, int (kDefaults.depth_scale), live));
+  install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits",
+      "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits, live);
+  install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
+      "A neighbour replaces a pixel if their depths differ by no more than so many codes (0 to "
+      "65535, default 8; 0 and colour-threshold 0: lossless after quantisation)",
+      0, 65535, kDefaults.depth_threshold, steered);
+  install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
+      "Neighbours replace a pixel if also R, G and B each differ by no more than so many codes (0 "
+      "to 255, default 5)",
+      0, 255, kDefaults.colour_threshold, steered);
+  install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
+      "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
+      int (rangecast::kMaxUnitSize), kDefaults.max_slice_size, steered);
+  g_object_class_install_property (object_class, PROP_TEMPORAL,
+      g_param_spec_boolean ("temporal", "Temporal",
+          "Pixels may equal those of the frame set before, too (default false: every frame set "
+          "decodes alone)",
+          kDefaults.temporal, live));
+  const auto install_ms = [&] (guint id, const char *name, const char *nick, const char *blurb,
+                              guint fallback) {
+    g_object_class_install_property (
+        object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, steered));
+  };
+  install_ms (PROP_REFRESH_PERIOD, "refresh-period", "Refresh period",
+      "With temporal: every pixel is coded without reference to earlier frame sets at least so "
+      "often, milliseconds (0 to 3600000, default 1000; 0: only in key frame sets)",
+      guint (kDefaults.refresh_period_ns / GST_MSECOND));
+  install_ms (PROP_KEY_INTERVAL, "key-interval", "Key interval",
+      "With temporal: a key frame set comes at least so often, milliseconds; files can be sought "
+      "to those (0 to 3600000, default 0: only first and on request)",
+      0);
+  g_object_class_install_property (object_class, PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
+      g_param_spec_uint64 ("min-force-key-unit-interval", "Minimum interval of forced key units",
+          "With temporal: a key frame set that somebody asks for (GstForceKeyUnit) waits until the "
+          "last one is so old, nanoseconds (0 to 18446744073709551615, default 0: it never waits; "
+          "18446744073709551615: nor does it then)",
+          0, G_MAXUINT64, 0, steered));
+  install_int (PROP_N_THREADS, "n-threads", "Threads",
+      "Pieces coded at the same time, of one view or of several; bytes do not depend on it (0 to "
+      "64, default 0: as many as there are cores)",
+      0, 64, 0, live);
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+}
+
+static void
+gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_neighbour_code_enc_set_property;
+  object_class->get_property = gst_neighbour_code_enc_get_property;
+  object_class->finalize = gst_neighbour_code_enc_finalize;
+  install_properties (object_class);
+  install_results (object_class);
+  NeighbourCodeRateSettings::install (object_class);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
+      "Codec/Encoder/Video",
+      "Codes depth and colour of range images together, in slices that decode alone",
+      "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, GstPluginAPIFlags (0));
+
+  transform_class->sink_event = gst_neighbour_code_enc_sink_event;
+  transform_class->src_event = gst_neighbour_code_enc_src_event;
+  transform_class->start = gst_neighbour_code_enc_start;
+  transform_class->stop = gst_neighbour_code_enc_stop;
+  transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
+  transform_class->set_caps = gst_neighbour_code_enc_set_caps;
+  transform_class->generate_output = gst_neighbour_code_enc_generate_output;
+  transform_class->transform = gst_neighbour_code_enc_transform;
+  transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");
+}

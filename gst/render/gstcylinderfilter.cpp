@@ -1,0 +1,871 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-cylinderfilter
+ * @title: cylinderfilter
+ *
+ * Clears the points that several views of a frame set see of the same place, all but those of the
+ * view that sees it most squarely. Before that, errors of the rig are corrected, views that
+ * contradict the others left out, points that another view contradicts cleared, and colours made to
+ * agree (#GstCylinderFilter:agree, #GstCylinderFilter:colour-balance); points move only with
+ * agree=depth.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc views=4 num-buffers=30 ! cylinderfilter ! plyenc ! multifilesink
+ * location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstcylinderfilter.h"
+
+#include <cmath>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <optional>
+#include <rangecast/alignment/view_agreement.hpp>
+#include <rangecast/overlap/colour_match.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
+#include <rangecast/base/guarded.hpp>
+
+#include "common/controlledvalues.hpp"
+#include "common/statsreporter.hpp"
+#include "common/streamlock.hpp"
+
+GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
+#define GST_CAT_DEFAULT gst_cylinder_filter_debug
+
+enum {
+  PROP_0,
+  PROP_MODE,
+  PROP_COLOUR_BALANCE,
+  PROP_BLEND_WIDTH,
+  PROP_AGREE,
+  PROP_AXIS,
+  PROP_AXIS_POSITION,
+  PROP_AXIS_DIRECTION,
+  PROP_UNIT_HEIGHT,
+  PROP_COLUMNS,
+  PROP_LAYER_GAP,
+  PROP_SMOOTHING,
+  PROP_OVERLAP,
+  PROP_HYSTERESIS,
+  PROP_AGREEMENT,
+  PROP_BODIES,
+  PROP_N_THREADS,
+  PROP_STATS,
+  PROP_STATS_INTERVAL,
+};
+
+enum GstCylinderFilterMode {
+  GST_CYLINDER_FILTER_OFF,
+  GST_CYLINDER_FILTER_WINNER,
+  GST_CYLINDER_FILTER_BLEND
+};
+enum GstCylinderFilterAgree {
+  GST_CYLINDER_FILTER_AGREE_POSES = 1,
+  GST_CYLINDER_FILTER_AGREE_DEPTH = 2,
+  GST_CYLINDER_FILTER_AGREE_VIEWS = 4,
+  GST_CYLINDER_FILTER_AGREE_POINTS = 8
+};
+enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
+
+static constexpr guint kDefaultAgree = GST_CYLINDER_FILTER_AGREE_POSES |
+                                       GST_CYLINDER_FILTER_AGREE_VIEWS |
+                                       GST_CYLINDER_FILTER_AGREE_POINTS;
+static constexpr double kDefaultBlendWidth = 0.02;
+static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
+                        kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
+                        kDefaultAgreement = 0.1;
+static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
+
+struct CylinderCounts {
+  guint64 frames = 0, points_contradicted = 0, points_in = 0, points_out = 0, units = 0,
+          units_shared = 0, units_held = 0, units_changed = 0,
+          untouched = 0; /* frame sets while the mode is off */
+  int bodies = 0;
+  rangecast::Axis axis;
+};
+
+struct GstCylinderFilterPrivate {
+  std::mutex lock; /* guards all settings and counts; never held while working on a frame */
+  GstCylinderFilterMode mode = GST_CYLINDER_FILTER_WINNER;
+  rangecast::CylinderSettings settings;
+  GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
+  double blend_width = kDefaultBlendWidth;
+  guint agree = kDefaultAgree; /* GstCylinderFilterAgree */
+  CylinderCounts counts;
+  std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
+  StatsReporter reporter;                                        /* has locks of its own */
+
+  /* Streaming thread only. */
+  rangecast::ViewAgreement agreement;
+  rangecast::ColourMatch colours;
+  rangecast::CylinderFilter core;
+  bool has_rig = false;     /* set_caps gave agreement, core and colours one */
+  bool rig_pending = false; /* the source's caps may have another one than agreement */
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  bool was_off = false;
+  guint64 left_out = 0; /* views that a warning was posted for, a bit each */
+};
+
+struct _GstCylinderFilter {
+  GstBaseTransform parent;
+  GstCylinderFilterPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
+
+/* ---- enums ---- */
+
+#define GST_TYPE_CYLINDER_FILTER_MODE (gst_cylinder_filter_mode_get_type ())
+static GType
+gst_cylinder_filter_mode_get_type (void)
+{
+  static const GEnumValue values[] = {
+      {GST_CYLINDER_FILTER_OFF, "Let everything pass", "off"},
+      {GST_CYLINDER_FILTER_WINNER, "One view keeps its points, the others' are cleared", "winner"},
+      {GST_CYLINDER_FILTER_BLEND, "As winner, and colours are blended along the seams", "blend"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_AGREE (gst_cylinder_filter_agree_get_type ())
+static GType
+gst_cylinder_filter_agree_get_type (void)
+{
+  static const GFlagsValue values[] = {
+      {0, "Nothing", "none"},
+      {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of poses", "poses"},
+      {GST_CYLINDER_FILTER_AGREE_DEPTH, "Move depths of one surface together", "depth"},
+      {GST_CYLINDER_FILTER_AGREE_VIEWS, "Leave out a view that contradicts the others", "views"},
+      {GST_CYLINDER_FILTER_AGREE_POINTS,
+          "Clear points that another view sees through, in another colour", "points"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_flags_register_static ("GstCylinderFilterAgree", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_BALANCE (gst_cylinder_filter_balance_get_type ())
+static GType
+gst_cylinder_filter_balance_get_type (void)
+{
+  static const GEnumValue values[] = {
+      {GST_CYLINDER_FILTER_BALANCE_OFF, "Leave colours as the cameras see them", "off"},
+      {GST_CYLINDER_FILTER_BALANCE_AUTO, "Gains from what several cameras see", "auto"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterBalance", values);
+  return type;
+}
+
+#define GST_TYPE_CYLINDER_FILTER_AXIS (gst_cylinder_filter_axis_get_type ())
+static GType
+gst_cylinder_filter_axis_get_type (void)
+{
+  using rangecast::AxisMode;
+  static const GEnumValue values[] = {
+      {int (AxisMode::kPrincipal), "Along the direction in which the points spread most",
+          "principal"},
+      {int (AxisMode::kVertical), "World y, through the middle of all points", "vertical"},
+      {int (AxisMode::kFixed), "As axis-position and axis-direction say", "fixed"},
+      {0, nullptr, nullptr},
+  };
+  static const GType type = g_enum_register_static ("GstCylinderFilterAxis", values);
+  return type;
+}
+
+/* ---- streaming ---- */
+
+/* After a jump in time: people and light are others, the cameras stand where they stood. */
+static void
+gst_cylinder_filter_forget_moment (GstCylinderFilterPrivate *priv)
+{
+  priv->core.reset ();
+  priv->colours.reset ();
+  priv->last_pts = GST_CLOCK_TIME_NONE;
+}
+
+/* All that is of one stream. */
+static void
+gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
+{
+  gst_cylinder_filter_forget_moment (priv);
+  priv->agreement.reset ();
+  priv->rig_pending = true;
+}
+
+/* Gives the rig that the views have now to those who work with it, here and downstream. */
+static rangecast::Status
+gst_cylinder_filter_send_rig (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  rangecast::Status good = validate (priv->agreement.rig ());
+  if (!good.ok ())
+    GST_WARNING_OBJECT (self, "the rig stays as it came; corrected, %s", good.message ().c_str ());
+  const rangecast::Rig &rig = good.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
+  priv->rig_pending = false;
+  if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->colours.change_rig (rig); !status.ok ())
+    return status;
+  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
+  GstCaps *present = gst_pad_get_current_caps (pad);
+  if (!present)
+    return {};
+  GstCaps *caps = gstrange::with_rig (present, rig);
+  if (!gst_caps_is_equal (caps, present)) {
+    GST_DEBUG_OBJECT (self, "poses of the rig change");
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "they were not taken downstream"); /* and the buffer says why */
+  }
+  gst_caps_unref (caps);
+  gst_caps_unref (present);
+  return {};
+}
+
+static gboolean
+gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    gstrange::RangeInfo info;
+    rangecast::Status result = gstrange::parse_caps (in, info);
+    /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
+    if (result.ok () && priv->has_rig &&
+        encode_rig (info.rig) == encode_rig (priv->agreement.nominal_rig ())) {
+      priv->rig_pending = true;
+      return result;
+    }
+    priv->has_rig = false;
+    gst_cylinder_filter_forget (priv);
+    priv->reporter.set_views (info.rig);
+    {
+      const std::lock_guard guard (priv->lock);
+      priv->views.clear ();
+      for (const rangecast::View &view : info.rig.views)
+        priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
+    }
+    if (result.ok ())
+      result = priv->agreement.set_rig (info.rig);
+    if (result.ok ())
+      result = priv->core.set_rig (info.rig);
+    if (result.ok ())
+      result = priv->colours.set_rig (info.rig);
+    priv->has_rig = result.ok ();
+    return result;
+  });
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
+ */
+static bool
+gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  return !known || now <= last || now - last > GST_SECOND / 2;
+}
+
+/* Every buffer comes by here, also those that are too late or pass untouched. */
+static GstFlowReturn
+gst_cylinder_filter_submit_input_buffer (
+    GstBaseTransform *base, gboolean is_discont, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
+    gst_cylinder_filter_forget_moment (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
+      ->submit_input_buffer (base, is_discont, buffer);
+}
+
+/* Controlled properties take their values of this buffer's time; the mode may be one of them. */
+static void
+gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  sync_controlled_values (base, buffer);
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  priv->counts.untouched += off;
+  guard.unlock ();
+  if (off)
+    priv->reporter.passed (GST_ELEMENT (base), buffer);
+  if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
+    gst_cylinder_filter_forget (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
+    const rangecast::Status status = rangecast::guarded ("cylinderfilter",
+        [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
+    if (!status.ok ())
+      GST_WARNING_OBJECT (base, "%s", status.message ().c_str ());
+  }
+  priv->was_off = off;
+  gst_base_transform_set_passthrough (base, off);
+}
+
+static void
+gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
+{
+  const std::lock_guard guard (priv->lock);
+  CylinderCounts &counts = priv->counts;
+  counts.frames++;
+  counts.points_contradicted += priv->agreement.contradicted_points ();
+  counts.points_in += result.points_in;
+  counts.points_out += result.points_out;
+  counts.units += result.units;
+  counts.units_shared += result.units_shared;
+  counts.units_held += result.units_held;
+  counts.units_changed += result.units_changed;
+  counts.bodies = result.bodies;
+  counts.axis = result.axis;
+  for (auto &[view_id, consistency] : priv->views)
+    consistency = priv->agreement.view (view_id);
+}
+
+/* Works on the mapped views of a frame set. */
+static rangecast::Status
+gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast::RangeImage> views,
+    const rangecast::AgreementSettings &agree, const rangecast::ColourSettings &colours,
+    const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
+{
+  auto priv = self->priv;
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
+  for (const rangecast::RangeImage &view : views)
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
+  if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
+    return status;
+  if (priv->rig_pending || priv->agreement.rig_changed ())
+    if (rangecast::Status status = gst_cylinder_filter_send_rig (self); !status.ok ())
+      return status;
+  if (rangecast::Status status = priv->colours.before (views, colours); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->core.process (views, settings, result); !status.ok ())
+    return status;
+  return priv->colours.after (views, colours);
+}
+
+/* One warning for each view that is left out from now on. */
+static void
+gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  for (const auto &[view_id, view] : priv->views) {
+    const guint64 bit = guint64{1} << view_id;
+    if (view.left_out && !(priv->left_out & bit))
+      GST_ELEMENT_WARNING (self, STREAM, FAILED,
+          ("View %d contradicts the other views and is left out.", view_id),
+          ("%.0f %% of its points agree with theirs; check its pose in the rig and its depth",
+              100 * view.consistency));
+    else if (!view.left_out && (priv->left_out & bit))
+      GST_INFO_OBJECT (self, "view %d agrees again", view_id);
+    priv->left_out = view.left_out ? priv->left_out | bit : priv->left_out & ~bit;
+  }
+}
+
+static GstFlowReturn
+gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  const rangecast::CylinderSettings settings = priv->settings;
+  const rangecast::ColourSettings colours = {priv->balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
+      priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
+  const rangecast::AgreementSettings agree = {(priv->agree & GST_CYLINDER_FILTER_AGREE_POSES) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_DEPTH) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_VIEWS) != 0,
+      (priv->agree & GST_CYLINDER_FILTER_AGREE_POINTS) != 0, settings.threads};
+  guard.unlock ();
+  if (off)
+    return GST_FLOW_OK;
+
+  rangecast::CylinderResult result;
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+    return frame.status ().ok () ? gst_cylinder_filter_process (
+                                       self, frame.views (), agree, colours, settings, result)
+                                 : frame.status ();
+  });
+  if (status.ok ()) {
+    gst_cylinder_filter_count (priv, result);
+    gst_cylinder_filter_warn_left_out (self);
+  }
+  GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
+      result.points_out, result.points_in);
+  priv->reporter.passed (GST_ELEMENT (self), buffer);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+static gboolean
+gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  /* Serialised with the data: axis, winners and gains start anew after a seek, what is known of the
+   * rig with another stream. */
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    gst_cylinder_filter_forget_moment (priv);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
+    const gchar *stream_id = nullptr;
+    gst_event_parse_stream_start (event, &stream_id);
+    gchar *last = gst_pad_get_stream_id (base->sinkpad); /* it takes this event afterwards */
+    gst_cylinder_filter_forget_moment (priv);
+    if (g_strcmp0 (last, stream_id) != 0)
+      gst_cylinder_filter_forget (priv);
+    g_free (last);
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    priv->reporter.finish ();
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
+}
+
+static std::vector<StatsRow>
+gst_cylinder_filter_collect (GstElement *element)
+{
+  auto priv = GST_CYLINDER_FILTER (element)->priv;
+  const std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->counts.frames + priv->counts.untouched,
+               .points = priv->counts.points_out}}};
+}
+
+static gboolean
+gst_cylinder_filter_start (GstBaseTransform *base)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  gst_cylinder_filter_forget (priv);
+  priv->was_off = false;
+  priv->left_out = 0;
+  priv->reporter.start (GST_ELEMENT (base), gst_cylinder_filter_collect);
+  const std::lock_guard guard (priv->lock);
+  priv->counts = {};
+  return TRUE;
+}
+
+static gboolean
+gst_cylinder_filter_stop (GstBaseTransform *base)
+{
+  GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
+  const StreamLock lock (base);
+  /* With the stream its memory goes too. */
+  GST_CYLINDER_FILTER (base)->priv->has_rig = false;
+  GST_CYLINDER_FILTER (base)->priv->core = {};
+  GST_CYLINDER_FILTER (base)->priv->agreement = {};
+  GST_CYLINDER_FILTER (base)->priv->colours = {};
+  return TRUE;
+}
+
+/* ---- properties ---- */
+
+/* A GstValueArray of three doubles. */
+static bool
+get_vector (const GValue *value, rangecast::Vec3 &vector)
+{
+  double v[3];
+  if (gst_value_array_get_size (value) != 3)
+    return false;
+  for (guint i = 0; i < 3; i++) {
+    const GValue *item = gst_value_array_get_value (value, i);
+    GValue number = G_VALUE_INIT;
+    g_value_init (&number, G_TYPE_DOUBLE);
+    if (!g_value_transform (item, &number) || !std::isfinite (g_value_get_double (&number)))
+      return false;
+    v[i] = g_value_get_double (&number);
+  }
+  vector = {v[0], v[1], v[2]};
+  return true;
+}
+
+static void
+set_vector (GValue *array, rangecast::Vec3 vector)
+{
+  for (double number : {vector.x, vector.y, vector.z}) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, G_TYPE_DOUBLE);
+    g_value_set_double (&value, number);
+    gst_value_array_append_and_take_value (array, &value);
+  }
+}
+
+static void
+gst_cylinder_filter_set_axis_vector (GstCylinderFilter *self, guint id, const GValue *value)
+{
+  rangecast::Vec3 vector;
+  const bool direction = id == PROP_AXIS_DIRECTION;
+  const bool good = get_vector (value, vector) && norm (vector) < 1e6;
+  if (!good || (direction && norm (vector) < 1e-6)) {
+    GST_WARNING_OBJECT (self, "%s: expected three numbers, a length%s below 1e6; not changed",
+        direction ? "axis-direction" : "axis-position", direction ? " from 1e-6 to" : "");
+    return;
+  }
+  const std::lock_guard guard (self->priv->lock);
+  rangecast::Axis &axis = self->priv->settings.fixed_axis;
+  (direction ? axis.direction : axis.position) = vector;
+}
+
+static void
+gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto self = GST_CYLINDER_FILTER (object);
+  if (id == PROP_AXIS_POSITION || id == PROP_AXIS_DIRECTION)
+    return gst_cylinder_filter_set_axis_vector (self, id, value);
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return self->priv->reporter.set_interval (g_value_get_uint (value));
+  const std::lock_guard guard (self->priv->lock);
+  rangecast::CylinderSettings &settings = self->priv->settings;
+  switch (id) {
+    case PROP_MODE: /* before_transform sets passthrough to match */
+      self->priv->mode = static_cast<GstCylinderFilterMode> (g_value_get_enum (value));
+      break;
+    case PROP_COLOUR_BALANCE:
+      self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
+      break;
+    case PROP_AGREE:
+      self->priv->agree = g_value_get_flags (value);
+      break;
+    case PROP_BLEND_WIDTH:
+      self->priv->blend_width = g_value_get_double (value);
+      break;
+    case PROP_AXIS:
+      settings.axis = static_cast<rangecast::AxisMode> (g_value_get_enum (value));
+      break;
+    case PROP_UNIT_HEIGHT:
+      settings.units.unit_height_m = g_value_get_double (value);
+      break;
+    case PROP_COLUMNS:
+      settings.units.columns = g_value_get_int (value);
+      break;
+    case PROP_LAYER_GAP:
+      settings.units.layer_gap_m = g_value_get_double (value);
+      break;
+    case PROP_SMOOTHING:
+      settings.units.smoothing_m = g_value_get_double (value);
+      break;
+    case PROP_OVERLAP:
+      settings.overlap = g_value_get_double (value);
+      break;
+    case PROP_HYSTERESIS:
+      settings.hysteresis = g_value_get_double (value);
+      break;
+    case PROP_AGREEMENT:
+      settings.agreement = g_value_get_double (value);
+      break;
+    case PROP_BODIES:
+      settings.bodies = g_value_get_int (value);
+      break;
+    case PROP_N_THREADS:
+      settings.threads = g_value_get_int (value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
+{
+  GValue array = G_VALUE_INIT;
+  g_value_init (&array, GST_TYPE_ARRAY);
+  for (const auto &[view_id, view] : priv->views) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, GST_TYPE_STRUCTURE);
+    g_value_take_boxed (&value,
+        gst_structure_new ("view", "view-id", G_TYPE_INT, view_id, "moved", G_TYPE_DOUBLE,
+            1000 * norm (view.correction.translation), "turned", G_TYPE_DOUBLE,
+            180 / M_PI * norm (view.correction.rotation), "consistency", G_TYPE_DOUBLE,
+            view.consistency, "left-out", G_TYPE_BOOLEAN, gboolean (view.left_out), nullptr));
+    gst_value_array_append_and_take_value (&array, &value);
+  }
+  gst_structure_take_value (stats, "views", &array);
+}
+
+static GstStructure *
+gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
+{
+  const CylinderCounts &counts = priv->counts;
+  GstStructure *stats =
+      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
+          counts.frames, "points-contradicted", G_TYPE_UINT64, counts.points_contradicted,
+          "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
+          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
+          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
+  const char *names[] = {"axis-position", "axis-direction"};
+  const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
+  for (int i = 0; i < 2; i++) {
+    GValue array = G_VALUE_INIT;
+    g_value_init (&array, GST_TYPE_ARRAY);
+    set_vector (&array, vectors[i]);
+    gst_structure_take_value (stats, names[i], &array);
+  }
+  add_view_stats (stats, priv);
+  return stats;
+}
+
+static void
+gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto priv = GST_CYLINDER_FILTER (object)->priv;
+  const std::lock_guard guard (priv->lock);
+  const rangecast::CylinderSettings &settings = priv->settings;
+  switch (id) {
+    case PROP_MODE:
+      g_value_set_enum (value, priv->mode);
+      break;
+    case PROP_COLOUR_BALANCE:
+      g_value_set_enum (value, priv->balance);
+      break;
+    case PROP_AGREE:
+      g_value_set_flags (value, priv->agree);
+      break;
+    case PROP_BLEND_WIDTH:
+      g_value_set_double (value, priv->blend_width);
+      break;
+    case PROP_AXIS:
+      g_value_set_enum (value, int (settings.axis));
+      break;
+    case PROP_AXIS_POSITION:
+      set_vector (value, settings.fixed_axis.position);
+      break;
+    case PROP_AXIS_DIRECTION:
+      set_vector (value, settings.fixed_axis.direction);
+      break;
+    case PROP_UNIT_HEIGHT:
+      g_value_set_double (value, settings.units.unit_height_m);
+      break;
+    case PROP_COLUMNS:
+      g_value_set_int (value, settings.units.columns);
+      break;
+    case PROP_LAYER_GAP:
+      g_value_set_double (value, settings.units.layer_gap_m);
+      break;
+    case PROP_SMOOTHING:
+      g_value_set_double (value, settings.units.smoothing_m);
+      break;
+    case PROP_OVERLAP:
+      g_value_set_double (value, settings.overlap);
+      break;
+    case PROP_HYSTERESIS:
+      g_value_set_double (value, settings.hysteresis);
+      break;
+    case PROP_AGREEMENT:
+      g_value_set_double (value, settings.agreement);
+      break;
+    case PROP_BODIES:
+      g_value_set_int (value, settings.bodies);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_int (value, settings.threads);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+/* ---- life ---- */
+
+static void
+gst_cylinder_filter_finalize (GObject *object)
+{
+  delete GST_CYLINDER_FILTER (object)->priv;
+  G_OBJECT_CLASS (gst_cylinder_filter_parent_class)->finalize (object);
+}
+
+static void
+gst_cylinder_filter_init (GstCylinderFilter *self)
+{
+  self->priv = new GstCylinderFilterPrivate;
+  self->priv->settings.units = {
+      kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
+  self->priv->settings.overlap = kDefaultOverlap;
+  self->priv->settings.hysteresis = kDefaultHysteresis;
+  self->priv->settings.agreement = kDefaultAgreement;
+  self->priv->settings.bodies = kDefaultBodies;
+  self->priv->settings.threads = 0;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static GParamSpec *
+vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags flags)
+{
+  return gst_param_spec_array (name, nick, blurb,
+      g_param_spec_double ("number", "Number", "One of x, y, z", -G_MAXDOUBLE, G_MAXDOUBLE, 0,
+          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
+      flags);
+}
+
+static void
+install_colour_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
+      g_param_spec_enum ("colour-balance", "Colour balance",
+          "How colours of different cameras are made to agree (default: auto)",
+          GST_TYPE_CYLINDER_FILTER_BALANCE, GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
+  g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
+      g_param_spec_double ("blend-width", "Blend width",
+          "For mode=blend: how far from a seam colours are blended, metres, 0 to 1 (default: 0.02)",
+          0, 1, kDefaultBlendWidth, controllable));
+}
+
+static void
+install_agree_property (GObjectClass *object_class, GParamFlags flags)
+{
+  g_object_class_install_property (object_class, PROP_AGREE,
+      g_param_spec_flags ("agree", "Agree",
+          "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
+          "rig), depth (depths of one surface move together), views (one that contradicts the "
+          "others is left out), points (those that another view sees through, in another colour, "
+          "are cleared; needs colour-balance=auto), or none (default: poses+views+points)",
+          GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
+          GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
+}
+
+static void
+install_axis_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_MODE,
+      g_param_spec_enum ("mode", "Mode", "What happens to points seen twice (default: winner)",
+          GST_TYPE_CYLINDER_FILTER_MODE, GST_CYLINDER_FILTER_WINNER, controllable));
+  g_object_class_install_property (object_class, PROP_AXIS,
+      g_param_spec_enum ("axis", "Axis", "Where the cylinder's axis lies (default: principal)",
+          GST_TYPE_CYLINDER_FILTER_AXIS, int (rangecast::AxisMode::kPrincipal), controllable));
+  g_object_class_install_property (object_class, PROP_AXIS_POSITION,
+      vector_spec ("axis-position", "Axis position",
+          "For axis=fixed: a point of the axis, <x, y, z> in the world, metres, less than 1e6 from "
+          "0 (default: <0, 0, 0>)",
+          flags));
+  g_object_class_install_property (object_class, PROP_BODIES,
+      g_param_spec_int ("bodies", "Bodies",
+          "Bodies that stand beside each other get a cylinder each, so many at most, 1 to 8; 1 is "
+          "one cylinder for all, and so is axis=fixed (default: 4)",
+          1, rangecast::kMaxBodies, kDefaultBodies, controllable));
+  g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
+      vector_spec ("axis-direction", "Axis direction",
+          "For axis=fixed: its direction, <x, y, z> in the world, length 1e-6 to 1e6 (default: <0, "
+          "1, 0>)",
+          flags));
+}
+
+static void
+install_unit_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_UNIT_HEIGHT,
+      g_param_spec_double ("unit-height", "Unit height",
+          "Height of a slice, metres, 0.0002 to 10 (default: 0.004)", 0.0002, 10,
+          kDefaultUnitHeight, controllable));
+  g_object_class_install_property (object_class, PROP_COLUMNS,
+      g_param_spec_int ("columns", "Columns", "Units round a slice, 8 to 3600 (default: 360)", 8,
+          3600, kDefaultColumns, controllable));
+  g_object_class_install_property (object_class, PROP_LAYER_GAP,
+      g_param_spec_double ("layer-gap", "Layer gap",
+          "Points of a unit whose radii lie further apart belong to different surfaces, metres, 0 "
+          "to 100 (default: 0.03)",
+          0, 100, kDefaultLayerGap, controllable));
+  g_object_class_install_property (object_class, PROP_SMOOTHING,
+      g_param_spec_double ("smoothing", "Smoothing",
+          "How far neighbours count in a unit's decision, metres, 0 to 1; 0 decides each unit "
+          "alone (default: 0.01)",
+          0, 1, kDefaultSmoothing, controllable));
+  g_object_class_install_property (object_class, PROP_OVERLAP,
+      g_param_spec_double ("overlap", "Overlap",
+          "How far round a point the surface of the view that stays must reach before it goes, "
+          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending "
+          "(default: 8)",
+          0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
+}
+
+static void
+install_steadiness_properties (GObjectClass *object_class, GParamFlags flags)
+{
+  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
+  g_object_class_install_property (object_class, PROP_HYSTERESIS,
+      g_param_spec_double ("hysteresis", "Hysteresis",
+          "A unit changes its view only if the other one looks at it more squarely by this cosine, "
+          "0 to 2; 0 forgets every frame (default: 0.2)",
+          0, 2, kDefaultHysteresis, controllable));
+  g_object_class_install_property (object_class, PROP_AGREEMENT,
+      g_param_spec_double ("agreement", "Agreement",
+          "Cosine that a view gains in a unit whose neighbours it won, 0 to 2 (default: 0.1)", 0, 2,
+          kDefaultAgreement, controllable));
+}
+
+static void
+gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+  const auto flags =
+      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+  object_class->set_property = gst_cylinder_filter_set_property;
+  object_class->get_property = gst_cylinder_filter_get_property;
+  object_class->finalize = gst_cylinder_filter_finalize;
+
+  install_colour_properties (object_class, flags);
+  install_agree_property (object_class, flags);
+  install_axis_properties (object_class, flags);
+  install_unit_properties (object_class, flags);
+  install_steadiness_properties (object_class, flags);
+  g_object_class_install_property (object_class, PROP_N_THREADS,
+      g_param_spec_int ("n-threads", "Threads",
+          "Views and slices worked on at the same time, 0 to 64; 0 = number of cores (default: 0)",
+          0, 64, 0, flags));
+  g_object_class_install_property (object_class, PROP_STATS,
+      g_param_spec_boxed ("stats", "Statistics",
+          "frames, points-contradicted, points-in, points-out, units, units-shared, units-held, "
+          "units-changed since "
+          "READY; bodies, axis-position, axis-direction, views (consistency and corrections) of "
+          "the last frame",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
+      "Clears the points that several views see of the same place, but for the best view's",
+      "gst-rangecast");
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AGREE, GstPluginAPIFlags (0));
+  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_BALANCE, GstPluginAPIFlags (0));
+
+  transform_class->set_caps = gst_cylinder_filter_set_caps;
+  transform_class->submit_input_buffer = gst_cylinder_filter_submit_input_buffer;
+  transform_class->before_transform = gst_cylinder_filter_before_transform;
+  transform_class->transform_ip = gst_cylinder_filter_transform_ip;
+  transform_class->transform_ip_on_passthrough = FALSE;
+  transform_class->sink_event = gst_cylinder_filter_sink_event;
+  transform_class->start = gst_cylinder_filter_start;
+  transform_class->stop = gst_cylinder_filter_stop;
+
+  GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
+}
