@@ -39,9 +39,9 @@ MappedCalibrationPictures::open (CalibrationPictures &pictures, std::size_t i)
   }
   const std::string &name = pictures.described[i].name;
   if (!source.reader_set)
-    status = {StatusCode::kUnsupported, "pad " + name + ": cannot convert the pictures to RGBx"};
+    status = {StatusCode::kUnsupported, "pad " + name + ": cannot convert the images to RGBx"};
   else if (!source.reader.open (pictures.buffers[i]))
-    status = {StatusCode::kBadData, "pad " + name + ": a buffer is smaller than its caps say"};
+    status = {StatusCode::kBadData, "pad " + name + ": a buffer is smaller than its caps require"};
   else {
     open_.push_back (&source);
     views[i] = source.reader.view ();

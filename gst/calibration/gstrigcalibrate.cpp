@@ -112,7 +112,7 @@ calibrate (GstRigCalibrate *self, std::stop_token stop)
   GstRigCalibratePrivate *priv = self->priv;
   const std::string location = current_properties (self).location;
   rangecast::CalibrationResult result;
-  Status status = {StatusCode::kNotFound, "there were no pictures to calibrate from"};
+  Status status = {StatusCode::kNotFound, "there were no images to calibrate from"};
   if (!priv->session.cameras ().empty ())
     status = priv->session.calibrate (result, std::move (stop));
   if (status.ok ()) {
@@ -341,10 +341,10 @@ nothing_came (GstRigCalibrate *self, const CalibrationSources &cameras)
     return {};
   if (const CalibrationSource *camera = without_caps (cameras))
     return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
-                                       ": no pictures came; expected some on every pad"};
-  return {StatusCode::kNotFound,
-      "no pictures of the same time came on all pads; expected capture times that differ by less "
-      "than half a frame, or by max-skew"};
+                                       ": no images arrived; expected some on every pad"};
+  return {
+      StatusCode::kNotFound, "no images with matching times arrived on all pads; expected capture "
+                             "times that differ by less than half a frame, or by max-skew"};
 }
 
 /* All pads have ended: calibrates, unless that was done already. */
@@ -423,7 +423,7 @@ take_caps (GstRigCalibrate *self, CalibrationSource &camera, GstCaps *caps)
   const std::string name = calibration_camera (camera.pad).name;
   GstVideoInfo info;
   if (!gst_video_info_from_caps (&info, caps))
-    return {StatusCode::kUnsupported, "pad " + name + ": these are not the caps of pictures"};
+    return {StatusCode::kUnsupported, "pad " + name + ": not the caps of raw video"};
   bool begun;
   {
     std::lock_guard guard (self->priv->lock);
@@ -431,7 +431,7 @@ take_caps (GstRigCalibrate *self, CalibrationSource &camera, GstCaps *caps)
   }
   if (begun && camera.has_info &&
       (info.width != camera.info.width || info.height != camera.info.height))
-    return {StatusCode::kBadSize, "pad " + name + ": pictures changed from " +
+    return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
                                       size_text (camera.info.width, camera.info.height) + " to " +
                                       size_text (info.width, info.height) +
                                       "; expected one size throughout a calibration"};
@@ -670,8 +670,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   install_calibration_properties (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters of moments since start: examined, taken, skipped (live, while busy), and "
-          "pictures dropped (no partner)",
+          "Counters since the element was started: examined, taken, skipped, dropped",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   install_signals (klass);
 
@@ -680,7 +679,8 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Rig calibration", "Analyzer/Video",
-      "Calibrates cameras and their poses from pictures of a board", "gst-rangecast");
+      "Calibrates cameras, stereo pairs and their poses from images of a calibration board",
+      "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
 
   element_class->change_state = gst_rig_calibrate_change_state;

@@ -21,7 +21,8 @@ gst_rig_calibrate_role_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (CameraRole::kLeft), "The view's own camera, left of a stereo pair", "left"},
+        {int (CameraRole::kLeft), "Left camera of a stereo pair, or the only camera of a view",
+            "left"},
         {int (CameraRole::kRight), "Right camera of a stereo pair", "right"},
         {int (CameraRole::kThird), "Third camera of a view", "third"}, {}};
     return g_enum_register_static ("GstRigCalibrateRole", values);
@@ -93,10 +94,10 @@ gst_rig_calibrate_pad_class_init (GstRigCalibratePadClass *klass)
       GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
   g_object_class_install_property (object_class, PROP_VIEW,
       g_param_spec_int ("view", "View",
-          "View-id of the view that the camera belongs to (0 to 63, default: the pad's number)", 0,
+          "view-id of the view that the camera belongs to (default: the number of the pad)", 0,
           rangecast::kMaxViews - 1, 0, kReady));
   g_object_class_install_property (object_class, PROP_ROLE,
-      g_param_spec_enum ("role", "Role", "What the camera is to its view (default: left)",
+      g_param_spec_enum ("role", "Role", "Role of the camera in its view",
           GST_TYPE_RIG_CALIBRATE_ROLE, int (CameraRole::kLeft), kReady));
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_ROLE, GstPluginAPIFlags (0));
 }

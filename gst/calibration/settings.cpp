@@ -42,9 +42,10 @@ gst_rig_calibrate_selection_get_type (void)
   static const GType type = [] {
     static const GEnumValue values[] = {
         {int (CalibrationSelection::kAuto),
-            "All of photographs (not live, at most 2 a second), spread otherwise", "auto"},
-        {int (CalibrationSelection::kAll), "Every frame with a board", "all"},
-        {int (CalibrationSelection::kSpread), "Where the board is still, sharp, and lies otherwise",
+            "'all' for still images (not live, at most 2 per second), else 'spread'", "auto"},
+        {int (CalibrationSelection::kAll), "Keep every frame that shows the board", "all"},
+        {int (CalibrationSelection::kSpread),
+            "Keep frames in which the board is still, sharp and at a new place, size or tilt",
             "spread"},
         {}};
     return g_enum_register_static ("GstRigCalibrateSelection", values);
@@ -60,8 +61,8 @@ gst_rig_calibrate_distortion_get_type (void)
     static const GEnumValue values[] = {{int (DistortionModel::kNone), "No distortion", "none"},
         {int (DistortionModel::kFour), "k1 k2 p1 p2", "four"},
         {int (DistortionModel::kFive), "k1 k2 p1 p2 k3", "five"},
-        {int (DistortionModel::kEight), "k1 k2 p1 p2 k3 k4 k5 k6: rational, for wide angles",
-            "eight"},
+        {int (DistortionModel::kEight),
+            "k1 k2 p1 p2 k3 k4 k5 k6 (rational model, for wide-angle lenses)", "eight"},
         {}};
     return g_enum_register_static ("GstRigCalibrateDistortion", values);
   }();
@@ -74,11 +75,12 @@ gst_rig_calibrate_world_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (WorldFrame::kCentre), "Origin where the cameras look, first view on +z", "centre"},
+        {int (WorldFrame::kCentre),
+            "Origin at the point that the cameras look at, first view on +z", "centre"},
         {int (WorldFrame::kFirstView), "Origin in the first view, which looks along -z",
             "first-view"},
-        {int (WorldFrame::kBoard), "The first frame's board is the floor, origin in its middle",
-            "board"},
+        {int (WorldFrame::kBoard),
+            "Origin in the middle of the first frame's board, which defines the floor", "board"},
         {}};
     return g_enum_register_static ("GstRigCalibrateWorld", values);
   }();
@@ -118,45 +120,40 @@ static void
 install_board_properties (GObjectClass *c)
 {
   const rangecast::BoardSpec &board = kDefaults.core.board;
-  install_enum (c, kCalibrationBoard, "board", "Board", "Kind of board (default: chessboard)",
+  install_enum (c, kCalibrationBoard, "board", "Board", "Type of the calibration board",
       GST_TYPE_RIG_CALIBRATE_BOARD, int (board.kind));
   install_int (c, kCalibrationColumns, "columns", "Columns",
-      "Inner corners across the board, one less than squares (3 to 32, default 9)", 3, 32,
-      board.columns);
+      "Number of inner corners per row, one less than the number of squares", 3, 32, board.columns);
   install_int (c, kCalibrationRows, "rows", "Rows",
-      "Inner corners down the board, one less than squares (3 to 32, default 6)", 3, 32,
-      board.rows);
+      "Number of inner corners per column, one less than the number of squares", 3, 32, board.rows);
   install_double (c, kCalibrationSquareSize, "square-size", "Square size",
-      "Side of a square, metres (0.0001 to 10, default 0.025)", 1e-4, 10, board.square_m);
+      "Side length of a square in metres", 1e-4, 10, board.square_m);
   install_double (c, kCalibrationMarkerSize, "marker-size", "Marker size",
-      "ChArUco: side of a marker, metres (less than a square, default 0: 3/4 of a square)", 0, 10,
-      board.marker_m);
+      "Side length of a ChArUco marker in metres (0 = 3/4 of a square)", 0, 10, board.marker_m);
   install_enum (c, kCalibrationDictionary, "dictionary", "Dictionary",
-      "ChArUco: the markers' dictionary (default: 4x4-50)", GST_TYPE_RIG_CALIBRATE_DICTIONARY,
-      board.dictionary);
+      "Dictionary of the ChArUco markers", GST_TYPE_RIG_CALIBRATE_DICTIONARY, board.dictionary);
 }
 
 static void
 install_frame_properties (GObjectClass *c)
 {
   install_int (c, kCalibrationMinFrames, "min-frames", "Minimum frames",
-      "Frames in which each camera must have seen the board (3 to 1000, default 8)", 3, 1000,
+      "Number of frames in which each camera must have seen the board", 3, 1000,
       kDefaults.core.min_frames);
   install_int (c, kCalibrationMaxFrames, "max-frames", "Maximum frames",
-      "Frames to keep; then the one most like others makes room (3 to 1000, default 100)", 3, 1000,
+      "Maximum number of frames to keep; beyond it the most redundant frame is replaced", 3, 1000,
       kDefaults.max_frames);
-  install_enum (c, kCalibrationSelection, "selection", "Selection",
-      "Which frames to keep (default: auto)", GST_TYPE_RIG_CALIBRATE_SELECTION,
-      int (kDefaults.selection));
+  install_enum (c, kCalibrationSelection, "selection", "Selection", "Which frames to keep",
+      GST_TYPE_RIG_CALIBRATE_SELECTION, int (kDefaults.selection));
   g_object_class_install_property (c, kCalibrationAutoFinish,
-      g_param_spec_boolean ("auto-finish", "Finish automatically",
-          "Calibrate and end the stream as soon as the coverage is complete, with an error if that "
-          "cannot be done (default: false)",
+      g_param_spec_boolean ("auto-finish", "Automatic finish",
+          "Calibrate and send EOS as soon as the board was seen often enough by every camera; post "
+          "an error if the calibration fails",
           kDefaults.auto_finish, kReady));
   g_object_class_install_property (c, kCalibrationMaxSkew,
       g_param_spec_uint64 ("max-skew", "Maximum skew",
-          "Pictures whose capture times differ by no more belong together, ns (default 0: half a "
-          "frame period, or 5 ms where the frame rate is unknown)",
+          "Maximum difference of the capture times of one set in nanoseconds (0 = half a frame "
+          "period, or 5 ms if the frame rate is unknown)",
           0, G_MAXINT64, kDefaults.max_skew, kReady));
 }
 
@@ -166,22 +163,20 @@ install_calibration_properties (GObjectClass *c)
   install_board_properties (c);
   install_frame_properties (c);
   g_object_class_install_property (c, kCalibrationLocation,
-      g_param_spec_string ("location", "Location",
-          "Rig file to write, .yaml, .yml or .json (default: none)", nullptr, kReady));
+      g_param_spec_string (
+          "location", "Location", "Rig file to write (.yaml, .yml or .json)", nullptr, kReady));
   install_enum (c, kCalibrationDistortion, "distortion", "Distortion",
-      "Coefficients of the lens model (default: five)", GST_TYPE_RIG_CALIBRATE_DISTORTION,
+      "Distortion coefficients of the lens model", GST_TYPE_RIG_CALIBRATE_DISTORTION,
       int (kDefaults.core.distortion));
-  install_enum (c, kCalibrationWorld, "world", "World", "Where the world lies (default: centre)",
-      GST_TYPE_RIG_CALIBRATE_WORLD, int (kDefaults.core.world));
+  install_enum (c, kCalibrationWorld, "world", "World",
+      "Origin and orientation of the world coordinate system", GST_TYPE_RIG_CALIBRATE_WORLD,
+      int (kDefaults.core.world));
   install_double (c, kCalibrationNear, "near", "Near",
-      "Nearest depth of interest, written into all views, metres (0.001 to 1000, default 0.3)",
-      0.001, 1000, kDefaults.core.near_m);
+      "Near limit written into all views of the rig in metres", 0.001, 1000, kDefaults.core.near_m);
   install_double (c, kCalibrationFar, "far", "Far",
-      "Farthest depth of interest, written into all views, metres (0.001 to 1000, default 3)",
-      0.001, 1000, kDefaults.core.far_m);
+      "Far limit written into all views of the rig in metres", 0.001, 1000, kDefaults.core.far_m);
   install_int (c, kCalibrationTileWidth, "tile-width", "Tile width",
-      "Width of each camera's picture in the output, pixels, even (32 to 4096, default 480)", 32,
-      4096, kDefaults.tile_width);
+      "Width of each camera's tile in the output in pixels, even", 32, 4096, kDefaults.tile_width);
 }
 
 bool

@@ -107,7 +107,7 @@ camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const st
   const SizeRange widths = common_range (cameras, true), heights = common_range (cameras, false);
   GstCaps *caps = gst_caps_new_empty ();
   if (widths.least > widths.most || heights.least > heights.most) {
-    why = "the cameras have no picture size in common";
+    why = "the cameras have no image size in common";
     return caps;
   }
   for (const std::string &name : common_formats (cameras))

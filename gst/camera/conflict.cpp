@@ -64,7 +64,7 @@ conflict_of (GstCaps *asked, GstCaps *there, const std::string &pad, const std::
              "; " + whose + " " + values_of (there, field);
   gchar *text = gst_caps_to_string (asked);
   std::string all = "pad " + pad + ": downstream asks for " + text +
-                    ", which no format of the cameras has together";
+                    ", a combination that no common format of the cameras has";
   g_free (text);
   return all;
 }
@@ -88,5 +88,5 @@ caps_conflict (GstCaps *offered, std::span<GstPad *const> pads)
     left = both;
   }
   gst_caps_unref (left);
-  return text.empty () ? "downstream takes none of the cameras' formats" : text;
+  return text.empty () ? "downstream accepts none of the cameras' formats" : text;
 }

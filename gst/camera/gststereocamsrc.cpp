@@ -305,8 +305,7 @@ start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
   setup.previous = self->priv->current ();
   auto session = CamSourceSession::begin (std::move (setup));
   if (!session) {
-    GST_ELEMENT_ERROR (
-        self, RESOURCE, FAILED, ("The system gives no thread for the cameras"), (nullptr));
+    GST_ELEMENT_ERROR (self, RESOURCE, FAILED, ("Could not start the camera thread"), (nullptr));
     return false;
   }
   std::lock_guard guard (self->priv->lock);
@@ -328,7 +327,7 @@ close (GstStereoCamSrc *self)
 {
   const auto session = self->priv->current ();
   if (session && !session->wait_for_cameras (kGiveBack))
-    GST_INFO_OBJECT (self, "a camera does not answer; it is given back later");
+    GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
 }
 
 static GstStateChangeReturn
@@ -463,7 +462,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->finalize = gst_stereo_cam_src_finalize;
   CamSourceSettings::install (object_class);
   g_object_class_install_property (object_class, kStats,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was last started",
+      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, kStatsInterval);
   install_capture (klass);
@@ -472,7 +471,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Stereo camera source",
       "Source/Video/Hardware",
-      "Two or three GigE or USB3 Vision cameras that take their pictures together",
+      "Captures synchronised images from two or three GigE Vision or USB3 Vision cameras",
       "gst-rangecast");
 
   element_class->send_event = gst_stereo_cam_src_send_event;

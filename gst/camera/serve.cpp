@@ -60,9 +60,8 @@ CamSourceSession::begin_to_play ()
   GstClock *clock = gst_element_get_clock (element_);
   if (clock_ && clock && clock != clock_)
     GST_ELEMENT_WARNING (element_, CORE, CLOCK,
-        ("The pipeline does not use the clock of clock-server %s, but another element's: pictures "
-         "of "
-         "different hosts will not be taken together",
+        ("The pipeline uses another clock than that of clock-server %s: images of different hosts "
+         "will not be captured simultaneously",
             settings_.clock_server.c_str ()),
         ("it uses %s", GST_OBJECT_NAME (clock)));
   if (settings_.action_scheduled && settings_.trigger == TriggerMode::kAction)
@@ -202,11 +201,10 @@ CamSourceSession::watch_clock (std::int64_t now_ns, std::int64_t most_ns)
   if (!fires () || now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) <= most_ns)
     return;
   fail ({CameraFault::kTimedOut,
-      "the pipeline's clock does not go on: no tick for " + std::to_string (most_ns / kSecond) +
-          " s" +
-          (settings_.clock_server.empty () ? ""
-                                           : "; is clock-server " + settings_.clock_server +
-                                                 " still the one that it was?")});
+      "the pipeline clock has stopped: no tick for" + std::to_string (most_ns / kSecond) + " s" +
+          (settings_.clock_server.empty ()
+                  ? ""
+                  : "; is clock-server " + settings_.clock_server + " still the same server?")});
 }
 
 /* Cameras that must send pictures, and answer, but send none. */
@@ -228,11 +226,10 @@ CamSourceSession::watch_cameras (std::int64_t now_ns)
     const std::int64_t last =
         std::max (pairing_.last_arrival (static_cast<int> (i)), playing_since_ns_);
     if (now_ns - last > most && !pulses_[i].is_doubtful ())
-      fail ({CameraFault::kTimedOut, cameras_[i]->label () + ": no picture for " +
-                                         std::to_string ((now_ns - last) / kSecond) +
-                                         " s, although it answers; expected one each frame period "
-                                         "(is the way for its packets open, is its trigger "
-                                         "connected?)"});
+      fail ({CameraFault::kTimedOut,
+          cameras_[i]->label () + ": no picture for " + std::to_string ((now_ns - last) / kSecond) +
+              " s, although it answers; expected one each frame period (does a firewall block its "
+              "packets, is its trigger connected?)"});
   }
 }
 
@@ -255,15 +252,15 @@ CamSourceSession::warn_once (const CameraStatistics &all)
 {
   if (keeps_buffers () && !std::exchange (said_underruns_, true))
     GST_ELEMENT_WARNING (element_, RESOURCE, NO_SPACE_LEFT,
-        ("Pictures are lost because downstream keeps all buffers of a camera: raise property "
+        ("Images are lost because downstream holds all buffers of a camera: raise the property "
          "buffers above %d, or make downstream faster",
             settings_.n_buffers),
         (nullptr));
   if (all.failures > 20 && all.failures > all.completed / 4 &&
       !std::exchange (said_incomplete_, true))
     GST_ELEMENT_WARNING (element_, RESOURCE, READ,
-        ("Many pictures arrive without all of their packets: lower packet-size to the network's "
-         "MTU, raise packet-delay or the receive buffers"),
+        ("Many images arrive incomplete: lower packet-size to the network's MTU, raise "
+         "packet-delay or the socket receive buffers"),
         ("%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT, guint64 (all.failures),
             guint64 (all.failures + all.completed)));
 }

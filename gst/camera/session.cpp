@@ -126,7 +126,7 @@ CamSourceSession::one_guarded_life ()
   try {
     return one_life ();
   } catch (const std::exception &e) {
-    fail ({CameraFault::kFailed, std::string ("the cameras cannot be served: ") + e.what ()});
+    fail ({CameraFault::kFailed, std::string ("cannot run the camera loop: ") + e.what ()});
     return End::kFault;
   }
 }

@@ -11,13 +11,12 @@ GType
 gst_stereo_cam_src_trigger_get_type (void)
 {
   static const GEnumValue values[] = {
-      {gint (TriggerMode::kFreeRun), "Each camera at its own frame rate; nearest pictures pair",
-          "free-run"},
+      {gint (TriggerMode::kFreeRun),
+          "Cameras run freely at their frame rate; the nearest frames are paired", "free-run"},
       {gint (TriggerMode::kSoftware),
-          "This element fires all cameras at multiples of the frame period of the clock",
-          "software"},
-      {gint (TriggerMode::kHardware), "A signal on trigger-line fires all cameras", "hardware"},
-      {gint (TriggerMode::kAction), "GigE Vision action commands fire all cameras of a rig",
+          "Software trigger at multiples of the frame period on the pipeline clock", "software"},
+      {gint (TriggerMode::kHardware), "Electrical signal on trigger-line", "hardware"},
+      {gint (TriggerMode::kAction), "GigE Vision action commands to all cameras of a rig",
           "action"},
       {0, nullptr, nullptr},
   };
@@ -50,87 +49,84 @@ struct SwitchRow {
 #define FIELD(type, member) [] (Settings &s) -> type & { return s.member; }
 
 static const TextRow kTexts[] = {
-    {"left", "Left camera", "Name, serial number, address or Aravis id of the left camera",
+    {"left", "Left camera", "Left camera: name, serial number, IP or MAC address, or Aravis id",
         FIELD (std::string, names[0])},
-    {"right", "Right camera", "Name, serial number, address or Aravis id of the right camera",
+    {"right", "Right camera", "Right camera: name, serial number, IP or MAC address, or Aravis id",
         FIELD (std::string, names[1])},
-    {"third", "Third camera",
-        "Name, serial number, address or Aravis id of a third camera (default: none)",
+    {"third", "Third camera", "Third camera: name, serial number, IP or MAC address, or Aravis id",
         FIELD (std::string, names[2])},
-    {"rig", "Rig", "Rig file that names the cameras of view-id, instead of left, right and third",
+    {"rig", "Rig", "Rig file that names the cameras of the view, used if left and right are unset",
         FIELD (std::string, rig)},
     {"format", "Pixel format",
-        "GenICam pixel format, as Mono8 or BayerRG8 (default: what downstream takes)",
+        "GenICam pixel format, such as Mono8 or BayerRG8 (unset = negotiated with downstream)",
         FIELD (std::string, format)},
     {"features", "Features",
-        "GenICam features to set in all cameras, last of all: \"Name=Value Name=Value ...\"",
+        "GenICam features to set on all cameras after all other settings: \"Name=Value Name=Value "
+        "Command ...\"",
         FIELD (std::string, features)},
-    {"trigger-line", "Trigger line", "trigger=hardware: input line of the cameras (default Line1)",
+    {"trigger-line", "Trigger line", "Input line of the cameras for trigger=hardware",
         FIELD (std::string, trigger_line)},
     {"output-line", "Output line",
-        "trigger=hardware: output line of the left camera, which then runs free and fires the "
-        "others (default: none, the signal comes from elsewhere)",
+        "Output line of the left camera for trigger=hardware; the left camera then runs freely and "
+        "triggers the others (unset = external signal)",
         FIELD (std::string, output_line)},
     {"clock-server", "Clock server",
-        "Clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or ptp:DOMAIN "
-        "(default: none)",
+        "Network clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or "
+        "ptp:DOMAIN",
         FIELD (std::string, clock_server)},
 };
 
 static const IntegerRow kIntegers[] = {
-    {"view-id", "View id", "View of the rig file, 0 to 63 (default 0)", 0, 63,
+    {"view-id", "View ID", "View of the rig file that names the cameras", 0, 63,
         FIELD (int, view_id)},
-    {"offset-x", "Offset x", "Left edge of the region on the sensor, pixels (default -1: middle)",
-        -1, 65535, FIELD (int, offset_x)},
-    {"offset-y", "Offset y", "Top edge of the region on the sensor, pixels (default -1: middle)",
-        -1, 65535, FIELD (int, offset_y)},
+    {"offset-x", "Offset x",
+        "Left edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
+        FIELD (int, offset_x)},
+    {"offset-y", "Offset y",
+        "Top edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
+        FIELD (int, offset_y)},
     {"packet-size", "Packet size",
-        "GigE: bytes with headers; 0: the largest that gets through, -1: as set (default 0)", -1,
-        65535, FIELD (int, packet_size)},
+        "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 = "
+        "leave unchanged)",
+        -1, 65535, FIELD (int, packet_size)},
     {"buffers", "Buffers",
-        "Pictures of each camera that may be under way, downstream and in it (default 8)", 2, 256,
+        "Number of buffers per camera, shared by the camera's stream and downstream", 2, 256,
         FIELD (int, n_buffers)},
-    {"num-buffers", "num-buffers",
-        "Sets, one picture of each camera, to put out before EOS (default -1: no end)", -1,
+    {"num-buffers", "num-buffers", "Number of image sets to output before EOS (-1 = unlimited)", -1,
         G_MAXINT, FIELD (int, num_buffers)},
 };
 
 static const UnsignedRow kUnsigneds[] = {
-    {"action-device-key", "Action device key",
-        "trigger=action: the cameras' ActionDeviceKey (default 0x52414e47)",
+    {"action-device-key", "Action device key", "ActionDeviceKey of the cameras for trigger=action",
         FIELD (guint, action_device_key)},
-    {"action-group-key", "Action group key",
-        "trigger=action: the cameras' ActionGroupKey (default 1)", FIELD (guint, action_group_key)},
-    {"action-group-mask", "Action group mask",
-        "trigger=action: the cameras' ActionGroupMask (default 1)",
+    {"action-group-key", "Action group key", "ActionGroupKey of the cameras for trigger=action",
+        FIELD (guint, action_group_key)},
+    {"action-group-mask", "Action group mask", "ActionGroupMask of the cameras for trigger=action",
         FIELD (guint, action_group_mask)},
 };
 
 static const SwitchRow kSwitches[] = {
-    {"auto-exposure", "Automatic exposure", "The left camera sets its exposure time by itself",
+    {"auto-exposure", "Automatic exposure", "Automatic exposure time on the left camera",
         FIELD (bool, auto_exposure)},
-    {"auto-gain", "Automatic gain", "The left camera sets its gain by itself",
-        FIELD (bool, auto_gain)},
-    {"auto-white-balance", "Automatic white balance",
-        "The left camera sets its white balance by itself", FIELD (bool, auto_white_balance)},
+    {"auto-gain", "Automatic gain", "Automatic gain on the left camera", FIELD (bool, auto_gain)},
+    {"auto-white-balance", "Automatic white balance", "Automatic white balance on the left camera",
+        FIELD (bool, auto_white_balance)},
     {"lock-exposure", "Lock exposure",
-        "Give what the left camera sets by itself to the others, so that all look alike (default "
-        "true); else each sets its own",
+        "Copy the left camera's automatic settings to the other cameras (false = each camera "
+        "adjusts itself)",
         FIELD (bool, lock_exposure)},
-    {"packet-resend", "Packet resend", "GigE: ask for missing packets again (default true)",
+    {"packet-resend", "Packet resend", "Request retransmission of missing GigE Vision packets",
         FIELD (bool, packet_resend)},
     {"action-send", "Action send",
-        "trigger=action: this element sends the commands (default true); one of a rig does",
+        "Send the action commands for trigger=action; exactly one element per rig does",
         FIELD (bool, action_send)},
     {"action-scheduled", "Action scheduled",
-        "trigger=action: commands name the time, for cameras and pipeline on one PTP clock "
-        "(default "
-        "false)",
+        "Send action commands ahead of time with the time to execute them; requires cameras and "
+        "pipeline on one PTP clock",
         FIELD (bool, action_scheduled)},
-    {"single-shot", "Single shot", "Pictures only by the signal capture (default false)",
+    {"single-shot", "Single shot", "Capture only when the capture signal is emitted",
         FIELD (bool, single_shot)},
-    {"reconnect", "Reconnect",
-        "A camera that is gone is a warning, and comes back by itself (default false: an error)",
+    {"reconnect", "Reconnect", "Reconnect to a lost camera and post a warning instead of an error",
         FIELD (bool, reconnect)},
 };
 
@@ -161,19 +157,18 @@ static void
 install_numbers (GObjectClass *object_class)
 {
   g_object_class_install_property (object_class, PROP_TRIGGER,
-      g_param_spec_enum ("trigger", "Trigger", "What fires the cameras (default free-run)",
+      g_param_spec_enum ("trigger", "Trigger", "What triggers the cameras",
           GST_TYPE_STEREO_CAM_SRC_TRIGGER, gint (Settings{}.trigger), kFlags));
   g_object_class_install_property (object_class, PROP_EXPOSURE,
       g_param_spec_double ("exposure", "Exposure",
-          "Exposure time of all cameras, microseconds (default 0: as they are set)", 0, 1e9, 0,
-          kFlags));
+          "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0, 1e9, 0, kFlags));
   g_object_class_install_property (object_class, PROP_GAIN,
       g_param_spec_double ("gain", "Gain",
-          "Gain of all cameras in their unit, mostly dB (default -1: as they are set)", -1, 1000,
-          -1, kFlags));
+          "Gain of all cameras in their own unit, usually dB (-1 = leave unchanged)", -1, 1000, -1,
+          kFlags));
   g_object_class_install_property (object_class, PROP_PACKET_DELAY,
       g_param_spec_int64 ("packet-delay", "Packet delay",
-          "GigE: pause between packets, nanoseconds (default -1: as set)", -1,
+          "Delay between GigE Vision packets in nanoseconds (-1 = leave unchanged)", -1,
           G_GINT64_CONSTANT (1000000000), -1, kFlags));
 }
 
@@ -286,7 +281,7 @@ CamSourceSettings::find_names (CameraNames &found) const
     return {StatusCode::kNotFound,
         std::string ("no ") + (found[0].empty () ? "left" : "right") + " camera: property " +
             (found[0].empty () ? "right" : "left") +
-            " names one, so rig is not asked; expected both left and right, or neither and rig"};
+            " names one, so rig is ignored; expected both left and right, or neither and rig"};
   if (found[0].empty () || found[1].empty ())
     return {StatusCode::kNotFound, std::string ("no ") + (found[0].empty () ? "left" : "right") +
                                        " camera: expected property " +
@@ -308,7 +303,7 @@ CamSourceSettings::check () const
     return {StatusCode::kBadValue,
         std::string ("single-shot with trigger=") +
             (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware") +
-            ": the cameras are not fired by this element; expected trigger=software or action"};
+            ": this element does not trigger the cameras; expected trigger=software or action"};
   return {};
 }
 

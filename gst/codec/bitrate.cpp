@@ -28,35 +28,29 @@ NeighbourCodeRateSettings::install (GObjectClass *klass)
                                  GST_PARAM_MUTABLE_PLAYING | GST_PARAM_CONTROLLABLE);
   g_object_class_install_property (klass, PROP_TARGET_BITRATE,
       g_param_spec_uint ("target-bitrate", "Target bit rate",
-          "Bits per second of coded frame sets, which thresholds between those configured and the "
-          "max- ones are steered to (0 to 4294967295, default 0: thresholds are as configured)",
+          "Target bit rate in bits per second, kept by raising the thresholds up to their max- "
+          "limits (0 = constant thresholds)",
           0, G_MAXUINT, defaults.target_bitrate, live));
   g_object_class_install_property (klass, PROP_MAX_DEPTH_THRESHOLD,
       g_param_spec_int ("max-depth-threshold", "Maximum depth threshold",
-          "With target-bitrate the depth threshold is at most so many codes, or depth-threshold if "
-          "that is more (0 to 65535, default 32)",
-          0, 65535, defaults.max_depth_threshold, live));
+          "Upper limit of the depth threshold with target-bitrate, in quantisation steps", 0, 65535,
+          defaults.max_depth_threshold, live));
   g_object_class_install_property (klass, PROP_MAX_COLOUR_THRESHOLD,
       g_param_spec_int ("max-colour-threshold", "Maximum colour threshold",
-          "With target-bitrate the colour threshold is at most so many codes, or colour-threshold "
-          "if that is more (0 to 255, default 32)",
-          0, 255, defaults.max_colour_threshold, live));
+          "Upper limit of the colour threshold with target-bitrate, in quantisation steps", 0, 255,
+          defaults.max_colour_threshold, live));
   g_object_class_install_property (klass, PROP_ADAPTIVE_BITRATE,
       g_param_spec_boolean ("adaptive-bitrate", "Adaptive bit rate",
-          "The rate follows what receivers report (RTPTWCCPackets and RangecastReceiverReport "
-          "events from downstream), from min-bitrate to target-bitrate or, if that is 0, without "
-          "limit (default false)",
+          "Adapt the bit rate between min-bitrate and target-bitrate to the receiver reports "
+          "(RTPTWCCPackets and RangecastReceiverReport events)",
           defaults.adaptive, GParamFlags (live & ~GST_PARAM_CONTROLLABLE)));
   g_object_class_install_property (klass, PROP_MIN_BITRATE,
       g_param_spec_uint ("min-bitrate", "Minimum bit rate",
-          "With adaptive-bitrate, bits per second of coded frame sets at least, or target-bitrate "
-          "if that is less (1000 to 4294967295, default 200000)",
-          1000, G_MAXUINT, defaults.min_bitrate, live));
+          "Lower limit of the bit rate with adaptive-bitrate, in bits per second", 1000, G_MAXUINT,
+          defaults.min_bitrate, live));
   g_object_class_install_property (klass, PROP_MIN_FRAMERATE,
       gst_param_spec_fraction ("min-framerate", "Minimum frame rate",
-          "With adaptive-bitrate, where the max- thresholds still take more than there is, whole "
-          "frame sets are left out, evenly, but so many a second are kept (0/1 to 2147483647/1, "
-          "default 5/1)",
+          "Minimum number of frame sets per second to keep when adaptive-bitrate drops frame sets",
           0, 1, G_MAXINT, 1, defaults.min_fps_n, defaults.min_fps_d,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
 }

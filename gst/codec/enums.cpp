@@ -10,8 +10,7 @@ gst_neighbour_code_profile_get_type (void)
     static const GEnumValue values[] = {
         {int (rangecast::Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
         {int (rangecast::Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
-        {int (rangecast::Profile::kEntropy), "Adaptive probabilities and a range coder", "entropy"},
-        {}};
+        {int (rangecast::Profile::kEntropy), "Context model and range coder", "entropy"}, {}};
     return g_enum_register_static ("GstNeighbourCodeProfile", values);
   }();
   return type;
@@ -22,9 +21,10 @@ gst_neighbour_code_choice_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (rangecast::NeighbourChoice::kFirst), "Left, upper-left, upper, upper-right", "first"},
-        {int (rangecast::NeighbourChoice::kBest), "What costs least in error and bits, slower",
-            "best"},
+        {int (rangecast::NeighbourChoice::kFirst),
+            "First neighbour in the order left, upper-left, upper, upper-right", "first"},
+        {int (rangecast::NeighbourChoice::kBest),
+            "Neighbour with the least cost in error and bits; slower", "best"},
         {}};
     return g_enum_register_static ("GstNeighbourCodeChoice", values);
   }();
@@ -36,8 +36,10 @@ gst_neighbour_code_depth_scale_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (rangecast::DepthScale::kLinear), "Codes are linear in depth", "linear"},
-        {int (rangecast::DepthScale::kInverse), "Codes are linear in 1/depth", "inverse"}, {}};
+        {int (rangecast::DepthScale::kLinear), "Linear in depth", "linear"},
+        {int (rangecast::DepthScale::kInverse),
+            "Linear in 1/depth, as the errors of stereo cameras", "inverse"},
+        {}};
     return g_enum_register_static ("GstNeighbourCodeDepthScale", values);
   }();
   return type;

@@ -103,9 +103,8 @@ gst_neighbour_code_conceal_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {CONCEAL_INVALID, "Pixels of lost or damaged slices are invalid", "invalid"},
-        {CONCEAL_LAST, "Pixels of lost or damaged slices are those of the last frame set", "last"},
-        {}};
+        {CONCEAL_INVALID, "Leave pixels of lost or damaged slices invalid", "invalid"},
+        {CONCEAL_LAST, "Repeat the pixels of the last frame set", "last"}, {}};
     return g_enum_register_static ("GstNeighbourCodeConceal", values);
   }();
   return type;
@@ -548,31 +547,28 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   object_class->finalize = gst_neighbour_code_dec_finalize;
 
   g_object_class_install_property (object_class, PROP_CONCEAL,
-      g_param_spec_enum ("conceal", "Conceal",
-          "What becomes of pixels whose slices are lost or damaged (default: invalid)",
-          GST_TYPE_NEIGHBOUR_CODE_CONCEAL, CONCEAL_INVALID, playing));
+      g_param_spec_enum ("conceal", "Concealment",
+          "How to fill pixels whose slices are lost or damaged", GST_TYPE_NEIGHBOUR_CODE_CONCEAL,
+          CONCEAL_INVALID, playing));
   g_object_class_install_property (object_class, PROP_REQUEST_KEY_UNITS,
       g_param_spec_boolean ("request-key-units", "Request key units",
-          "Asks upstream for a key frame set (GstForceKeyUnit) when something was lost that later "
-          "frame sets refer to (default true)",
+          "Request a key frame set from upstream (GstForceKeyUnit) when data was lost that later "
+          "frame sets refer to",
           TRUE, playing));
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
-          "Slices decoded at the same time, of one view or of several (0 to 64, default 0: as many "
-          "as there are cores)",
-          0, 64, 0, playing));
+          "Number of threads that decode slices (0 = one per CPU core)", 0, 64, 0, playing));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points, slices, bad-slices, missing-pixels, "
-          "unknown-pixels, raw-bytes, "
-          "coded-bytes",
+          "Counters since the element was started: frames, points, slices, bad-slices, "
+          "missing-pixels, unknown-pixels, raw-bytes, coded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
-      "Decodes range images from the neighbour code", "gst-rangecast");
+      "Decodes neighbour-coded range images", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CONCEAL, GstPluginAPIFlags (0));
 
   transform_class->src_event = gst_neighbour_code_dec_src_event;

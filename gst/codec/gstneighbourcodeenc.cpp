@@ -651,20 +651,19 @@ install_results (GObjectClass *object_class)
   const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
   g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
       g_param_spec_double ("max-depth-error", "Maximum depth error",
-          "Metres by which a decoded depth differs from the one that came in at most, of any view, "
-          "with the settings of the latest frame set; 0 before the first",
+          "Maximum difference between a decoded depth and the input depth in metres, over all "
+          "views, with the settings of the latest frame set (0 = no frame set yet)",
           0, G_MAXDOUBLE, 0, readable));
   g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
       g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
-          "Bits per second that receivers let the encoder have with adaptive-bitrate; 0: not known "
-          "(0 to 18446744073709551615, default 0)",
+          "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
+          "first receiver report: target-bitrate; 0 = no limit known)",
           0, G_MAXUINT64, 0, readable));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, left-out, points, full-pixels, slices, delta-slices, "
-          "raw-bytes, coded-bytes; bitrate over the last 2 s; depth-threshold, colour-threshold of "
-          "the latest frame set; what receivers say: estimated-bitrate, receiver-reports, "
-          "receiver-loss, receiver-queue",
+          "Counters since the element was started (frames, left-out, points, full-pixels, slices, "
+          "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds of "
+          "the latest frame set and the state of adaptive-bitrate",
           GST_TYPE_STRUCTURE, readable));
 }
 
@@ -682,39 +681,35 @@ install_properties (GObjectClass *object_class)
         object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, flags));
   };
   g_object_class_install_property (object_class, PROP_PROFILE,
-      g_param_spec_enum ("profile", "Profile",
-          "How pixels are written (plain, packed, entropy, default plain)",
-          GST_TYPE_NEIGHBOUR_CODE_PROFILE, int (kDefaults.profile), live));
+      g_param_spec_enum ("profile", "Profile", "Coding profile", GST_TYPE_NEIGHBOUR_CODE_PROFILE,
+          int (kDefaults.profile), live));
   g_object_class_install_property (object_class, PROP_CHOICE,
-      g_param_spec_enum ("choice", "Choice",
-          "Which neighbour within the thresholds replaces a pixel, if any; plain always takes the "
-          "first (first, best, default first)",
+      g_param_spec_enum ("choice", "Neighbour choice",
+          "Which neighbour within the thresholds replaces a pixel (the plain profile always uses "
+          "the first)",
           GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), steered));
   install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
-      "Bits of a depth code, of depths between the view's near and far (6 to 16, default 12)", 6,
-      16, kDefaults.depth_bits, live);
+      "Bits of a quantised depth between the view's near and far limits", 6, 16,
+      kDefaults.depth_bits, live);
   g_object_class_install_property (object_class, PROP_DEPTH_SCALE,
-      g_param_spec_enum ("depth-scale", "Depth scale",
-          "What depth codes are linear in: depth, or 1/depth, where codes stand for more depth the "
-          "further it is (linear, inverse, default linear)",
+      g_param_spec_enum ("depth-scale", "Depth scale", "Quantisation of depth",
           GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, int (kDefaults.depth_scale), live));
-  install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits",
-      "Bits of each of R, G and B (4 to 8, default 8)", 4, 8, kDefaults.colour_bits, live);
+  install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits", "Bits of each colour channel", 4, 8,
+      kDefaults.colour_bits, live);
   install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
-      "A neighbour replaces a pixel if their depths differ by no more than so many codes (0 to "
-      "65535, default 8; 0 and colour-threshold 0: lossless after quantisation)",
+      "Maximum depth difference, in quantisation steps, at which a neighbour replaces a pixel (0 "
+      "together with colour-threshold=0 = lossless after quantisation)",
       0, 65535, kDefaults.depth_threshold, steered);
   install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "Neighbours replace a pixel if also R, G and B each differ by no more than so many codes (0 "
-      "to 255, default 5)",
+      "Maximum difference of each of R, G and B, in quantisation steps, at which a neighbour "
+      "replaces a pixel",
       0, 255, kDefaults.colour_threshold, steered);
   install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
-      "No slice is longer, bytes with its header (256 to 65535, default 1200)", 256,
-      int (rangecast::kMaxUnitSize), kDefaults.max_slice_size, steered);
+      "Maximum size of a slice in bytes, including its header", 256, int (rangecast::kMaxUnitSize),
+      kDefaults.max_slice_size, steered);
   g_object_class_install_property (object_class, PROP_TEMPORAL,
       g_param_spec_boolean ("temporal", "Temporal",
-          "Pixels may equal those of the frame set before, too (default false: every frame set "
-          "decodes alone)",
+          "Predict pixels from the previous frame set (false = frame sets decode independently)",
           kDefaults.temporal, live));
   const auto install_ms = [&] (guint id, const char *name, const char *nick, const char *blurb,
                               guint fallback) {
@@ -722,22 +717,21 @@ install_properties (GObjectClass *object_class)
         object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, steered));
   };
   install_ms (PROP_REFRESH_PERIOD, "refresh-period", "Refresh period",
-      "With temporal: every pixel is coded without reference to earlier frame sets at least so "
-      "often, milliseconds (0 to 3600000, default 1000; 0: only in key frame sets)",
+      "Period in milliseconds within which every pixel is coded without temporal prediction (0 = "
+      "only in key frame sets)",
       guint (kDefaults.refresh_period_ns / GST_MSECOND));
   install_ms (PROP_KEY_INTERVAL, "key-interval", "Key interval",
-      "With temporal: a key frame set comes at least so often, milliseconds; files can be sought "
-      "to those (0 to 3600000, default 0: only first and on request)",
+      "Maximum interval between key frame sets in milliseconds with temporal=true (0 = only the "
+      "first frame set and on request)",
       0);
   g_object_class_install_property (object_class, PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
       g_param_spec_uint64 ("min-force-key-unit-interval", "Minimum interval of forced key units",
-          "With temporal: a key frame set that somebody asks for (GstForceKeyUnit) waits until the "
-          "last one is so old, nanoseconds (0 to 18446744073709551615, default 0: it never waits; "
-          "18446744073709551615: nor does it then)",
+          "Minimum interval between key frame sets on request (GstForceKeyUnit) in nanoseconds "
+          "with temporal=true (0 or G_MAXUINT64 = no minimum)",
           0, G_MAXUINT64, 0, steered));
   install_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Pieces coded at the same time, of one view or of several; bytes do not depend on it (0 to "
-      "64, default 0: as many as there are cores)",
+      "Number of threads that encode tiles; the output does not depend on it (0 = one per CPU "
+      "core)",
       0, 64, 0, live);
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 }
@@ -760,8 +754,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
       "Codec/Encoder/Video",
-      "Codes depth and colour of range images together, in slices that decode alone",
-      "gst-rangecast");
+      "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, GstPluginAPIFlags (0));

@@ -417,8 +417,9 @@ static GstFlowReturn
 drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  GST_WARNING_OBJECT (base, "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are no access unit",
-      size, guint64 (frame->offset));
+  GST_WARNING_OBJECT (base,
+      "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
+      guint64 (frame->offset));
   if (priv->seen == Seen::kNothing) {
     priv->stream.leading_rubbish += size;
     if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
@@ -560,7 +561,7 @@ warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
   if (!at_end || !GST_BASE_PARSE_DRAINING (base) || part.length >= expected)
     return;
   GST_ELEMENT_WARNING (base, STREAM, DECODE,
-      ("The stream ends within an access unit: it lacks %" G_GSIZE_FORMAT " bytes",
+      ("The stream ends within an access unit: missing %" G_GSIZE_FORMAT " bytes",
           expected - part.length),
       ("expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT, expected, part.length));
 }
@@ -728,7 +729,8 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
-      "Codec/Parser/Video", "Parses and writes files of coded range frame sets", "gst-rangecast");
+      "Codec/Parser/Video", "Converts between neighbour code byte streams and access units",
+      "gst-rangecast");
 
   parse_class->start = gst_neighbour_code_parse_start;
   parse_class->stop = gst_neighbour_code_parse_stop;

@@ -20,7 +20,7 @@ static GstFlowReturn
 post_no_memory (GstElement *element, const char *what)
 {
   return gst_range_flow_return (
-      element, Status (StatusCode::kNoSpace, std::string ("no memory left for ") + what));
+      element, Status (StatusCode::kNoSpace, std::string ("out of memory for ") + what));
 }
 
 GstFlowReturn

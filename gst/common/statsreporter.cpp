@@ -281,9 +281,8 @@ StatsReporter::install (GObjectClass *object_class, guint property_id)
 {
   g_object_class_install_property (object_class, property_id,
       g_param_spec_uint ("stats-interval", "Statistics interval",
-          "Post a rangecast-stats message so often, milliseconds (0 to 3600000, 0: never, default "
-          "1000)",
-          0, kLongestIntervalMs, kDefaultIntervalMs,
+          "Interval between rangecast-stats messages in milliseconds (0 = never)", 0,
+          kLongestIntervalMs, kDefaultIntervalMs,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
 }
 

@@ -61,7 +61,7 @@ gst_ply_enc_format_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {{PointCloudFormat::kPly, "PLY, binary", "ply"},
-        {PointCloudFormat::kPcd, "PCD 0.7 of the Point Cloud Library, binary", "pcd"}, {}};
+        {PointCloudFormat::kPcd, "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
     return g_enum_register_static ("GstPlyEncFormat", values);
   }();
   return type;
@@ -236,26 +236,22 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   object_class->finalize = gst_ply_enc_finalize;
 
   g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_boolean ("view-id", "View id",
-          "Give each point the view-id of the camera that saw it, as property view_id (default: "
-          "false)",
-          FALSE,
+      g_param_spec_boolean ("view-id", "View ID",
+          "Write the view-id of each point as property view_id", FALSE,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_NORMALS,
       g_param_spec_boolean ("normals", "Normals",
-          "Give each point the direction, of length 1, that its surface faces: estimated from the "
-          "pixels around it, towards the camera (default: false)",
-          FALSE,
+          "Write a unit normal for each point, estimated from the neighbouring pixels", FALSE,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_FORMAT,
-      g_param_spec_enum ("format", "Format", "What the files are (default: ply)",
-          GST_TYPE_PLY_ENC_FORMAT, PointCloudFormat::kPly,
+      g_param_spec_enum ("format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT,
+          PointCloudFormat::kPly,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
-      "Writes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
+      "Encodes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_PLY_ENC_FORMAT, GstPluginAPIFlags (0));
 
   transform_class->start = gst_ply_enc_start;

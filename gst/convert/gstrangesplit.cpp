@@ -459,19 +459,18 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
   object_class->finalize = gst_range_split_finalize;
 
   g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View id",
-          "Which view the pads depth and colour show (0 to 63; -1, the default: the rig's first)",
-          kFirstView, rangecast::kMaxViews - 1, kFirstView, playing));
+      g_param_spec_int ("view-id", "View ID",
+          "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
+          rangecast::kMaxViews - 1, kFirstView, playing));
   g_object_class_install_property (object_class, PROP_MASK,
-      g_param_spec_boolean ("mask", "Mask",
-          "Colour is black where depth is invalid (default: true); else as the camera saw it", TRUE,
-          playing));
+      g_param_spec_boolean (
+          "mask", "Mask colour", "Make colour black where depth is invalid", TRUE, playing));
 
   for (GstStaticPadTemplate *pad_template :
       {&sink_template, &depth_template, &colour_template, &depth_of_template, &colour_of_template})
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Range image splitter", "Filter/Video",
-      "Gives depth and colour of single views of a range frame set as video", "gst-rangecast");
+      "Converts single views of range frame sets to depth and colour video", "gst-rangecast");
 
   element_class->request_new_pad = gst_range_split_request_new_pad;
   element_class->release_pad = gst_range_split_release_pad;

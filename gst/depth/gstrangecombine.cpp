@@ -124,8 +124,10 @@ gst_range_combine_into_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (RegisterInto::kDepth), "The depth camera's: depth stays as measured", "depth"},
-        {int (RegisterInto::kColour), "The colour camera's: colour stays as seen", "colour"}, {}};
+        {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
+        {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured",
+            "colour"},
+        {}};
     return g_enum_register_static ("GstRangeCombineInto", values);
   }();
   return type;
@@ -195,7 +197,7 @@ make_colour_view (
 {
   if (settings.colour_view_id >= 0 && settings.rig.empty ())
     return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
-                                   "that says how the cameras stand"};
+                                   "with the poses of both cameras"};
   if (settings.colour_view_id >= 0)
     return view_from_rig (
         settings.rig, settings.colour_view_id, "colour-view-id", width, height, view);
@@ -363,7 +365,7 @@ combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
     rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
   if (!convert_colour (priv, colour, image.colour))
-    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
   const double unit = priv->view.depth_unit_m;
   return rangecast::rescale_depth (depth, priv->depth_scale / unit,
       rangecast::depth_units (priv->view.near_m, unit),
@@ -376,11 +378,11 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
 {
   GstMapInfo map;
   if (!gst_buffer_map (priv->straight, &map, GST_MAP_READWRITE))
-    return {StatusCode::kNoSpace, "pad colour: no memory"};
+    return {StatusCode::kNoSpace, "pad colour: out of memory"};
   const rangecast::ImageView<rangecast::Rgbx> straight = {
       reinterpret_cast<rangecast::Rgbx *> (map.data), GST_VIDEO_INFO_WIDTH (&priv->rgbx),
       GST_VIDEO_INFO_HEIGHT (&priv->rgbx), GST_VIDEO_INFO_PLANE_STRIDE (&priv->rgbx, 0)};
-  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps say"};
+  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
   if (convert_colour (priv, colour, straight))
     status = priv->registration.process (depth, priv->depth_scale, straight, image);
   gst_buffer_unmap (priv->straight, &map);
@@ -395,7 +397,7 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
     return frame.status ();
   GstVideoFrame from;
   if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
-    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps say"};
+    return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps require"};
   const rangecast::ImageView<const std::uint16_t> picture = {
       static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)),
       GST_VIDEO_FRAME_WIDTH (&from), GST_VIDEO_FRAME_HEIGHT (&from),
@@ -644,45 +646,39 @@ install_properties (GObjectClass *object_class)
   };
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
-          "Rig file with the view that view-id names (default: none, a camera at the origin that "
-          "focal-length describes)",
+          "Rig file with the calibration of the view (unset = a pinhole camera at the origin with "
+          "focal-length)",
           nullptr, ready));
   g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View id",
-          "View of the depth camera, and of the output unless that is the colour camera's (0 to "
-          "63, "
-          "default 0)",
-          0, rangecast::kMaxViews - 1, 0, ready));
+      g_param_spec_int ("view-id", "View ID",
+          "view-id of the depth camera, and of the output unless into=colour", 0,
+          rangecast::kMaxViews - 1, 0, ready));
   g_object_class_install_property (object_class, PROP_COLOUR_VIEW_ID,
-      g_param_spec_int ("colour-view-id", "Colour view id",
-          "View of the rig that is the colour camera, if it stands elsewhere than the depth camera "
-          "(-1 to 63, default -1: it is the same camera)",
-          -1, rangecast::kMaxViews - 1, -1, ready));
+      g_param_spec_int ("colour-view-id", "Colour view ID",
+          "view-id of the colour camera in the rig (-1 = colour and depth are registered)", -1,
+          rangecast::kMaxViews - 1, -1, ready));
   g_object_class_install_property (object_class, PROP_INTO,
-      g_param_spec_enum ("into", "Into",
-          "Whose view comes out if colour and depth are not registered (default: depth)",
+      g_param_spec_enum ("into", "Output view",
+          "Output view if colour and depth come from different cameras",
           GST_TYPE_RANGE_COMBINE_INTO, int (RegisterInto::kDepth), ready));
   install_double (PROP_FOCAL_LENGTH, "focal-length", "Focal length",
-      "Without a rig: focal length in pixels (default 0: 0.82 of the width)", 0, 1e6, 0);
+      "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, 0);
   install_double (PROP_PRINCIPAL_X, "principal-x", "Principal point x",
-      "Without a rig: principal point in pixels from the left (default -1: the centre)", -1, 1e6,
-      -1);
+      "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
   install_double (PROP_PRINCIPAL_Y, "principal-y", "Principal point y",
-      "Without a rig: principal point in pixels from the top (default -1: the centre)", -1, 1e6,
-      -1);
+      "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
   install_double (PROP_DEPTH_SCALE, "depth-scale", "Depth scale",
-      "Metres per unit of pad depth (1e-7 to 1, default 0.001: millimetres)", 1e-7, 1,
-      kDefaultDepthScale);
+      "Metres per unit of the input depth", 1e-7, 1, kDefaultDepthScale);
   install_double (PROP_DEPTH_UNIT, "depth-unit", "Depth unit",
-      "Metres per depth unit of the output (0 to 1, default 0: the rig's, or 0.0001)", 0, 1, 0);
+      "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, 0);
   install_double (PROP_NEAR, "near", "Near",
-      "Nearest valid depth in metres (default 0: the rig's, or 0.3)", 0, 1e4, 0);
-  install_double (PROP_FAR, "far", "Far",
-      "Farthest valid depth in metres (default 0: the rig's, or 6)", 0, 1e4, 0);
+      "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, 0);
+  install_double (
+      PROP_FAR, "far", "Far", "Farthest valid depth in metres (0 = from the rig, or 6)", 0, 1e4, 0);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, dropped-colour, dropped-depth", GST_TYPE_STRUCTURE,
-          GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          "Counters since the element was started: frames, dropped-colour, dropped-depth",
+          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 }
 
 static void
@@ -704,7 +700,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
-      "Combines colour and depth of a depth camera into range images", "gst-rangecast");
+      "Combines the colour and depth images of a depth camera into range images", "gst-rangecast");
 
   gst_type_mark_as_plugin_api (GST_TYPE_RANGE_COMBINE_INTO, GstPluginAPIFlags (0));
 

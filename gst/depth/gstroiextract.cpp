@@ -541,7 +541,8 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   prop_stats = install_roi_settings (object_class) + 1;
   g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, points-in, points-out; and the last ROI of the first view",
+          "Counters since the element was started: frames, points-in, points-out; and the last ROI "
+          "of the first view",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, prop_stats + 1);
 
@@ -558,7 +559,8 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Region of interest extractor",
-      "Filter/Effect/Video", "Clears the background of range images and crops them to what is left",
+      "Filter/Effect/Video",
+      "Removes the background of range images by depth and colour and crops them to the rest",
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_ROI_EXTRACT_CUE, GstPluginAPIFlags (0));
 

@@ -176,7 +176,7 @@ configure_core (GstStereoDepthPrivate *priv, bool third_is_there)
   priv->third_changed = priv->have_info[2] && !with_third;
   for (int i = 0; i < (with_third ? 3 : 2); i++)
     if (!priv->readers[i].set (priv->info[i]))
-      return {StatusCode::kUnsupported, "cannot convert the pictures to RGBx"};
+      return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
   return {};
 }
 
@@ -344,7 +344,7 @@ match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output)
   for (; n < 3 && buffers[n] && status.ok (); n++)
     if (!priv->readers[n].open (buffers[n])) {
       status = {StatusCode::kBadData,
-          std::string ("pad ") + kNames[n] + ": a buffer is smaller than its caps say"};
+          std::string ("pad ") + kNames[n] + ": a buffer is smaller than its caps require"};
       break;
     }
   if (status.ok ())
@@ -365,7 +365,7 @@ warn_if_mirrored (GstStereoDepth *self)
   GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
       ("The left and right cameras seem to be exchanged: swap what is linked to pads left and "
        "right"),
-      ("hardly anything matches; with the pictures exchanged, much does"));
+      ("hardly anything matches; with the images exchanged, much does"));
 }
 
 static GstFlowReturn
@@ -462,9 +462,9 @@ warn_if_nothing_pairs (GstStereoDepth *self, bool paired)
     return;
   priv->said_unpaired = true;
   GST_ELEMENT_WARNING (self, STREAM, FAILED,
-      ("Left and right pictures do not come in pairs: expected times that differ by at most half a "
-       "frame, or 5 ms where the caps have no framerate"),
-      ("the last %" G_GUINT64_FORMAT " pictures found no partner", dropped - priv->dropped_before));
+      ("Left and right images do not pair up: expected times that differ by at most half a frame, "
+       "or 5 ms if the caps have no framerate"),
+      ("the last %" G_GUINT64_FORMAT " images found no partner", dropped - priv->dropped_before));
 }
 
 static GstFlowReturn
@@ -747,8 +747,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   prop_stats = install_stereo_settings (object_class) + 1;
   g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, restricted-frames, third-frames, dropped-left, "
-          "dropped-right, dropped-third, dropped-late, match-time (ns)",
+          "Counters since the element was started: frames, restricted-frames, third-frames, "
+          "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, prop_stats + 1);
 
@@ -757,7 +757,8 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
     gst_element_class_add_static_pad_template_with_gtype (
         element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Stereo depth", "Filter/Video",
-      "Makes range images of a stereo pair of cameras, or of three cameras", "gst-rangecast");
+      "Computes range images from a stereo pair of cameras, or from three cameras",
+      "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_STEREO_DEPTH_ALGORITHM, GstPluginAPIFlags (0));
 
   element_class->release_pad = gst_stereo_depth_release_pad;

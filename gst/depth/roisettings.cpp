@@ -18,61 +18,54 @@ static const Settings kDefaults;
 /* All of them kLive. */
 static const NumberRow<Settings, double> kReals[] = {
     {"noise-factor", "Noise factor",
-        "A difference counts from so many standard deviations of the background (0 to 100, default "
-        "4)",
-        0, 100, kDefaults.segmentation.noise_factor,
+        "Number of standard deviations of the background's noise from which a difference counts", 0,
+        100, kDefaults.segmentation.noise_factor,
         [] (Settings &s) -> double & { return s.segmentation.noise_factor; }},
     {"depth-threshold", "Depth threshold",
-        "Depth speaks for a pixel from so many metres nearer than the background (0 to 10, default "
-        "0.02)",
+        "Minimum distance in front of the background in metres at which depth marks a pixel as "
+        "foreground",
         0, 10, kDefaults.segmentation.depth_threshold_m,
         [] (Settings &s) -> double & { return s.segmentation.depth_threshold_m; }},
     {"colour-threshold", "Colour threshold",
-        "Colour speaks for a pixel from so many grey levels of chromatic distortion (0 to 255, "
-        "default 18)",
+        "Minimum chromatic distortion in grey levels at which colour marks a pixel as foreground",
         0, 255, kDefaults.segmentation.colour_threshold,
         [] (Settings &s) -> double & { return s.segmentation.colour_threshold; }},
-    {"shadow", "Shadow",
-        "A pixel darker than this share of the background is no shadow (0 to 1, default 0.5)", 0, 1,
+    {"shadow", "Shadow limit",
+        "Ratio to the background's brightness down to which a pixel may be a shadow", 0, 1,
         kDefaults.segmentation.shadow,
         [] (Settings &s) -> double & { return s.segmentation.shadow; }},
-    {"highlight", "Highlight",
-        "A pixel brighter than this share of the background is no change of light (1 to 10, "
-        "default 1.35)",
-        1, 10, kDefaults.segmentation.highlight,
+    {"highlight", "Highlight limit",
+        "Ratio to the background's brightness up to which a pixel may be a change of light", 1, 10,
+        kDefaults.segmentation.highlight,
         [] (Settings &s) -> double & { return s.segmentation.highlight; }},
     {"adapt-time", "Adaptation time",
-        "Time constant with which the background follows slow change where nobody is, seconds (0 "
-        "to 100000, default 30; 0: never)",
-        0, 100000, kDefaults.adapt_time_s, [] (Settings &s) -> double & { return s.adapt_time_s; }},
+        "Time constant in seconds with which the background follows slow changes (0 = never)", 0,
+        100000, kDefaults.adapt_time_s, [] (Settings &s) -> double & { return s.adapt_time_s; }},
 };
 static const NumberRow<Settings, int> kIntegers[] = {
-    {"min-area", "Minimum area", "Smaller islands are cleared, pixels (0 to 1000000, default 150)",
-        0, 1000000, kDefaults.segmentation.min_area,
+    {"min-area", "Minimum area",
+        "Minimum area of a foreground region in pixels; smaller regions are cleared", 0, 1000000,
+        kDefaults.segmentation.min_area,
         [] (Settings &s) -> int & { return s.segmentation.min_area; }},
-    {"max-hole", "Maximum hole", "Smaller holes are closed, pixels (0 to 1000000, default 100)", 0,
-        1000000, kDefaults.segmentation.max_hole,
+    {"max-hole", "Maximum hole area", "Maximum area of a hole in pixels that is closed", 0, 1000000,
+        kDefaults.segmentation.max_hole,
         [] (Settings &s) -> int & { return s.segmentation.max_hole; }},
-    {"max-people", "Maximum people",
-        "Only so many of the largest islands stay (0 to 1000, default 0: all)", 0, 1000,
-        kDefaults.segmentation.max_people,
+    {"max-people", "Maximum people", "Number of largest foreground regions to keep (0 = all)", 0,
+        1000, kDefaults.segmentation.max_people,
         [] (Settings &s) -> int & { return s.segmentation.max_people; }},
-    {"fill", "Fill",
-        "Depth is extended so many pixels to what has none, where colour says that it is no "
-        "background, and four times as many more where its hue says so (0 to 1000, default 4; 0: "
-        "no depth is made)",
+    {"fill", "Depth extrapolation",
+        "Distance in pixels to which depth is extrapolated into foreground without depth; up to "
+        "five times as far where the hue differs from the background (0 = off)",
         0, 1000, kDefaults.segmentation.fill,
         [] (Settings &s) -> int & { return s.segmentation.fill; }},
-    {"fringe", "Fringe",
-        "What is nearer but looks like the background beside it must be so wide, pixels (0 to 99, "
-        "default 9; 0: depth is taken at its word, for cameras whose depth ends at the silhouette)",
+    {"fringe", "Fringe width",
+        "Minimum width in pixels of a region that is nearer than the background but looks like it "
+        "(0 = trust depth at silhouettes, for cameras with exact depth edges)",
         0, 99, kDefaults.segmentation.fringe,
         [] (Settings &s) -> int & { return s.segmentation.fringe; }},
-    {"margin", "Margin",
-        "The ROI is this much larger than what is left, pixels each side (0 to 1000, default 0)", 0,
-        1000, kDefaults.margin, [] (Settings &s) -> int & { return s.margin; }},
-    {"n-threads", "Threads",
-        "Views worked on at the same time (0 to 64, default 0: as many as there are cores)", 0, 64,
+    {"margin", "Margin", "Margin added to each side of the ROI in pixels", 0, 1000,
+        kDefaults.margin, [] (Settings &s) -> int & { return s.margin; }},
+    {"n-threads", "Threads", "Number of threads that process views (0 = one per CPU core)", 0, 64,
         kDefaults.n_threads, [] (Settings &s) -> int & { return s.n_threads; }},
 };
 
@@ -91,10 +84,9 @@ GType
 gst_roi_extract_cue_get_type (void)
 {
   static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (Cue::kBoth), "Nearer than the background or of another colour", "both"},
-        {int (Cue::kColour), "Of another colour", "colour"},
-        {int (Cue::kDepth), "Nearer than the background", "depth"}, {}};
+    static const GEnumValue values[] = {{int (Cue::kBoth), "Depth and colour", "both"},
+        {int (Cue::kColour), "Colour only", "colour"}, {int (Cue::kDepth), "Depth only", "depth"},
+        {}};
     return g_enum_register_static ("GstRoiExtractCue", values);
   }();
   return type;
@@ -105,21 +97,19 @@ install_background_settings (GObjectClass *object_class)
 {
   g_object_class_install_property (object_class, PROP_BACKGROUND_FRAMES,
       g_param_spec_int ("background-frames", "Background frames",
-          "Frames of the empty scene from which a background is learnt (1 to 10000, default 30)", 1,
-          10000, kDefaults.background_frames, kPlaying));
+          "Number of frames of the empty scene from which to learn the background", 1, 10000,
+          kDefaults.background_frames, kPlaying));
   g_object_class_install_property (object_class, PROP_SETTLE_FRAMES,
       g_param_spec_int ("settle-frames", "Settle frames",
-          "Frames at the start from which nothing is learnt, while exposure settles (0 to 100000, "
-          "default 0)",
-          0, 100000, kDefaults.settle_frames, kReady));
+          "Number of frames to skip before learning, while automatic exposure settles", 0, 100000,
+          kDefaults.settle_frames, kReady));
   g_object_class_install_property (object_class, PROP_BACKGROUND_FILE,
       g_param_spec_string ("background-file", "Background file",
-          "Take the background from this file instead of learning it (default: none)", nullptr,
-          kReady));
+          "Background file to load instead of learning (unset = learn)", nullptr, kReady));
   g_object_class_install_property (object_class, PROP_SAVE_BACKGROUND,
       g_param_spec_string ("save-background", "Save background",
-          "Write the background to this file (.yml, .yaml or .json, with .gz if wanted) "
-          "whenever one is learnt, and as it has become at EOS (default: none)",
+          "Background file to write after learning and at EOS (.yml, .yaml or .json, optionally "
+          "with .gz)",
           nullptr, kPlaying));
 }
 
@@ -130,11 +120,11 @@ install_roi_settings (GObjectClass *object_class)
   install_rows (object_class, kIntegers, PROP_INTEGERS, kLive);
   install_background_settings (object_class);
   g_object_class_install_property (object_class, PROP_CUE,
-      g_param_spec_enum ("cue", "Cue", "What speaks for a pixel (default: both)",
+      g_param_spec_enum ("cue", "Segmentation cue", "What distinguishes foreground from background",
           GST_TYPE_ROI_EXTRACT_CUE, int (kDefaults.segmentation.cue), kLive));
   g_object_class_install_property (object_class, PROP_FOLLOW_LIGHT,
       g_param_spec_boolean ("follow-light", "Follow light",
-          "Undo what exposure, white balance and lamps do to the whole picture (default: true)",
+          "Compensate brightness and white balance changes of the whole image",
           kDefaults.segmentation.follow_light, kLive));
   return PROP_FOLLOW_LIGHT;
 }

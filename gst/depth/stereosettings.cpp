@@ -21,102 +21,94 @@ static constexpr double kDefaultNear = 0.3, kDefaultFar = 3.0;
 
 static const NumberRow<Settings, double> kReals[] = {
     {"focal-length", "Focal length",
-        "Without a rig, for rectified pictures: pixels (default 0: not set)", 0, 1e6, 0,
+        "Focal length of rectified input in pixels, without a rig (0 = unset)", 0, 1e6, 0,
         [] (Settings &s) -> double & { return s.focal_length; }},
     {"baseline", "Baseline",
-        "Without a rig: distance of the cameras in metres (default 0: not set)", 0, 1e4, 0,
+        "Distance of the left and right cameras in metres, without a rig (0 = unset)", 0, 1e4, 0,
         [] (Settings &s) -> double & { return s.baseline; }},
     {"principal-x", "Principal point x",
-        "Without a rig: of the left camera, pixels (default -1: the centre)", -1, 1e6, -1,
-        [] (Settings &s) -> double & { return s.principal_x; }},
+        "Horizontal principal point of the left camera in pixels, without a rig (-1 = centre)", -1,
+        1e6, -1, [] (Settings &s) -> double & { return s.principal_x; }},
     {"principal-y", "Principal point y",
-        "Without a rig: of both cameras, pixels (default -1: the centre)", -1, 1e6, -1,
-        [] (Settings &s) -> double & { return s.principal_y; }},
+        "Vertical principal point of both cameras in pixels, without a rig (-1 = centre)", -1, 1e6,
+        -1, [] (Settings &s) -> double & { return s.principal_y; }},
     {"principal-offset", "Principal point offset",
-        "Without a rig: right minus left principal point x, pixels (Middlebury's doffs, default 0)",
+        "Horizontal principal point of the right camera minus that of the left in pixels, without "
+        "a rig (Middlebury's doffs)",
         -1e5, 1e5, 0, [] (Settings &s) -> double & { return s.principal_offset; }},
-    {"near", "Near", "Nearest depth to look for, metres (default 0: the rig's, or 0.3)", 0, 1e4, 0,
+    {"near", "Near", "Minimum depth to match in metres (0 = from the rig, or 0.3)", 0, 1e4, 0,
         [] (Settings &s) -> double & { return s.near; }},
-    {"far", "Far", "Farthest depth to look for, metres (default 0: the rig's, or 3)", 0, 1e4, 0,
+    {"far", "Far", "Maximum depth to output in metres (0 = from the rig, or 3)", 0, 1e4, 0,
         [] (Settings &s) -> double & { return s.far; }},
     {"depth-unit", "Depth unit",
-        "Metres per depth unit of the output (0 to 1, default 0: the rig's, or 0.0001, coarser if "
-        "far asks for it)",
+        "Metres per depth unit of the output (0 = from the rig, or 0.0001, larger if far requires "
+        "it)",
         0, 1, 0, [] (Settings &s) -> double & { return s.depth_unit; }},
     {"flying-pixel-step", "Flying pixel step",
-        "Points that fewer than 4 of 8 neighbours follow within this share of their depth are "
-        "cleared (0 = off, to 1, default 0.03)",
+        "Clear points that fewer than 4 of their 8 neighbours support within this fraction of "
+        "their depth (0 = off)",
         0, 1, kDefaults.flying_pixel_step,
         [] (Settings &s) -> double & { return s.core.flying_pixel_step; }},
     {"patch-tolerance", "Patch tolerance",
-        "Points around which both pictures differ by more than this share of the contrast are "
-        "cleared "
-        "(0 = off, to 10, default 1)",
+        "Clear points around which the two images differ by more than this fraction of the local "
+        "contrast (0 = off)",
         0, 10, kDefaults.patch_tolerance,
         [] (Settings &s) -> double & { return s.core.patch_tolerance; }},
-    {"search-far", "Search far",
-        "What lies beyond far is matched, too, so that it is not taken for something nearer, and "
-        "cleared: up to so many metres (default 0: to infinity; as far: nothing is there)",
+    {"search-far", "Maximum search depth",
+        "Match out to this depth in metres so that background is not mistaken for foreground; "
+        "results beyond far are discarded (0 = to infinity)",
         0, 1e4, kDefaults.search_far_m,
         [] (Settings &s) -> double & { return s.core.search_far_m; }},
-    {"steady", "Steady",
-        "Hold depth still where nothing moves: each new depth counts 1 - 0.9 of this (0 = off, to "
-        "1, "
-        "default 0)",
-        0, 1, kDefaults.steady, [] (Settings &s) -> double & { return s.core.steady; }},
+    {"steady", "Temporal smoothing",
+        "Temporal smoothing of depth where nothing moves (0 = off, 1 = strongest)", 0, 1,
+        kDefaults.steady, [] (Settings &s) -> double & { return s.core.steady; }},
 };
 static const NumberRow<Settings, int> kIntegers[] = {
-    {"view-id", "View id", "View of the rig, and view-id of the output (0 to 63, default 0)", 0,
+    {"view-id", "View ID", "View of the rig, and view-id of the output", 0,
         rangecast::kMaxViews - 1, 0, [] (Settings &s) -> int & { return s.view_id; }},
     {"block-size", "Block size",
-        "Width of a block, pixels, odd (0 to 51, default 0: 15 for bm, 3 for sgbm and sgbm-3way; "
-        "sgm has none)",
+        "Width of the matching block in pixels, odd (0 = 15 for bm, 3 for sgbm and sgbm-3way; "
+        "ignored by sgm)",
         0, 51, kDefaults.match.block_size,
         [] (Settings &s) -> int & { return s.core.match.block_size; }},
     {"uniqueness-ratio", "Uniqueness ratio",
-        "Per cent by which the best match must beat the second (0 to 100, default 0)", 0, 100,
+        "Margin in percent by which the best match must be better than the second best", 0, 100,
         kDefaults.match.uniqueness_ratio,
         [] (Settings &s) -> int & { return s.core.match.uniqueness_ratio; }},
     {"speckle-window-size", "Speckle window size",
-        "Smaller patches of like disparity are cleared, pixels (0 = off, to 100000, default 100)",
+        "Minimum size in pixels of a region of similar disparity; smaller regions are cleared (0 = "
+        "off)",
         0, 100000, kDefaults.match.speckle_window_size,
         [] (Settings &s) -> int & { return s.core.match.speckle_window_size; }},
     {"speckle-range", "Speckle range",
-        "Disparity step within a patch, pixels (0 to 1000, default 2)", 0, 1000,
+        "Maximum disparity difference within a region in pixels, for speckle-window-size", 0, 1000,
         kDefaults.match.speckle_range,
         [] (Settings &s) -> int & { return s.core.match.speckle_range; }},
-    {"left-right-max-difference", "Left-right difference",
-        "Disparities of both directions agree to so many pixels (-1 = no check, to 1000, default "
-        "1)",
+    {"left-right-max-difference", "Left-right check",
+        "Maximum difference in pixels between left-to-right and right-to-left disparities (-1 = no "
+        "check)",
         -1, 1000, kDefaults.match.left_right_max_difference,
         [] (Settings &s) -> int & { return s.core.match.left_right_max_difference; }},
     {"silhouette-radius", "Silhouette radius",
-        "Near a silhouette, points whose colour is that of the other side are cleared: pixels "
-        "around "
-        "that are looked at (0 = off, to 64, default 8)",
+        "Radius in pixels around depth edges in which points with the colour of the surface behind "
+        "are cleared (0 = off)",
         0, 64, kDefaults.silhouette_radius,
         [] (Settings &s) -> int & { return s.core.silhouette_radius; }},
     {"gap-width", "Gap width",
-        "Gaps in a surface of one colour up to so many pixels are filled (0 = off, to 1000, "
-        "default "
-        "12)",
-        0, 1000, kDefaults.gap_width, [] (Settings &s) -> int & { return s.core.gap_width; }},
-    {"refine", "Refine",
-        "Disparity refinement iterations (0 = off, to 20, "
-        "default 2)",
-        0, 20, kDefaults.refine, [] (Settings &s) -> int & { return s.core.refine; }},
-    {"average", "Average",
-        "Frames whose pictures are averaged before matching where nothing moves (1 = off, to 64, "
-        "default 10)",
-        1, 64, kDefaults.average, [] (Settings &s) -> int & { return s.core.average; }},
+        "Maximum width in pixels of gaps within one surface that are filled (0 = off)", 0, 1000,
+        kDefaults.gap_width, [] (Settings &s) -> int & { return s.core.gap_width; }},
+    {"refine", "Refinement iterations", "Disparity refinement iterations (0 = off)", 0, 20,
+        kDefaults.refine, [] (Settings &s) -> int & { return s.core.refine; }},
+    {"average", "Temporal averaging",
+        "Maximum number of frames averaged before matching where nothing moves (1 = off)", 1, 64,
+        kDefaults.average, [] (Settings &s) -> int & { return s.core.average; }},
     {"refresh-interval", "Refresh interval",
-        "When downstream wants only a part, one full picture every so many frames (0: always all, "
-        "to "
-        "100000, default 30)",
+        "Interval in frames between full images when downstream requests only a region (0 = always "
+        "match full images)",
         0, 100000, Settings::kDefaultRefreshInterval,
         [] (Settings &s) -> int & { return s.refresh_interval; }},
-    {"n-threads", "Threads", "Threads that match one pair (0, the default: one a core; to 64)", 0,
-        64, kDefaults.n_threads, [] (Settings &s) -> int & { return s.core.n_threads; }},
+    {"n-threads", "Threads", "Number of matching threads (0 = one per CPU core)", 0, 64,
+        kDefaults.n_threads, [] (Settings &s) -> int & { return s.core.n_threads; }},
 };
 
 enum : guint {
@@ -131,12 +123,11 @@ GType
 gst_stereo_depth_algorithm_get_type (void)
 {
   static const GType type = [] {
-    static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "Block matching", "bm"},
-        {int (MatchAlgorithm::kSgbm), "Semi-global matching, five directions", "sgbm"},
-        {int (MatchAlgorithm::kSgbm3Way), "Semi-global matching, three directions", "sgbm-3way"},
-        {int (MatchAlgorithm::kSgm),
-            "Semi-global matching of clipped differences, rows and columns", "sgm"},
-        {}};
+    static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "OpenCV block matching", "bm"},
+        {int (MatchAlgorithm::kSgbm), "OpenCV semi-global block matching, five directions", "sgbm"},
+        {int (MatchAlgorithm::kSgbm3Way), "OpenCV semi-global block matching, three directions",
+            "sgbm-3way"},
+        {int (MatchAlgorithm::kSgm), "Semi-global matching of census-like descriptors", "sgm"}, {}};
     return g_enum_register_static ("GstStereoDepthAlgorithm", values);
   }();
   return type;
@@ -149,14 +140,14 @@ install_stereo_settings (GObjectClass *object_class)
   install_rows (object_class, kIntegers, PROP_INTEGERS, kFlags);
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
-          "Rig file with the stereo pair that view-id names (default: none, see focal-length)",
-          nullptr, kFlags));
+          "Rig file with the stereo pair view-id (unset = focal-length and baseline)", nullptr,
+          kFlags));
   g_object_class_install_property (object_class, PROP_ALGORITHM,
-      g_param_spec_enum ("algorithm", "Algorithm", "How to match (default: sgm)",
+      g_param_spec_enum ("algorithm", "Algorithm", "Stereo matching algorithm",
           GST_TYPE_STEREO_DEPTH_ALGORITHM, int (kDefaults.match.algorithm), kFlags));
   g_object_class_install_property (object_class, PROP_QOS,
       g_param_spec_boolean ("qos", "QoS",
-          "Do not match pictures whose depth would come too late to be shown (default true)", true,
+          "Skip image pairs whose depth would arrive too late downstream", true,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   return PROP_QOS;
 }

@@ -38,7 +38,7 @@ CodedViews::read (GstBuffer *frame_set)
     return true;
   };
   if (!for_each_unit (frame_set, take, end))
-    return {StatusCode::kBadData, "a coded frame set cannot be read"};
+    return {StatusCode::kBadData, "cannot map a coded frame set"};
   dropped_ += !end.ok ();
   return {};
 }

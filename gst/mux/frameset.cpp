@@ -108,7 +108,7 @@ FrameSetJoiner::copy_rest ()
   GstMemory *copy = copies_.acquire (rest_size_);
   GstMapInfo map;
   if (!copy)
-    return {StatusCode::kNoSpace, "no memory left for " + std::to_string (rest_size_) +
+    return {StatusCode::kNoSpace, "out of memory for " + std::to_string (rest_size_) +
                                       " bytes of " + std::to_string (rest_.size ()) + " streams"};
   gst_buffer_append_memory (frame_set_, copy);
   bool all = gst_memory_map (copy, &map, GST_MAP_WRITE);

@@ -365,7 +365,7 @@ complain_without_pads (GstRangeDemux *self)
 {
   if (!self->priv->any_pad)
     GST_ELEMENT_ERROR (self, STREAM, DEMUX,
-        ("The stream ends before its caps: expected a rig, which names the views"), (nullptr));
+        ("The stream ended before caps with a rig, which names the views"), (nullptr));
 }
 
 static gboolean
@@ -485,9 +485,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
 
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames (frame sets), buffers (of single views), gaps (views that "
-          "frame sets lacked), dropped (units that are damaged or of an unknown kind; views whose "
-          "planes do not lie in their buffer; views that the rig does not name)",
+          "Counters since the element was started: frames, buffers, gaps, dropped",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
@@ -495,7 +493,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Range demultiplexer", "Demuxer/Video",
-      "Gives each view of a range frame set stream on a pad of its own", "gst-rangecast");
+      "Splits a stream of range frame sets into one stream per view", "gst-rangecast");
 
   element_class->change_state = gst_range_demux_change_state;
 

@@ -413,28 +413,26 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
 
   g_object_class_install_property (object_class, PROP_MAX_SKEW,
       g_param_spec_uint64 ("max-skew", "Maximum skew",
-          "Capture times that differ by no more belong to one frame set, ns (default 0: half a "
-          "frame period, or 5 ms where the frame rate is unknown)",
+          "Maximum difference of the capture times within a frame set in nanoseconds (0 = half a "
+          "frame period, or 5 ms if the frame rate is unknown)",
           0, G_MAXINT64, 0,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_CLOCK_PORT,
       g_param_spec_int ("clock-port", "Clock port",
-          "Publish the pipeline's clock on this UDP port, for GstNetClientClock on other hosts; -1 "
-          "= no, 0 = any free port, which can be read while not in READY (default -1)",
+          "UDP port on which to publish the pipeline clock for GstNetClientClock (-1 = do not "
+          "publish, 0 = any free port, readable once published)",
           -1, 65535, ClockPublisher::kOff,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
-          "Rig file that streams have to agree with: one whose cameras are others, or elsewhere, "
-          "is "
-          "left out, and in a pipeline that is not live an error (default: none, any will do)",
+          "Rig file that all streams must agree with; a stream with other cameras is left out when "
+          "live, else it is an error (unset = no check)",
           nullptr,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: frames, complete, incomplete, dropped-late, out-of-step, "
-          "left-out; "
-          "and a structure for each pad",
+          "Counters since the element was started: frames, complete, incomplete, dropped-late, "
+          "out-of-step, left-out, and a structure for each sink pad",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
@@ -443,7 +441,8 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range multiplexer", "Muxer/Video",
-      "Puts the views of several range streams together, matched by capture time", "gst-rangecast");
+      "Combines the views of several range streams into frame sets by capture time",
+      "gst-rangecast");
 
   element_class->request_new_pad = gst_range_mux_request_new_pad;
   element_class->release_pad = gst_range_mux_release_pad;

@@ -169,7 +169,7 @@ report_clash (GstRangeMux *self, MuxPad &entry)
   entry.clash_reported = true;
   gst_range_post_warning (GST_ELEMENT (self),
       {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (entry.pad)) +
-                                  ": its buffers have views that another pad has, too; dropped"});
+                                  ": its buffers have view-ids of another pad; dropped"});
 }
 
 /* The buffers of one frame set. */

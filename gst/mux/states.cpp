@@ -33,20 +33,20 @@ explain (const MuxPad &entry, MuxState state, GstClockTimeDiff offset)
   switch (state) {
     case MuxState::kSilent:
       return ": nothing came for " + std::to_string (kSilentAfter / GST_SECOND) +
-             " s; the others go on without it";
+             " s; the others continue without it";
     case MuxState::kLate:
-      return ": all that comes is too late, capture times are " + seconds +
-             " behind the others'; left out; expected a host and a network that keep up, a clock "
-             "in step, or a greater latency";
+      return ": all buffers are late, capture times are " + seconds +
+             " behind the others'; left out; expected a host and a network that keep up, a "
+             "synchronised clock, or a greater latency";
     case MuxState::kOutOfStep:
       return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
-             " the others': the host's clock is not in step; left out until it is";
+             " the others': the host's clock is not synchronised; left out until it is";
     case MuxState::kApart:
       return (offset > 0 ? ": its capture times are " + seconds +
-                               " ahead of the others': it waits until they come there"
-                         : std::string (": it has ended, and no frame set has both its views and "
-                                        "another stream's")) +
-             "; expected recordings of the same time, by hosts whose clocks are in step";
+                               " ahead of the others': it waits until they catch up"
+                         : std::string (": it has ended, and no frame set contains both its views "
+                                        "and another stream's")) +
+             "; expected recordings of the same time, by hosts with synchronised clocks";
     case MuxState::kOtherRig:
       return ": " + entry.other_rig.message () + "; left out";
     case MuxState::kClash:

@@ -135,7 +135,7 @@ check_view (const View &view, View expected)
       !(apart <= kSamePlace_m))
     return differs (view, "it stands " + std::to_string (apart) + " m away");
   if (!(farthest (p.rotation, q.rotation) <= kSameDirection))
-    return differs (view, "it looks elsewhere");
+    return differs (view, "its optical axis points elsewhere");
   const double scale = view.intrinsics.fx / expected.intrinsics.fx;
   if (!(std::abs (scale - 1) <= kSameScale))
     return differs (view, "its focal length is " + std::to_string (scale) + " times as long");

@@ -48,7 +48,7 @@ CameraPainter::start (GstGLContext *context)
   shader_ = make_shader (context, kVertexShader, kFragmentShader, &error);
   if (!shader_) {
     failed_ = true;
-    GST_WARNING ("cameras cannot be drawn: %s", error ? error->message : "no shader");
+    GST_WARNING ("cannot draw the cameras: %s", error ? error->message : "no shader");
     g_clear_error (&error);
     return false;
   }

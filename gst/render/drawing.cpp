@@ -208,7 +208,7 @@ fatal_error (const GstGLFuncs *gl)
       case kContextLost:
         return "its context is lost";
       case GL_OUT_OF_MEMORY:
-        return "it has no memory left";
+        return "it is out of memory";
       default:
         break;
     }

@@ -132,9 +132,10 @@ static GType
 gst_cylinder_filter_mode_get_type (void)
 {
   static const GEnumValue values[] = {
-      {GST_CYLINDER_FILTER_OFF, "Let everything pass", "off"},
-      {GST_CYLINDER_FILTER_WINNER, "One view keeps its points, the others' are cleared", "winner"},
-      {GST_CYLINDER_FILTER_BLEND, "As winner, and colours are blended along the seams", "blend"},
+      {GST_CYLINDER_FILTER_OFF, "Pass buffers through unchanged", "off"},
+      {GST_CYLINDER_FILTER_WINNER, "Keep the points of the best view and clear those of the others",
+          "winner"},
+      {GST_CYLINDER_FILTER_BLEND, "As winner, with colours blended along the seams", "blend"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
@@ -147,11 +148,12 @@ gst_cylinder_filter_agree_get_type (void)
 {
   static const GFlagsValue values[] = {
       {0, "Nothing", "none"},
-      {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of poses", "poses"},
-      {GST_CYLINDER_FILTER_AGREE_DEPTH, "Move depths of one surface together", "depth"},
-      {GST_CYLINDER_FILTER_AGREE_VIEWS, "Leave out a view that contradicts the others", "views"},
+      {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of the camera poses", "poses"},
+      {GST_CYLINDER_FILTER_AGREE_DEPTH,
+          "Move the depths that several views measured of one surface together", "depth"},
+      {GST_CYLINDER_FILTER_AGREE_VIEWS, "Omit a view that contradicts the others", "views"},
       {GST_CYLINDER_FILTER_AGREE_POINTS,
-          "Clear points that another view sees through, in another colour", "points"},
+          "Clear points that another view sees through in a different colour", "points"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_flags_register_static ("GstCylinderFilterAgree", values);
@@ -163,8 +165,9 @@ static GType
 gst_cylinder_filter_balance_get_type (void)
 {
   static const GEnumValue values[] = {
-      {GST_CYLINDER_FILTER_BALANCE_OFF, "Leave colours as the cameras see them", "off"},
-      {GST_CYLINDER_FILTER_BALANCE_AUTO, "Gains from what several cameras see", "auto"},
+      {GST_CYLINDER_FILTER_BALANCE_OFF, "Leave colours unchanged", "off"},
+      {GST_CYLINDER_FILTER_BALANCE_AUTO,
+          "Estimate a gain per view and channel from surfaces that several views see", "auto"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_enum_register_static ("GstCylinderFilterBalance", values);
@@ -177,10 +180,9 @@ gst_cylinder_filter_axis_get_type (void)
 {
   using rangecast::AxisMode;
   static const GEnumValue values[] = {
-      {int (AxisMode::kPrincipal), "Along the direction in which the points spread most",
-          "principal"},
-      {int (AxisMode::kVertical), "World y, through the middle of all points", "vertical"},
-      {int (AxisMode::kFixed), "As axis-position and axis-direction say", "fixed"},
+      {int (AxisMode::kPrincipal), "Principal axis of the points of all views", "principal"},
+      {int (AxisMode::kVertical), "World y axis through the centroid of the points", "vertical"},
+      {int (AxisMode::kFixed), "Axis given by axis-position and axis-direction", "fixed"},
       {0, nullptr, nullptr},
   };
   static const GType type = g_enum_register_static ("GstCylinderFilterAxis", values);
@@ -374,7 +376,8 @@ gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
     if (view.left_out && !(priv->left_out & bit))
       GST_ELEMENT_WARNING (self, STREAM, FAILED,
           ("View %d contradicts the other views and is left out.", view_id),
-          ("%.0f %% of its points agree with theirs; check its pose in the rig and its depth",
+          ("%.0f %% of its points agree with the other views; check its pose in the rig and its "
+           "depth",
               100 * view.consistency));
     else if (!view.left_out && (priv->left_out & bit))
       GST_INFO_OBJECT (self, "view %d agrees again", view_id);
@@ -714,8 +717,8 @@ static GParamSpec *
 vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags flags)
 {
   return gst_param_spec_array (name, nick, blurb,
-      g_param_spec_double ("number", "Number", "One of x, y, z", -G_MAXDOUBLE, G_MAXDOUBLE, 0,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
+      g_param_spec_double ("number", "Number", "One of the components x, y, z", -G_MAXDOUBLE,
+          G_MAXDOUBLE, 0, GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
       flags);
 }
 
@@ -725,23 +728,20 @@ install_colour_properties (GObjectClass *object_class, GParamFlags flags)
   const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
   g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
       g_param_spec_enum ("colour-balance", "Colour balance",
-          "How colours of different cameras are made to agree (default: auto)",
-          GST_TYPE_CYLINDER_FILTER_BALANCE, GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
+          "How to match the colours of the views", GST_TYPE_CYLINDER_FILTER_BALANCE,
+          GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
   g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
       g_param_spec_double ("blend-width", "Blend width",
-          "For mode=blend: how far from a seam colours are blended, metres, 0 to 1 (default: 0.02)",
-          0, 1, kDefaultBlendWidth, controllable));
+          "Distance from a seam within which colours are blended with mode=blend, in metres", 0, 1,
+          kDefaultBlendWidth, controllable));
 }
 
 static void
 install_agree_property (GObjectClass *object_class, GParamFlags flags)
 {
   g_object_class_install_property (object_class, PROP_AGREE,
-      g_param_spec_flags ("agree", "Agree",
-          "Consistency corrections: poses (errors of some mm are estimated and corrected in the "
-          "rig), depth (depths of one surface move together), views (one that contradicts the "
-          "others is left out), points (those that another view sees through, in another colour, "
-          "are cleared; needs colour-balance=auto), or none (default: poses+views+points)",
+      g_param_spec_flags ("agree", "View consistency",
+          "Which consistency checks and corrections to apply between views",
           GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
           GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
 }
@@ -751,25 +751,25 @@ install_axis_properties (GObjectClass *object_class, GParamFlags flags)
 {
   const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
   g_object_class_install_property (object_class, PROP_MODE,
-      g_param_spec_enum ("mode", "Mode", "What happens to points seen twice (default: winner)",
+      g_param_spec_enum ("mode", "Mode", "What to do with points that several views see",
           GST_TYPE_CYLINDER_FILTER_MODE, GST_CYLINDER_FILTER_WINNER, controllable));
   g_object_class_install_property (object_class, PROP_AXIS,
-      g_param_spec_enum ("axis", "Axis", "Where the cylinder's axis lies (default: principal)",
+      g_param_spec_enum ("axis", "Axis", "How to choose the axis of the cylinder",
           GST_TYPE_CYLINDER_FILTER_AXIS, int (rangecast::AxisMode::kPrincipal), controllable));
   g_object_class_install_property (object_class, PROP_AXIS_POSITION,
       vector_spec ("axis-position", "Axis position",
-          "For axis=fixed: a point of the axis, <x, y, z> in the world, metres, less than 1e6 from "
-          "0 (default: <0, 0, 0>)",
+          "A point <x, y, z> of the axis for axis=fixed, in world coordinates and metres, less "
+          "than 1e6 from the origin",
           flags));
   g_object_class_install_property (object_class, PROP_BODIES,
-      g_param_spec_int ("bodies", "Bodies",
-          "Bodies that stand beside each other get a cylinder each, so many at most, 1 to 8; 1 is "
-          "one cylinder for all, and so is axis=fixed (default: 4)",
+      g_param_spec_int ("bodies", "Maximum bodies",
+          "Maximum number of separate bodies that get a cylinder each (1 = one cylinder for "
+          "everything, as with axis=fixed)",
           1, rangecast::kMaxBodies, kDefaultBodies, controllable));
   g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
       vector_spec ("axis-direction", "Axis direction",
-          "For axis=fixed: its direction, <x, y, z> in the world, length 1e-6 to 1e6 (default: <0, "
-          "1, 0>)",
+          "Direction <x, y, z> of the axis for axis=fixed, in world coordinates, of length 1e-6 to "
+          "1e6",
           flags));
 }
 
@@ -778,27 +778,26 @@ install_unit_properties (GObjectClass *object_class, GParamFlags flags)
 {
   const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
   g_object_class_install_property (object_class, PROP_UNIT_HEIGHT,
-      g_param_spec_double ("unit-height", "Unit height",
-          "Height of a slice, metres, 0.0002 to 10 (default: 0.004)", 0.0002, 10,
-          kDefaultUnitHeight, controllable));
+      g_param_spec_double ("unit-height", "Slice height",
+          "Height of a slice of the cylinder in metres", 0.0002, 10, kDefaultUnitHeight,
+          controllable));
   g_object_class_install_property (object_class, PROP_COLUMNS,
-      g_param_spec_int ("columns", "Columns", "Units round a slice, 8 to 3600 (default: 360)", 8,
-          3600, kDefaultColumns, controllable));
+      g_param_spec_int ("columns", "Cells per slice", "Number of cells around a slice", 8, 3600,
+          kDefaultColumns, controllable));
   g_object_class_install_property (object_class, PROP_LAYER_GAP,
       g_param_spec_double ("layer-gap", "Layer gap",
-          "Points of a unit whose radii lie further apart belong to different surfaces, metres, 0 "
-          "to 100 (default: 0.03)",
-          0, 100, kDefaultLayerGap, controllable));
+          "Radial gap in metres beyond which points of one cell belong to different surfaces", 0,
+          100, kDefaultLayerGap, controllable));
   g_object_class_install_property (object_class, PROP_SMOOTHING,
-      g_param_spec_double ("smoothing", "Smoothing",
-          "How far neighbours count in a unit's decision, metres, 0 to 1; 0 decides each unit "
-          "alone (default: 0.01)",
+      g_param_spec_double ("smoothing", "Smoothing radius",
+          "Radius in metres of the neighbourhood that decides which view wins a cell (0 = each "
+          "cell on its own)",
           0, 1, kDefaultSmoothing, controllable));
   g_object_class_install_property (object_class, PROP_OVERLAP,
       g_param_spec_double ("overlap", "Overlap",
-          "How far round a point the surface of the view that stays must reach before it goes, "
-          "pixels, 0 to 16; from 1 on no hole opens, more keeps a wider overlap for blending "
-          "(default: 8)",
+          "Distance in pixels to which the winning view's surface must extend around a point "
+          "before the point is cleared (1 or more = no holes open, larger = wider overlap for "
+          "blending)",
           0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
 }
 
@@ -808,13 +807,13 @@ install_steadiness_properties (GObjectClass *object_class, GParamFlags flags)
   const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
   g_object_class_install_property (object_class, PROP_HYSTERESIS,
       g_param_spec_double ("hysteresis", "Hysteresis",
-          "A unit changes its view only if the other one looks at it more squarely by this cosine, "
-          "0 to 2; 0 forgets every frame (default: 0.2)",
+          "Cosine by which another view must face the surface more directly to take over a cell (0 "
+          "= no memory of earlier frames)",
           0, 2, kDefaultHysteresis, controllable));
   g_object_class_install_property (object_class, PROP_AGREEMENT,
-      g_param_spec_double ("agreement", "Agreement",
-          "Cosine that a view gains in a unit whose neighbours it won, 0 to 2 (default: 0.1)", 0, 2,
-          kDefaultAgreement, controllable));
+      g_param_spec_double ("agreement", "Neighbour bonus",
+          "Bonus, as a cosine, of a view in cells whose neighbours it won", 0, 2, kDefaultAgreement,
+          controllable));
 }
 
 static void
@@ -837,21 +836,20 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   install_steadiness_properties (object_class, flags);
   g_object_class_install_property (object_class, PROP_N_THREADS,
       g_param_spec_int ("n-threads", "Threads",
-          "Views and slices worked on at the same time, 0 to 64; 0 = number of cores (default: 0)",
-          0, 64, 0, flags));
+          "Number of threads that process views and slices (0 = one per CPU core)", 0, 64, 0,
+          flags));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "frames, points-contradicted, points-in, points-out, units, units-shared, units-held, "
-          "units-changed since "
-          "READY; bodies, axis-position, axis-direction, views (consistency and corrections) of "
-          "the last frame",
+          "Counters since READY: frames, points-contradicted, points-in, points-out, units, "
+          "units-shared, units-held, units-changed; of the last frame: bodies, axis-position, "
+          "axis-direction, views",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
-      "Clears the points that several views see of the same place, but for the best view's",
+      "Removes redundant points of overlapping views and matches the views' poses and colours",
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
   gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));

@@ -124,7 +124,7 @@ gst_range_render_change_state (GstElement *element, GstStateChange transition)
   auto self = GST_RANGE_RENDER (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && self->missing) {
     GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN, ("There is no element %s", self->missing),
-        ("expected it among the plugins of GStreamer and gst-rangecast"));
+        ("expected it in the plugins of GStreamer and gst-rangecast"));
     return GST_STATE_CHANGE_FAILURE;
   }
   return GST_ELEMENT_CLASS (gst_range_render_parent_class)->change_state (element, transition);
@@ -157,7 +157,7 @@ gst_range_render_class_init (GstRangeRenderClass *klass)
   gst_element_class_add_static_pad_template (element_class, &src_template);
   /* decodebin looks for a Decoder; nothing else that turns something into raw video is tried. */
   gst_element_class_set_static_metadata (element_class, "Range image renderer",
-      "Codec/Decoder/Video", "Draws range images as ordinary video, for playbin and decodebin",
+      "Codec/Decoder/Video", "Renders range images as raw video, for playbin and decodebin",
       "gst-rangecast");
   element_class->change_state = gst_range_render_change_state;
 

@@ -116,7 +116,8 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
   GstStripRenderPrivate *priv = self->priv;
   if (strip_has_flags_as_text (out)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("The caps' multiview-flags are text, expected (GstVideoMultiviewFlagsSet)"), (nullptr));
+        ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
+        (nullptr));
     return FALSE;
   }
   if (strip_guarded (self, [&] { return take_input_caps (self, in); }) != GST_FLOW_OK ||
@@ -195,7 +196,7 @@ choose_pool (GstStripRender *self, GstQuery *query)
   PoolSizes sizes = offer;
   if (!is_usable (pool, context) || !configure_pool (pool, query, sizes)) {
     if (pool)
-      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " does not suit us: a pool of our own", pool);
+      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " cannot be used; creating a pool", pool);
     gst_clear_object (&pool);
     pool = gst_gl_buffer_pool_new (context);
     sizes = {least, offer.min, 0};
@@ -550,7 +551,7 @@ describe_element (GstElementClass *element_class)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
-      "Draws range images as triangle strips with OpenGL", "gst-rangecast");
+      "Renders range images with OpenGL without building a mesh", "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_STRIP_RENDER_MODE, GstPluginAPIFlags (0));
 }
 
@@ -568,9 +569,9 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   prop_stats = install_strip_settings (object_class) + 1;
   g_object_class_install_property (object_class, prop_stats,
       g_param_spec_boxed ("stats", "Statistics",
-          "Since start: frames, frame-sets, repeated, dropped, uploaded-total; and of the last "
-          "frame: points, "
-          "vertices, triangles, strips, isolated, uploaded-bytes",
+          "Counters since the element was started: frames, frame-sets, repeated, dropped, "
+          "uploaded-total; of the last frame: points, vertices, triangles, strips, isolated, "
+          "uploaded-bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, prop_stats + 1);
 

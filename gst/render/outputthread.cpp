@@ -15,7 +15,7 @@ PictureThread::start (GstElement *element, Tick tick)
   try {
     thread_ = std::thread ([this, element, tick] { run (element, tick); });
   } catch (const std::exception &error) {
-    GST_WARNING ("no thread: %s", error.what ());
+    GST_WARNING ("could not start the drawing thread: %s", error.what ());
     return false;
   }
   return true;

@@ -29,7 +29,7 @@ PanelPainter::start (GstGLContext *context)
   shader_ = make_shader (context, kCoveringVertexShader, kFragmentShader, &error);
   if (!shader_) {
     failed_ = true;
-    GST_WARNING ("statistics cannot be drawn: %s", error ? error->message : "no shader");
+    GST_WARNING ("cannot draw the statistics: %s", error ? error->message : "no shader");
     g_clear_error (&error);
     return false;
   }

@@ -23,60 +23,48 @@ struct NumberRow {
 };
 static const NumberRow kNumbers[] = {
     {"azimuth", "Azimuth",
-        "Degrees round the scene from the first view, to the right (-360 to 360, default 0)", -360,
+        "Camera angle around the scene in degrees, positive to the right of the first view", -360,
         360, 0, [] (Settings &s) -> double & { return s.camera.orbit.azimuth_deg; }},
-    {"elevation", "Elevation", "Degrees above the first view's height (-89 to 89, default 0)", -89,
-        89, 0, [] (Settings &s) -> double & { return s.camera.orbit.elevation_deg; }},
+    {"elevation", "Elevation", "Camera angle above the first view in degrees", -89, 89, 0,
+        [] (Settings &s) -> double & { return s.camera.orbit.elevation_deg; }},
     {"distance", "Distance",
-        "Metres from what is looked at (0 to 1000, default 0: the first view's distance)", 0, 1000,
-        0, [] (Settings &s) -> double & { return s.camera.orbit.distance_m; }},
-    {"field-of-view", "Field of view",
-        "Vertical angle in degrees (0 to 170, default 0: the first view's)", 0, 170, 0,
-        [] (Settings &s) -> double & { return s.camera.orbit.fov_deg; }},
-    {"pan-x", "Pan x",
-        "Metres by which what is looked at moves to the first view's right (-1000 to 1000, "
-        "default 0)",
-        -1000, 1000, 0, [] (Settings &s) -> double & { return s.camera.orbit.pan.x; }},
-    {"pan-y", "Pan y", "Metres by which what is looked at moves up (-1000 to 1000, default 0)",
-        -1000, 1000, 0, [] (Settings &s) -> double & { return s.camera.orbit.pan.y; }},
-    {"pan-z", "Pan z",
-        "Metres by which what is looked at moves towards the first view (-1000 to 1000, default 0)",
-        -1000, 1000, 0, [] (Settings &s) -> double & { return s.camera.orbit.pan.z; }},
-    {"auto-orbit", "Auto orbit",
-        "Degrees a second by which the azimuth grows by itself from the first frame on (-3600 to "
-        "3600, default 0)",
-        -3600, 3600, 0, [] (Settings &s) -> double & { return s.camera.auto_orbit; }},
+        "Distance of the camera from its target in metres (0 = as the first view)", 0, 1000, 0,
+        [] (Settings &s) -> double & { return s.camera.orbit.distance_m; }},
+    {"field-of-view", "Field of view", "Vertical field of view in degrees (0 = as the first view)",
+        0, 170, 0, [] (Settings &s) -> double & { return s.camera.orbit.fov_deg; }},
+    {"pan-x", "Pan x", "Shift of the camera target to the first view's right in metres", -1000,
+        1000, 0, [] (Settings &s) -> double & { return s.camera.orbit.pan.x; }},
+    {"pan-y", "Pan y", "Shift of the camera target upwards in metres", -1000, 1000, 0,
+        [] (Settings &s) -> double & { return s.camera.orbit.pan.y; }},
+    {"pan-z", "Pan z", "Shift of the camera target towards the first view in metres", -1000, 1000,
+        0, [] (Settings &s) -> double & { return s.camera.orbit.pan.z; }},
+    {"auto-orbit", "Auto orbit", "Speed of automatic rotation in degrees per second", -3600, 3600,
+        0, [] (Settings &s) -> double & { return s.camera.auto_orbit; }},
     {"depth-step", "Depth step",
-        "Neighbours that differ by more than this share of their depth are not joined (0 to 1, "
-        "default 0.03)",
+        "Depth difference, as a fraction of depth, beyond which neighbouring pixels are not joined",
         0, 1, kDefaults.depth_step, [] (Settings &s) -> double & { return s.strips.depth_step; }},
-    {"merge", "Merge",
-        "Strips leave out pixels that are off the surface between others by less than this times "
-        "0.07 % of their depth and 1.5 levels of colour; copies: 0.4 % and 12 levels (0 = none, "
-        "to 100, default 1)",
+    {"merge", "Merge tolerance",
+        "Tolerance of strip simplification (0 = keep every pixel, 1 = 0.07 % of depth and 1.5 "
+        "colour levels)",
         0, 100, kDefaults.merge, [] (Settings &s) -> double & { return s.strips.merge; }},
     {"view-gap", "View gap",
-        "Modes other than blend: metres by which what a view sees moves behind what others see, "
-        "times 1 - cosine of the "
-        "angle between its direction and the picture's (0 to 1, default 0.012)",
+        "Metres by which a view is moved behind the others, times 1 - cosine of its angle to the "
+        "viewing direction; not used by mode=blend",
         0, 1, 0.012, [] (Settings &s) -> double & { return s.view_gap_m; }},
     {"blend-range", "Blend range",
-        "Of mode blend: metres behind the nearest surface in which what other views see is taken "
-        "for "
-        "the same surface (0 to 1, default 0.02)",
+        "Depth behind the nearest surface in metres within which views are blended with mode=blend",
         0, 1, 0.02, [] (Settings &s) -> double & { return s.blend_range_m; }},
     {"background-shade", "Background shade",
-        "Share by which an opaque background is lighter at the top and darker at the bottom (0 to "
-        "1, default 0)",
-        0, 1, 0, [] (Settings &s) -> double & { return s.background_shade; }},
-    {"point-size", "Point size", "Of mode points, in footprints of a pixel (0.1 to 100, default 1)",
-        0.1, 100, 1, [] (Settings &s) -> double & { return s.point_size; }},
-    {"eye-distance", "Eye distance",
-        "Metres between the eyes of stereoscopic pictures (0 to 10, default 0.063)", 0, 10, 0.063,
-        [] (Settings &s) -> double & { return s.eye_distance_m; }},
+        "Vertical gradient of an opaque background, as a fraction of its colour (0 = none)", 0, 1,
+        0, [] (Settings &s) -> double & { return s.background_shade; }},
+    {"point-size", "Point size",
+        "Size of a point relative to the footprint of its pixel, for mode=points", 0.1, 100, 1,
+        [] (Settings &s) -> double & { return s.point_size; }},
+    {"eye-distance", "Eye distance", "Distance between the eyes in metres, for stereoscopic output",
+        0, 10, 0.063, [] (Settings &s) -> double & { return s.eye_distance_m; }},
     {"convergence", "Convergence",
-        "Metres from the viewer to what both eyes' pictures have in the same place, the plane of "
-        "the screen (0 to 1000, default 0: what is looked at; 1000 for headsets)",
+        "Distance of zero parallax in metres, for stereoscopic output (0 = camera target, 1000 = "
+        "headsets)",
         0, 1000, 0, [] (Settings &s) -> double & { return s.convergence_m; }},
 };
 
@@ -87,29 +75,23 @@ struct SwitchRow {
   bool &(*field) (Settings &);
 };
 static const SwitchRow kSwitches[] = {
-    {"fit", "Fit",
-        "Camera properties count from a view that is centred on what is drawn and as near as it "
-        "fits, found when the stream begins and by the keys r and Home (default false: from the "
-        "first view)",
+    {"fit", "Fit to content",
+        "Fit the view to the content at the start of the stream and on the keys r and Home; camera "
+        "properties then count from that view",
         kFlags, [] (Settings &s) -> bool & { return s.fit; }},
-    {"show-cameras", "Show cameras",
-        "Also draw where the rig's cameras stand, and their frusta from near to far (default "
-        "false)",
+    {"show-cameras", "Show cameras", "Draw the rig's cameras and their frusta from near to far",
         kFlags, [] (Settings &s) -> bool & { return s.show_cameras; }},
     {"back-faces", "Back faces",
-        "Mode strips: also show surfaces from behind, from inside a body, where no front is "
-        "(default "
-        "false; always with one camera)",
+        "Draw back faces where no front face covers them, for mode=strips (always on for rigs of "
+        "one camera)",
         kFlags, [] (Settings &s) -> bool & { return s.back_faces; }},
-    {"show-units", "Show units",
-        "Points in shades of their camera's colour, which show-cameras has too (default false)",
-        kFlags, [] (Settings &s) -> bool & { return s.show_units; }},
-    {"show-stats", "Show statistics",
-        "Rates, points, views, triangles and latency as text over the picture (default false)",
-        kFlags, [] (Settings &s) -> bool & { return s.show_stats; }},
+    {"show-units", "Tint views", "Tint each point with the colour of its view", kFlags,
+        [] (Settings &s) -> bool & { return s.show_units; }},
+    {"show-stats", "Show statistics", "Overlay statistics on the output", kFlags,
+        [] (Settings &s) -> bool & { return s.show_stats; }},
     {"keep-rate", "Keep rate",
-        "Pictures at the output's frame rate even if that is the input's: without holes, and a "
-        "live stream that stalls is drawn on (default false: then one picture a frame set)",
+        "Output at the negotiated frame rate even if it is the input's, repeating frames while a "
+        "live stream stalls",
         kRateFlags, [] (Settings &s) -> bool & { return s.keep_rate; }},
 };
 
@@ -138,10 +120,10 @@ gst_strip_render_mode_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (StripMode::kBlend), "Strips, blended where several views see a surface", "blend"},
-        {int (StripMode::kStrips), "Bands of triangles along the rows", "strips"},
-        {int (StripMode::kRectangles), "One rectangle a pixel", "rectangles"},
-        {int (StripMode::kPoints), "One point a pixel", "points"}, {}};
+        {int (StripMode::kBlend), "Surfaces of all views, blended where they overlap", "blend"},
+        {int (StripMode::kStrips), "Triangle strips along the rows", "strips"},
+        {int (StripMode::kRectangles), "One rectangle per pixel", "rectangles"},
+        {int (StripMode::kPoints), "One point per pixel", "points"}, {}};
     return g_enum_register_static ("GstStripRenderMode", values);
   }();
   return type;
@@ -162,31 +144,29 @@ install_strip_settings (GObjectClass *object_class)
         g_param_spec_boolean (row.name, row.nick, row.blurb, FALSE, row.flags));
   }
   g_object_class_install_property (object_class, PROP_MODE,
-      g_param_spec_enum ("mode", "Mode", "What is drawn for the points (default: blend)",
-          GST_TYPE_STRIP_RENDER_MODE, int (StripMode::kBlend), kFlags));
+      g_param_spec_enum ("mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE,
+          int (StripMode::kBlend), kFlags));
   g_object_class_install_property (object_class, PROP_BACKGROUND,
-      g_param_spec_uint ("background", "Background",
-          "Colour behind the scene, ARGB (default 0xff20242a)", 0, G_MAXUINT32,
+      g_param_spec_uint ("background", "Background", "Background colour, ARGB", 0, G_MAXUINT32,
           Settings::kDefaultBackground, kFlags));
   g_object_class_install_property (object_class, PROP_VIEW_MASK,
       g_param_spec_uint64 ("view-mask", "View mask",
-          "The views that are drawn: bit n is the view with view-id n (default "
-          "0xffffffffffffffff: all; 0: the background alone)",
-          0, G_MAXUINT64, G_MAXUINT64, kFlags));
+          "Bit mask of the views to draw; bit n is view-id n", 0, G_MAXUINT64, G_MAXUINT64,
+          kFlags));
   g_object_class_install_property (object_class, PROP_MAX_GAP,
       g_param_spec_int ("max-gap", "Maximum gap",
-          "Invalid pixels of a row or a column that strips bridge (0 to 1000, default 2)", 0, 1000,
+          "Maximum number of invalid pixels in a row or column that strips bridge", 0, 1000,
           kDefaults.max_gap, kFlags));
   g_object_class_install_property (object_class, PROP_SAMPLES,
-      g_param_spec_int ("samples", "Samples",
-          "Samples of a pixel, for antialiasing (0 or 1 = none, to 64, default 0); less where "
-          "OpenGL has no more",
+      g_param_spec_int ("samples", "Multisampling",
+          "Number of samples per pixel for antialiasing, limited by OpenGL (0 or 1 = off); not "
+          "used by mode=blend",
           0, 64, 0, kFlags));
   g_object_class_install_property (object_class, PROP_HOLD_TIME,
       g_param_spec_uint64 ("hold-time", "Hold time",
-          "ns for which the last frame set is drawn on, at the output's frame rate, when none "
-          "follows; only if that rate is not the input's, or with keep-rate; a minute at most "
-          "unless live (0 to 18446744073709551615, default 18446744073709551615: for ever)",
+          "Time in nanoseconds for which the last frame set is repeated when no other follows, if "
+          "the output has a frame rate of its own (G_MAXUINT64 = forever; not live: one minute at "
+          "most)",
           0, G_MAXUINT64, G_MAXUINT64, kRateFlags));
   return PROP_LAST;
 }

@@ -402,15 +402,15 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
   object_class->finalize = gst_rtcp_reports_finalize;
 
   g_object_class_install_property (object_class, PROP_MAX_RECEIVERS,
-      g_param_spec_uint ("max-receivers", "Max receivers",
-          "RTCP of so many receivers gets through at a time, and of a quarter of them from one "
-          "address, 1 to 4096 (default 256)",
+      g_param_spec_uint ("max-receivers", "Maximum receivers",
+          "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
+          "quarter of it",
           1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Receivers now; packets of RTCP since start that were refused (of nobody who receives "
-          "the stream, or of too many), and malformed",
+          "Current number of receivers, and the RTCP packets refused and malformed since the "
+          "element was started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   element_class->change_state = gst_rtcp_reports_change_state;
@@ -420,7 +420,8 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
   gst_element_class_add_static_pad_template (element_class, &rtcp_src_template);
   gst_element_class_set_static_metadata (element_class, "RTCP reports for encoders",
       "Network/RTP/Analyzer",
-      "Tells an encoder what receivers report in RTCP: loss, jitter, round trip", "gst-rangecast");
+      "Reports loss, jitter and round-trip time from RTCP receiver reports to the encoder",
+      "gst-rangecast");
 
   GST_DEBUG_CATEGORY_INIT (gst_rtcp_reports_debug, "rtcpreports", 0, "RTCP reports for encoders");
 }

@@ -452,15 +452,15 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
 
   g_object_class_install_property (object_class, PROP_UNIT_STATS,
       g_param_spec_boxed ("unit-stats", "Unit statistics",
-          "Counters since start: packets, units, bad-units, access-units, unmarked, without-rig, "
-          "lost-packets, bytes",
+          "Counters since the element was started: packets, units, bad-units, access-units, "
+          "unmarked, without-rig, lost-packets, bytes",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code depayloader",
-      "Codec/Depayloader/Network/RTP", "Takes coded range frame sets out of RTP packets",
+      "Codec/Depayloader/Network/RTP", "Extracts neighbour-coded frame sets from RTP packets",
       "gst-rangecast");
 
   element_class->change_state = gst_rtp_neighbour_code_depay_change_state;

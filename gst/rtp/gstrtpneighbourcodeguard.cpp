@@ -374,8 +374,8 @@ warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
 {
   gchar *rival = text_of (packet.address), *sender = text_of (self->priv->address);
   GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-      ("Two senders at one port: packets of SSRC %08x from %s are dropped, expected those of "
-       "%08x from %s",
+      ("Two senders at one port: dropping packets of SSRC %08x from %s, accepting those of %08x "
+       "from %s",
           packet.ssrc, rival, *self->priv->ssrc, sender),
       (nullptr));
   g_free (sender);
@@ -387,15 +387,15 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
 {
   if (verdict == Verdict::kUnsound)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%" G_GUINT64_FORMAT " packets came and none is sound: expected coded frame sets of "
-         "version %d; they are another codec's, or encrypted (--key)",
+        ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
+                              "version %d; they belong to another codec, or are encrypted (--key)",
             unsound, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
     warn_of_rival (self, packet);
   if (verdict == Verdict::kOtherVersion)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("A sender's packets are of version %d of the neighbour code: dropped; expected version %d",
+        ("A sender uses version %d of the neighbour code: dropped; expected version %d",
             packet.version, rangecast::kBitstreamVersion),
         (nullptr));
 }
@@ -577,19 +577,19 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
 
   g_object_class_install_property (object_class, PROP_TIMEOUT,
       g_param_spec_uint64 ("timeout", "Timeout",
-          "Another sender takes over when the one that passes has been silent for so long, in "
-          "nanoseconds, 0 to 2^64 - 1 (never); default 500000000 (500 ms)",
+          "Silence of the current sender in nanoseconds after which another sender is accepted "
+          "(G_MAXUINT64 = never)",
           0, G_MAXUINT64, kDefaultTimeout,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
-          "Counters since start: packets passed, packets foreign (dropped), senders that passed",
+          "Counters since the element was started: passed and foreign packets, and senders",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code guard",
-      "Filter/Network/RTP", "Lets one sender of coded range frame sets through and nothing else",
+      "Filter/Network/RTP", "Passes the RTP packets of one sender and drops those of all others",
       "gst-rangecast");
   element_class->change_state = gst_rtp_neighbour_code_guard_change_state;
 

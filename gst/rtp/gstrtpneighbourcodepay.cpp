@@ -414,8 +414,8 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
 
   g_object_class_install_property (object_class, PROP_CONFIG_INTERVAL,
       g_param_spec_int ("config-interval", "Config interval",
-          "Seconds after which the rig is sent again in band (0: never, -1: with every frame set; "
-          "-1 to 3600, default 1)",
+          "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
+          "frame set)",
           -1, 3600, kDefaultConfigInterval,
           GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
@@ -423,7 +423,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code payloader",
-      "Codec/Payloader/Network/RTP", "Puts coded range frame sets into RTP packets",
+      "Codec/Payloader/Network/RTP", "Packs neighbour-coded frame sets into RTP packets",
       "gst-rangecast");
 
   element_class->change_state = gst_rtp_neighbour_code_pay_change_state;

@@ -258,14 +258,15 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
   object_class->finalize = gst_avatar_test_src_finalize;
   AvatarSettings::install (object_class);
   g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was last started",
+      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
           GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   for (GstStaticPadTemplate *pad_template :
       {&src_template, &left_template, &right_template, &third_template})
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Avatar test source", "Source/Video",
-      "A head and shoulders seen by a rig of stereo cameras, with exact depth", "gst-rangecast");
+      "Renders a moving head and shoulders as seen by a rig of stereo cameras, with exact depth",
+      "gst-rangecast");
 
   element_class->request_new_pad = gst_avatar_test_src_request_new_pad;
   element_class->release_pad = gst_avatar_test_src_release_pad;

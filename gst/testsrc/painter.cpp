@@ -102,13 +102,13 @@ AvatarPainter::make_loop (SceneCamera camera)
     return {StatusCode::kBadValue,
         "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
             std::to_string (kMostPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
-            std::to_string (height) + ", which take 1 GiB a camera"};
+            std::to_string (height) + ", which take 1 GiB per camera"};
   try {
     Loop &loop = loops_[int (camera)];
     loop.drawn.assign (settings_.loop_frames, false);
     loop.pictures.resize (settings_.loop_frames * pixels);
   } catch (const std::bad_alloc &) {
-    return {StatusCode::kNoSpace, "loop-frames: no memory left for so many pictures"};
+    return {StatusCode::kNoSpace, "loop-frames: out of memory for that many frames"};
   }
   return {};
 }

@@ -37,11 +37,11 @@ static GType
 avatar_dress_get_type ()
 {
   static const GFlagsValue values[] = {{0, "Nothing", "none"},
-      {rangecast::kDressHair, "Long hair with free strands", "hair"},
+      {rangecast::kDressHair, "Long hair with loose strands", "hair"},
       {rangecast::kDressGlasses, "Glasses", "glasses"},
       {rangecast::kDressCollar, "Open collar", "collar"},
-      {rangecast::kDressHand, "Forearm and hand before the chest", "hand"},
-      {rangecast::kDressAll, "All of these", "all"}, {0, nullptr, nullptr}};
+      {rangecast::kDressHand, "Forearm and hand in front of the chest", "hand"},
+      {rangecast::kDressAll, "All accessories", "all"}, {0, nullptr, nullptr}};
   static const GType type = g_flags_register_static ("GstAvatarTestSrcDress", values);
   return type;
 }
@@ -295,92 +295,89 @@ struct Installer {
 static void
 install_scene (const Installer &to)
 {
-  to.add_int (
-      PROP_VIEWS, "views", "Views", "Stereo cameras in the rig (1 to 64, default: 4)", 1, 64, 4);
+  to.add_int (PROP_VIEWS, "views", "Views", "Number of stereo cameras in the rig", 1, 64, 4);
   to.add_int (PROP_VIEW_ID, "view-id", "View",
-      "Which view to give (0 to 63; -1, the default: all on src, view 0 on left, right and third)",
+      "View to output, by view-id (-1 = all views on src, view 0 on left, right and third)",
       AvatarSettings::kAllViews, 63, AvatarSettings::kAllViews);
   to.add_double (PROP_ARC, "arc", "Arc",
-      "Arc on which the views stand, degrees (1 to 360; 360, the default: a ring, view 0 in front; "
-      "less: the figure's front in the middle)",
+      "Arc covered by the cameras in degrees (360 = closed ring with view 0 in front of the "
+      "figure, less = arc centred on its front)",
       1, 360, 360);
-  to.add_double (PROP_DISTANCE, "distance", "Distance",
-      "From the left cameras to the figure's axis, metres (0.5 to 1.2, default: 0.8)", 0.5, 1.2,
-      0.8);
+  to.add_double (PROP_DISTANCE, "distance", "Camera distance",
+      "Distance from the left cameras to the figure's axis in metres", 0.5, 1.2, 0.8);
   to.add_double (PROP_BASELINE, "baseline", "Baseline",
-      "From left to right and to third camera, metres (0.01 to 0.3, default: 0.1)", 0.01, 0.3, 0.1);
-  to.add_uint (PROP_SEED, "seed", "Seed", "Of all patterns and the noise (default: 1)", 1);
-  to.add_double (PROP_NOISE, "noise", "Noise",
-      "Sensor noise, standard deviation in grey levels (0 to 20, default: 1)", 0, 20, 1);
-  to.add_double (PROP_MOTION, "motion", "Motion",
-      "How much the figure moves (0 = still, to 2; default: 1)", 0, 2, 1);
+      "Distance from the left camera to the right and to the third camera in metres", 0.01, 0.3,
+      0.1);
+  to.add_uint (PROP_SEED, "seed", "Random seed", "Seed of the textures and the sensor noise", 1);
+  to.add_double (PROP_NOISE, "noise", "Sensor noise",
+      "Standard deviation of the sensor noise in grey levels (0 = none)", 0, 20, 1);
+  to.add_double (PROP_MOTION, "motion", "Motion amplitude",
+      "Amplitude of the figure's motion (0 = still, 1 = head turns by 20 degrees)", 0, 2, 1);
 }
 
 static void
 install_dress (const Installer &to)
 {
   g_object_class_install_property (to.klass, PROP_DRESS,
-      g_param_spec_flags ("dress", "Dress",
-          "What the built-in figure wears: surfaces one behind the other (default: none)",
+      g_param_spec_flags ("dress", "Accessories",
+          "Accessories of the built-in figure that add surfaces in front of one another",
           TYPE_AVATAR_DRESS, 0, Installer::kReady));
 }
 
 static void
 install_room (const Installer &to)
 {
-  to.add_int (PROP_PERSONS, "persons", "Persons",
-      "Figures; the others stand 0.4 m behind the first, left and right (1 to 3, default: 1)", 1,
+  to.add_int (PROP_PERSONS, "persons", "Figures",
+      "Number of figures; the second and third stand 0.4 m behind the first, left and right", 1,
       rangecast::SceneSettings::kMaxPersons, 1);
   to.add_double (PROP_FAR, "far", "Far",
-      "Farthest depth of range images and rig, metres; from 3.5 on it reaches the walls (1 to 6, "
-      "default: 1.3)",
-      1, 6, 1.3);
+      "Far limit of the range images and of the rig in metres (walls are within reach from 3.5)", 1,
+      6, 1.3);
   to.add_double (PROP_CAST_SHADOW, "cast-shadow", "Cast shadow",
-      "Share of light that is missing in the figures' shadow on the room (0 to 0.9, default: 0)", 0,
-      0.9, 0);
+      "Fraction of light blocked in the shadow that the figures cast on the room", 0, 0.9, 0);
   to.add_double (PROP_LIGHT_DRIFT, "light-drift", "Light drift",
-      "All light swings by this share, within 40 seconds (0 to 0.5, default: 0)", 0, 0.5, 0);
+      "Amplitude of a slow brightness change with a period of 40 seconds, as a fraction of the "
+      "light",
+      0, 0.5, 0);
   to.add_double (PROP_WALL_TEXTURE, "wall-texture", "Wall texture",
-      "Contrast of the room's texture (0 = plain, to 1, the default)", 0, 1, 1);
+      "Contrast of the room's texture (0 = plain walls)", 0, 1, 1);
   to.add_double (PROP_WALL_WARMTH, "wall-warmth", "Wall warmth",
-      "Colour of the walls (0, the default: blue-grey, to 1: as wood, skin and hair)", 0, 1, 0);
+      "Colour of the walls (0 = blue-grey, 1 = similar to skin, hair and wood)", 0, 1, 0);
   to.add_bool (PROP_CHAIR, "chair", "Chair",
-      "A chair stands behind the figure, also in the empty room (default: false)");
+      "Place a chair behind the figure; it is also part of the empty room");
 }
 
 static void
 install_model_and_stream (const Installer &to)
 {
   to.add_uint (PROP_EMPTY_FRAMES, "empty-frames", "Empty frames",
-      "So many frames at first show the room without the figure (default: 0)", 0);
+      "Number of frames at the start that show the room without the figure", 0);
   to.add_uint (PROP_LOOP_FRAMES, "loop-frames", "Loop frames",
-      "Draw so many pictures of the figure once each, when first shown, and repeat them forwards "
-      "and backwards, as cameras that cost no drawing; left, right and third only, at most 1 GiB a "
-      "camera (0, the default: draw each picture)",
+      "Render this many frames once and replay them forwards and backwards to save CPU time; left, "
+      "right and third pads only, at most 1 GiB per camera (0 = render every frame)",
       0);
   to.add_int (PROP_NUM_BUFFERS, "num-buffers", "Number of buffers",
-      "Frames before EOS (default: -1, no end)", -1, G_MAXINT, -1);
+      "Number of frames to output before EOS (-1 = unlimited)", -1, G_MAXINT, -1);
   to.add_bool (PROP_IS_LIVE, "is-live", "Is live",
-      "Take pictures at multiples of the frame period of the pipeline's clock (default: false)");
+      "Act as a live source, with frames at multiples of the frame period on the pipeline clock");
   to.add_string (PROP_LOCATION, "location", "Location",
-      "Model of the figure, glTF or OBJ (default: the built-in one)");
+      "glTF or OBJ file with the model to show (unset = built-in figure)");
   to.add_double (PROP_MODEL_TOP, "model-top", "Model top",
-      "How much of the model is kept, metres from the crown down of a person of 1.8 m (0.1 to 1.8; "
-      "0: all of it, scaled to 0.5 m; -1, the default: 0.5 m of a model that stands like a person, "
-      "else all)",
+      "Part of the model to keep, in metres below the crown after scaling it to a person 1.8 m "
+      "tall (0 = the whole model scaled to 0.5 m, -1 = 0.5 for models of a standing person, else "
+      "0)",
       -1, 1.8, -1);
   to.add_string (PROP_TEXTURE, "texture", "Texture",
-      "Picture for all meshes of the model (default: what its materials name, or a colour map "
-      "beside it)");
-  to.add_bool (PROP_TEXTURE_FLIP, "texture-flip", "Texture upside down",
-      "Turn the model's texture upside down, for a picture made for the other direction of v "
-      "(default: false)");
+      "Image file used as texture of all meshes of the model (unset = as the model's materials "
+      "say, or a colour map next to the model file)");
+  to.add_bool (
+      PROP_TEXTURE_FLIP, "texture-flip", "Flip texture", "Flip the model's textures vertically");
   to.add_string (PROP_RIG_EXPORT, "rig-export", "Rig export",
-      "Write the calibration of all cameras to this file, YAML or JSON (default: none)");
-  to.add_bool (PROP_RANGE_PERSON_ONLY, "range-person-only", "Range of person only",
-      "Crop range images to the person's bounding box (default: false)");
+      "File to write the calibration of all cameras to, YAML or JSON");
+  to.add_bool (PROP_RANGE_PERSON_ONLY, "range-person-only", "Crop to person",
+      "Crop range images to the bounding box of the figures");
   to.add_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Threads that draw range images (0, the default: one a core)", 0, 64, 0);
+      "Number of threads that render range images (0 = one per CPU core)", 0, 64, 0);
 }
 
 void

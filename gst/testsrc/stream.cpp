@@ -151,7 +151,9 @@ AvatarStream::refused (const AvatarPad &pad)
   if (GST_PAD_NEEDS_RECONFIGURE (pad.pad ()))
     return kAgain; /* the peer wants something else since the format was chosen */
   GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
-      ("pad %s: its peer takes none of our formats", GST_PAD_NAME (pad.pad ())), (nullptr));
+      ("pad %s: the peer accepts none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }",
+          GST_PAD_NAME (pad.pad ())),
+      (nullptr));
   return GST_FLOW_ERROR;
 }
 
@@ -164,8 +166,8 @@ AvatarStream::no_common_format ()
       return GST_FLOW_FLUSHING;
   }
   GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
-      ("the peers of the pads agree on no size and frame rate (16 to 4096 pixels, 1/1000 to "
-       "1000 frames a second)"),
+      ("the peers of the pads have no size and frame rate in common (16 to 4096 pixels, 1/1000 to "
+       "1000 frames per second)"),
       (nullptr));
   return GST_FLOW_ERROR;
 }
@@ -200,7 +202,7 @@ AvatarStream::push_picture (AvatarPad &pad, const AvatarMoment &moment)
   GstFlowReturn flow = pad.acquire (&buffer);
   if (flow == GST_FLOW_ERROR)
     return gst_range_flow_return (
-        element_, {rangecast::StatusCode::kNoSpace, "no memory left for a picture"});
+        element_, {rangecast::StatusCode::kNoSpace, "out of memory for a frame"});
   if (flow != GST_FLOW_OK)
     return flow;
   flow = gst_range_flow_return (

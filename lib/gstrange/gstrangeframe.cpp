@@ -17,7 +17,7 @@ namespace gstrange {
 static Status
 no_memory ()
 {
-  return {StatusCode::kNoSpace, "no memory left for a frame set"};
+  return {StatusCode::kNoSpace, "out of memory for a frame set"};
 }
 
 Status

@@ -144,7 +144,7 @@ test_an_encrypted_stream_to_a_receiver_without_a_key_is_told () {
   make_key
   start_viewer
   start_encrypted_camera
-  wait_for viewer.log 'packets came and none is sound.*--key' 60
+  wait_for viewer.log 'packets arrived and none is valid.*--key' 60
   sleep 4
   kill -TERM "${camera[0]}" "$viewer"
   wait_for viewer.log "nothing came to port $((port + 9))" 30

@@ -279,11 +279,11 @@ gst_camera_device_provider_start (GstDeviceProvider *provider)
     watch.changed.notify_all ();
   };
   if (watch.usb && !watch.usb->watch (on_usb))
-    GST_WARNING_OBJECT (provider, "this host's libusb does not tell when devices come and go");
+    GST_WARNING_OBJECT (provider, "libusb does not support hotplug on this host");
   try {
     watch.thread = std::thread ([&watch] { run_watch (watch); });
   } catch (const std::system_error &error) {
-    GST_ERROR_OBJECT (provider, "no thread to look for cameras: %s", error.what ());
+    GST_ERROR_OBJECT (provider, "could not start the camera discovery thread: %s", error.what ());
     delete std::exchange (self->watch, nullptr);
     return FALSE;
   }

@@ -170,7 +170,7 @@ UsbCameras::open (std::string &why)
   auto priv = std::make_unique<Private> ();
   const int error = libusb_init (&priv->context);
   if (error != LIBUSB_SUCCESS) {
-    why = std::string ("libusb does not start: ") + libusb_strerror (libusb_error (error));
+    why = std::string ("cannot initialise libusb: ") + libusb_strerror (libusb_error (error));
     return nullptr;
   }
   return std::unique_ptr<UsbCameras> (new UsbCameras (std::move (priv)));

@@ -27,9 +27,9 @@ guarded (const char *what, const Work &work) noexcept
   try {
     return work ();
   } catch (const std::bad_alloc &) {
-    return failed ("no memory left");
+    return failed ("out of memory");
   } catch (...) {
-    return failed ("failed, expected OpenCV and the system's threads to work");
+    return failed ("internal error");
   }
 }
 

@@ -164,9 +164,8 @@ adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &fram
     if (stop.stop_requested ())
       return {StatusCode::kInterrupted, "bundle adjustment was interrupted"};
     if (!solved)
-      return {StatusCode::kBadValue,
-          "no poses of the cameras fit all boards; expected cameras that "
-          "take their pictures at the same time, and boards held still"};
+      return {StatusCode::kBadValue, "no poses of the cameras fit all boards; expected cameras "
+                                     "that capture at the same time, and boards held still"};
     adjustment.get (bundle);
   } catch (const std::exception &e) {
     return {StatusCode::kBadValue, std::string ("bundle adjustment: ") + e.what ()};

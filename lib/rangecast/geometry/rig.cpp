@@ -142,10 +142,10 @@ scale_view (View &view, int width, int height)
     return {};
   const double sx = double (width) / view.width, sy = double (height) / view.height;
   if (!(std::abs (sx / sy - 1) <= kShapeTolerance))
-    return {StatusCode::kBadSize, "view " + std::to_string (view.id) + " is " +
-                                      size_text (view.width, view.height) + ", the pictures are " +
-                                      size_text (width, height) +
-                                      "; expected the same shape, then it is scaled"};
+    return {StatusCode::kBadSize,
+        "view " + std::to_string (view.id) + " is " + size_text (view.width, view.height) +
+            ", the images are " + size_text (width, height) +
+            "; expected the same aspect ratio, then the calibration is scaled"};
   view.width = width;
   view.height = height;
   view.intrinsics = view.intrinsics.scaled (sx, sy);
@@ -188,7 +188,7 @@ merge (Rig &into, const Rig &other)
     if (!known)
       merged.views.push_back (view);
     else if (encode_rig ({{*known}}) != encode_rig ({{view}}))
-      return bad_field (view, "view-id stands for two different cameras");
+      return bad_field (view, "view-id refers to two different cameras");
   }
   if (Status s = check_pixels (merged); !s.ok ())
     return s;

@@ -377,7 +377,7 @@ ColourBlend::work (Images images, double width_m, int threads)
   for (std::size_t i = 0; same && i < images.size (); i++)
     same = begin_[i + 1] - begin_[i] == size_of (i);
   if (!same)
-    return {StatusCode::kBadSize, "blend: expected the images that were remembered"};
+    return {StatusCode::kBadSize, "blend: expected the images of the last analysis"};
   if (!(width_m > 0))
     return {};
   const auto width = static_cast<float> (std::min (width_m, 1.0));

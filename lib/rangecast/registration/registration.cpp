@@ -185,7 +185,7 @@ Registration::process (ImageView<const std::uint16_t> depth, double metres,
       colour.width != colour_.width || colour.height != colour_.height ||
       image.depth.width != view.width || image.depth.height != view.height ||
       !image.depth.same_size (image.colour))
-    return {StatusCode::kBadSize, "registration: a picture has not the size of its camera"};
+    return {StatusCode::kBadSize, "registration: an image does not have the size of its camera"};
   try {
     mesh_.take (depth, metres, depth_.near_m, depth_.far_m);
     if (into_ == RegisterInto::kColour) {

@@ -17,7 +17,7 @@ needs_too_much (double near_m, double pixels)
 {
   char text[120];
   std::snprintf (text, sizeof text,
-      "near = %g m needs disparities of %g pixels, more than the picture is wide", near_m, pixels);
+      "near = %g m needs disparities of %g pixels, more than the image is wide", near_m, pixels);
   return {StatusCode::kBadValue, text};
 }
 
@@ -229,7 +229,7 @@ DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi
       return s;
     filter (left);
   } catch (const cv::Exception &) {
-    return {StatusCode::kNoSpace, "stereo: OpenCV failed to match the pictures"};
+    return {StatusCode::kNoSpace, "stereo: OpenCV failed to match the images"};
   }
   take (roi);
   return {};

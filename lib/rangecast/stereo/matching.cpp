@@ -90,7 +90,7 @@ Matcher::set_range (int min_disparity, int max_disparity)
     for (const auto &matcher : more_)
       limit (*matcher);
   } catch (const cv::Exception &) {
-    return {StatusCode::kBadValue, "stereo: OpenCV refuses these settings"};
+    return {StatusCode::kBadValue, "stereo: OpenCV rejects these settings"};
   }
   return {};
 }
@@ -121,7 +121,7 @@ Matcher::match_whole (const cv::Mat &left, const cv::Mat &right, cv::Mat &dispar
     matcher_->compute (left, right, disparity);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace,
-        "stereo: OpenCV's matcher failed; is the block larger than the picture?"};
+        "stereo: OpenCV's matcher failed; is the block larger than the image?"};
   }
   return {};
 }
@@ -157,7 +157,7 @@ Matcher::match_stripes (
   cv::parallel_for_ (cv::Range (0, n), work, n);
   if (failed)
     return {StatusCode::kNoSpace,
-        "stereo: OpenCV's matcher failed; is the block larger than a stripe of the picture?"};
+        "stereo: OpenCV's matcher failed; is the block larger than a stripe of the image?"};
   return {};
 }
 

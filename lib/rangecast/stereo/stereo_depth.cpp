@@ -81,7 +81,7 @@ StereoDepth::take (
   has_third_ = with_third_ && !third.empty ();
   for (const auto &picture : {left, right, has_third_ ? third : left})
     if (picture.width != view_.width || picture.height != view_.height)
-      return {StatusCode::kBadSize, "stereo: a picture does not have the view's size"};
+      return {StatusCode::kBadSize, "stereo: an image does not have the view's size"};
   try {
     rectify (0, left);
     rectify (1, right);
@@ -224,7 +224,7 @@ StereoDepth::match (const RangeImage &image)
   try {
     pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
   } catch (const cv::Exception &) {
-    return {StatusCode::kNoSpace, "stereo: OpenCV failed to cut the pictures"};
+    return {StatusCode::kNoSpace, "stereo: OpenCV failed to crop the images"};
   }
   const bool whole = roi.width == view_.width && roi.height == view_.height;
   if (whole) {

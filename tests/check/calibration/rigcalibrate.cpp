@@ -359,7 +359,7 @@ GST_START_TEST (test_new_size_in_the_stream_is_an_error_that_names_the_pad)
   gst_harness_set_src_caps_str (
       c.in[0], "video/x-raw,format=GRAY8,width=64,height=48,framerate=1/1");
   c.push_picture (0, GST_SECOND, std::vector<std::uint8_t> (64 * 48));
-  c.expect_error ("pad sink_0: pictures changed from 320x240 to 64x48");
+  c.expect_error ("pad sink_0: images changed from 320x240 to 64x48");
 }
 GST_END_TEST;
 
@@ -409,7 +409,7 @@ GST_START_TEST (test_pad_without_pictures_is_one_error_at_eos)
   gst_pad_send_event (lonely, gst_event_new_stream_start ("lonely"));
   gst_pad_send_event (lonely, gst_event_new_eos ());
   c.end ();
-  c.expect_error ("pad sink_1: no pictures came");
+  c.expect_error ("pad sink_1: no images arrived");
   gst_element_release_request_pad (c.element, lonely);
   gst_object_unref (lonely);
 }
@@ -544,7 +544,7 @@ GST_START_TEST (test_pictures_smaller_than_their_caps_are_one_error)
 {
   Calibrate c (1);
   c.push_picture (0, 0, std::vector<std::uint8_t> (100));
-  c.expect_error ("pad sink_0: a buffer is smaller than its caps say");
+  c.expect_error ("pad sink_0: a buffer is smaller than its caps require");
 }
 GST_END_TEST;
 

@@ -240,7 +240,7 @@ GST_START_TEST (test_cameras_that_are_not_named_are_one_error)
       {"", "property left"},
       {"left=a", "property right"},
       {"left=a right=a", "named twice"},
-      {"left=a rig=" + path, "no right camera: property left names one, so rig is not asked"},
+      {"left=a rig=" + path, "no right camera: property left names one, so rig is ignored"},
       {"left=a right=b single-shot=true", "single-shot with trigger=free-run"},
       {"left=a right=b single-shot=true trigger=hardware", "single-shot with trigger=hardware"},
       {"rig=/nowhere.yaml", "/nowhere.yaml: no such file"},

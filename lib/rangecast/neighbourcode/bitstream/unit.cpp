@@ -78,7 +78,7 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
   if (header.size < kUnitHeaderSize)
     return {StatusCode::kBadData, "unit: its size is less than its header"};
   if (header.size > bytes.size ())
-    return {StatusCode::kTruncated, "unit: ends before its size says"};
+    return {StatusCode::kTruncated, "unit: truncated"};
   return {};
 }
 

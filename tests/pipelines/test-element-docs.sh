@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# docs/elements: the generated tables are those of the elements, and the launch lines run.
+#
+# A block of a page that begins with "```sh run" is a shell script. The blocks of a page run in order in one folder, with the
+# following changes: a source draws 8 frames, sinks that open a window are fakesinks, UDP ports and the addresses of fake
+# cameras are this run's own. What a block leaves running in the background ends with it.
+
+pages=$source_dir/docs/elements
+
+test_tables_are_those_of_the_elements () {
+  RANGECAST_BUILD=${RANGECAST_BUILD:-$source_dir/build} python3 "$pages/update.py" --check
+}
+
+# usage: adapt <script >script
+adapt () {
+  sed -E -e 's/num-buffers=[0-9]{2,}/num-buffers=8/g' -e 's/\bavatartestsrc\b/avatartestsrc num-buffers=8/g' \
+    -e 's/\bvideotestsrc\b/videotestsrc num-buffers=8/g' -e 's/\b(autovideosink|glimagesink)\b/fakesink/g' \
+    -e "s/\\bport=500([0-9])\\b/port=$((ports / 10))\\1/g" \
+    -e "s/\\bfake-cameras /fake-cameras --address-base 127.$((ports / 256)).$((ports % 256)).1 --size 160x120 /g"
+}
+
+# usage: run_page NAME
+run_page () {
+  local script n=0
+  awk -v name="$1" '/^```sh run$/ { n++; inside = 1; next } /^```$/ { inside = 0 } inside { print > sprintf("%s-%02d.sh", name, n) }' \
+    "$pages/$1.md"
+  for script in "$1"-*.sh; do
+    [ -f "$script" ] || fail "$1.md has no block '\`\`\`sh run'"
+    adapt <"$script" >run.sh
+    # In a process group of its own, which ends with it.
+    setsid timeout -k 5 60 bash -e run.sh >log.txt 2>&1 || fail "$script: $(cat "$script" log.txt)"
+    ! grep -E '^(ERROR|WARNING)|CRITICAL' log.txt >errors.txt || fail "$script: $(cat "$script" errors.txt log.txt)"
+    n=$((n + 1))
+  done
+  echo "$1: $n blocks"
+}
+
+for page in "$pages"/*.md; do
+  name=$(basename "$page" .md)
+  ! grep -q '^```sh run$' "$page" && [ "$name" = rangecastdeviceprovider ] && continue
+  case $name in
+    stereocamsrc) need='need_command fake-cameras' ;;
+    rigcalibrate) need='need_boards' ;;
+    striprender | rangerender | neighbourcodeenc | neighbourcodedec | neighbourcodeparse | rtpneighbourcodeguard) need=need_gl ;;
+    *) need=: ;;
+  esac
+  eval "test_launch_lines_of_$name () { $need; run_page $name; }"
+done
+
+need_command () { command -v "$1" >/dev/null || skip "no $1"; }
+
+# Photographs of a board, as rigcalibrate.md takes them.
+need_boards () {
+  local boards=/usr/share/doc/opencv-doc/examples/data
+  [ -f "$boards/left01.jpg" ] || skip "no opencv-doc"
+  cp "$boards"/left0[1-9].jpg "$boards"/right0[1-9].jpg .
+}
