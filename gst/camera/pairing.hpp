@@ -3,14 +3,14 @@
 
 #include <gst/gst.h>
 
-#include <array>
 #include "camera/aravis/frame.hpp"
 #include "camera/aravis/settings.hpp"
+#include <array>
 #include <mutex>
 #include <optional>
 #include <rangecast/sync/camera_clock.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/frame_associator.hpp>
+#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/trigger_matcher.hpp>
 
 using rangecast::kMaxCameras;
