@@ -197,6 +197,13 @@ public:
         name, nick, blurb, type, guint (properties::member<kPath...> (defaults)), flags));
   }
 
+  /** What no single member holds. */
+  static Row custom (GParamSpec *spec, void (*set) (Settings &, const GValue *),
+      void (*get) (const Settings &, GValue *))
+  {
+    return {spec, set, get};
+  }
+
   /** Installs the rows as properties `first_id` and following. @return the next free number */
   guint install (GObjectClass *object_class, guint first_id)
   {
@@ -248,3 +255,11 @@ private:
   std::vector<Row> rows_;
   guint first_id_ = 1;
 };
+
+/** Installs the read-only property `stats`, a GstStructure. @param blurb  names its fields */
+inline void
+install_stats (GObjectClass *object_class, guint id, const char *blurb)
+{
+  g_object_class_install_property (object_class, id,
+      g_param_spec_boxed ("stats", "Statistics", blurb, GST_TYPE_STRUCTURE, kReadOnly));
+}
