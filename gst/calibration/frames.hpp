@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include "pad.hpp"
 #include "common/videoframereader.hpp"
+#include "pad.hpp"
 
 #include <memory>
 #include <optional>

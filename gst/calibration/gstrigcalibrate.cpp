@@ -21,10 +21,10 @@
 #include "gstrigcalibrate.h"
 
 #include "backgroundjobs.hpp"
+#include "common/bufferpools.hpp"
 #include "frames.hpp"
 #include "messages.hpp"
 #include "settings.hpp"
-#include "common/bufferpools.hpp"
 
 #include <algorithm>
 #include <gstrange/gstrangepairing.hpp>
@@ -42,7 +42,7 @@ using rangecast::TileLayout;
 GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
 #define GST_CAT_DEFAULT gst_rig_calibrate_debug
 
-enum { PROP_STATS = kCalibrationLast };
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
 static guint signals[LAST_SIGNAL];
 
@@ -342,9 +342,9 @@ nothing_came (GstRigCalibrate *self, const CalibrationSources &cameras)
   if (const CalibrationSource *camera = without_caps (cameras))
     return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
                                        ": no images arrived; expected some on every pad"};
-  return {
-      StatusCode::kNotFound, "no images with matching times arrived on all pads; expected capture "
-                             "times that differ by less than half a frame, or by max-skew"};
+  return {StatusCode::kNotFound,
+      "no images with matching times arrived on all pads; expected capture "
+      "times that differ by less than half a frame, or by max-skew"};
 }
 
 /* All pads have ended: calibrates, unless that was done already. */
@@ -604,7 +604,7 @@ gst_rig_calibrate_set_property (GObject *object, guint id, const GValue *value, 
 {
   GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (!set_calibration_property (priv->properties, id, value))
+  if (!calibration_properties ().set (priv->properties, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -618,7 +618,7 @@ gst_rig_calibrate_get_property (GObject *object, guint id, GValue *value, GParam
         value, gst_structure_new ("application/x-rigcalibrate-stats", "examined", G_TYPE_UINT64,
                    priv->examined, "taken", G_TYPE_UINT64, priv->taken, "skipped", G_TYPE_UINT64,
                    priv->skipped, "dropped", G_TYPE_UINT64, priv->dropped, nullptr));
-  else if (!get_calibration_property (priv->properties, id, value))
+  else if (!calibration_properties ().get (priv->properties, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -667,7 +667,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   object_class->set_property = gst_rig_calibrate_set_property;
   object_class->get_property = gst_rig_calibrate_get_property;
   object_class->finalize = gst_rig_calibrate_finalize;
-  install_calibration_properties (object_class);
+  calibration_properties ().install (object_class, PROP_SETTINGS);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since the element was started: examined, taken, skipped, dropped",

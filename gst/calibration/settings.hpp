@@ -6,6 +6,8 @@
 #include <rangecast/calibration/session.hpp>
 #include <string>
 
+#include "common/properties.hpp"
+
 /* Which frames are kept. */
 enum class CalibrationSelection { kAuto, kAll, kSpread };
 
@@ -20,30 +22,5 @@ struct CalibrationProperties {
   std::string location;
 };
 
-/* The ids of the properties, from 1 on; the element's own follow from kCalibrationLast on. */
-enum CalibrationPropertyId {
-  kCalibrationNone,
-  kCalibrationBoard,
-  kCalibrationColumns,
-  kCalibrationRows,
-  kCalibrationSquareSize,
-  kCalibrationMarkerSize,
-  kCalibrationDictionary,
-  kCalibrationLocation,
-  kCalibrationMinFrames,
-  kCalibrationMaxFrames,
-  kCalibrationSelection,
-  kCalibrationDistortion,
-  kCalibrationWorld,
-  kCalibrationNear,
-  kCalibrationFar,
-  kCalibrationAutoFinish,
-  kCalibrationMaxSkew,
-  kCalibrationTileWidth,
-  kCalibrationLast
-};
-
-void install_calibration_properties (GObjectClass *object_class);
-/* @return false if the id is none of ours. The caller holds the lock that guards the properties. */
-bool set_calibration_property (CalibrationProperties &p, guint id, const GValue *value);
-bool get_calibration_property (const CalibrationProperties &p, guint id, GValue *value);
+/** Their properties, which may change in NULL and READY. */
+PropertyTable<CalibrationProperties> &calibration_properties ();

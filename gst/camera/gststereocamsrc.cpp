@@ -35,13 +35,13 @@
 #include <utility>
 
 #include "clock.hpp"
-#include "session.hpp"
 #include "common/statsreporter.hpp"
+#include "session.hpp"
 
 GST_DEBUG_CATEGORY (gst_stereo_cam_src_debug); /* the other camsource files log to it too */
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
-static const guint kStats = CamSourceSettings::kFirstFreeId, kStatsInterval = kStats + 1;
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 enum { SIGNAL_CAPTURE, N_SIGNALS };
 static guint signals[N_SIGNALS];
@@ -388,12 +388,12 @@ static void
 gst_stereo_cam_src_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   auto priv = GST_STEREO_CAM_SRC (object)->priv;
-  if (id == kStatsInterval) {
+  if (id == PROP_STATS_INTERVAL) {
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!priv->settings.set (id, value))
+  if (!camera_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -401,18 +401,18 @@ static void
 gst_stereo_cam_src_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   auto priv = GST_STEREO_CAM_SRC (object)->priv;
-  if (id == kStats) {
+  if (id == PROP_STATS) {
     const auto session = priv->current ();
     g_value_take_boxed (
         value, session ? session->stats () : gst_structure_new_empty ("stereocamsrc-stats"));
     return;
   }
-  if (id == kStatsInterval) {
+  if (id == PROP_STATS_INTERVAL) {
     g_value_set_uint (value, priv->reporter.interval ());
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!priv->settings.get (id, value))
+  if (!camera_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -460,11 +460,11 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->set_property = gst_stereo_cam_src_set_property;
   object_class->get_property = gst_stereo_cam_src_get_property;
   object_class->finalize = gst_stereo_cam_src_finalize;
-  CamSourceSettings::install (object_class);
-  g_object_class_install_property (object_class, kStats,
+  camera_properties ().install (object_class, PROP_SETTINGS);
+  g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-  StatsReporter::install (object_class, kStatsInterval);
+          GST_TYPE_STRUCTURE, kReadOnly));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
   install_capture (klass);
 
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template, &third_template})
@@ -478,6 +478,5 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   element_class->change_state = gst_stereo_cam_src_change_state;
   element_class->provide_clock = gst_stereo_cam_src_provide_clock;
 
-  gst_type_mark_as_plugin_api (GST_TYPE_STEREO_CAM_SRC_TRIGGER, GstPluginAPIFlags (0));
   GST_DEBUG_CATEGORY_INIT (gst_stereo_cam_src_debug, "stereocamsrc", 0, "Stereo camera source");
 }

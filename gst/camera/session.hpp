@@ -5,11 +5,11 @@
 #include <gst/gst.h>
 
 #include "camera/aravis/action_command.hpp"
-#include <atomic>
 #include "camera/aravis/camera.hpp"
-#include "camera/aravis/heartbeat.hpp"
-#include <condition_variable>
 #include "camera/aravis/exposure_sync.hpp"
+#include "camera/aravis/heartbeat.hpp"
+#include <atomic>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>

@@ -26,223 +26,107 @@ gst_stereo_cam_src_trigger_get_type (void)
   return type;
 }
 
-/* ---- properties: tables ---- */
-
-struct TextRow {
-  const char *name, *nick, *blurb;
-  std::string &(*field) (Settings &);
-};
-struct IntegerRow {
-  const char *name, *nick, *blurb;
-  int minimum, maximum;
-  int &(*field) (Settings &);
-};
-struct UnsignedRow {
-  const char *name, *nick, *blurb;
-  guint &(*field) (Settings &);
-};
-struct SwitchRow {
-  const char *name, *nick, *blurb;
-  bool &(*field) (Settings &);
-};
-
-#define FIELD(type, member) [] (Settings &s) -> type & { return s.member; }
-
-static const TextRow kTexts[] = {
-    {"left", "Left camera", "Left camera: name, serial number, IP or MAC address, or Aravis id",
-        FIELD (std::string, names[0])},
-    {"right", "Right camera", "Right camera: name, serial number, IP or MAC address, or Aravis id",
-        FIELD (std::string, names[1])},
-    {"third", "Third camera", "Third camera: name, serial number, IP or MAC address, or Aravis id",
-        FIELD (std::string, names[2])},
-    {"rig", "Rig", "Rig file that names the cameras of the view, used if left and right are unset",
-        FIELD (std::string, rig)},
-    {"format", "Pixel format",
+PropertyTable<CamSourceSettings> &
+camera_properties ()
+{
+  using S = CamSourceSettings;
+  using P = PropertyTable<S>;
+  static P table = {P::text < [](auto &s) -> auto &{return s.names[0];
+}
+> ("left", "Left camera", "Left camera: name, serial number, IP or MAC address, or Aravis id",
+      kMutableReady),
+    P::text < [](auto &s) -> auto &
+{
+  return s.names[1];
+}
+> ("right", "Right camera", "Right camera: name, serial number, IP or MAC address, or Aravis id",
+      kMutableReady),
+    P::text < [](auto &s) -> auto &
+{
+  return s.names[2];
+}
+> ("third", "Third camera", "Third camera: name, serial number, IP or MAC address, or Aravis id",
+      kMutableReady),
+    P::text<&S::rig> ("rig", "Rig",
+        "Rig file that names the cameras of the view, used if left and right are unset",
+        kMutableReady),
+    P::text<&S::format> ("format", "Pixel format",
         "GenICam pixel format, such as Mono8 or BayerRG8 (unset = negotiated with downstream)",
-        FIELD (std::string, format)},
-    {"features", "Features",
+        kMutableReady),
+    P::text<&S::features> ("features", "Features",
         "GenICam features to set on all cameras after all other settings: \"Name=Value Name=Value "
         "Command ...\"",
-        FIELD (std::string, features)},
-    {"trigger-line", "Trigger line", "Input line of the cameras for trigger=hardware",
-        FIELD (std::string, trigger_line)},
-    {"output-line", "Output line",
+        kMutableReady),
+    P::text<&S::trigger_line> ("trigger-line", "Trigger line",
+        "Input line of the cameras for trigger=hardware", kMutableReady),
+    P::text<&S::output_line> ("output-line", "Output line",
         "Output line of the left camera for trigger=hardware; the left camera then runs freely and "
         "triggers the others (unset = external signal)",
-        FIELD (std::string, output_line)},
-    {"clock-server", "Clock server",
+        kMutableReady),
+    P::text<&S::clock_server> ("clock-server", "Clock server",
         "Network clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or "
         "ptp:DOMAIN",
-        FIELD (std::string, clock_server)},
-};
-
-static const IntegerRow kIntegers[] = {
-    {"view-id", "View ID", "View of the rig file that names the cameras", 0, 63,
-        FIELD (int, view_id)},
-    {"offset-x", "Offset x",
+        kMutableReady),
+    P::number<&S::view_id> (
+        "view-id", "View ID", "View of the rig file that names the cameras", 0, 63, kMutableReady),
+    P::number<&S::offset_x> ("offset-x", "Offset x",
         "Left edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-        FIELD (int, offset_x)},
-    {"offset-y", "Offset y",
+        kMutableReady),
+    P::number<&S::offset_y> ("offset-y", "Offset y",
         "Top edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-        FIELD (int, offset_y)},
-    {"packet-size", "Packet size",
+        kMutableReady),
+    P::number<&S::packet_size> ("packet-size", "Packet size",
         "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 = "
         "leave unchanged)",
-        -1, 65535, FIELD (int, packet_size)},
-    {"buffers", "Buffers",
+        -1, 65535, kMutableReady),
+    P::number<&S::n_buffers> ("buffers", "Buffers",
         "Number of buffers per camera, shared by the camera's stream and downstream", 2, 256,
-        FIELD (int, n_buffers)},
-    {"num-buffers", "num-buffers", "Number of image sets to output before EOS (-1 = unlimited)", -1,
-        G_MAXINT, FIELD (int, num_buffers)},
-};
-
-static const UnsignedRow kUnsigneds[] = {
-    {"action-device-key", "Action device key", "ActionDeviceKey of the cameras for trigger=action",
-        FIELD (guint, action_device_key)},
-    {"action-group-key", "Action group key", "ActionGroupKey of the cameras for trigger=action",
-        FIELD (guint, action_group_key)},
-    {"action-group-mask", "Action group mask", "ActionGroupMask of the cameras for trigger=action",
-        FIELD (guint, action_group_mask)},
-};
-
-static const SwitchRow kSwitches[] = {
-    {"auto-exposure", "Automatic exposure", "Automatic exposure time on the left camera",
-        FIELD (bool, auto_exposure)},
-    {"auto-gain", "Automatic gain", "Automatic gain on the left camera", FIELD (bool, auto_gain)},
-    {"auto-white-balance", "Automatic white balance", "Automatic white balance on the left camera",
-        FIELD (bool, auto_white_balance)},
-    {"lock-exposure", "Lock exposure",
+        kMutableReady),
+    P::number<&S::num_buffers> ("num-buffers", "num-buffers",
+        "Number of image sets to output before EOS (-1 = unlimited)", -1, G_MAXINT, kMutableReady),
+    P::number<&S::action_device_key> ("action-device-key", "Action device key",
+        "ActionDeviceKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+    P::number<&S::action_group_key> ("action-group-key", "Action group key",
+        "ActionGroupKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+    P::number<&S::action_group_mask> ("action-group-mask", "Action group mask",
+        "ActionGroupMask of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+    P::boolean<&S::auto_exposure> ("auto-exposure", "Automatic exposure",
+        "Automatic exposure time on the left camera", kMutableReady),
+    P::boolean<&S::auto_gain> (
+        "auto-gain", "Automatic gain", "Automatic gain on the left camera", kMutableReady),
+    P::boolean<&S::auto_white_balance> ("auto-white-balance", "Automatic white balance",
+        "Automatic white balance on the left camera", kMutableReady),
+    P::boolean<&S::lock_exposure> ("lock-exposure", "Lock exposure",
         "Copy the left camera's automatic settings to the other cameras (false = each camera "
         "adjusts itself)",
-        FIELD (bool, lock_exposure)},
-    {"packet-resend", "Packet resend", "Request retransmission of missing GigE Vision packets",
-        FIELD (bool, packet_resend)},
-    {"action-send", "Action send",
+        kMutableReady),
+    P::boolean<&S::packet_resend> ("packet-resend", "Packet resend",
+        "Request retransmission of missing GigE Vision packets", kMutableReady),
+    P::boolean<&S::action_send> ("action-send", "Action send",
         "Send the action commands for trigger=action; exactly one element per rig does",
-        FIELD (bool, action_send)},
-    {"action-scheduled", "Action scheduled",
+        kMutableReady),
+    P::boolean<&S::action_scheduled> ("action-scheduled", "Action scheduled",
         "Send action commands ahead of time with the time to execute them; requires cameras and "
         "pipeline on one PTP clock",
-        FIELD (bool, action_scheduled)},
-    {"single-shot", "Single shot", "Capture only when the capture signal is emitted",
-        FIELD (bool, single_shot)},
-    {"reconnect", "Reconnect", "Reconnect to a lost camera and post a warning instead of an error",
-        FIELD (bool, reconnect)},
-};
-
-enum : guint {
-  PROP_TEXTS = 1,
-  PROP_INTEGERS = PROP_TEXTS + G_N_ELEMENTS (kTexts),
-  PROP_UNSIGNEDS = PROP_INTEGERS + G_N_ELEMENTS (kIntegers),
-  PROP_SWITCHES = PROP_UNSIGNEDS + G_N_ELEMENTS (kUnsigneds),
-  PROP_TRIGGER = PROP_SWITCHES + G_N_ELEMENTS (kSwitches),
-  PROP_EXPOSURE,
-  PROP_GAIN,
-  PROP_PACKET_DELAY,
-  PROP_FIRST_FREE,
-};
-const guint CamSourceSettings::kFirstFreeId = PROP_FIRST_FREE;
-
-template <typename Row, std::size_t N>
-static const Row *
-find_row (const Row (&rows)[N], guint id, guint first)
-{
-  return id >= first && id < first + N ? &rows[id - first] : nullptr;
+        kMutableReady),
+    P::boolean<&S::single_shot> ("single-shot", "Single shot",
+        "Capture only when the capture signal is emitted", kMutableReady),
+    P::boolean<&S::reconnect> ("reconnect", "Reconnect",
+        "Reconnect to a lost camera and post a warning instead of an error", kMutableReady),
+    P::enumeration<&S::trigger> ("trigger", "Trigger", "What triggers the cameras",
+        GST_TYPE_STEREO_CAM_SRC_TRIGGER, kMutableReady),
+    P::number<&S::exposure_us> ("exposure", "Exposure",
+        "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0., 1e9,
+        kMutableReady),
+    P::number<&S::gain> ("gain", "Gain",
+        "Gain of all cameras in their own unit, usually dB (-1 = leave unchanged)", -1, 1000,
+        kMutableReady),
+    P::number<&S::packet_delay_ns> ("packet-delay", "Packet delay",
+        "Delay between GigE Vision packets in nanoseconds (-1 = leave unchanged)", -1, 1000000000,
+        kMutableReady),
 }
-
-static constexpr auto kFlags =
-    GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-
-static void
-install_numbers (GObjectClass *object_class)
-{
-  g_object_class_install_property (object_class, PROP_TRIGGER,
-      g_param_spec_enum ("trigger", "Trigger", "What triggers the cameras",
-          GST_TYPE_STEREO_CAM_SRC_TRIGGER, gint (Settings{}.trigger), kFlags));
-  g_object_class_install_property (object_class, PROP_EXPOSURE,
-      g_param_spec_double ("exposure", "Exposure",
-          "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0, 1e9, 0, kFlags));
-  g_object_class_install_property (object_class, PROP_GAIN,
-      g_param_spec_double ("gain", "Gain",
-          "Gain of all cameras in their own unit, usually dB (-1 = leave unchanged)", -1, 1000, -1,
-          kFlags));
-  g_object_class_install_property (object_class, PROP_PACKET_DELAY,
-      g_param_spec_int64 ("packet-delay", "Packet delay",
-          "Delay between GigE Vision packets in nanoseconds (-1 = leave unchanged)", -1,
-          G_GINT64_CONSTANT (1000000000), -1, kFlags));
-}
-
-void
-CamSourceSettings::install (GObjectClass *object_class)
-{
-  Settings defaults;
-  for (guint i = 0; const TextRow &row : kTexts) {
-    const std::string &fallback = row.field (defaults);
-    g_object_class_install_property (object_class, PROP_TEXTS + i++,
-        g_param_spec_string (row.name, row.nick, row.blurb,
-            fallback.empty () ? nullptr : fallback.c_str (), kFlags));
-  }
-  for (guint i = 0; const IntegerRow &row : kIntegers)
-    g_object_class_install_property (object_class, PROP_INTEGERS + i++,
-        g_param_spec_int (
-            row.name, row.nick, row.blurb, row.minimum, row.maximum, row.field (defaults), kFlags));
-  for (guint i = 0; const UnsignedRow &row : kUnsigneds)
-    g_object_class_install_property (object_class, PROP_UNSIGNEDS + i++,
-        g_param_spec_uint (
-            row.name, row.nick, row.blurb, 0, G_MAXUINT, row.field (defaults), kFlags));
-  for (guint i = 0; const SwitchRow &row : kSwitches)
-    g_object_class_install_property (object_class, PROP_SWITCHES + i++,
-        g_param_spec_boolean (row.name, row.nick, row.blurb, row.field (defaults), kFlags));
-  install_numbers (object_class);
-}
-
-bool
-CamSourceSettings::set (guint id, const GValue *value)
-{
-  if (const auto text = find_row (kTexts, id, PROP_TEXTS))
-    text->field (*this) = g_value_get_string (value) ? g_value_get_string (value) : "";
-  else if (const auto integer = find_row (kIntegers, id, PROP_INTEGERS))
-    integer->field (*this) = g_value_get_int (value);
-  else if (const auto number = find_row (kUnsigneds, id, PROP_UNSIGNEDS))
-    number->field (*this) = g_value_get_uint (value);
-  else if (const auto on = find_row (kSwitches, id, PROP_SWITCHES))
-    on->field (*this) = g_value_get_boolean (value);
-  else if (id == PROP_TRIGGER)
-    trigger = TriggerMode (g_value_get_enum (value));
-  else if (id == PROP_EXPOSURE)
-    exposure_us = g_value_get_double (value);
-  else if (id == PROP_GAIN)
-    gain = g_value_get_double (value);
-  else if (id == PROP_PACKET_DELAY)
-    packet_delay_ns = g_value_get_int64 (value);
-  else
-    return false;
-  return true;
-}
-
-bool
-CamSourceSettings::get (guint id, GValue *value) const
-{
-  Settings copy = *this; /* fields are found in what may be written */
-  if (const auto text = find_row (kTexts, id, PROP_TEXTS))
-    g_value_set_string (value, text->field (copy).empty () ? nullptr : text->field (copy).c_str ());
-  else if (const auto integer = find_row (kIntegers, id, PROP_INTEGERS))
-    g_value_set_int (value, integer->field (copy));
-  else if (const auto number = find_row (kUnsigneds, id, PROP_UNSIGNEDS))
-    g_value_set_uint (value, number->field (copy));
-  else if (const auto on = find_row (kSwitches, id, PROP_SWITCHES))
-    g_value_set_boolean (value, on->field (copy));
-  else if (id == PROP_TRIGGER)
-    g_value_set_enum (value, gint (trigger));
-  else if (id == PROP_EXPOSURE)
-    g_value_set_double (value, exposure_us);
-  else if (id == PROP_GAIN)
-    g_value_set_double (value, gain);
-  else if (id == PROP_PACKET_DELAY)
-    g_value_set_int64 (value, packet_delay_ns);
-  else
-    return false;
-  return true;
+;
+return table;
 }
 
 /* ---- the cameras ---- */

@@ -3,11 +3,13 @@
 
 #include <gst/gst.h>
 
-#include <array>
 #include "camera/aravis/settings.hpp"
+#include <array>
 #include <rangecast/base/status.hpp>
 #include <rangecast/sync/frame_sets.hpp>
 #include <string>
+
+#include "common/properties.hpp"
 
 using CameraNames = std::array<std::string, rangecast::kMaxCameras>; ///< left, right, third
 
@@ -33,13 +35,6 @@ struct CamSourceSettings {
   int num_buffers = -1;
   std::string clock_server;
 
-  /** Installs the properties, numbers 1 to kFirstFreeId - 1. */
-  static void install (GObjectClass *object_class);
-  static const guint kFirstFreeId;
-  /** @return false if there is no property of that number */
-  bool set (guint id, const GValue *value);
-  bool get (guint id, GValue *value) const;
-
   /** The names, from the rig file where there is none.
    *  @return kNotFound, kBadValue: the text says which property, or the file */
   rangecast::Status find_names (CameraNames &found) const;
@@ -53,6 +48,9 @@ struct CamSourceSettings {
     return lock_exposure && (auto_exposure || auto_gain || auto_white_balance);
   }
 };
+
+/** Their properties, which may change in NULL and READY. */
+PropertyTable<CamSourceSettings> &camera_properties ();
 
 GType gst_stereo_cam_src_trigger_get_type (void);
 #define GST_TYPE_STEREO_CAM_SRC_TRIGGER (gst_stereo_cam_src_trigger_get_type ())

@@ -17,13 +17,6 @@ struct NeighbourCodeRateSettings {
   bool adaptive = false;                                   ///< the rate follows receivers
   guint min_bitrate = 200000;                              ///< bits/s, then
   int min_fps_n = 5, min_fps_d = 1;                        ///< frame sets a second, then
-
-  /** The first property id that is free for the element's own ones. */
-  static constexpr guint kFirstFreeId = 100;
-  static void install (GObjectClass *klass);
-  /** @return false if the id is none of ours */
-  bool set (guint id, const GValue *value);
-  bool get (guint id, GValue *value) const;
 };
 
 /** Steers the thresholds of an encoder frame set by frame set, and leaves some out where that does

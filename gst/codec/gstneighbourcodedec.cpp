@@ -36,10 +36,11 @@
 #include <optional>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
-#include "concealment.hpp"
 #include "common/bufferpools.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
+#include "concealment.hpp"
 
 using rangecast::DecoderResult;
 using rangecast::Status;
@@ -47,25 +48,24 @@ using rangecast::Status;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
 
-enum {
-  PROP_0,
-  PROP_CONCEAL,
-  PROP_REQUEST_KEY_UNITS,
-  PROP_N_THREADS,
-  PROP_STATS,
-  PROP_STATS_INTERVAL
-};
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 /* Upstream is asked for a key frame set no more often. */
 static constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
 
 enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
-struct GstNeighbourCodeDecPrivate {
-  std::mutex lock; /* guards what follows; never held across a push or message */
+namespace {
+struct Settings {
   GstNeighbourCodeConceal conceal = CONCEAL_INVALID;
   bool request_key_units = true;
   int n_threads = 0;
+};
+} // namespace
+
+struct GstNeighbourCodeDecPrivate {
+  std::mutex lock; /* guards what follows; never held across a push or message */
+  Settings settings;
   guint64 frames = 0, coded_bytes = 0;
   DecoderResult totals;
 
@@ -220,7 +220,7 @@ request_key_unit (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResu
     return;
   {
     std::lock_guard guard (priv->lock);
-    if (!priv->request_key_units)
+    if (!priv->settings.request_key_units)
       return;
   }
   priv->last_request = now;
@@ -283,7 +283,7 @@ decode_frame_set (
   FrameSettings settings;
   {
     std::lock_guard guard (priv->lock);
-    settings = {priv->conceal == CONCEAL_LAST, priv->n_threads};
+    settings = {priv->settings.conceal == CONCEAL_LAST, priv->settings.n_threads};
   }
   const GstFlowReturn flow = decode_bytes (self, input, bytes, settings, output);
   if (flow != GST_FLOW_OK)
@@ -455,6 +455,24 @@ gst_neighbour_code_dec_stop (GstBaseTransform *base)
   return TRUE;
 }
 
+static PropertyTable<Settings> &
+decoder_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::enumeration<&Settings::conceal> ("conceal", "Concealment",
+          "How to fill pixels whose slices are lost or damaged", GST_TYPE_NEIGHBOUR_CODE_CONCEAL,
+          kMutablePlaying),
+      P::boolean<&Settings::request_key_units> ("request-key-units", "Request key units",
+          "Request a key frame set from upstream (GstForceKeyUnit) when data was lost that later "
+          "frame sets refer to",
+          kMutablePlaying),
+      P::number<&Settings::n_threads> ("n-threads", "Threads",
+          "Number of threads that decode slices (0 = one per CPU core)", 0, 64, kMutablePlaying),
+  };
+  return table;
+}
+
 static void
 gst_neighbour_code_dec_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
@@ -463,19 +481,8 @@ gst_neighbour_code_dec_set_property (
   if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
     return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_CONCEAL:
-      priv->conceal = GstNeighbourCodeConceal (g_value_get_enum (value));
-      break;
-    case PROP_REQUEST_KEY_UNITS:
-      priv->request_key_units = g_value_get_boolean (value);
-      break;
-    case PROP_N_THREADS:
-      priv->n_threads = g_value_get_int (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!decoder_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
@@ -495,25 +502,12 @@ gst_neighbour_code_dec_get_property (GObject *object, guint id, GValue *value, G
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_CONCEAL:
-      g_value_set_enum (value, priv->conceal);
-      break;
-    case PROP_REQUEST_KEY_UNITS:
-      g_value_set_boolean (value, priv->request_key_units);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_int (value, priv->n_threads);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
-      break;
-    case PROP_STATS_INTERVAL:
-      g_value_set_uint (value, priv->reporter.interval ());
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    g_value_take_boxed (value, make_stats (priv));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else if (!decoder_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -539,37 +533,21 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  const auto playing =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
   object_class->set_property = gst_neighbour_code_dec_set_property;
   object_class->get_property = gst_neighbour_code_dec_get_property;
   object_class->finalize = gst_neighbour_code_dec_finalize;
 
-  g_object_class_install_property (object_class, PROP_CONCEAL,
-      g_param_spec_enum ("conceal", "Concealment",
-          "How to fill pixels whose slices are lost or damaged", GST_TYPE_NEIGHBOUR_CODE_CONCEAL,
-          CONCEAL_INVALID, playing));
-  g_object_class_install_property (object_class, PROP_REQUEST_KEY_UNITS,
-      g_param_spec_boolean ("request-key-units", "Request key units",
-          "Request a key frame set from upstream (GstForceKeyUnit) when data was lost that later "
-          "frame sets refer to",
-          TRUE, playing));
-  g_object_class_install_property (object_class, PROP_N_THREADS,
-      g_param_spec_int ("n-threads", "Threads",
-          "Number of threads that decode slices (0 = one per CPU core)", 0, 64, 0, playing));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, points, slices, bad-slices, "
-          "missing-pixels, unknown-pixels, raw-bytes, coded-bytes",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  decoder_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, points, slices, bad-slices, "
+      "missing-pixels, unknown-pixels, raw-bytes, coded-bytes");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
       "Decodes neighbour-coded range images", "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CONCEAL, GstPluginAPIFlags (0));
 
   transform_class->src_event = gst_neighbour_code_dec_src_event;
   transform_class->start = gst_neighbour_code_dec_start;

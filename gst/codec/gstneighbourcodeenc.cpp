@@ -33,13 +33,13 @@
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
 
-#include "common/controlledvalues.hpp"
-#include "keyunitrequests.hpp"
-#include "enums.hpp"
 #include "bitrate.hpp"
 #include "common/bufferpools.hpp"
+#include "common/controlledvalues.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
+#include "encsettings.hpp"
+#include "keyunitrequests.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -48,40 +48,17 @@ using rangecast::Status;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
 
-enum {
-  PROP_PROFILE = NeighbourCodeRateSettings::kFirstFreeId,
-  PROP_CHOICE,
-  PROP_DEPTH_BITS,
-  PROP_DEPTH_SCALE,
-  PROP_COLOUR_BITS,
-  PROP_DEPTH_THRESHOLD,
-  PROP_COLOUR_THRESHOLD,
-  PROP_MAX_SLICE_SIZE,
-  PROP_TEMPORAL,
-  PROP_REFRESH_PERIOD,
-  PROP_KEY_INTERVAL,
-  PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
-  PROP_N_THREADS,
-  PROP_MAX_DEPTH_ERROR,
+enum : guint {
+  PROP_MAX_DEPTH_ERROR = 1,
   PROP_ESTIMATED_BITRATE,
   PROP_STATS,
-  PROP_STATS_INTERVAL
-};
-
-static constexpr EncoderSettings kDefaults;
-
-/* When there are key frame sets. */
-struct KeySettings {
-  guint interval_ms = 0;                /* at most between two; 0: no limit */
-  GstClockTime min_forced_interval = 0; /* at least before one that somebody asked for */
+  PROP_STATS_INTERVAL,
+  PROP_SETTINGS
 };
 
 struct GstNeighbourCodeEncPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
-  EncoderSettings settings;
-  NeighbourCodeRateSettings rate_settings;
-  int n_threads = 0;
-  KeySettings key_settings;
+  NeighbourCodeEncSettings settings;
   double max_depth_error_m = 0;
   guint64 frames = 0, coded_bytes = 0, left_out = 0;
   EncoderResult totals;
@@ -173,13 +150,6 @@ configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
   return {};
 }
 
-struct FrameSettings {
-  EncoderSettings encoder;
-  NeighbourCodeRateSettings rate;
-  int n_threads;
-  KeySettings key;
-};
-
 static GstClockTime
 frame_interval (const gstrange::RangeInfo &info)
 {
@@ -188,8 +158,8 @@ frame_interval (const gstrange::RangeInfo &info)
 }
 
 static Status
-encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSettings &settings,
-    EncoderResult &result)
+encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input,
+    const NeighbourCodeEncSettings &settings, EncoderResult &result)
 {
   gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
@@ -198,9 +168,9 @@ encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input, const FrameSet
   for (const rangecast::RangeImage &image : frame.views ())
     pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
   /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
-  if (settings.encoder.temporal && !(priv->is_configured && priv->configured.temporal))
+  if (settings.coding.temporal && !(priv->is_configured && priv->configured.temporal))
     priv->frame_number = g_random_int ();
-  if (Status s = configure (priv, priv->rate.next (settings.encoder, pixels)); !s.ok ())
+  if (Status s = configure (priv, priv->rate.next (settings.coding, pixels)); !s.ok ())
     return s;
   const Status status =
       priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
@@ -231,17 +201,17 @@ running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
 /* Asks the encoder for a key frame set where one is due. Requests that come too soon after one
  * wait, as with GstVideoEncoder. */
 static void
-prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const KeySettings &settings)
+prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
   const GstClockTime now = running_time_of (self, input), last = priv->last_key;
   const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
   /* The next frame set would come too late. */
   const GstClockTime until = now + frame_interval (priv->info);
-  const bool is_old = settings.interval_ms > 0 && has_times &&
-                      (now < last || until - last > settings.interval_ms * GST_MSECOND);
-  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_interval) &&
-                       now >= last && now - last < settings.min_forced_interval;
+  const bool is_old = settings.key_interval_ms > 0 && has_times &&
+                      (now < last || until - last > settings.key_interval_ms * GST_MSECOND);
+  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
+                       now >= last && now - last < settings.min_forced_key_interval;
   if (is_old || (!is_soon && priv->key_requests.is_due (now)))
     priv->encoder.request_key ();
 }
@@ -293,19 +263,19 @@ encode_input (GstNeighbourCodeEnc *self)
   GstNeighbourCodeEncPrivate *priv = self->priv;
   GstBuffer *input = priv->input;
   sync_controlled_values (GST_BASE_TRANSFORM (self), input);
-  FrameSettings settings;
+  NeighbourCodeEncSettings settings;
   {
     std::lock_guard guard (priv->lock);
-    settings = {priv->settings, priv->rate_settings, priv->n_threads, priv->key_settings};
+    settings = priv->settings;
   }
-  settings.encoder.frame_interval_ns = frame_interval (priv->info);
-  const bool keeps = priv->rate.begin (settings.rate, input, settings.encoder.frame_interval_ns);
+  settings.coding.frame_interval_ns = frame_interval (priv->info);
+  const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
   tell_news (self);
   if (!keeps) {
     leave_out (self, input);
     return GST_FLOW_OK;
   }
-  prepare_key (self, input, settings.key);
+  prepare_key (self, input, settings);
   EncoderResult result;
   const Status status = encode_frame (priv, input, settings, result);
   if (!status.ok ())
@@ -503,52 +473,8 @@ gst_neighbour_code_enc_set_property (
   if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
     return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
-  EncoderSettings &settings = priv->settings;
-  if (priv->rate_settings.set (id, value))
-    return;
-  switch (id) {
-    case PROP_PROFILE:
-      settings.profile = rangecast::Profile (g_value_get_enum (value));
-      break;
-    case PROP_CHOICE:
-      settings.choice = rangecast::NeighbourChoice (g_value_get_enum (value));
-      break;
-    case PROP_DEPTH_BITS:
-      settings.depth_bits = g_value_get_int (value);
-      break;
-    case PROP_DEPTH_SCALE:
-      settings.depth_scale = rangecast::DepthScale (g_value_get_enum (value));
-      break;
-    case PROP_COLOUR_BITS:
-      settings.colour_bits = g_value_get_int (value);
-      break;
-    case PROP_DEPTH_THRESHOLD:
-      settings.depth_threshold = g_value_get_int (value);
-      break;
-    case PROP_COLOUR_THRESHOLD:
-      settings.colour_threshold = g_value_get_int (value);
-      break;
-    case PROP_MAX_SLICE_SIZE:
-      settings.max_slice_size = g_value_get_int (value);
-      break;
-    case PROP_TEMPORAL:
-      settings.temporal = g_value_get_boolean (value);
-      break;
-    case PROP_REFRESH_PERIOD:
-      settings.refresh_period_ns = g_value_get_uint (value) * GST_MSECOND;
-      break;
-    case PROP_KEY_INTERVAL:
-      priv->key_settings.interval_ms = g_value_get_uint (value);
-      break;
-    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
-      priv->key_settings.min_forced_interval = g_value_get_uint64 (value);
-      break;
-    case PROP_N_THREADS:
-      priv->n_threads = g_value_get_int (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!encoder_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
@@ -572,49 +498,7 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
   std::lock_guard guard (priv->lock);
-  const EncoderSettings &settings = priv->settings;
-  if (priv->rate_settings.get (id, value))
-    return;
   switch (id) {
-    case PROP_PROFILE:
-      g_value_set_enum (value, int (settings.profile));
-      break;
-    case PROP_CHOICE:
-      g_value_set_enum (value, int (settings.choice));
-      break;
-    case PROP_DEPTH_BITS:
-      g_value_set_int (value, settings.depth_bits);
-      break;
-    case PROP_DEPTH_SCALE:
-      g_value_set_enum (value, int (settings.depth_scale));
-      break;
-    case PROP_COLOUR_BITS:
-      g_value_set_int (value, settings.colour_bits);
-      break;
-    case PROP_DEPTH_THRESHOLD:
-      g_value_set_int (value, settings.depth_threshold);
-      break;
-    case PROP_COLOUR_THRESHOLD:
-      g_value_set_int (value, settings.colour_threshold);
-      break;
-    case PROP_MAX_SLICE_SIZE:
-      g_value_set_int (value, settings.max_slice_size);
-      break;
-    case PROP_TEMPORAL:
-      g_value_set_boolean (value, settings.temporal);
-      break;
-    case PROP_REFRESH_PERIOD:
-      g_value_set_uint (value, guint (settings.refresh_period_ns / GST_MSECOND));
-      break;
-    case PROP_KEY_INTERVAL:
-      g_value_set_uint (value, priv->key_settings.interval_ms);
-      break;
-    case PROP_MIN_FORCE_KEY_UNIT_INTERVAL:
-      g_value_set_uint64 (value, priv->key_settings.min_forced_interval);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_int (value, priv->n_threads);
-      break;
     case PROP_MAX_DEPTH_ERROR:
       g_value_set_double (value, priv->max_depth_error_m);
       break;
@@ -628,7 +512,8 @@ gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, G
       g_value_set_uint (value, priv->reporter.interval ());
       break;
     default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+      if (!encoder_properties ().get (priv->settings, id, value))
+        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
   }
 }
 
@@ -646,97 +531,6 @@ gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
 }
 
 static void
-install_results (GObjectClass *object_class)
-{
-  const auto readable = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
-  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
-      g_param_spec_double ("max-depth-error", "Maximum depth error",
-          "Maximum difference between a decoded depth and the input depth in metres, over all "
-          "views, with the settings of the latest frame set (0 = no frame set yet)",
-          0, G_MAXDOUBLE, 0, readable));
-  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
-      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
-          "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
-          "first receiver report: target-bitrate; 0 = no limit known)",
-          0, G_MAXUINT64, 0, readable));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started (frames, left-out, points, full-pixels, slices, "
-          "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds of "
-          "the latest frame set and the state of adaptive-bitrate",
-          GST_TYPE_STRUCTURE, readable));
-}
-
-static void
-install_properties (GObjectClass *object_class)
-{
-  /* Those with which tables, references or threads begin anew are none for a controller, which may
-   * set them with every frame set. */
-  const auto live =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-  const auto steered = GParamFlags (live | GST_PARAM_CONTROLLABLE);
-  const auto install_int = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                               int minimum, int maximum, int fallback, GParamFlags flags) {
-    g_object_class_install_property (
-        object_class, id, g_param_spec_int (name, nick, blurb, minimum, maximum, fallback, flags));
-  };
-  g_object_class_install_property (object_class, PROP_PROFILE,
-      g_param_spec_enum ("profile", "Profile", "Coding profile", GST_TYPE_NEIGHBOUR_CODE_PROFILE,
-          int (kDefaults.profile), live));
-  g_object_class_install_property (object_class, PROP_CHOICE,
-      g_param_spec_enum ("choice", "Neighbour choice",
-          "Which neighbour within the thresholds replaces a pixel (the plain profile always uses "
-          "the first)",
-          GST_TYPE_NEIGHBOUR_CODE_CHOICE, int (kDefaults.choice), steered));
-  install_int (PROP_DEPTH_BITS, "depth-bits", "Depth bits",
-      "Bits of a quantised depth between the view's near and far limits", 6, 16,
-      kDefaults.depth_bits, live);
-  g_object_class_install_property (object_class, PROP_DEPTH_SCALE,
-      g_param_spec_enum ("depth-scale", "Depth scale", "Quantisation of depth",
-          GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, int (kDefaults.depth_scale), live));
-  install_int (PROP_COLOUR_BITS, "colour-bits", "Colour bits", "Bits of each colour channel", 4, 8,
-      kDefaults.colour_bits, live);
-  install_int (PROP_DEPTH_THRESHOLD, "depth-threshold", "Depth threshold",
-      "Maximum depth difference, in quantisation steps, at which a neighbour replaces a pixel (0 "
-      "together with colour-threshold=0 = lossless after quantisation)",
-      0, 65535, kDefaults.depth_threshold, steered);
-  install_int (PROP_COLOUR_THRESHOLD, "colour-threshold", "Colour threshold",
-      "Maximum difference of each of R, G and B, in quantisation steps, at which a neighbour "
-      "replaces a pixel",
-      0, 255, kDefaults.colour_threshold, steered);
-  install_int (PROP_MAX_SLICE_SIZE, "max-slice-size", "Maximum slice size",
-      "Maximum size of a slice in bytes, including its header", 256, int (rangecast::kMaxUnitSize),
-      kDefaults.max_slice_size, steered);
-  g_object_class_install_property (object_class, PROP_TEMPORAL,
-      g_param_spec_boolean ("temporal", "Temporal",
-          "Predict pixels from the previous frame set (false = frame sets decode independently)",
-          kDefaults.temporal, live));
-  const auto install_ms = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                              guint fallback) {
-    g_object_class_install_property (
-        object_class, id, g_param_spec_uint (name, nick, blurb, 0, 3600000, fallback, steered));
-  };
-  install_ms (PROP_REFRESH_PERIOD, "refresh-period", "Refresh period",
-      "Period in milliseconds within which every pixel is coded without temporal prediction (0 = "
-      "only in key frame sets)",
-      guint (kDefaults.refresh_period_ns / GST_MSECOND));
-  install_ms (PROP_KEY_INTERVAL, "key-interval", "Key interval",
-      "Maximum interval between key frame sets in milliseconds with temporal=true (0 = only the "
-      "first frame set and on request)",
-      0);
-  g_object_class_install_property (object_class, PROP_MIN_FORCE_KEY_UNIT_INTERVAL,
-      g_param_spec_uint64 ("min-force-key-unit-interval", "Minimum interval of forced key units",
-          "Minimum interval between key frame sets on request (GstForceKeyUnit) in nanoseconds "
-          "with temporal=true (0 or G_MAXUINT64 = no minimum)",
-          0, G_MAXUINT64, 0, steered));
-  install_int (PROP_N_THREADS, "n-threads", "Threads",
-      "Number of threads that encode tiles; the output does not depend on it (0 = one per CPU "
-      "core)",
-      0, 64, 0, live);
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
-}
-
-static void
 gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -746,18 +540,28 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   object_class->set_property = gst_neighbour_code_enc_set_property;
   object_class->get_property = gst_neighbour_code_enc_get_property;
   object_class->finalize = gst_neighbour_code_enc_finalize;
-  install_properties (object_class);
-  install_results (object_class);
-  NeighbourCodeRateSettings::install (object_class);
+  encoder_properties ().install (object_class, PROP_SETTINGS);
+  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
+      g_param_spec_double ("max-depth-error", "Maximum depth error",
+          "Maximum difference between a decoded depth and the input depth in metres, over all "
+          "views, with the settings of the latest frame set (0 = no frame set yet)",
+          0, G_MAXDOUBLE, 0, kReadOnly));
+  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
+      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
+          "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
+          "first receiver report: target-bitrate; 0 = no limit known)",
+          0, G_MAXUINT64, 0, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started (frames, left-out, points, full-pixels, slices, "
+      "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds of "
+      "the latest frame set and the state of adaptive-bitrate");
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
       "Codec/Encoder/Video",
       "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_PROFILE, GstPluginAPIFlags (0));
-  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_CHOICE, GstPluginAPIFlags (0));
-  gst_type_mark_as_plugin_api (GST_TYPE_NEIGHBOUR_CODE_DEPTH_SCALE, GstPluginAPIFlags (0));
 
   transform_class->sink_event = gst_neighbour_code_enc_sink_event;
   transform_class->src_event = gst_neighbour_code_enc_src_event;

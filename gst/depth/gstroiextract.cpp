@@ -26,18 +26,18 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
-#include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/base/output_path.hpp>
 #include <rangecast/base/parallel.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
 #include "common/controlledvalues.hpp"
-#include "roisettings.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
+#include "roisettings.hpp"
 
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
@@ -49,9 +49,9 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
 #define GST_CAT_DEFAULT gst_roi_extract_debug
 
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
 static guint signals[N_SIGNALS];
-static guint prop_stats; /* number of that property, after the settings */
 
 /* It is taught no more often than this, which nobody sees and saves time, seconds. */
 static constexpr double kShortestStep = 0.2;
@@ -482,12 +482,12 @@ static void
 gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
-  if (id == prop_stats + 1) {
+  if (id == PROP_STATS_INTERVAL) {
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!set_roi_setting (priv->settings, id, value))
+  if (!roi_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -506,11 +506,11 @@ gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSp
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (id == prop_stats)
+  if (id == PROP_STATS)
     g_value_take_boxed (value, make_stats (priv));
-  else if (id == prop_stats + 1)
+  else if (id == PROP_STATS_INTERVAL)
     g_value_set_uint (value, priv->reporter.interval ());
-  else if (!get_roi_setting (priv->settings, id, value))
+  else if (!roi_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -538,13 +538,13 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   object_class->set_property = gst_roi_extract_set_property;
   object_class->get_property = gst_roi_extract_get_property;
   object_class->finalize = gst_roi_extract_finalize;
-  prop_stats = install_roi_settings (object_class) + 1;
-  g_object_class_install_property (object_class, prop_stats,
+  roi_properties ().install (object_class, PROP_SETTINGS);
+  g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since the element was started: frames, points-in, points-out; and the last ROI "
           "of the first view",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-  StatsReporter::install (object_class, prop_stats + 1);
+          GST_TYPE_STRUCTURE, kReadOnly));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   /**
    * GstRoiExtract::capture-background:
@@ -562,7 +562,6 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       "Filter/Effect/Video",
       "Removes the background of range images by depth and colour and crops them to the rest",
       "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_ROI_EXTRACT_CUE, GstPluginAPIFlags (0));
 
   transform_class->start = gst_roi_extract_start;
   transform_class->stop = gst_roi_extract_stop;

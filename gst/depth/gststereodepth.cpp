@@ -26,10 +26,10 @@
  */
 #include "gststereodepth.h"
 
-#include "common/videoframereader.hpp"
 #include "common/bufferpools.hpp"
-#include "roischedule.hpp"
 #include "common/statsreporter.hpp"
+#include "common/videoframereader.hpp"
+#include "roischedule.hpp"
 #include "stereosettings.hpp"
 
 #include <gst/video/video.h>
@@ -58,7 +58,7 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
 
-static guint prop_stats; /* number of that property, after the settings */
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 /* Pictures without a partner, one after the other, that are worth a warning: two seconds. */
 static constexpr guint64 kManyWithoutPartner = 100;
@@ -679,12 +679,12 @@ static void
 gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
-  if (id == prop_stats + 1) {
+  if (id == PROP_STATS_INTERVAL) {
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!set_stereo_setting (priv->settings, id, value))
+  if (!stereo_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -707,11 +707,11 @@ gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamS
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (id == prop_stats)
+  if (id == PROP_STATS)
     g_value_take_boxed (value, make_stats (priv));
-  else if (id == prop_stats + 1)
+  else if (id == PROP_STATS_INTERVAL)
     g_value_set_uint (value, priv->reporter.interval ());
-  else if (!get_stereo_setting (priv->settings, id, value))
+  else if (!stereo_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -744,13 +744,13 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   object_class->set_property = gst_stereo_depth_set_property;
   object_class->get_property = gst_stereo_depth_get_property;
   object_class->finalize = gst_stereo_depth_finalize;
-  prop_stats = install_stereo_settings (object_class) + 1;
-  g_object_class_install_property (object_class, prop_stats,
+  stereo_properties ().install (object_class, PROP_SETTINGS);
+  g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics",
           "Counters since the element was started: frames, restricted-frames, third-frames, "
           "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-  StatsReporter::install (object_class, prop_stats + 1);
+          GST_TYPE_STRUCTURE, kReadOnly));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template :
       {&left_template, &right_template, &third_template, &src_template})
@@ -759,7 +759,6 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   gst_element_class_set_static_metadata (element_class, "Stereo depth", "Filter/Video",
       "Computes range images from a stereo pair of cameras, or from three cameras",
       "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_STEREO_DEPTH_ALGORITHM, GstPluginAPIFlags (0));
 
   element_class->release_pad = gst_stereo_depth_release_pad;
   aggregator_class->start = gst_stereo_depth_start;

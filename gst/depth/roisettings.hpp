@@ -6,6 +6,8 @@
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
+#include "common/properties.hpp"
+
 /** What an application wants of roiextract. Any thread, under the element's lock. */
 struct RoiSettings {
   int background_frames = 30; ///< of the empty scene, from which a background is learnt
@@ -17,13 +19,8 @@ struct RoiSettings {
   double adapt_time_s = 30; ///< seconds; 0 = never
 };
 
-/** Installs the properties of these settings, numbers 1 to the result. Flags say when each may
- *  change. */
-guint install_roi_settings (GObjectClass *object_class);
-
-/** @return false if no property of these settings has that number */
-bool set_roi_setting (RoiSettings &settings, guint id, const GValue *value);
-bool get_roi_setting (const RoiSettings &settings, guint id, GValue *value);
+/** Their properties. */
+PropertyTable<RoiSettings> &roi_properties ();
 
 GType gst_roi_extract_cue_get_type (void);
 #define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())

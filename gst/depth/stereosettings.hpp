@@ -7,27 +7,22 @@
 #include <rangecast/stereo/disparity_finder.hpp>
 #include <string>
 
+#include "common/properties.hpp"
+
 /** What an application wants of stereodepth. Any thread, under the element's lock. */
 struct StereoDepthSettings {
-  static constexpr int kDefaultRefreshInterval = 30;
-
   std::string rig; ///< file; empty: what follows
   int view_id = 0;
   double focal_length = 0, baseline = 0;                           ///< pixels, metres; 0 = not set
   double principal_x = -1, principal_y = -1, principal_offset = 0; ///< pixels; -1 = the centre
   double near = 0, far = 0, depth_unit = 0; ///< metres; 0 = the rig's, or the default
   rangecast::StereoSettings core;
-  int refresh_interval = kDefaultRefreshInterval; ///< frames
-  bool qos = true;                                ///< late pairs are not matched
+  int refresh_interval = 30; ///< frames
+  bool qos = true;           ///< late pairs are not matched
 };
 
-/** Installs the properties of these settings, numbers 1 to the result. All may change in READY, and
- *  qos at any time. */
-guint install_stereo_settings (GObjectClass *object_class);
-
-/** @return false if no property of these settings has that number */
-bool set_stereo_setting (StereoDepthSettings &settings, guint id, const GValue *value);
-bool get_stereo_setting (const StereoDepthSettings &settings, guint id, GValue *value);
+/** Their properties. */
+PropertyTable<StereoDepthSettings> &stereo_properties ();
 
 /** The view of the rig that settings name, or one of rectified pictures that settings describe.
  *  @param width, height  of the pictures

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include "backgroundpainter.hpp"
 #include "camerapainter.hpp"
 #include "multisampler.hpp"
-#include "panelpainter.hpp"
-#include "backgroundpainter.hpp"
 #include "multiviewlayout.hpp"
-#include "strippainter.hpp"
+#include "panelpainter.hpp"
 #include "scene.hpp"
 #include "settings.hpp"
+#include "strippainter.hpp"
 
 /** What to draw into one output buffer. */
 struct StripDrawingJob {

@@ -26,60 +26,19 @@
 #include <mutex>
 #include <optional>
 #include <rangecast/alignment/view_agreement.hpp>
+#include <rangecast/base/guarded.hpp>
 #include <rangecast/overlap/colour_match.hpp>
 #include <rangecast/overlap/cylinder_filter.hpp>
-#include <rangecast/base/guarded.hpp>
 
 #include "common/controlledvalues.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
+#include "cylindersettings.hpp"
 
-GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
+GST_DEBUG_CATEGORY (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
 
-enum {
-  PROP_0,
-  PROP_MODE,
-  PROP_COLOUR_BALANCE,
-  PROP_BLEND_WIDTH,
-  PROP_AGREE,
-  PROP_AXIS,
-  PROP_AXIS_POSITION,
-  PROP_AXIS_DIRECTION,
-  PROP_UNIT_HEIGHT,
-  PROP_COLUMNS,
-  PROP_LAYER_GAP,
-  PROP_SMOOTHING,
-  PROP_OVERLAP,
-  PROP_HYSTERESIS,
-  PROP_AGREEMENT,
-  PROP_BODIES,
-  PROP_N_THREADS,
-  PROP_STATS,
-  PROP_STATS_INTERVAL,
-};
-
-enum GstCylinderFilterMode {
-  GST_CYLINDER_FILTER_OFF,
-  GST_CYLINDER_FILTER_WINNER,
-  GST_CYLINDER_FILTER_BLEND
-};
-enum GstCylinderFilterAgree {
-  GST_CYLINDER_FILTER_AGREE_POSES = 1,
-  GST_CYLINDER_FILTER_AGREE_DEPTH = 2,
-  GST_CYLINDER_FILTER_AGREE_VIEWS = 4,
-  GST_CYLINDER_FILTER_AGREE_POINTS = 8
-};
-enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
-
-static constexpr guint kDefaultAgree = GST_CYLINDER_FILTER_AGREE_POSES |
-                                       GST_CYLINDER_FILTER_AGREE_VIEWS |
-                                       GST_CYLINDER_FILTER_AGREE_POINTS;
-static constexpr double kDefaultBlendWidth = 0.02;
-static constexpr double kDefaultUnitHeight = 0.004, kDefaultLayerGap = 0.03,
-                        kDefaultSmoothing = 0.01, kDefaultOverlap = 8, kDefaultHysteresis = 0.2,
-                        kDefaultAgreement = 0.1;
-static constexpr int kDefaultColumns = 360, kDefaultBodies = 4;
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 struct CylinderCounts {
   guint64 frames = 0, points_contradicted = 0, points_in = 0, points_out = 0, units = 0,
@@ -91,11 +50,7 @@ struct CylinderCounts {
 
 struct GstCylinderFilterPrivate {
   std::mutex lock; /* guards all settings and counts; never held while working on a frame */
-  GstCylinderFilterMode mode = GST_CYLINDER_FILTER_WINNER;
-  rangecast::CylinderSettings settings;
-  GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
-  double blend_width = kDefaultBlendWidth;
-  guint agree = kDefaultAgree; /* GstCylinderFilterAgree */
+  CylinderFilterSettings settings;
   CylinderCounts counts;
   std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
   StatsReporter reporter;                                        /* has locks of its own */
@@ -124,70 +79,6 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
-
-/* ---- enums ---- */
-
-#define GST_TYPE_CYLINDER_FILTER_MODE (gst_cylinder_filter_mode_get_type ())
-static GType
-gst_cylinder_filter_mode_get_type (void)
-{
-  static const GEnumValue values[] = {
-      {GST_CYLINDER_FILTER_OFF, "Pass buffers through unchanged", "off"},
-      {GST_CYLINDER_FILTER_WINNER, "Keep the points of the best view and clear those of the others",
-          "winner"},
-      {GST_CYLINDER_FILTER_BLEND, "As winner, with colours blended along the seams", "blend"},
-      {0, nullptr, nullptr},
-  };
-  static const GType type = g_enum_register_static ("GstCylinderFilterMode", values);
-  return type;
-}
-
-#define GST_TYPE_CYLINDER_FILTER_AGREE (gst_cylinder_filter_agree_get_type ())
-static GType
-gst_cylinder_filter_agree_get_type (void)
-{
-  static const GFlagsValue values[] = {
-      {0, "Nothing", "none"},
-      {GST_CYLINDER_FILTER_AGREE_POSES, "Estimate and correct errors of the camera poses", "poses"},
-      {GST_CYLINDER_FILTER_AGREE_DEPTH,
-          "Move the depths that several views measured of one surface together", "depth"},
-      {GST_CYLINDER_FILTER_AGREE_VIEWS, "Omit a view that contradicts the others", "views"},
-      {GST_CYLINDER_FILTER_AGREE_POINTS,
-          "Clear points that another view sees through in a different colour", "points"},
-      {0, nullptr, nullptr},
-  };
-  static const GType type = g_flags_register_static ("GstCylinderFilterAgree", values);
-  return type;
-}
-
-#define GST_TYPE_CYLINDER_FILTER_BALANCE (gst_cylinder_filter_balance_get_type ())
-static GType
-gst_cylinder_filter_balance_get_type (void)
-{
-  static const GEnumValue values[] = {
-      {GST_CYLINDER_FILTER_BALANCE_OFF, "Leave colours unchanged", "off"},
-      {GST_CYLINDER_FILTER_BALANCE_AUTO,
-          "Estimate a gain per view and channel from surfaces that several views see", "auto"},
-      {0, nullptr, nullptr},
-  };
-  static const GType type = g_enum_register_static ("GstCylinderFilterBalance", values);
-  return type;
-}
-
-#define GST_TYPE_CYLINDER_FILTER_AXIS (gst_cylinder_filter_axis_get_type ())
-static GType
-gst_cylinder_filter_axis_get_type (void)
-{
-  using rangecast::AxisMode;
-  static const GEnumValue values[] = {
-      {int (AxisMode::kPrincipal), "Principal axis of the points of all views", "principal"},
-      {int (AxisMode::kVertical), "World y axis through the centroid of the points", "vertical"},
-      {int (AxisMode::kFixed), "Axis given by axis-position and axis-direction", "fixed"},
-      {0, nullptr, nullptr},
-  };
-  static const GType type = g_enum_register_static ("GstCylinderFilterAxis", values);
-  return type;
-}
 
 /* ---- streaming ---- */
 
@@ -306,7 +197,7 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   sync_controlled_values (base, buffer);
   std::unique_lock guard (priv->lock);
-  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
+  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
   priv->counts.untouched += off;
   guard.unlock ();
   if (off)
@@ -391,14 +282,17 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
   std::unique_lock guard (priv->lock);
-  const bool off = priv->mode == GST_CYLINDER_FILTER_OFF;
-  const rangecast::CylinderSettings settings = priv->settings;
-  const rangecast::ColourSettings colours = {priv->balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
-      priv->mode == GST_CYLINDER_FILTER_BLEND ? priv->blend_width : 0, settings.threads};
-  const rangecast::AgreementSettings agree = {(priv->agree & GST_CYLINDER_FILTER_AGREE_POSES) != 0,
-      (priv->agree & GST_CYLINDER_FILTER_AGREE_DEPTH) != 0,
-      (priv->agree & GST_CYLINDER_FILTER_AGREE_VIEWS) != 0,
-      (priv->agree & GST_CYLINDER_FILTER_AGREE_POINTS) != 0, settings.threads};
+  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
+  const CylinderFilterSettings settings = priv->settings;
+  const rangecast::ColourSettings colours = {settings.balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
+      settings.mode == GST_CYLINDER_FILTER_BLEND ? settings.blend_width_m : 0,
+      settings.core.threads};
+  const auto checks = [&] (GstCylinderFilterAgree check) {
+    return (settings.consistency & check) != 0;
+  };
+  const rangecast::AgreementSettings agree = {checks (GST_CYLINDER_FILTER_AGREE_POSES),
+      checks (GST_CYLINDER_FILTER_AGREE_DEPTH), checks (GST_CYLINDER_FILTER_AGREE_VIEWS),
+      checks (GST_CYLINDER_FILTER_AGREE_POINTS), settings.core.threads};
   guard.unlock ();
   if (off)
     return GST_FLOW_OK;
@@ -407,7 +301,7 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
     return frame.status ().ok () ? gst_cylinder_filter_process (
-                                       self, frame.views (), agree, colours, settings, result)
+                                       self, frame.views (), agree, colours, settings.core, result)
                                  : frame.status ();
   });
   if (status.ok ()) {
@@ -480,107 +374,15 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
 /* ---- properties ---- */
 
 /* A GstValueArray of three doubles. */
-static bool
-get_vector (const GValue *value, rangecast::Vec3 &vector)
-{
-  double v[3];
-  if (gst_value_array_get_size (value) != 3)
-    return false;
-  for (guint i = 0; i < 3; i++) {
-    const GValue *item = gst_value_array_get_value (value, i);
-    GValue number = G_VALUE_INIT;
-    g_value_init (&number, G_TYPE_DOUBLE);
-    if (!g_value_transform (item, &number) || !std::isfinite (g_value_get_double (&number)))
-      return false;
-    v[i] = g_value_get_double (&number);
-  }
-  vector = {v[0], v[1], v[2]};
-  return true;
-}
-
-static void
-set_vector (GValue *array, rangecast::Vec3 vector)
-{
-  for (double number : {vector.x, vector.y, vector.z}) {
-    GValue value = G_VALUE_INIT;
-    g_value_init (&value, G_TYPE_DOUBLE);
-    g_value_set_double (&value, number);
-    gst_value_array_append_and_take_value (array, &value);
-  }
-}
-
-static void
-gst_cylinder_filter_set_axis_vector (GstCylinderFilter *self, guint id, const GValue *value)
-{
-  rangecast::Vec3 vector;
-  const bool direction = id == PROP_AXIS_DIRECTION;
-  const bool good = get_vector (value, vector) && norm (vector) < 1e6;
-  if (!good || (direction && norm (vector) < 1e-6)) {
-    GST_WARNING_OBJECT (self, "%s: expected three numbers, a length%s below 1e6; not changed",
-        direction ? "axis-direction" : "axis-position", direction ? " from 1e-6 to" : "");
-    return;
-  }
-  const std::lock_guard guard (self->priv->lock);
-  rangecast::Axis &axis = self->priv->settings.fixed_axis;
-  (direction ? axis.direction : axis.position) = vector;
-}
-
 static void
 gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
-  auto self = GST_CYLINDER_FILTER (object);
-  if (id == PROP_AXIS_POSITION || id == PROP_AXIS_DIRECTION)
-    return gst_cylinder_filter_set_axis_vector (self, id, value);
+  GstCylinderFilterPrivate *priv = GST_CYLINDER_FILTER (object)->priv;
   if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
-    return self->priv->reporter.set_interval (g_value_get_uint (value));
-  const std::lock_guard guard (self->priv->lock);
-  rangecast::CylinderSettings &settings = self->priv->settings;
-  switch (id) {
-    case PROP_MODE: /* before_transform sets passthrough to match */
-      self->priv->mode = static_cast<GstCylinderFilterMode> (g_value_get_enum (value));
-      break;
-    case PROP_COLOUR_BALANCE:
-      self->priv->balance = static_cast<GstCylinderFilterBalance> (g_value_get_enum (value));
-      break;
-    case PROP_AGREE:
-      self->priv->agree = g_value_get_flags (value);
-      break;
-    case PROP_BLEND_WIDTH:
-      self->priv->blend_width = g_value_get_double (value);
-      break;
-    case PROP_AXIS:
-      settings.axis = static_cast<rangecast::AxisMode> (g_value_get_enum (value));
-      break;
-    case PROP_UNIT_HEIGHT:
-      settings.units.unit_height_m = g_value_get_double (value);
-      break;
-    case PROP_COLUMNS:
-      settings.units.columns = g_value_get_int (value);
-      break;
-    case PROP_LAYER_GAP:
-      settings.units.layer_gap_m = g_value_get_double (value);
-      break;
-    case PROP_SMOOTHING:
-      settings.units.smoothing_m = g_value_get_double (value);
-      break;
-    case PROP_OVERLAP:
-      settings.overlap = g_value_get_double (value);
-      break;
-    case PROP_HYSTERESIS:
-      settings.hysteresis = g_value_get_double (value);
-      break;
-    case PROP_AGREEMENT:
-      settings.agreement = g_value_get_double (value);
-      break;
-    case PROP_BODIES:
-      settings.bodies = g_value_get_int (value);
-      break;
-    case PROP_N_THREADS:
-      settings.threads = g_value_get_int (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+    return priv->reporter.set_interval (g_value_get_uint (value));
+  const std::lock_guard guard (priv->lock);
+  if (!cylinder_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -629,65 +431,12 @@ gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GPar
 {
   auto priv = GST_CYLINDER_FILTER (object)->priv;
   const std::lock_guard guard (priv->lock);
-  const rangecast::CylinderSettings &settings = priv->settings;
-  switch (id) {
-    case PROP_MODE:
-      g_value_set_enum (value, priv->mode);
-      break;
-    case PROP_COLOUR_BALANCE:
-      g_value_set_enum (value, priv->balance);
-      break;
-    case PROP_AGREE:
-      g_value_set_flags (value, priv->agree);
-      break;
-    case PROP_BLEND_WIDTH:
-      g_value_set_double (value, priv->blend_width);
-      break;
-    case PROP_AXIS:
-      g_value_set_enum (value, int (settings.axis));
-      break;
-    case PROP_AXIS_POSITION:
-      set_vector (value, settings.fixed_axis.position);
-      break;
-    case PROP_AXIS_DIRECTION:
-      set_vector (value, settings.fixed_axis.direction);
-      break;
-    case PROP_UNIT_HEIGHT:
-      g_value_set_double (value, settings.units.unit_height_m);
-      break;
-    case PROP_COLUMNS:
-      g_value_set_int (value, settings.units.columns);
-      break;
-    case PROP_LAYER_GAP:
-      g_value_set_double (value, settings.units.layer_gap_m);
-      break;
-    case PROP_SMOOTHING:
-      g_value_set_double (value, settings.units.smoothing_m);
-      break;
-    case PROP_OVERLAP:
-      g_value_set_double (value, settings.overlap);
-      break;
-    case PROP_HYSTERESIS:
-      g_value_set_double (value, settings.hysteresis);
-      break;
-    case PROP_AGREEMENT:
-      g_value_set_double (value, settings.agreement);
-      break;
-    case PROP_BODIES:
-      g_value_set_int (value, settings.bodies);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_int (value, settings.threads);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
-      break;
-    case PROP_STATS_INTERVAL:
-      g_value_set_uint (value, priv->reporter.interval ());
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else if (!cylinder_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 /* ---- life ---- */
@@ -703,117 +452,7 @@ static void
 gst_cylinder_filter_init (GstCylinderFilter *self)
 {
   self->priv = new GstCylinderFilterPrivate;
-  self->priv->settings.units = {
-      kDefaultUnitHeight, kDefaultColumns, kDefaultLayerGap, kDefaultSmoothing};
-  self->priv->settings.overlap = kDefaultOverlap;
-  self->priv->settings.hysteresis = kDefaultHysteresis;
-  self->priv->settings.agreement = kDefaultAgreement;
-  self->priv->settings.bodies = kDefaultBodies;
-  self->priv->settings.threads = 0;
   gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
-}
-
-static GParamSpec *
-vector_spec (const char *name, const char *nick, const char *blurb, GParamFlags flags)
-{
-  return gst_param_spec_array (name, nick, blurb,
-      g_param_spec_double ("number", "Number", "One of the components x, y, z", -G_MAXDOUBLE,
-          G_MAXDOUBLE, 0, GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS)),
-      flags);
-}
-
-static void
-install_colour_properties (GObjectClass *object_class, GParamFlags flags)
-{
-  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (object_class, PROP_COLOUR_BALANCE,
-      g_param_spec_enum ("colour-balance", "Colour balance",
-          "How to match the colours of the views", GST_TYPE_CYLINDER_FILTER_BALANCE,
-          GST_CYLINDER_FILTER_BALANCE_AUTO, controllable));
-  g_object_class_install_property (object_class, PROP_BLEND_WIDTH,
-      g_param_spec_double ("blend-width", "Blend width",
-          "Distance from a seam within which colours are blended with mode=blend, in metres", 0, 1,
-          kDefaultBlendWidth, controllable));
-}
-
-static void
-install_agree_property (GObjectClass *object_class, GParamFlags flags)
-{
-  g_object_class_install_property (object_class, PROP_AGREE,
-      g_param_spec_flags ("agree", "View consistency",
-          "Which consistency checks and corrections to apply between views",
-          GST_TYPE_CYLINDER_FILTER_AGREE, kDefaultAgree,
-          GParamFlags (flags | GST_PARAM_CONTROLLABLE)));
-}
-
-static void
-install_axis_properties (GObjectClass *object_class, GParamFlags flags)
-{
-  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (object_class, PROP_MODE,
-      g_param_spec_enum ("mode", "Mode", "What to do with points that several views see",
-          GST_TYPE_CYLINDER_FILTER_MODE, GST_CYLINDER_FILTER_WINNER, controllable));
-  g_object_class_install_property (object_class, PROP_AXIS,
-      g_param_spec_enum ("axis", "Axis", "How to choose the axis of the cylinder",
-          GST_TYPE_CYLINDER_FILTER_AXIS, int (rangecast::AxisMode::kPrincipal), controllable));
-  g_object_class_install_property (object_class, PROP_AXIS_POSITION,
-      vector_spec ("axis-position", "Axis position",
-          "A point <x, y, z> of the axis for axis=fixed, in world coordinates and metres, less "
-          "than 1e6 from the origin",
-          flags));
-  g_object_class_install_property (object_class, PROP_BODIES,
-      g_param_spec_int ("bodies", "Maximum bodies",
-          "Maximum number of separate bodies that get a cylinder each (1 = one cylinder for "
-          "everything, as with axis=fixed)",
-          1, rangecast::kMaxBodies, kDefaultBodies, controllable));
-  g_object_class_install_property (object_class, PROP_AXIS_DIRECTION,
-      vector_spec ("axis-direction", "Axis direction",
-          "Direction <x, y, z> of the axis for axis=fixed, in world coordinates, of length 1e-6 to "
-          "1e6",
-          flags));
-}
-
-static void
-install_unit_properties (GObjectClass *object_class, GParamFlags flags)
-{
-  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (object_class, PROP_UNIT_HEIGHT,
-      g_param_spec_double ("unit-height", "Slice height",
-          "Height of a slice of the cylinder in metres", 0.0002, 10, kDefaultUnitHeight,
-          controllable));
-  g_object_class_install_property (object_class, PROP_COLUMNS,
-      g_param_spec_int ("columns", "Cells per slice", "Number of cells around a slice", 8, 3600,
-          kDefaultColumns, controllable));
-  g_object_class_install_property (object_class, PROP_LAYER_GAP,
-      g_param_spec_double ("layer-gap", "Layer gap",
-          "Radial gap in metres beyond which points of one cell belong to different surfaces", 0,
-          100, kDefaultLayerGap, controllable));
-  g_object_class_install_property (object_class, PROP_SMOOTHING,
-      g_param_spec_double ("smoothing", "Smoothing radius",
-          "Radius in metres of the neighbourhood that decides which view wins a cell (0 = each "
-          "cell on its own)",
-          0, 1, kDefaultSmoothing, controllable));
-  g_object_class_install_property (object_class, PROP_OVERLAP,
-      g_param_spec_double ("overlap", "Overlap",
-          "Distance in pixels to which the winning view's surface must extend around a point "
-          "before the point is cleared (1 or more = no holes open, larger = wider overlap for "
-          "blending)",
-          0, rangecast::kMaxOverlap, kDefaultOverlap, controllable));
-}
-
-static void
-install_steadiness_properties (GObjectClass *object_class, GParamFlags flags)
-{
-  const auto controllable = GParamFlags (flags | GST_PARAM_CONTROLLABLE);
-  g_object_class_install_property (object_class, PROP_HYSTERESIS,
-      g_param_spec_double ("hysteresis", "Hysteresis",
-          "Cosine by which another view must face the surface more directly to take over a cell (0 "
-          "= no memory of earlier frames)",
-          0, 2, kDefaultHysteresis, controllable));
-  g_object_class_install_property (object_class, PROP_AGREEMENT,
-      g_param_spec_double ("agreement", "Neighbour bonus",
-          "Bonus, as a cosine, of a view in cells whose neighbours it won", 0, 2, kDefaultAgreement,
-          controllable));
 }
 
 static void
@@ -822,28 +461,16 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  const auto flags =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
   object_class->set_property = gst_cylinder_filter_set_property;
   object_class->get_property = gst_cylinder_filter_get_property;
   object_class->finalize = gst_cylinder_filter_finalize;
 
-  install_colour_properties (object_class, flags);
-  install_agree_property (object_class, flags);
-  install_axis_properties (object_class, flags);
-  install_unit_properties (object_class, flags);
-  install_steadiness_properties (object_class, flags);
-  g_object_class_install_property (object_class, PROP_N_THREADS,
-      g_param_spec_int ("n-threads", "Threads",
-          "Number of threads that process views and slices (0 = one per CPU core)", 0, 64, 0,
-          flags));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since READY: frames, points-contradicted, points-in, points-out, units, "
-          "units-shared, units-held, units-changed; of the last frame: bodies, axis-position, "
-          "axis-direction, views",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  cylinder_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS,
+      "Counters since READY: frames, points-contradicted, points-in, points-out, units, "
+      "units-shared, units-held, units-changed; of the last frame: bodies, axis-position, "
+      "axis-direction, views");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
@@ -851,10 +478,6 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
       "Removes redundant points of overlapping views and matches the views' poses and colours",
       "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_MODE, GstPluginAPIFlags (0));
-  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AXIS, GstPluginAPIFlags (0));
-  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_AGREE, GstPluginAPIFlags (0));
-  gst_type_mark_as_plugin_api (GST_TYPE_CYLINDER_FILTER_BALANCE, GstPluginAPIFlags (0));
 
   transform_class->set_caps = gst_cylinder_filter_set_caps;
   transform_class->submit_input_buffer = gst_cylinder_filter_submit_input_buffer;

@@ -50,7 +50,7 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_GL_BASE_FILTER)
 GST_ELEMENT_REGISTER_DEFINE (striprender, "striprender", GST_RANK_NONE, GST_TYPE_STRIP_RENDER)
 
-static guint prop_stats; /* after those of the settings */
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_CAMERA };
 
 /* ---- caps ---- */
 
@@ -407,15 +407,15 @@ static bool
 handle_navigation (GstStripRender *self, GstEvent *event)
 {
   GstStripRenderPrivate *priv = self->priv;
-  StripRenderSettings before, after;
+  OrbitControl before, after;
   bool handled;
   {
     std::lock_guard guard (priv->lock);
-    before = priv->settings;
+    before = priv->settings.camera;
     handled = priv->settings.camera.handle (event);
-    after = priv->settings;
+    after = priv->settings.camera;
   }
-  notify_strip_settings (G_OBJECT (self), before, after);
+  camera_properties ().notify_changes (G_OBJECT (self), before, after);
   return handled;
 }
 
@@ -496,7 +496,7 @@ static void
 gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
-  if (id == prop_stats + 1) {
+  if (id == PROP_STATS_INTERVAL) {
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
@@ -504,7 +504,9 @@ gst_strip_render_set_property (GObject *object, guint id, const GValue *value, G
   {
     std::lock_guard guard (priv->lock);
     const StripRenderSettings before = priv->settings;
-    if (!set_strip_setting (priv->settings, id, value))
+    if (strip_properties ().set (priv->settings, id, value))
+      priv->settings.strips_serial++;
+    else if (!camera_properties ().set (priv->settings.camera, id, value))
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     hold_changed = priv->settings.hold_time != before.hold_time;
     keep_changed = priv->settings.keep_rate != before.keep_rate;
@@ -519,11 +521,12 @@ gst_strip_render_get_property (GObject *object, guint id, GValue *value, GParamS
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (id == prop_stats)
+  if (id == PROP_STATS)
     g_value_take_boxed (value, priv->stats.to_structure ());
-  else if (id == prop_stats + 1)
+  else if (id == PROP_STATS_INTERVAL)
     g_value_set_uint (value, priv->reporter.interval ());
-  else if (!get_strip_setting (priv->settings, id, value))
+  else if (!camera_properties ().get (priv->settings.camera, id, value) &&
+           !strip_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -552,7 +555,6 @@ describe_element (GstElementClass *element_class)
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
       "Renders range images with OpenGL without building a mesh", "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_STRIP_RENDER_MODE, GstPluginAPIFlags (0));
 }
 
 static void
@@ -566,14 +568,13 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   object_class->set_property = gst_strip_render_set_property;
   object_class->get_property = gst_strip_render_get_property;
   object_class->finalize = gst_strip_render_finalize;
-  prop_stats = install_strip_settings (object_class) + 1;
-  g_object_class_install_property (object_class, prop_stats,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, frame-sets, repeated, dropped, "
-          "uploaded-total; of the last frame: points, vertices, triangles, strips, isolated, "
-          "uploaded-bytes",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-  StatsReporter::install (object_class, prop_stats + 1);
+  strip_properties ().install (
+      object_class, camera_properties ().install (object_class, PROP_CAMERA));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, frame-sets, repeated, dropped, "
+      "uploaded-total; of the last frame: points, vertices, triangles, strips, isolated, "
+      "uploaded-bytes");
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   describe_element (element_class);
   element_class->change_state = gst_strip_render_change_state;

@@ -114,9 +114,9 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
       continue;
     const rangecast::View *view = rig_->find (images[i].view_id);
     rangecast::ConstRangeImage image = images[i]; /* the same one may be mapped elsewhere by now */
-    if (settings.show_units && built)
+    if (settings.tint_views && built)
       image.colour = views_[i].image.colour;
-    else if (settings.show_units)
+    else if (settings.tint_views)
       image.colour = rangecast::tinted (images[i].colour,
           rangecast::camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
     views_[i] = {image, view};

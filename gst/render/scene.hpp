@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "strippainter.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
+#include "strippainter.hpp"
 
 /** A frame set made ready to be painted, and what its rig tells of the scene. Streaming thread.
  *  Memory is kept from one frame set to the next. */

@@ -20,15 +20,15 @@
 #include <mutex>
 #include <rangecast/surface/stats_panel.hpp>
 
+#include "common/statsreporter.hpp"
+#include "drawing.hpp"
 #include "gststriprender.h"
 #include "outputschedule.hpp"
 #include "outputthread.hpp"
-#include "viewfit.hpp"
-#include "common/statsreporter.hpp"
-#include "drawing.hpp"
 #include "scene.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
+#include "viewfit.hpp"
 
 /** A stretch of the stream without frame sets. */
 struct StreamGap {

@@ -39,7 +39,7 @@
 
 GST_DEBUG_CATEGORY (gst_avatar_test_src_debug); /* avatarstream.cpp logs to it too */
 
-enum { PROP_STATS = AvatarSettings::kFirstFreeId };
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 
 struct GstAvatarTestSrcPrivate {
   std::mutex lock; /* guards settings */
@@ -215,7 +215,7 @@ gst_avatar_test_src_set_property (GObject *object, guint id, const GValue *value
 {
   auto priv = GST_AVATAR_TEST_SRC (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (!priv->settings.set (id, value))
+  if (!avatar_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -230,7 +230,7 @@ gst_avatar_test_src_get_property (GObject *object, guint id, GValue *value, GPar
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!priv->settings.get (id, value))
+  if (!avatar_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -256,10 +256,10 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
   object_class->set_property = gst_avatar_test_src_set_property;
   object_class->get_property = gst_avatar_test_src_get_property;
   object_class->finalize = gst_avatar_test_src_finalize;
-  AvatarSettings::install (object_class);
+  avatar_properties ().install (object_class, PROP_SETTINGS);
   g_object_class_install_property (object_class, PROP_STATS,
       g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          GST_TYPE_STRUCTURE, kReadOnly));
 
   for (GstStaticPadTemplate *pad_template :
       {&src_template, &left_template, &right_template, &third_template})

@@ -6,6 +6,8 @@
 #include <rangecast/scene/scene.hpp>
 #include <string>
 
+#include "common/properties.hpp"
+
 /** What the application wants of avatartestsrc; all of it may change in NULL and READY. */
 struct AvatarSettings {
   static constexpr int kAllViews = -1;
@@ -19,15 +21,7 @@ struct AvatarSettings {
   std::string rig_export; ///< file; empty: none
   bool person_only = false;
   int n_threads = 0; ///< 0: one a core
-
-  /** The first property id that is free for the element's own ones. */
-  static constexpr guint kFirstFreeId = 100;
-  static void install (GObjectClass *klass);
-  /** @return false if the id is none of ours */
-  bool set (guint id, const GValue *value);
-  bool get (guint id, GValue *value) const;
-
-private:
-  bool set_room (guint id, const GValue *value);
-  bool get_room (guint id, GValue *value) const;
 };
+
+/** Their properties. */
+PropertyTable<AvatarSettings> &avatar_properties ();
