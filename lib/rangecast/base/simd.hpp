@@ -83,23 +83,17 @@ private:
 /** Lanes of the widest version, AVX2's. Others have four: SSE2, NEON. */
 inline constexpr int kMaxLanes = 8;
 
-/* gnu::flatten: all that work () calls and whose text is at hand becomes part of the version.
+/* gnu::flatten: all that work () calls and whose text is at hand becomes part of the version; not
+ * through a function that both versions share, as GCC 12 gives up on what an inlined one calls.
  * gnu::noinline: that happens before it could become part of its caller instead. */
-template <int kNumbers, typename Work>
-[[gnu::always_inline]] inline auto
-run_with_lanes (const Work &work)
-{
-  if constexpr (std::is_invocable_v<const Work &, Lanes<kNumbers>>)
-    return work (Lanes<kNumbers>{});
-  else
-    return work ();
-}
-
 template <typename Work>
 [[gnu::flatten, gnu::noinline]] auto
 run_for_any_cpu (const Work &work)
 {
-  return run_with_lanes<4> (work);
+  if constexpr (std::is_invocable_v<const Work &, Lanes<4>>)
+    return work (Lanes<4>{});
+  else
+    return work ();
 }
 
 #if defined __x86_64__
@@ -107,7 +101,10 @@ template <typename Work>
 [[RANGECAST_TARGET_AVX2, gnu::flatten, gnu::noinline]] auto
 run_for_avx2 (const Work &work)
 {
-  return run_with_lanes<kMaxLanes> (work);
+  if constexpr (std::is_invocable_v<const Work &, Lanes<kMaxLanes>>)
+    return work (Lanes<kMaxLanes>{});
+  else
+    return work ();
 }
 #endif
 
