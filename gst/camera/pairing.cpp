@@ -54,13 +54,13 @@ CamSourcePairing::forget ()
   std::lock_guard guard (lock_);
   tolerance_ = static_cast<std::int64_t> (period_) / 2;
   sets_.start (cameras_, triggered_ ? 0 : tolerance_, waiting_);
-  intervals_.forget ();
+  intervals_.reset ();
   counted_intervals_ = 0;
   clocks_are_off_ = false;
   for (int c = 0; c < kMaxCameras; c++) {
     finders_[c].start (static_cast<std::int64_t> (period_));
     partners_[c].start (static_cast<std::int64_t> (period_));
-    clocks_[c].forget ();
+    clocks_[c].reset ();
     offsets_[c].reset ();
     answered_[c] = last_arrival_ns_[c] = last_taken_ns_[c] = 0;
     has_number_[c] = false;
@@ -134,7 +134,7 @@ CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
   std::lock_guard guard (lock_);
   const auto finders = std::span (finders_).first (static_cast<std::size_t> (cameras_));
   for (auto &finder : finders)
-    if (finder.lost_step ()) {
+    if (finder.lost_sync ()) {
       finder.start (static_cast<std::int64_t> (period_));
       lone_shots_ = 0;
     }
@@ -221,18 +221,18 @@ CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
   const auto found =
       finders_[camera].find (frame.number + 1, stamp_of (frame), frame.arrived_us * 1000);
   if (shots_ > 0)
-    answered_[camera] = std::max (answered_[camera], found.known ? found.shot + 1 : 0);
+    answered_[camera] = std::max (answered_[camera], found.known ? found.trigger + 1 : 0);
   if (!found.known || owing_) {
     counts_.dropped[camera] += frame.buffer != nullptr;
     counts_.unknown += frame.buffer != nullptr;
     return;
   }
-  const Tick &tick = ticks_[found.shot % kTicks];
+  const Tick &tick = ticks_[found.trigger % kTicks];
   /* without stamps the residual is of the arrival, and says nothing about the exposure */
   const std::int64_t taken = tick.fired_ns + (stamp_of (frame) ? found.residual_ns : 0);
   if (frame.buffer)
     delay_.add (frame.arrived_us * 1000 - tick.fired_ns);
-  put (camera, found.shot, std::move (frame), taken);
+  put (camera, found.trigger, std::move (frame), taken);
 }
 
 /* Pictures of a line may come faster than the caps say: what belongs together then lies closer. A

@@ -114,8 +114,8 @@ private:
   bool triggered_ = false, one_signal_ = false;
   GstClockTime period_ = 0, exposure_ = 0;
   rangecast::FrameSets sets_;
-  std::array<rangecast::ShotFinder, kMaxCameras> finders_;
-  std::array<rangecast::PartnerFinder, kMaxCameras> partners_; ///< of those beside the left one
+  std::array<rangecast::TriggerMatcher, kMaxCameras> finders_;
+  std::array<rangecast::FrameAssociator, kMaxCameras> partners_; ///< of those beside the left one
   std::array<rangecast::CameraClock, kMaxCameras> clocks_;
   std::array<std::optional<std::int64_t>, kMaxCameras> offsets_;
   std::array<Tick, kTicks> ticks_;

@@ -130,7 +130,7 @@ forget_slices (GstNeighbourCodeDecPrivate *priv)
 static void
 forget_references (GstNeighbourCodeDecPrivate *priv)
 {
-  priv->decoder.forget_references ();
+  priv->decoder.reset_references ();
   priv->is_temporal = false;
   priv->last_request = GST_CLOCK_TIME_NONE;
 }

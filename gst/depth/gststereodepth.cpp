@@ -315,7 +315,7 @@ match_pictures (
     GstStereoDepthPrivate *priv, bool with_third, GstBuffer *output, GstClockTime capture)
 {
   const GstClockTime begin = gst_util_get_timestamp ();
-  if (Status s = priv->core.take (priv->readers[0].view (), priv->readers[1].view (),
+  if (Status s = priv->core.rectify (priv->readers[0].view (), priv->readers[1].view (),
           with_third ? priv->readers[2].view () : ImageView<const Rgbx>{});
       !s.ok ())
     return s;
@@ -598,7 +598,7 @@ gst_stereo_depth_flush (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   priv->rois.restart ();
-  priv->core.forget ();
+  priv->core.reset ();
   forget_pair (priv);
   priv->gaps.reset ();
   priv->discont = false;

@@ -186,7 +186,7 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
   const int options = data[0];
   std::uint32_t number = 0;
   for (Player *p : {&player, &other}) {
-    p->decoder.forget_references ();
+    p->decoder.reset_references ();
     p->pictures.make ({});
   }
   for (Bytes rest (data + 1, size - 1); rest.size () >= 3;) {
@@ -199,7 +199,7 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
       set_number (access_unit, number);
     for (Player *p : {&player, &other}) {
       if (how & kForget)
-        p->decoder.forget_references ();
+        p->decoder.reset_references ();
       if (p == &player || !(options & kOnce))
         p->decode (access_unit, options);
     }

@@ -40,8 +40,7 @@ sees_other (const FusedView &view, int x, int y, float beyond, const std::array<
       float difference = 0;
       for (std::size_t k = 0; k < 3; k++)
         difference = std::max (difference, std::abs (other[k] - colour[k]));
-      if (static_cast<float> (image.depth.at (u, v)) <= beyond ||
-          difference < ContradictedPoints::kOtherColour)
+      if (static_cast<float> (image.depth.at (u, v)) <= beyond || difference < kMinPatchDifference)
         return false;
     }
   return true;

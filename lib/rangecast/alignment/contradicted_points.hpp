@@ -17,8 +17,6 @@ class ContradictedPoints {
 public:
   /** Share of depth by which another view has to see farther. */
   static constexpr float kMargin = 0.03f;
-  /** Grey levels by which one of R, G, B has to differ, in all of 3 x 3 pixels. */
-  static constexpr float kOtherColour = 40;
 
   /** Looks at every other pixel of every other row, and around those that are contradicted.
    *  Allocates only for an image larger than all before. Views without gains are left alone.

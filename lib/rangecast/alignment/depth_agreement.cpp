@@ -10,8 +10,6 @@ namespace rangecast {
 
 namespace {
 
-/* How far apart the depths of one surface may be, in footprints of a pixel. */
-constexpr float kSameSurface = 6;
 /* Own weight at which a pixel moves half the way. */
 constexpr float kHalfWay = 0.1f;
 
@@ -131,7 +129,7 @@ DepthAgreement::sum_row (const FusedView &own, int y)
       row.ray[k] = other.transfer.corner[k] + static_cast<float> (y) * other.transfer.down[k];
     row.find (depth_.data (), begin_, end_);
     row.gather (*other.planes, begin_, end_);
-    row.meet (depth_.data (), begin_, end_, other.closeness, kSameSurface / own.focal_px,
+    row.meet (depth_.data (), begin_, end_, other.closeness, kSurfaceFootprints / own.focal_px,
         sum_.data (), weight_.data ());
   }
   return true;

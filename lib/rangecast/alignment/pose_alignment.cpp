@@ -5,9 +5,9 @@
 #include <bit>
 #include <cmath>
 
-#include "../geometry/world_points.hpp"
 #include "../base/cholesky.hpp"
 #include "../geometry/pixel_transfer.hpp"
+#include "../geometry/world_points.hpp"
 
 namespace rangecast {
 
@@ -17,16 +17,12 @@ constexpr int kSamples = 1500;      ///< grid pixels of each view in a frame
 constexpr int kFirstSamples = 6000; ///< in the first frame,
 constexpr int kFirstRounds = 6;     ///< which is compared so often
 constexpr double kKept = 0.85;      ///< share of what older frames told that counts in the next one
-/* Points farther apart than this, in footprints of a pixel, are not of one surface. A footprint
- * grows with z as the error of stereo does with z^2 / (focal length * baseline). */
-constexpr float kSameSurface = 6;
 constexpr float kSeenThrough = 10;  ///< in footprints: farther before a surface is before it
 constexpr float kMinWeight = 0.1f;  ///< SurfacePlane::weight of points that are compared
 constexpr float kMinNormals = 0.7f; ///< cosine between the normals of one surface
 /* Views more than 120 degrees apart see no surface well together. */
 constexpr double kMinAxes = -0.5;
 constexpr float kFar = 2 * kMaxImageSide; ///< pixels: no view sees as far aside
-constexpr int kSameColour = 60;           ///< levels; pixels beside an edge differ as much
 constexpr double kEnough = 100;           ///< points that say all there is to say of a pair
 /* A pose is expected to be off by this, metres; the prior of no motion follows from it. */
 constexpr double kExpected = 0.003;
@@ -149,7 +145,7 @@ is_same_colour (const AlignedView &a, int ax, int ay, const AlignedView &b, int 
   const Rgbx p = a.image.colour.at (ax, ay), q = b.image.colour.at (bx, by);
   const std::array<float, 3> &f = *a.gains, &g = *b.gains;
   const float d[] = {f[0] * p.r - g[0] * q.r, f[1] * p.g - g[1] * q.g, f[2] * p.b - g[2] * q.b};
-  return std::max ({std::abs (d[0]), std::abs (d[1]), std::abs (d[2])}) < kSameColour;
+  return std::max ({std::abs (d[0]), std::abs (d[1]), std::abs (d[2])}) < kMaxPixelDifference;
 }
 
 } // namespace
@@ -280,7 +276,7 @@ struct PoseAlignment::Comparison {
                          theirs.constant (column, row) * h[2] - theirs.depth * theirs.depth,
                 size = length_of (n), distance = behind / size,
                 footprint = std::max (mine.depth * own.footprint, theirs.depth * other.footprint),
-                off = distance / (kSameSurface * footprint);
+                off = distance / (kSurfaceFootprints * footprint);
     if (distance < -kSeenThrough * footprint)
       pair.through++;
     if (std::abs (off) >= 1) /* behind: hidden, which says nothing */

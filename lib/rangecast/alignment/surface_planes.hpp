@@ -9,6 +9,16 @@
 
 namespace rangecast {
 
+/** What two views see of one surface lies no further apart than this, in footprints of a pixel. A
+ *  footprint grows with z as the error of stereo does with z^2 / (focal length * baseline). */
+inline constexpr float kSurfaceFootprints = 6;
+/** Two pixels of one surface differ by less in R, G and B, grey levels: beside an edge they mix
+ *  colours differently, so they may differ by much. */
+inline constexpr float kMaxPixelDifference = 60;
+/** Two surfaces differ by no less in R, G or B, grey levels, in all of 3 x 3 pixels: no edge is
+ * that wide, so less than kMaxPixelDifference is enough. */
+inline constexpr float kMinPatchDifference = 40;
+
 /** The plane that touches the surface at a pixel. On a plane 1 / depth is linear in column and row,
  *  so with h = (column * z, row * z, z) of a point, in the pixel's own plane of the image, the
  *  point lies on it if across * h0 + down * h1 + constant (x, y) * h2 = depth^2, and behind it if

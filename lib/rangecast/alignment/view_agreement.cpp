@@ -51,7 +51,7 @@ ViewAgreement::reset ()
   of_.fill ({});
   gains_.fill (std::nullopt);
   frame_ = changed_at_ = 0;
-  judged_ = corrected_ = rig_changed_ = false;
+  evaluated_ = corrected_ = rig_changed_ = false;
 }
 
 const View &
@@ -77,7 +77,7 @@ ViewAgreement::prepare (std::span<const RangeImage> images, int threads)
 void
 ViewAgreement::correct_rig (bool poses)
 {
-  if (judged_ && frame_ - changed_at_ < kChangeEvery)
+  if (evaluated_ && frame_ - changed_at_ < kChangeEvery)
     return;
   double most = 0, change = 0;
   for (const View &view : nominal_.views)
@@ -151,7 +151,7 @@ ViewAgreement::has_good_pair (std::uint64_t trusted) const
 /* Of the views that are contradicted the one goes first without which the others contradict each
  * other least. */
 void
-ViewAgreement::judge_views (std::span<const RangeImage> images)
+ViewAgreement::evaluate_views (std::span<const RangeImage> images)
 {
   std::uint64_t all = 0;
   for (const RangeImage &image : images)
@@ -229,11 +229,11 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
     prepare (images, settings.threads);
   if (learns) {
     poses_.learn (aligned_);
-    judge_views (images);
+    evaluate_views (images);
   }
   correct_rig (settings.poses);
-  judged_ = judged_ || learns;
-  frame_ += judged_;
+  evaluated_ = evaluated_ || learns;
+  frame_ += evaluated_;
   if (!several || !settings.views)
     for (ViewConsistency &view : of_)
       view.left_out = false;

@@ -80,7 +80,7 @@ public:
 private:
   void prepare (std::span<const RangeImage> images, int threads);
   void correct_rig (bool poses);
-  void judge_views (std::span<const RangeImage> images);
+  void evaluate_views (std::span<const RangeImage> images);
   [[nodiscard]] PairAgreement agreement_among (int id, std::uint64_t trusted) const;
   [[nodiscard]] double contradictions_of (std::uint64_t views) const;
   [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
@@ -95,7 +95,7 @@ private:
   std::array<std::optional<std::array<float, 3>>, kMaxViews> gains_;
   PoseAlignment poses_;
   std::uint32_t frame_ = 0, changed_at_ = 0;
-  bool rig_changed_ = false, corrected_ = false, judged_ = false;
+  bool rig_changed_ = false, corrected_ = false, evaluated_ = false;
   /* Of the present frame. */
   std::vector<AlignedView> aligned_;
   std::vector<FusedView> fused_;

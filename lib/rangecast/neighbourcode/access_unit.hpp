@@ -11,7 +11,7 @@
 
 namespace rangecast {
 
-/** Codes whole frame sets; views and pieces of each in parallel. */
+/** Codes whole frame sets; views and partitions of each in parallel. */
 class AccessUnitEncoder {
 public:
   Status configure (const Rig &rig, const EncoderSettings &settings);
@@ -20,7 +20,7 @@ public:
   void set_thresholds (int depth, int colour);
 
   /** Codes a frame set. Its bytes are those of parts() in order, valid until the next call.
-   *  @param threads  pieces at a time; 0 = number of cores. The bytes do not depend on it
+   *  @param threads  partitions at a time; 0 = number of cores. The bytes do not depend on it
    *  @return kNotFound for a view that the rig has not, kBadData for one that is there twice,
    *  kBadSize for a ROI outside its view */
   Status encode (std::span<const RangeImage> images, std::uint32_t frame_number, int threads,
@@ -42,7 +42,7 @@ public:
 private:
   struct Job {
     ViewEncoder *view;
-    ViewEncoder::PieceId piece;
+    ViewEncoder::PartitionId partition;
   };
   void find_max_depth_error ();
   Status check_views (std::span<const RangeImage> images);
@@ -55,7 +55,7 @@ private:
   std::array<ViewEncoder, kMaxViews> views_; /* by view-id */
   std::array<Status, kMaxViews> begun_;      /* by image of the frame set */
   std::vector<Job> jobs_;
-  WorkerMemory<PieceEncoder> memory_;
+  WorkerMemory<PartitionEncoder> memory_;
   std::vector<std::span<const std::uint8_t>> parts_;
 };
 
@@ -100,7 +100,7 @@ public:
   Status set_rig (const Rig &rig);
   [[nodiscard]] const Rig &rig () const { return rig_; }
   /** What comes next does not continue what was decoded last. */
-  void forget_references ();
+  void reset_references ();
 
   /** Reads all headers. Views are sorted by view-id. ROI, bits and frame number of a view are those
    *  that most of its slices have (of two as frequent: those that came first); slices that differ

@@ -19,10 +19,10 @@ AccessUnitDecoder::set_rig (const Rig &rig)
 }
 
 void
-AccessUnitDecoder::forget_references ()
+AccessUnitDecoder::reset_references ()
 {
   for (ReferencePair &pair : references_)
-    pair.forget ();
+    pair.reset ();
 }
 
 /* Slices of one place: the first sound one counts, the others are copies of it. */

@@ -82,7 +82,9 @@ AccessUnitEncoder::begin_views (
 void
 AccessUnitEncoder::add_jobs (ViewEncoder &view)
 {
-  view.for_open_pieces ([&] (ViewEncoder::PieceId piece) { jobs_.push_back ({&view, piece}); });
+  view.for_open_partitions ([&] (ViewEncoder::PartitionId partition) {
+    jobs_.push_back ({&view, partition});
+  });
 }
 
 Status
@@ -102,7 +104,7 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
     memory_.reserve (workers);
     in_parallel (
         jobs_.size (), static_cast<int> (workers), [&] (std::size_t i, std::size_t worker) {
-          jobs_[i].view->code (jobs_[i].piece, memory_.of (worker));
+          jobs_[i].view->code (jobs_[i].partition, memory_.of (worker));
         });
     jobs_.clear ();
     for (const RangeImage &image : images)
@@ -112,7 +114,8 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
   for (const RangeImage &image : images) {
     const ViewEncoder &view = views_[image.view_id];
     result += view.result ();
-    view.for_coded_pieces ([&] (std::span<const std::uint8_t> bytes) { parts_.push_back (bytes); });
+    view.for_coded_partitions (
+        [&] (std::span<const std::uint8_t> bytes) { parts_.push_back (bytes); });
   }
   return {};
 }

@@ -52,7 +52,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     motions_.resize (view.width, view.height);
   }
   if (!comparable) {
-    references_.forget ();
+    references_.reset ();
     reference_choice_.reset (refresh_.bands ());
   }
   view_ = view;
@@ -112,36 +112,36 @@ ViewEncoder::compact_settings (bool fine) const
 }
 
 int
-ViewEncoder::pieces_of (const Plan &plan) const
+ViewEncoder::partitions_of (const Plan &plan) const
 {
   if (header_.roi.empty ())
     return 1;
   if (settings_.profile == Profile::kPlain)
-    return plain_pieces (header_, settings_.max_slice_size);
+    return plain_partitions (header_, settings_.max_slice_size);
   const CompactSettings finer = finer_settings (compact_settings (plan.fine));
   const bool is_exact =
       is_zero (steps_within (finer.depth_threshold, finer.colour_threshold).components () - 1);
-  return compact_pieces (
+  return compact_partitions (
       header_, plan.rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
 }
 
-/* Room for what pieces mostly come to, and for ROIs that grow, so that frame sets need no memory
- * anew. With a reference there may be fewer pieces than without, but no more; and a piece behind i
- * others is no wider than one of i + 1. */
+/* Room for what partitions mostly come to, and for ROIs that grow, so that frame sets need no
+ * memory anew. With a reference there may be fewer partitions than without, but no more; and a
+ * partition behind i others is no wider than one of i + 1. */
 void
-ViewEncoder::make_room (Band &band, int pieces)
+ViewEncoder::make_room (Band &band, int partitions)
 {
   constexpr std::size_t kUsualBytesOfPixel = 2;
   Plan key = band.plan;
   key.rows.key = true;
-  const int most = std::max (pieces, band.plan.rows.key ? 0 : pieces_of (key));
+  const int most = std::max (partitions, band.plan.rows.key ? 0 : partitions_of (key));
   const int rows = std::max (band.plan.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
-  if (band.pieces.size () < static_cast<std::size_t> (most))
-    band.pieces.resize (static_cast<std::size_t> (most));
+  if (band.partitions.size () < static_cast<std::size_t> (most))
+    band.partitions.resize (static_cast<std::size_t> (most));
   for (std::size_t i = 0; i < static_cast<std::size_t> (most); i++) {
     const std::size_t columns = static_cast<std::size_t> (header_.roi.width) / (i + 1) + 1;
     const std::size_t usual = kUsualBytesOfPixel * columns * static_cast<std::size_t> (rows);
-    std::vector<std::uint8_t> &bytes = band.pieces[i].bytes;
+    std::vector<std::uint8_t> &bytes = band.partitions[i].bytes;
     bytes.clear ();
     if (bytes.capacity () < usual)
       bytes.reserve (usual + usual / 2);
@@ -149,17 +149,17 @@ ViewEncoder::make_room (Band &band, int pieces)
 }
 
 void
-ViewEncoder::cut (Band &band, int pieces)
+ViewEncoder::cut (Band &band, int partitions)
 {
   const int width = header_.roi.width;
-  make_room (band, pieces);
-  band.count = static_cast<std::size_t> (pieces);
+  make_room (band, partitions);
+  band.count = static_cast<std::size_t> (partitions);
   band.is_open = true;
   band.misfits = false;
-  for (int i = 0; i < pieces; i++) {
-    Piece &piece = band.pieces[static_cast<std::size_t> (i)];
-    piece.first_column = width * i / pieces;
-    piece.columns = width * (i + 1) / pieces - piece.first_column;
+  for (int i = 0; i < partitions; i++) {
+    Partition &partition = band.partitions[static_cast<std::size_t> (i)];
+    partition.first_column = width * i / partitions;
+    partition.columns = width * (i + 1) / partitions - partition.first_column;
   }
 }
 
@@ -181,7 +181,7 @@ ViewEncoder::cut_bands ()
     bands_.resize (band_count_);
   for (std::size_t i = 0; i < band_count_; i++) {
     bands_[i].plan = plans_[i];
-    cut (bands_[i], pieces_of (plans_[i]));
+    cut (bands_[i], partitions_of (plans_[i]));
   }
 }
 
@@ -193,11 +193,11 @@ ViewEncoder::make_empty_slice ()
   coarse_.assign (1, {0, 0, true, 0});
   cut_bands ();
   bands_[0].is_open = false;
-  Piece &piece = bands_[0].pieces[0];
-  piece.bytes.resize (kSliceHeaderSize);
-  write_slice_header (header_, kSliceHeaderSize, piece.bytes.data ());
-  piece.result = {};
-  piece.result.slices = 1;
+  Partition &partition = bands_[0].partitions[0];
+  partition.bytes.resize (kSliceHeaderSize);
+  write_slice_header (header_, kSliceHeaderSize, partition.bytes.data ());
+  partition.result = {};
+  partition.result.slices = 1;
 }
 
 Status
@@ -214,7 +214,7 @@ ViewEncoder::begin (const ConstRangeImage &image, std::uint32_t frame_number)
   image_ = image;
   fill_header (image, frame_number);
   if (roi.empty ()) {
-    references_.forget (); /* as if it were absent */
+    references_.reset (); /* as if it were absent */
     make_empty_slice ();
     return {};
   }
@@ -225,38 +225,39 @@ ViewEncoder::begin (const ConstRangeImage &image, std::uint32_t frame_number)
 
 bool
 ViewEncoder::code_compact (
-    const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with)
+    const Band &band, const SliceHeader &header, Partition &partition, CompactEncoder &with)
 {
   const CompactPicture picture = {
       image_, reference_, {depth_, colour_}, compact_settings (band.plan.fine), motions_};
-  return with.code_piece (picture, band.plan.rows, header, piece.bytes, piece.result);
+  return with.code_partition (picture, band.plan.rows, header, partition.bytes, partition.result);
 }
 
 void
-ViewEncoder::code (PieceId id, PieceEncoder &with)
+ViewEncoder::code (PartitionId id, PartitionEncoder &with)
 {
   Band &band = bands_[id.band];
-  Piece &piece = band.pieces[id.piece];
+  Partition &partition = band.partitions[id.partition];
   const std::atomic_ref misfits (band.misfits);
-  piece.bytes.clear ();
-  piece.result = {};
+  partition.bytes.clear ();
+  partition.result = {};
   if (misfits.load (std::memory_order_relaxed))
     return; /* all of the band is to be coded again */
   SliceHeader header = header_;
   header.key = band.plan.rows.key;
   header.reference_distance = header.key ? std::uint8_t{0} : header_.reference_distance;
-  header.first_column = piece.first_column;
-  header.columns = piece.columns;
+  header.first_column = partition.first_column;
+  header.columns = partition.columns;
   const PlainSettings plain = {
       settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
   if (settings_.profile != Profile::kPlain) {
-    if (!code_compact (band, header, piece, with.compact))
+    if (!code_compact (band, header, partition, with.compact))
       misfits.store (true, std::memory_order_relaxed);
   } else if (reference_.now) {
-    with.plain_temporal.code_piece (image_, band.plan.rows, reference_, depth_, colour_, plain,
-        header, piece.bytes, piece.result);
+    with.plain_temporal.code_partition (image_, band.plan.rows, reference_, depth_, colour_, plain,
+        header, partition.bytes, partition.result);
   } else {
-    with.plain.code_piece (image_, plain_codes_, plain, header, piece.bytes, piece.result);
+    with.plain.code_partition (
+        image_, plain_codes_, plain, header, partition.bytes, partition.result);
   }
 }
 
@@ -264,8 +265,8 @@ std::size_t
 ViewEncoder::bytes_of (const Band &band)
 {
   std::size_t bytes = 0;
-  for (const Piece &piece : std::span (band.pieces).first (band.count))
-    bytes += piece.bytes.size ();
+  for (const Partition &partition : std::span (band.partitions).first (band.count))
+    bytes += partition.bytes.size ();
   return bytes;
 }
 
@@ -276,7 +277,7 @@ ViewEncoder::pixels_of (const Band &band) const
          static_cast<std::size_t> (header_.roi.width);
 }
 
-/* Goes on with a trial whose pieces have been coded. @return false if that was all */
+/* Goes on with a trial whose partitions have been coded. @return false if that was all */
 bool
 ViewEncoder::go_on (Band &band)
 {
@@ -297,7 +298,7 @@ ViewEncoder::go_on (Band &band)
   }
   band.plan.rows.key = !was_key;
   band.plan.fine = was_key;
-  cut (band, pieces_of (band.plan));
+  cut (band, partitions_of (band.plan));
   return true;
 }
 
@@ -316,14 +317,14 @@ ViewEncoder::finish ()
     is_done = is_done && !band.is_open;
   }
   if (is_done)
-    note_bytes ();
+    record_bytes ();
   return is_done;
 }
 
 /* What bands come to says how wide the next slices with a reference may be, and whether a reference
  * still pays. */
 void
-ViewEncoder::note_bytes ()
+ViewEncoder::record_bytes ()
 {
   std::size_t bytes = 0, pixels = 0;
   for (const Band &band : std::span (bands_).first (band_count_)) {
@@ -343,8 +344,8 @@ ViewEncoder::result () const
 {
   EncoderResult sum;
   for (const Band &band : std::span (bands_).first (band_count_))
-    for (const Piece &piece : std::span (band.pieces).first (band.count))
-      sum += piece.result;
+    for (const Partition &partition : std::span (band.partitions).first (band.count))
+      sum += partition.result;
   sum.raw_bits =
       sum.points * static_cast<std::uint64_t> (settings_.depth_bits + 3 * settings_.colour_bits) +
       static_cast<std::uint64_t> (header_.roi.width) *

@@ -7,12 +7,12 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
-#include "compact/encoder.hpp"
 #include "bitstream/slice_partition.hpp"
+#include "bitstream/unit.hpp"
+#include "compact/encoder.hpp"
 #include "plain/encoder.hpp"
 #include "plain/temporal.hpp"
 #include "reference_choice.hpp"
-#include "bitstream/unit.hpp"
 
 namespace rangecast {
 
@@ -44,15 +44,15 @@ struct EncoderSettings {
 
 Status validate (const EncoderSettings &settings);
 
-/** Codes pieces of any view. Nothing of one piece has an effect on the next. */
-struct PieceEncoder {
+/** Codes partitions of any view. Nothing of one partition has an effect on the next. */
+struct PartitionEncoder {
   PlainEncoder plain;
   PlainTemporalEncoder plain_temporal;
   CompactEncoder compact; ///< profiles packed and entropy
 };
 
-/** Codes range images of one view, in pieces that do not depend on one another: in whatever order
- *  and with whatever helper they are coded, their bytes are the same. Keeps its memory. */
+/** Codes range images of one view, in partitions that do not depend on one another: in whatever
+ * order and with whatever helper they are coded, their bytes are the same. Keeps its memory. */
 class ViewEncoder {
 public:
   /** Sets up for a view. Builds tables only if something changed. */
@@ -64,49 +64,49 @@ public:
     settings_.colour_threshold = colour;
   }
 
-  /** Begins a range image: finds into which pieces it is cut.
+  /** Begins a range image: finds into which partitions it is cut.
    *
    *  Pixels are scanned row by row. A valid one is compared with its left, upper-left, upper and
    *  upper-right neighbours, as they are after quantisation and replacement; the first that is near
    *  enough in depth and in each of R, G, B replaces it. Neighbours outside the slice do not exist.
    *  An empty ROI gives one slice without pixels. Depths outside near..far are invalid.
-   *  @param image  must live until all pieces are coded
+   *  @param image  must live until all partitions are coded
    *  @return kBadSize if the ROI does not lie in the view's image */
   Status begin (const ConstRangeImage &image, std::uint32_t frame_number);
 
-  struct PieceId {
-    std::size_t band, piece;
+  struct PartitionId {
+    std::size_t band, partition;
   };
-  /** Calls take (id) for each piece that is to be coded. */
-  template <typename Take> void for_open_pieces (const Take &take) const
+  /** Calls take (id) for each partition that is to be coded. */
+  template <typename Take> void for_open_partitions (const Take &take) const
   {
     for (std::size_t b = 0; b < band_count_; b++)
       for (std::size_t p = 0; bands_[b].is_open && p < bands_[b].count; p++)
-        take (PieceId{b, p});
+        take (PartitionId{b, p});
   }
-  /** Codes a piece. Different ones may be coded at the same time. */
-  void code (PieceId id, PieceEncoder &with);
-  /** To be called when all open pieces have been coded. @return false if some bands had to be cut
-   * into more pieces, or are to be coded another way: these are open now */
+  /** Codes a partition. Different ones may be coded at the same time. */
+  void code (PartitionId id, PartitionEncoder &with);
+  /** To be called when all open partitions have been coded. @return false if some bands had to be
+   * cut into more partitions, or are to be coded another way: these are open now */
   bool finish ();
 
   /** What the range image came to. */
   [[nodiscard]] EncoderResult result () const;
-  /** Calls take (bytes) for each piece, in order; valid until the next begin(). */
-  template <typename Take> void for_coded_pieces (const Take &take) const
+  /** Calls take (bytes) for each partition, in order; valid until the next begin(). */
+  template <typename Take> void for_coded_partitions (const Take &take) const
   {
     for (std::size_t b = 0; b < band_count_; b++)
       for (std::size_t p = 0; p < bands_[b].count; p++)
-        take (std::span<const std::uint8_t> (bands_[b].pieces[p].bytes));
+        take (std::span<const std::uint8_t> (bands_[b].partitions[p].bytes));
   }
 
   /** The next range image is coded without reference to earlier ones. */
-  void request_key () { references_.forget (); }
+  void request_key () { references_.reset (); }
 
   [[nodiscard]] const DepthQuantiser &depth () const { return depth_; }
 
 private:
-  struct Piece {
+  struct Partition {
     int first_column = 0, columns = 0; /* of the ROI */
     std::vector<std::uint8_t> bytes;
     EncoderResult result;
@@ -122,26 +122,26 @@ private:
   };
   struct Band {
     Plan plan;
-    std::size_t first_bytes = 0; /* of a trial */
-    std::vector<Piece> pieces;   /* those behind the first `count` are memory for later */
+    std::size_t first_bytes = 0;       /* of a trial */
+    std::vector<Partition> partitions; /* those behind the first `count` are memory for later */
     std::size_t count = 0;
     bool is_open = false;
-    bool misfits = false; /* a row of a piece is longer than a slice may be */
+    bool misfits = false; /* a row of a partition is longer than a slice may be */
   };
   void fill_header (const ConstRangeImage &image, std::uint32_t frame_number);
   void make_empty_slice ();
   void plan_references ();
   void cut_bands ();
-  void cut (Band &band, int pieces);
-  void make_room (Band &band, int pieces);
-  [[nodiscard]] int pieces_of (const Plan &plan) const;
+  void cut (Band &band, int partitions);
+  void make_room (Band &band, int partitions);
+  [[nodiscard]] int partitions_of (const Plan &plan) const;
   [[nodiscard]] CompactSettings compact_settings (bool fine) const;
   [[nodiscard]] std::size_t pixels_of (const Band &band) const;
   static std::size_t bytes_of (const Band &band);
   bool go_on (Band &band);
   bool code_compact (
-      const Band &band, const SliceHeader &header, Piece &piece, CompactEncoder &with);
-  void note_bytes ();
+      const Band &band, const SliceHeader &header, Partition &partition, CompactEncoder &with);
+  void record_bytes ();
 
   View view_;
   EncoderSettings settings_;

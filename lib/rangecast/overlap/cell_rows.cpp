@@ -67,7 +67,7 @@ CellRows::make_room ()
     grow (covering_[w], nodes);
     std::fill_n (views_[w].begin (), nodes, 0);
   }
-  std::fill_n (radius_.begin (), nodes, kNowhere);
+  std::fill_n (radius_.begin (), nodes, kNoRadius);
   for (auto &plane : tangent_)
     std::fill_n (plane.begin (), nodes, 0.f);
 }
@@ -115,7 +115,7 @@ template <typename L> struct CellRows::Loops {
       const std::size_t here = to + static_cast<std::size_t> (c);
       const F radius = L::at (&rows.radius_[here]);
       Sum sum = {L::at (&rows.tangent_[0][here]), L::at (&rows.tangent_[1][here]), {}, {}};
-      if (L::any (radius < kNowhere)) {
+      if (L::any (radius < kNoRadius)) {
         const F least = 1e-6f + F{};
         const F reach = rules.smoothing_columns / (radius > least ? radius : least);
         for (int d = 1; static_cast<float> (d) <= rules.most_columns; d++) {
@@ -192,7 +192,7 @@ template <typename L> struct CellRows::Loops {
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const std::size_t here = std::size_t{row} * rows.width_ + kPad + c;
       const F radius = L::at (&rows.radius_[here]);
-      if (!L::any (radius < kNowhere)) /* nobody looks at what is in an empty node */
+      if (!L::any (radius < kNoRadius)) /* nobody looks at what is in an empty node */
         continue;
       F x = L::at (&rows.sum_[0][here]), z = L::at (&rows.sum_[1][here]);
       U below[2] = {}, above[2] = {};
@@ -203,7 +203,7 @@ template <typename L> struct CellRows::Loops {
       normalise (x, z, c);
       L::at (&rows.tangent_[0][here]) = x;
       L::at (&rows.tangent_[1][here]) = z;
-      const I full = radius < kNowhere;
+      const I full = radius < kNoRadius;
       for (int w = 0; w < kWords; w++) {
         U &covering = L::at (&rows.covering_[w][here]);
         covering = (covering | (below[w] & above[w])) & (U)full;
@@ -266,7 +266,7 @@ template <typename L> struct CellRows::Loops {
       for (std::uint32_t c = 0; c < rows.width_; c += kLanes) {
         F &radius = L::at (&rows.radius_[to + c]);
         I &first = L::at (&rows.first_[to + c]);
-        const I empty = radius >= kNowhere;
+        const I empty = radius >= kNoRadius;
         radius = empty ? L::at (&rows.old_radius_[from + c]) : radius;
         first = empty ? L::at (&rows.old_first_[from + c]) : first;
       }
@@ -374,7 +374,7 @@ template <typename L> struct CellRows::Loops {
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const std::size_t here = std::size_t{row} * rows.width_ + kPad + c;
       const F radius = L::at (&rows.radius_[here]);
-      if (!L::any (radius < kNowhere)) {
+      if (!L::any (radius < kNoRadius)) {
         L::at (&rows.next_[here]) = I{} - 1;
         continue;
       }
@@ -469,7 +469,7 @@ CellRows::count_slice (const Slice &slice, RowCounts &counts) const
 /* ---- from frame to frame ---- */
 
 void
-CellRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids)
+CellRows::keep_winners (const RowRules &rules, const std::array<int, kMaxViews> &ids)
 {
   for (const Slice &slice : slices_)
     for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.carry_over (slice); });
@@ -489,7 +489,7 @@ CellRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids
 }
 
 void
-CellRows::recall (const std::array<int, kMaxViews> &ids, int images)
+CellRows::renumber_winners (const std::array<int, kMaxViews> &ids, int images)
 {
   std::array<std::int32_t, kMaxViews> now;
   bool same = true;
@@ -522,7 +522,7 @@ CellRows::old_winner (int slice, int column) const
 }
 
 void
-CellRows::forget ()
+CellRows::reset ()
 {
   old_slices_.clear ();
   old_begin_.fill (0);

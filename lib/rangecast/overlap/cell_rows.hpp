@@ -10,7 +10,7 @@
 namespace rangecast {
 
 /** The radius of a node without points, metres: further than any layer gap from all others. */
-inline constexpr float kNowhere = 1e30f;
+inline constexpr float kNoRadius = 1e30f;
 /** Cylinders at a time, at most. */
 inline constexpr int kMaxClusters = 8;
 
@@ -39,8 +39,8 @@ struct RowCounts {
  *  cells need, a slice without points none.
  *
  *  Order of calls for a frame: begin(), add_slice() and layers into nodes(), sum_along() of all
- *  slices, sum_across() of all, decide(), remember(). Calls for different slices may be made at the
- *  same time. All planes have pads of columns repeated from the other end of the row. */
+ *  slices, sum_across() of all, decide(), keep_winners(). Calls for different slices may be made at
+ * the same time. All planes have pads of columns repeated from the other end of the row. */
 class CellRows {
 public:
   static constexpr int kPad = 8;
@@ -55,7 +55,7 @@ public:
 
   /** Of one layer. */
   struct Node {
-    float radius = kNowhere;
+    float radius = kNoRadius;
     float tangent[2] = {}; ///< x, z; unit vector after sum_across()
     std::uint64_t views = 0;
   };
@@ -98,13 +98,13 @@ public:
 
   /** Keeps the winners for the next frame's hysteresis.
    *  @param ids  view-id of each image */
-  void remember (const RowRules &rules, const std::array<int, kMaxViews> &ids);
+  void keep_winners (const RowRules &rules, const std::array<int, kMaxViews> &ids);
   /** Before the next decide(): what images the winners kept have now. Cells of another size are
    *  other cells: what was kept of them is not used. */
-  void recall (const std::array<int, kMaxViews> &ids, int images);
-  void forget ();
+  void renumber_winners (const std::array<int, kMaxViews> &ids, int images);
+  void reset ();
 
-  /** The slices of the frame that remember() saw, and the view-id of the winner of a cell's
+  /** The slices of the frame that keep_winners() saw, and the view-id of the winner of a cell's
    *  outermost layer in it; -1 where the cell had no points, whoever held it before. */
   [[nodiscard]] int old_slices () const { return static_cast<int> (old_slices_.size ()); }
   [[nodiscard]] int old_winner (int slice, int column) const;

@@ -233,7 +233,7 @@ struct Cells::Cutter {
     CellLayer &layer = cells.layers[layer_end];
     layer = {0, entry_end, 0, column, plane, 0, {}, begin, end - begin};
     const Point *points = cells.points.data ();
-    float radii = 0, low = kNowhere, high = 0;
+    float radii = 0, low = kNoRadius, high = 0;
     std::uint32_t to = entry_end;
     for (std::uint32_t i = begin; i < end; to++) {
       float x = 0, z = 0, radius = 0;

@@ -18,7 +18,7 @@ constexpr int kFirstSamples = 65536; ///< in the first frame
 constexpr float kBinsPerLog = 400;   ///< so histograms reach from -0.8 to 0.8: 0.45 to 2.2
 constexpr float kFewest = 30;        ///< shared pixels that tell something of a pair
 constexpr float kKept = 0.9f;        ///< share of what was counted that counts in the next frame
-/* Of kSameSurface. Where stereo is wrong on a shaded surface the colours are always wrong the same
+/* Of kSameSurfaceM. Where stereo is wrong on a shaded surface the colours are always wrong the same
  * way, so places that it has right tell more than many that it has nearly right. */
 constexpr float kSamePlace = 0.3f;
 constexpr double kMany = 300; ///< more than so many do not count more

@@ -67,14 +67,14 @@ CylinderFilter::reset ()
 {
   for (AxisTracker &tracker : trackers_)
     tracker.reset ();
-  cells_.rows.forget ();
+  cells_.rows.reset ();
   decided_ = false;
 }
 
 /* Cells about an axis found by another rule are other cells. So are those about one that was set
  * elsewhere; but one that is set a little further on in each frame follows somebody. */
 void
-CylinderFilter::forget_other_geometry (const CylinderSettings &settings)
+CylinderFilter::reset_on_new_geometry (const CylinderSettings &settings)
 {
   constexpr double kNear = 0.05, kAlike = 0.996; /* metres; cosine of 5 degrees */
   const Vec3 a = settings.fixed_axis.direction, b = fixed_axis_.direction;
@@ -87,7 +87,7 @@ CylinderFilter::forget_other_geometry (const CylinderSettings &settings)
 }
 
 Status
-CylinderFilter::take_cameras (std::span<const RangeImage> images)
+CylinderFilter::find_cameras (std::span<const RangeImage> images)
 {
   if (images.size () > kMaxViews)
     return {StatusCode::kBadSize, "frame set: more than 64 views"};
@@ -269,7 +269,7 @@ CylinderFilter::process (
   const Status status = guarded ("cylinder", [&] () -> Status {
     if (Status bad = check (settings); !bad.ok ())
       return bad;
-    if (Status bad = take_cameras (images); !bad.ok ())
+    if (Status bad = find_cameras (images); !bad.ok ())
       return bad;
     began = true;
     return work (images, settings, result);
@@ -288,7 +288,7 @@ CylinderFilter::work (
   decided_ = false;
   if (Status status = cloud_.reset (images); !status.ok ())
     return status;
-  forget_other_geometry (settings);
+  reset_on_new_geometry (settings);
   make_points (images, settings.threads);
   result.points_in = result.points_out = cloud_.size ();
   if (result.points_in > 0) {
@@ -304,7 +304,7 @@ CylinderFilter::work (
   set_rules (settings, images.size ());
   decide_cells (settings, result);
   clear_redundant (images, settings);
-  cells_.rows.remember (rules_, ids_);
+  cells_.rows.keep_winners (rules_, ids_);
   decided_ = true;
   result.points_out -= redundant_.size ();
   return {};
@@ -337,7 +337,7 @@ CylinderFilter::decide_cells (const CylinderSettings &settings, CylinderResult &
   });
   in_parallel (slices, settings.threads,
       [&] (std::size_t s) { cells_.rows.sum_across (rules_, static_cast<int> (s)); });
-  cells_.rows.recall (ids_, rules_.images);
+  cells_.rows.renumber_winners (ids_, rules_.images);
   const RowCounts counts = cells_.rows.decide (rules_, settings.threads);
   result.cells_held = counts.held;
   result.cells_changed = counts.changed;

@@ -105,8 +105,8 @@ public:
 private:
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
-  Status take_cameras (std::span<const RangeImage> images);
-  void forget_other_geometry (const CylinderSettings &settings);
+  Status find_cameras (std::span<const RangeImage> images);
+  void reset_on_new_geometry (const CylinderSettings &settings);
   void make_points (std::span<const RangeImage> images, int threads);
   void find_clusters (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);

@@ -93,28 +93,28 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
 
 void
 BackgroundDisparity::extend (
-    const cv::Point &at, int least, int far, const Pieces &pieces, cv::Mat &disparity) const
+    const cv::Point &at, int least, int far, const Tiles &tiles, cv::Mat &disparity) const
 {
   constexpr std::int16_t kNothing = 32767;
-  pieces.each ([&] (const cv::Rect &piece, std::size_t) {
-    for (int y = piece.y; y < piece.br ().y; y++) {
+  tiles.each ([&] (const cv::Rect &tile, std::size_t) {
+    for (int y = tile.y; y < tile.br ().y; y++) {
       auto d = disparity.ptr<std::int16_t> (y);
       const auto back = likely_.ptr<std::int16_t> (at.y + y) + at.x;
-      /* What is known of the pixels beside the piece: nothing, or the background. */
+      /* What is known of the pixels beside the tile: nothing, or the background. */
       const auto beside = [&] (int x) {
         const bool inside = at.x + x >= 0 && at.x + x < likely_.cols;
         return inside && back[x] > kHidden ? back[x] : kNothing;
       };
-      for (int x = piece.x; x < piece.br ().x;) {
+      for (int x = tile.x; x < tile.br ().x;) {
         if (d[x] >= least) {
           x++;
           continue;
         }
         const int begin = x;
-        while (x < piece.br ().x && d[x] < least)
+        while (x < tile.br ().x && d[x] < least)
           x++;
-        const std::int16_t farther = std::min (begin > piece.x ? d[begin - 1] : beside (begin - 1),
-            x < piece.br ().x ? d[x] : beside (x));
+        const std::int16_t farther = std::min (begin > tile.x ? d[begin - 1] : beside (begin - 1),
+            x < tile.br ().x ? d[x] : beside (x));
         if (farther >= least && farther < far)
           std::fill (d + begin, d + x, static_cast<std::int16_t> (least));
       }
@@ -125,12 +125,12 @@ BackgroundDisparity::extend (
 /* Differences of patches between both pictures, where there is a disparity. memory.grey is the left
  * one. @param disparity  of the size of job.left */
 void
-BackgroundDisparity::compare (const Job &job, const cv::Rect &piece, const cv::Mat &disparity,
+BackgroundDisparity::compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity,
     int least, Memory &m, Plane &unlike) const
 {
-  const int x0 = piece.x - kRadius, y0 = piece.y - kRadius;
+  const int x0 = tile.x - kRadius, y0 = tile.y - kRadius;
   const auto lowest = static_cast<std::int16_t> (least);
-  m.pixels.set_size (piece.width + 2 * kRadius, piece.height + 2 * kRadius);
+  m.pixels.set_size (tile.width + 2 * kRadius, tile.height + 2 * kRadius);
   const int width = m.pixels.width (), begin = std::max (0, -x0),
             end = std::min (width, disparity.cols - x0);
   for (int y = 0; y < m.pixels.height (); y++) {
@@ -150,7 +150,7 @@ BackgroundDisparity::compare (const Job &job, const cv::Rect &piece, const cv::M
   sum_windows<kRadius> (m.pixels, unlike, m.columns);
 }
 
-/* Row y of the part, which is row i of the piece, from column x on. */
+/* Row y of the part, which is row i of the tile, from column x on. */
 void
 BackgroundDisparity::restore_row (
     const Job &job, int x0, int y, int i, int width, Memory &m, std::int16_t *d) const
@@ -182,16 +182,16 @@ BackgroundDisparity::restore_row (
 }
 
 void
-BackgroundDisparity::restore_piece (
-    const Job &job, const cv::Rect &piece, const cv::Mat &disparity, Memory &m, cv::Mat &to) const
+BackgroundDisparity::restore_tile (
+    const Job &job, const cv::Rect &tile, const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
   const cv::Rect part (job.at, job.left.size ());
-  cut_grey (job.left, piece, 2 * kRadius, m.grey);
+  cut_grey (job.left, tile, 2 * kRadius, m.grey);
   differ_from_mean<kRadius> (m.grey, m.pixels, m.sums, m.columns);
   sum_windows<kRadius> (m.pixels, m.contrast, m.columns);
-  compare (job, piece, disparity, job.least, m, m.own);
-  compare (job, piece, likely_ (part), kHidden + 1, m, m.other);
-  cut_grey (picture_ (part), piece, kRadius, m.before);
+  compare (job, tile, disparity, job.least, m, m.own);
+  compare (job, tile, likely_ (part), kHidden + 1, m, m.other);
+  cut_grey (picture_ (part), tile, kRadius, m.before);
   m.pixels.set_size (m.before.width (), m.before.height ());
   for (int y = 0; y < m.pixels.height (); y++) {
     const std::int16_t *now = m.grey.row (y + kRadius) + kRadius, *before = m.before.row (y);
@@ -200,22 +200,22 @@ BackgroundDisparity::restore_piece (
       out[x] = static_cast<std::int16_t> (std::abs (now[x] - before[x]));
   }
   sum_windows<kRadius> (m.pixels, m.change, m.columns);
-  for (int i = 0; i < piece.height; i++) {
-    auto out = to.ptr<std::int16_t> (piece.y + i) + piece.x;
-    std::copy_n (disparity.ptr<std::int16_t> (piece.y + i) + piece.x, piece.width, out);
-    restore_row (job, piece.x, piece.y + i, i, piece.width, m, out);
+  for (int i = 0; i < tile.height; i++) {
+    auto out = to.ptr<std::int16_t> (tile.y + i) + tile.x;
+    std::copy_n (disparity.ptr<std::int16_t> (tile.y + i) + tile.x, tile.width, out);
+    restore_row (job, tile.x, tile.y + i, i, tile.width, m, out);
   }
 }
 
 void
 BackgroundDisparity::restore (const cv::Mat &left, const cv::Mat &right, int right_x,
-    const cv::Point &at, int least, int none, const Pieces &pieces, const cv::Mat &disparity,
+    const cv::Point &at, int least, int none, const Tiles &tiles, const cv::Mat &disparity,
     cv::Mat &to)
 {
   const Job job = {left, right, right_x, at, least, none};
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
-    restore_piece (job, piece, disparity, memory_.of (worker), to);
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
+    restore_tile (job, tile, disparity, memory_.of (worker), to);
   });
 }
 

@@ -15,7 +15,7 @@ namespace rangecast {
  *  Disparities are CV_16S in 1/16 pixel, greys CV_8U. */
 class BackgroundDisparity {
 public:
-  void forget () { known_.release (); }
+  void reset () { known_.release (); }
   [[nodiscard]] bool empty () const { return known_.empty (); }
 
   /** @param grey       the whole left picture
@@ -30,17 +30,17 @@ public:
    *  @param left, right  the same rows; column `right_x` of `right` is column 0 of `left`
    *  @param at           where `left` lies in the whole picture
    *  @param none         written where `disparity` is below `least` and stays so
-   *  @param[out] to      as `disparity`, not the same memory; written in `pieces` */
+   *  @param[out] to      as `disparity`, not the same memory; written in `tiles` */
   void restore (const cv::Mat &left, const cv::Mat &right, int right_x, const cv::Point &at,
-      int least, int none, const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to);
+      int least, int none, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
   /** Gives what has no disparity, but is beside the background in its row, the farthest one there
    *  is, `least`: one camera does not see it. */
   void extend (
-      const cv::Point &at, int least, int far, const Pieces &pieces, cv::Mat &disparity) const;
+      const cv::Point &at, int least, int far, const Tiles &tiles, cv::Mat &disparity) const;
 
 private:
-  /* What one thread needs for one piece: pixels, and sums over the patches around them. */
+  /* What one thread needs for one tile: pixels, and sums over the patches around them. */
   struct Memory {
     Plane grey, before, pixels, own, other, contrast, change, sums;
     std::vector<std::int16_t> columns;
@@ -53,10 +53,10 @@ private:
     cv::Point at;
     int least, none;
   };
-  void compare (const Job &job, const cv::Rect &piece, const cv::Mat &disparity, int least,
+  void compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity, int least,
       Memory &memory, Plane &unlike) const;
-  void restore_piece (const Job &job, const cv::Rect &piece, const cv::Mat &disparity,
-      Memory &memory, cv::Mat &to) const;
+  void restore_tile (const Job &job, const cv::Rect &tile, const cv::Mat &disparity, Memory &memory,
+      cv::Mat &to) const;
   void restore_row (const Job &job, int x0, int y, int i, int width, Memory &memory,
       std::int16_t *disparity) const;
   void mark_hidden (

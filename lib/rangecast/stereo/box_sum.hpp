@@ -38,16 +38,16 @@ private:
 /** A part of a picture and `around` pixels more on each side, mirrored where the picture ends.
  *  @param picture  CV_8U */
 inline void
-cut_grey (const cv::Mat &picture, const cv::Rect &piece, int around, Plane &to)
+cut_grey (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
 {
-  to.set_size (piece.width + 2 * around, piece.height + 2 * around);
+  to.set_size (tile.width + 2 * around, tile.height + 2 * around);
   const auto mirrored = [] (int i, int n) {
     return n < 2 ? 0 : std::clamp (i < 0 ? -i : i >= n ? 2 * n - 2 - i : i, 0, n - 1);
   };
   for (int y = 0; y < to.height (); y++) {
-    const auto from = picture.ptr<std::uint8_t> (mirrored (piece.y - around + y, picture.rows));
+    const auto from = picture.ptr<std::uint8_t> (mirrored (tile.y - around + y, picture.rows));
     std::int16_t *row = to.row (y);
-    const int first = piece.x - around, begin = std::max (0, -first),
+    const int first = tile.x - around, begin = std::max (0, -first),
               end = std::min (to.width (), picture.cols - first);
     for (int x = 0; x < begin; x++)
       row[x] = from[mirrored (first + x, picture.cols)];

@@ -20,7 +20,7 @@ public:
   [[nodiscard]] const cv::Mat &blocks () const { return blocks_; }
   /** What was looked at last is what later pictures are compared with. */
   void remember ();
-  void forget () { remembered_.release (); }
+  void reset () { remembered_.release (); }
 
   /** Whether two or more blocks that lie wholly outside of the ROI (pixels) differ from what was
    *  remembered by more than 10 grey levels in one colour. True if nothing is remembered. */

@@ -29,19 +29,19 @@ grey_at (const std::uint8_t *row, int x16, int width)
  * large it is, and the contrast of the left one. */
 void
 DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
-    const cv::Rect &piece, const cv::Mat &disparity, Memory &m) const
+    const cv::Rect &tile, const cv::Mat &disparity, Memory &m) const
 {
-  cut_grey (left, piece, 2 * kPatchRadius, m.grey);
+  cut_grey (left, tile, 2 * kPatchRadius, m.grey);
   differ_from_mean<kPatchRadius> (m.grey, m.contrast, m.sums, m.columns);
   const int width = m.contrast.width (), height = m.contrast.height ();
   for (Plane *plane : {&m.valid, &m.difference, &m.size})
     plane->set_size (width, height);
-  const int x0 = piece.x - kPatchRadius, begin = std::max (0, -x0),
+  const int x0 = tile.x - kPatchRadius, begin = std::max (0, -x0),
             end = std::min (width, disparity.cols - x0);
   for (int y = 0; y < height; y++) {
     std::int16_t *valid = m.valid.row (y), *difference = m.difference.row (y),
                  *size = m.size.row (y);
-    const int row = piece.y - kPatchRadius + y;
+    const int row = tile.y - kPatchRadius + y;
     std::fill_n (valid, width, std::int16_t{0});
     std::fill_n (difference, width, std::int16_t{0});
     if (row >= 0 && row < disparity.rows) {
@@ -65,19 +65,19 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
 
 void
 DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x,
-    double tolerance, int least, const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to)
+    double tolerance, int least, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
 {
   const int share = int (256 * tolerance);
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Memory &m = memory_.of (worker);
-    compare_patches (left, right, right_x, least, piece, disparity, m);
-    for (int y = 0; y < piece.height; y++) {
+    compare_patches (left, right, right_x, least, tile, disparity, m);
+    for (int y = 0; y < tile.height; y++) {
       const std::int16_t *counts = m.counts.row (y), *differences = m.differences.row (y),
                          *sizes = m.sizes.row (y), *contrasts = m.contrasts.row (y);
-      const auto from = disparity.ptr<std::int16_t> (piece.y + y) + piece.x;
-      auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
-      for (int x = 0; x < piece.width; x++) {
+      const auto from = disparity.ptr<std::int16_t> (tile.y + y) + tile.x;
+      auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
+      for (int x = 0; x < tile.width; x++) {
         const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
                   most = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
         out[x] = unlike > most ? std::int16_t (least - 16) : from[x];
@@ -87,42 +87,42 @@ DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int ri
 }
 
 void
-DisparityFilter::clear_hidden (int least, const Pieces &pieces, cv::Mat &disparity)
+DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity)
 {
   constexpr int kTolerance = 24; /* 1/16 pixel */
   const auto none = static_cast<std::int16_t> (least - 16);
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     std::vector<std::int16_t> &nearest = memory_.of (worker).nearest;
-    for (int y = piece.y; y < piece.br ().y; y++) {
-      auto d = disparity.ptr<std::int16_t> (y) + piece.x;
+    for (int y = tile.y; y < tile.br ().y; y++) {
+      auto d = disparity.ptr<std::int16_t> (y) + tile.x;
       int low = 32767, high = least;
-      for (int x = 0; x < piece.width; x++) {
+      for (int x = 0; x < tile.width; x++) {
         low = std::min<int> (low, d[x] >= least ? d[x] : 32767);
         high = std::max<int> (high, d[x]);
       }
       if (low > high)
         continue;
       const int first = (high + 8) >> 4; /* columns of the right picture begin so far left */
-      nearest.assign (std::size_t (piece.width + first - ((low + 8) >> 4)), none);
+      nearest.assign (std::size_t (tile.width + first - ((low + 8) >> 4)), none);
       const auto there = [&] (int x) { return std::size_t (x + first - ((d[x] + 8) >> 4)); };
-      for (int x = 0; x < piece.width; x++)
+      for (int x = 0; x < tile.width; x++)
         if (d[x] >= least)
           nearest[there (x)] = std::max (nearest[there (x)], d[x]);
-      for (int x = 0; x < piece.width; x++)
+      for (int x = 0; x < tile.width; x++)
         if (d[x] >= least && d[x] + kTolerance < nearest[there (x)])
           d[x] = none;
     }
   });
 }
 
-/* A piece and one pixel around it, and `more` columns so that vectors may end beyond it. */
+/* A tile and one pixel around it, and `more` columns so that vectors may end beyond it. */
 static void
 copy_with_border (
-    const cv::Mat &disparity, const cv::Rect &piece, int more, std::int16_t none, Plane &to)
+    const cv::Mat &disparity, const cv::Rect &tile, int more, std::int16_t none, Plane &to)
 {
   const cv::Rect all (0, 0, disparity.cols, disparity.rows);
-  const cv::Rect there (piece.x - 1, piece.y - 1, piece.width + 2, piece.height + 2);
+  const cv::Rect there (tile.x - 1, tile.y - 1, tile.width + 2, tile.height + 2);
   const cv::Rect inside = there & all;
   to.set_size (there.width + more, there.height);
   for (int y = 0; y < to.height (); y++) {
@@ -135,24 +135,24 @@ copy_with_border (
 }
 
 void
-DisparityFilter::clear_flying (double step, int support, int offset, int least,
-    const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to)
+DisparityFilter::clear_flying (double step, int support, int offset, int least, const Tiles &tiles,
+    const cv::Mat &disparity, cv::Mat &to)
 {
   const auto share = static_cast<std::uint16_t> (std::min (65535.0, 65536 * step));
   const auto none = static_cast<std::int16_t> (least - 16);
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Plane &copy = memory_.of (worker).grey;
     constexpr int kLanes = cv::v_int16x8::nlanes;
-    copy_with_border (disparity, piece, kLanes, none, copy);
+    copy_with_border (disparity, tile, kLanes, none, copy);
     const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
                         zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
                         shift = cv::v_setall_s16 (static_cast<short> (offset)),
                         /* counts are negative, and hold the pixel itself */
         enough = cv::v_setall_s16 (static_cast<short> (-support));
-    for (int y = 0; y < piece.height; y++) {
-      auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
-      for (int x = 0; x < piece.width; x += kLanes) {
+    for (int y = 0; y < tile.height; y++) {
+      auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
+      for (int x = 0; x < tile.width; x += kLanes) {
         const cv::v_int16x8 d = cv::v_load (copy.row (y + 1) + x + 1);
         const cv::v_uint16x8 most = cv::v_max (cv::v_setall_u16 (8),
             cv::v_mul_hi (
@@ -165,12 +165,12 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least,
                 ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= most));
           }
         const cv::v_int16x8 result = cv::v_select (n < enough, d, nothing);
-        if (x + kLanes <= piece.width)
+        if (x + kLanes <= tile.width)
           cv::v_store (out + x, result);
         else {
           std::int16_t last[kLanes];
           cv::v_store (last, result);
-          std::copy_n (last, piece.width - x, out + x);
+          std::copy_n (last, tile.width - x, out + x);
         }
       }
     }
@@ -214,14 +214,14 @@ DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint
 
 void
 DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
-    const Pieces &pieces, cv::Mat &disparity)
+    const Tiles &tiles, cv::Mat &disparity)
 {
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
-    for (int y = piece.y; y < piece.br ().y; y++)
-      clear_doubled_of_row (left.ptr<std::uint8_t> (y) + piece.x, right.ptr<std::uint8_t> (y),
-          right.cols, right_x + piece.x, least, piece.width, memory_.of (worker),
-          disparity.ptr<std::int16_t> (y) + piece.x);
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
+    for (int y = tile.y; y < tile.br ().y; y++)
+      clear_doubled_of_row (left.ptr<std::uint8_t> (y) + tile.x, right.ptr<std::uint8_t> (y),
+          right.cols, right_x + tile.x, least, tile.width, memory_.of (worker),
+          disparity.ptr<std::int16_t> (y) + tile.x);
   });
 }
 
@@ -276,12 +276,12 @@ DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, in
 
 void
 DisparityFilter::clear_specks (
-    int window, int range, int least, int nearest, const Pieces &pieces, cv::Mat &disparity)
+    int window, int range, int least, int nearest, const Tiles &tiles, cv::Mat &disparity)
 {
   runs_.clear ();
   first_runs_.assign (std::size_t (disparity.rows) + 1, 0);
   std::size_t next = 0; /* row whose first run is not known yet */
-  for (const cv::Rect &part : pieces.parts ()) {
+  for (const cv::Rect &part : tiles.parts ()) {
     const std::size_t top = std::size_t (part.y);
     for (; next <= top; next++)
       first_runs_[next] = runs_.size ();
@@ -295,7 +295,7 @@ DisparityFilter::clear_specks (
     }
     next = top + std::size_t (part.height) + 1;
   }
-  for (const cv::Rect &part : pieces.parts ())
+  for (const cv::Rect &part : tiles.parts ())
     for (int y = part.y; y < part.br ().y; y++) {
       auto row = disparity.ptr<std::int16_t> (y);
       for (std::size_t i = first_runs_[std::size_t (y)]; i < first_runs_[std::size_t (y) + 1]; i++)
@@ -339,13 +339,13 @@ fill_gap (const cv::Vec4b *colour, std::ptrdiff_t colour_step, std::int16_t *dis
 
 void
 DisparityFilter::fill_gaps (
-    const cv::Mat &colour, int width, int least, const Pieces &pieces, cv::Mat &disparity)
+    const cv::Mat &colour, int width, int least, const Tiles &tiles, cv::Mat &disparity)
 {
-  pieces.each ([&] (const cv::Rect &piece, std::size_t) {
-    for (int y = piece.y; y < piece.br ().y; y++) {
+  tiles.each ([&] (const cv::Rect &tile, std::size_t) {
+    for (int y = tile.y; y < tile.br ().y; y++) {
       auto d = disparity.ptr<std::int16_t> (y);
       int last = -1; /* with a disparity */
-      for (int x = piece.x; x < piece.br ().x; x++) {
+      for (int x = tile.x; x < tile.br ().x; x++) {
         if (d[x] < least)
           continue;
         if (last >= 0 && x - last > 1 && x - last - 1 <= width)
@@ -356,13 +356,13 @@ DisparityFilter::fill_gaps (
   });
   /* Columns go down together, as memory lies; threads share them among each other. */
   constexpr int kColumns = 64;
-  const cv::Rect hull = pieces.hull ();
+  const cv::Rect hull = tiles.hull ();
   last_rows_.assign (std::size_t (disparity.cols), -1);
-  in_parallel (std::size_t ((hull.width + kColumns - 1) / kColumns), pieces.n_threads (),
+  in_parallel (std::size_t ((hull.width + kColumns - 1) / kColumns), tiles.n_threads (),
       [&] (std::size_t stripe) {
         const int begin = hull.x + int (stripe) * kColumns,
                   end = std::min (begin + kColumns, hull.br ().x);
-        for (const cv::Rect &part : pieces.parts ())
+        for (const cv::Rect &part : tiles.parts ())
           for (int y = part.y; y < part.br ().y; y++) {
             const auto d = disparity.ptr<std::int16_t> (y);
             for (int x = std::max (begin, part.x); x < std::min (end, part.br ().x); x++) {

@@ -13,7 +13,7 @@ namespace rangecast {
 
 /** Clears disparities that cannot be right. Disparities are CV_16S in 1/16 pixel, left x minus
  *  right x; below `least` = none, and least - 16 is what is written. Greys are CV_8U, rectified, of
- *  the disparities' size. Only pixels in `pieces` are looked at and written: around them there must
+ *  the disparities' size. Only pixels in `tiles` are looked at and written: around them there must
  *  be no disparities. Keeps its memory between pictures. */
 class DisparityFilter {
 public:
@@ -24,39 +24,39 @@ public:
    *  @param right  of the same height; its column `right_x` is the left picture's column 0
    *  @param[out] to  of the same size, not the same memory */
   void clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x, double tolerance,
-      int least, const Pieces &pieces, const cv::Mat &disparity, cv::Mat &to);
+      int least, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
   /** Clears what the right camera cannot see because something nearer stands before it: of the
    *  pixels that land on one of the right picture, those more than 1.5 pixels of disparity behind
    *  the nearest. */
-  void clear_hidden (int least, const Pieces &pieces, cv::Mat &disparity);
+  void clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity);
 
   /** Clears flying pixels: those of whose eight neighbours fewer than `support` have a disparity
    *  within `step` (a share of disparity + offset: the same share of the depth) or 0.5 pixel.
    *  @param[out] to  of the same size, not the same memory */
-  void clear_flying (double step, int support, int offset, int least, const Pieces &pieces,
+  void clear_flying (double step, int support, int offset, int least, const Tiles &tiles,
       const cv::Mat &disparity, cv::Mat &to);
 
   /** Clears patches of up to `window` pixels, each within `range` (1/16 pixel) of one of its
    *  four neighbours: what cv::filterSpeckles() does.
    *  @param nearest  at least `least`: what is farther is left alone, and no part of a patch */
   void clear_specks (
-      int window, int range, int least, int nearest, const Pieces &pieces, cv::Mat &disparity);
+      int window, int range, int least, int nearest, const Tiles &tiles, cv::Mat &disparity);
 
   /** Fills gaps of up to `width` pixels in a row or a column between disparities that differ by at
    *  most one pixel, where colours lie between those of the ends, or nearly: specks on a surface.
    */
   void fill_gaps (
-      const cv::Mat &colour, int width, int least, const Pieces &pieces, cv::Mat &disparity);
+      const cv::Mat &colour, int width, int least, const Tiles &tiles, cv::Mat &disparity);
 
   /** Clears narrow surfaces that the pictures show no reason for: what they land on in the right
    *  picture is seen, by its disparity and its grey, as a part of a wide surface farther off. A
    *  pattern that repeats is matched so where its true match is hidden. */
   void clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
-      const Pieces &pieces, cv::Mat &disparity);
+      const Tiles &tiles, cv::Mat &disparity);
 
 private:
-  /* What one thread needs for one piece. */
+  /* What one thread needs for one tile. */
   struct Memory {
     Plane grey, contrast, valid, difference, size; /* of patches, and of their pixels */
     Plane contrasts, counts, differences, sizes, sums;
@@ -69,7 +69,7 @@ private:
     int root, size; /* of the patch: the number of one of its runs; there: its pixels */
   };
   void compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
-      const cv::Rect &piece, const cv::Mat &disparity, Memory &memory) const;
+      const cv::Rect &tile, const cv::Mat &disparity, Memory &memory) const;
   void find_runs (const std::int16_t *row, int x0, int x1, int range, int least);
   void join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
       std::size_t a_end, std::size_t b_end, int range);

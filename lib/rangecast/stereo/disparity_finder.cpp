@@ -38,7 +38,7 @@ DisparityFinder::set (
   most_ = static_cast<int> (std::ceil (pair.focal_baseline / near_m - pair.offset));
   most_ = std::max (most_, least_ + 1);
   far_ = static_cast<int> (std::ceil (16 * (pair.focal_baseline / far_m - pair.offset)));
-  background_.forget ();
+  background_.reset ();
   if (Status s = all_.set (settings.match, least_, most_); !s.ok ())
     return s;
   if (all_.reach () >= pair.width)
@@ -99,7 +99,7 @@ DisparityFinder::choose_parts (const std::vector<cv::Rect> *parts)
     for (const cv::Rect &part : *parts)
       if (const cv::Rect inside = (part - core_at_.tl ()) & all; !inside.empty ())
         parts_.push_back (inside);
-  pieces_.set (parts_, settings_.n_threads);
+  tiles_.set (parts_, settings_.n_threads);
 }
 
 /* Matches each part with some rows around it, and puts it into the core. */
@@ -137,7 +137,7 @@ DisparityFinder::know_background (const cv::Mat &grey, int right_x)
     return;
   }
   background_.restore (
-      grey, window_[1], right_x, core_at_.tl (), found, none, pieces_, core_, next_);
+      grey, window_[1], right_x, core_at_.tl (), found, none, tiles_, core_, next_);
   cv::swap (core_, next_);
 }
 
@@ -157,39 +157,39 @@ DisparityFinder::filter (const cv::Mat &left)
     know_background (grey, right_x);
   if (settings_.patch_tolerance > 0) {
     filter_.clear_unlike (
-        grey, window_[1], right_x, settings_.patch_tolerance, least, pieces_, core_, next_);
+        grey, window_[1], right_x, settings_.patch_tolerance, least, tiles_, core_, next_);
     cv::swap (core_, next_);
   }
-  filter_.clear_hidden (least, pieces_, core_);
+  filter_.clear_hidden (least, tiles_, core_);
   constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
   if (settings_.flying_pixel_step > 0) {
     filter_.clear_flying (
-        settings_.flying_pixel_step, kSupport, offset, least, pieces_, core_, next_);
+        settings_.flying_pixel_step, kSupport, offset, least, tiles_, core_, next_);
     cv::swap (core_, next_);
   }
   if (m.speckle_window_size > 0)
     filter_.clear_specks (
-        m.speckle_window_size, 16 * m.speckle_range, least, nearest, pieces_, core_);
+        m.speckle_window_size, 16 * m.speckle_range, least, nearest, tiles_, core_);
   if (settings_.gap_width > 0)
-    filter_.fill_gaps (colour, settings_.gap_width, least, pieces_, core_);
+    filter_.fill_gaps (colour, settings_.gap_width, least, tiles_, core_);
   if (settings_.silhouette_radius > 0) {
     SilhouetteFilter::Settings rims = {
         settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest};
-    silhouettes_.apply (rims, colour, pieces_, core_, next_);
+    silhouettes_.apply (rims, colour, tiles_, core_, next_);
     cv::swap (core_, next_);
     if (limited && !background_.empty ()) {
-      background_.extend (core_at_.tl (), least, far_, pieces_, core_);
+      background_.extend (core_at_.tl (), least, far_, tiles_, core_);
       rims.only_beyond = true;
       rims.look_near = least;
-      silhouettes_.apply (rims, colour, pieces_, core_, next_);
+      silhouettes_.apply (rims, colour, tiles_, core_, next_);
       cv::swap (core_, next_);
     }
   }
   if (!limited)
-    filter_.clear_doubled (grey, window_[1], right_x, least, pieces_, core_);
+    filter_.clear_doubled (grey, window_[1], right_x, least, tiles_, core_);
   if (settings_.refine > 0)
     refiner_.apply ({grey, window_[1], colour, right_x, std::max (least, far_), settings_.refine},
-        pieces_, core_);
+        tiles_, core_);
   if (!limited && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, least, far_);
 }

@@ -8,8 +8,8 @@
 #include "disparity_filter.hpp"
 #include "disparity_refiner.hpp"
 #include "matching.hpp"
-#include "tiles.hpp"
 #include "silhouette_filter.hpp"
+#include "tiles.hpp"
 
 namespace rangecast {
 
@@ -19,7 +19,7 @@ struct StereoSettings {
   double flying_pixel_step = 0.03; ///< share of the depth that neighbours may differ; 0 = off
   int silhouette_radius = 8;       ///< pixels around that say what is beside a silhouette; 0 = off
   int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
-  int refine = 2;                  ///< turns that take the noise off disparities; 0 = off
+  int refine = 2;                  ///< refinement iterations; 0 = off
   /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
    *  matched so as not to be taken for something nearer. */
   double search_far_m = 0;
@@ -89,7 +89,7 @@ private:
   DisparityRefiner refiner_;
   BackgroundDisparity background_;
   cv::Rect window_at_, core_at_; /* of the picture: what is needed; the ROI and its margin */
-  Pieces pieces_;                /* of the core: where to look */
+  Tiles tiles_;                  /* of the core: where to look */
   int missing_[2] = {0, 0};      /* columns that the window has beyond it, left and right */
   std::vector<cv::Rect> parts_;
   cv::Mat grey_, window_[2], raw_, disparity_;

@@ -25,7 +25,7 @@ constexpr int kAlike = 110;
 constexpr float kDull = 15;
 /* Greys that differ by more show different things, levels. */
 constexpr float kUnlike = 20;
-/* No turn moves a disparity farther, nor do all turns, pixels. */
+/* No iteration moves a disparity farther, nor do all together, pixels. */
 constexpr float kMax = 0.5f, kMaxOfAll = 1;
 
 /* Where bytes that follow each other in memory lie in a word. */
@@ -89,7 +89,7 @@ private:
 } // namespace
 
 void
-DisparityRefiner::make_room (const cv::Size &size, const Pieces &pieces)
+DisparityRefiner::make_room (const cv::Size &size, const Tiles &tiles)
 {
   const cv::Size all (size.width + 2 * kPad + 8, size.height + 2 * kPad); /* 8: ends of vectors */
   for (cv::Mat *m : {&first_, &now_, &next_, &products_, &squares_, &slopes_, &differences_}) {
@@ -105,8 +105,8 @@ DisparityRefiner::make_room (const cv::Size &size, const Pieces &pieces)
     plane.setTo (0);
   }
   members_.assign (std::size_t (all.width) * std::size_t (all.height), 0);
-  parts_ = pieces.pieces ();
-  memory_.reserve (pieces.workers ());
+  parts_ = tiles.tiles ();
+  memory_.reserve (tiles.workers ());
 }
 
 void
@@ -416,14 +416,14 @@ DisparityRefiner::put_back (const Job &job, const cv::Rect &part, cv::Mat &dispa
 }
 
 void
-DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparity)
+DisparityRefiner::apply (const Job &job, const Tiles &tiles, cv::Mat &disparity)
 {
-  if (job.turns <= 0 || job.right.cols < 4)
+  if (job.iterations <= 0 || job.right.cols < 4)
     return;
-  make_room (disparity.size (), pieces);
+  make_room (disparity.size (), tiles);
   take_colours (job.colour);
   const auto each = [&] (const auto &work) {
-    in_parallel (parts_.size (), pieces.n_threads (), [&] (std::size_t i, std::size_t worker) {
+    in_parallel (parts_.size (), tiles.n_threads (), [&] (std::size_t i, std::size_t worker) {
       for_this_cpu ([&, &memory = memory_.of (worker)] { work (parts_[i], memory); });
     });
   };
@@ -432,7 +432,7 @@ DisparityRefiner::apply (const Job &job, const Pieces &pieces, cv::Mat &disparit
   each ([&] (const cv::Rect &part, Memory &) { mark_steps (part); });
   each ([&] (const cv::Rect &part, Memory &m) { choose_members (part, m); });
   each ([&] (const cv::Rect &part, Memory &m) { smooth (part, m); });
-  for (int turn = 0; turn < job.turns; turn++) {
+  for (int i = 0; i < job.iterations; i++) {
     each ([&] (const cv::Rect &part, Memory &m) { compare (job, part, m); });
     each ([&] (const cv::Rect &part, Memory &m) { move (part, m); });
     each ([&] (const cv::Rect &part, Memory &m) { smooth (part, m); });

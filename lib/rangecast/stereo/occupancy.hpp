@@ -16,7 +16,7 @@ class Occupancy {
 public:
   /** Nothing is known of a view of that size. */
   void set (int width, int height);
-  void forget () { known_ = false; }
+  void reset () { known_ = false; }
 
   /** Takes the depth of one picture. @param image  of a view of the size that was set */
   void learn (const RangeImage &image);

@@ -51,14 +51,14 @@ choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const 
 /* A part of a picture and `around` pixels more on each side: of those outside of it, the nearest in
  * it. */
 void
-cut (const cv::Mat &picture, const cv::Rect &piece, int around, Plane &to)
+cut (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
 {
-  to.set_size (piece.width + 2 * around, piece.height + 2 * around);
-  const int first = piece.x - around, begin = std::max (0, -first),
+  to.set_size (tile.width + 2 * around, tile.height + 2 * around);
+  const int first = tile.x - around, begin = std::max (0, -first),
             end = std::min (to.width (), picture.cols - first);
   for (int y = 0; y < to.height (); y++) {
     const auto from =
-        picture.ptr<std::int16_t> (std::clamp (piece.y - around + y, 0, picture.rows - 1));
+        picture.ptr<std::int16_t> (std::clamp (tile.y - around + y, 0, picture.rows - 1));
     std::int16_t *row = to.row (y);
     std::fill (row, row + begin, from[0]);
     std::copy (from + first + begin, from + first + end, row + begin);
@@ -180,34 +180,34 @@ SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x,
 }
 
 void
-SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &piece,
+SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
     const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
   const int share = static_cast<int> (65536 * settings.step), reach = settings.radius * 2 / 3,
             least = settings.least;
   const auto tolerance = [&] (int d) { return std::max (16, (d + settings.offset) * share >> 16); };
-  cut (disparity, piece, reach, m.around);
+  cut (disparity, tile, reach, m.around);
   choose_in_windows (m.around, 2 * reach + 1, m.line, m.lowest,
       [] (std::int16_t a, std::int16_t b) { return std::min (a, b); });
   choose_in_windows (m.around, 2 * reach + 1, m.line, m.highest,
       [] (std::int16_t a, std::int16_t b) { return std::max (a, b); });
-  for (int y = 0; y < piece.height; y++) {
-    const auto pixels = colour.ptr<cv::Vec4b> (piece.y + y) + piece.x;
-    const auto from = disparity.ptr<std::int16_t> (piece.y + y) + piece.x;
-    auto out = to.ptr<std::int16_t> (piece.y + y) + piece.x;
+  for (int y = 0; y < tile.height; y++) {
+    const auto pixels = colour.ptr<cv::Vec4b> (tile.y + y) + tile.x;
+    const auto from = disparity.ptr<std::int16_t> (tile.y + y) + tile.x;
+    auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
     const std::int16_t *lowest = m.lowest.row (y), *highest = m.highest.row (y);
-    for (int x = 0; x < piece.width; x++) {
+    for (int x = 0; x < tile.width; x++) {
       out[x] = from[x];
       const bool valid = from[x] >= least;
       if (highest[x] < std::max (least, settings.nearest) ||
           (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
                         (settings.only_beyond && lowest[x] > settings.look_near))))
         continue; /* a surface, or nothing near */
-      const int d = valid ? from[x] : likely (settings, pixels[x], piece.x + x, piece.y + y);
+      const int d = valid ? from[x] : likely (settings, pixels[x], tile.x + x, tile.y + y);
       if (d < std::max (least, settings.nearest))
         continue;
       const cv::Vec4b &own = pixels[x];
-      const int at_x = piece.x + x, at_y = piece.y + y, most = tolerance (d);
+      const int at_x = tile.x + x, at_y = tile.y + y, most = tolerance (d);
       const Votes votes = valid && !settings.only_beyond
                               ? vote<false> (settings, own, at_x, at_y, d, most)
                               : vote<true> (settings, own, at_x, at_y, d, most);
@@ -221,13 +221,13 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
 }
 
 void
-SilhouetteFilter::apply (const Settings &settings, const cv::Mat &colour, const Pieces &pieces,
+SilhouetteFilter::apply (const Settings &settings, const cv::Mat &colour, const Tiles &tiles,
     const cv::Mat &disparity, cv::Mat &to)
 {
-  sample (settings.radius, colour, disparity, pieces.n_threads ());
-  memory_.reserve (pieces.workers ());
-  pieces.each ([&] (const cv::Rect &piece, std::size_t worker) {
-    apply_to (settings, colour, piece, disparity, memory_.of (worker), to);
+  sample (settings.radius, colour, disparity, tiles.n_threads ());
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
+    apply_to (settings, colour, tile, disparity, memory_.of (worker), to);
   });
 }
 

@@ -29,9 +29,9 @@ public:
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
-   *  @param disparity  CV_16S, 1/16 pixel; outside of `pieces` there must be none
-   *  @param[out] to    the same, not the same memory; written in `pieces` */
-  void apply (const Settings &settings, const cv::Mat &colour, const Pieces &pieces,
+   *  @param disparity  CV_16S, 1/16 pixel; outside of `tiles` there must be none
+   *  @param[out] to    the same, not the same memory; written in `tiles` */
+  void apply (const Settings &settings, const cv::Mat &colour, const Tiles &tiles,
       const cv::Mat &disparity, cv::Mat &to);
 
 private:
@@ -50,7 +50,7 @@ private:
   [[nodiscard]] Votes vote (
       const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const;
   [[nodiscard]] int likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const;
-  void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &piece,
+  void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
       const cv::Mat &disparity, Memory &memory, cv::Mat &to) const;
 
   /* Every second pixel of every second row, and pad_ more around that are of no colour. */

@@ -47,9 +47,9 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
   for (StillAverage &still : still_)
     still.set (settings.average);
   if (settings.steady > 0)
-    steady_.set (
+    temporal_.set (
         view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
-  changes_.forget ();
+  changes_.reset ();
   occupancy_.set (view.width, view.height);
   near_now_m_ = far_now_m_ = 0;
   last_roi_ = {};
@@ -75,7 +75,7 @@ StereoDepth::disparity () const
 }
 
 Status
-StereoDepth::take (
+StereoDepth::rectify (
     ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third)
 {
   has_third_ = with_third_ && !third.empty ();
@@ -158,7 +158,7 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
     return;
   constexpr int kMin = 16; /* disparity, 1/16 pixel; 16 less is none */
   const cv::Rect whole (0, 0, roi.width, roi.height);
-  pieces_.set ({&whole, 1}, settings_.n_threads);
+  tiles_.set ({&whole, 1}, settings_.n_threads);
   cv::Mat &disparity = finder_.disparity ();
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
@@ -169,7 +169,7 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   rims.only_beyond = true;
   rims.look_near = rims.nearest - 1;
   rims_.apply (
-      rims, pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), pieces_, from, to);
+      rims, pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), tiles_, from, to);
   cv::swap (disparity, before_fusion_);
 }
 
@@ -240,7 +240,7 @@ StereoDepth::match (const RangeImage &image)
   learn_range (image);
   occupancy_.learn (image);
   if (settings_.steady > 0)
-    steady_.apply (image);
+    temporal_.apply (image);
   return status;
 }
 

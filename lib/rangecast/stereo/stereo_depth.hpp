@@ -11,8 +11,8 @@
 #include "mirror_check.hpp"
 #include "occupancy.hpp"
 #include "rectification.hpp"
-#include "temporal_filter.hpp"
 #include "still_average.hpp"
+#include "temporal_filter.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {
@@ -22,7 +22,7 @@ namespace rangecast {
 class StereoDepth {
 public:
   /** @param view        a raw view with a right camera; its near and far set the disparity range
-   *  @param with_third  the view's third camera takes part: take() gets its pictures
+   *  @param with_third  the view's third camera takes part: rectify() gets its pictures
    *  @return what Rectifier, DisparityFinder and ThirdPair say about the view */
   Status set (const View &view, const StereoSettings &settings, bool with_third = false);
 
@@ -30,13 +30,13 @@ public:
   [[nodiscard]] const View &range_view () const { return rectifier_.range_view (); }
 
   /** @name One pair
-   *  Either process(), or take() and match(), between which the caller may choose the ROI. @{ */
+   *  Either process(), or rectify() and match(), between which the caller may choose the ROI. @{ */
 
   /** Takes and rectifies both pictures. Their memory must stay until match() is done.
    *  @param left, right  of the view's size
    *  @param third        the same; empty if there is none, then this pair goes without
    *  @return kBadSize if a picture has another size */
-  Status take (
+  Status rectify (
       ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third = {});
 
   /** Whether anything outside of the ROI has changed in the left picture since the last one that
@@ -54,7 +54,7 @@ public:
   Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image,
       ImageView<const Rgbx> third = {})
   {
-    const Status status = take (left, right, third);
+    const Status status = rectify (left, right, third);
     return status.ok () ? match (image) : status;
   }
   /** @} */
@@ -63,13 +63,13 @@ public:
   [[nodiscard]] bool looks_mirrored () const { return mirror_.mirrored (); }
 
   /** What was held still is not compared with what comes: after a gap in the stream. */
-  void forget ()
+  void reset ()
   {
-    changes_.forget ();
-    steady_.forget ();
+    changes_.reset ();
+    temporal_.reset ();
     for (StillAverage &still : still_)
-      still.forget ();
-    occupancy_.forget ();
+      still.reset ();
+    occupancy_.reset ();
     near_now_m_ = far_now_m_ = 0;
   }
 
@@ -91,13 +91,13 @@ private:
   DisparityFinder finder_;
   ThirdPair third_;
   SilhouetteFilter rims_; /* of what both pairs know */
-  Pieces pieces_;
+  Tiles tiles_;
   bool with_third_ = false, has_third_ = false; /* set up; in this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
   Occupancy occupancy_;
   MirrorCheck mirror_;
-  SteadyFilter steady_;
+  TemporalFilter temporal_;
   cv::Mat raw_[2];      /* the caller's memory */
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
   cv::Mat matched_[2];  /* the same with less noise */

@@ -21,7 +21,7 @@ void
 StillAverage::set (int frames)
 {
   frames_ = std::clamp (frames, 2, 64);
-  forget ();
+  reset ();
 }
 
 /* How a row of blocks differs from its mean. */

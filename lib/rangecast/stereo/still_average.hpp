@@ -13,7 +13,7 @@ class StillAverage {
 public:
   /** @param frames  that are averaged, 2 to 64; the latest ones count most */
   void set (int frames);
-  void forget () { blocks_.clear (); }
+  void reset () { blocks_.clear (); }
 
   /** @param picture  CV_8UC4; another size than before begins anew
    *  @return the mean, of the same kind; valid until the next call */

@@ -18,7 +18,7 @@ grey_of (const Rgbx &p)
 }
 
 void
-SteadyFilter::set (int width, int height, double steady, double focal_baseline)
+TemporalFilter::set (int width, int height, double steady, double focal_baseline)
 {
   weight_ = static_cast<float> (1 - 0.9 * std::clamp (steady, 0.0, 1.0));
   focal_baseline_ = static_cast<float> (focal_baseline);
@@ -32,7 +32,7 @@ SteadyFilter::set (int width, int height, double steady, double focal_baseline)
 
 /* What is different in a block, of its part in the ROI. */
 void
-SteadyFilter::look_at_block (const RangeImage &image, int bx, int by, Block &block) const
+TemporalFilter::look_at_block (const RangeImage &image, int bx, int by, Block &block) const
 {
   const Roi &roi = image.roi;
   const int x0 = std::max (bx * kBlock, roi.x),
@@ -60,7 +60,7 @@ SteadyFilter::look_at_block (const RangeImage &image, int bx, int by, Block &blo
 
 /* How much blocks change where nothing moves: the quarter of all that changes least. */
 float
-SteadyFilter::noise ()
+TemporalFilter::noise ()
 {
   if (changes_.empty ())
     return 0;
@@ -70,7 +70,7 @@ SteadyFilter::noise ()
 }
 
 void
-SteadyFilter::average (const RangeImage &image)
+TemporalFilter::average (const RangeImage &image)
 {
   const Roi &roi = image.roi;
   for (int y = roi.y; y < roi.y + roi.height; y++) {
@@ -98,7 +98,7 @@ SteadyFilter::average (const RangeImage &image)
 }
 
 void
-SteadyFilter::apply (const RangeImage &image)
+TemporalFilter::apply (const RangeImage &image)
 {
   const Roi &roi = image.roi;
   changes_.clear ();

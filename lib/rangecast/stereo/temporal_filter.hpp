@@ -13,13 +13,13 @@ namespace rangecast {
  *  pixels whose colours change by more than noise, and those beside them, begin anew, and so do
  *  blocks whose depth drifts to one side, by more than 0.15 pixel of disparity on average in two
  *  pictures running: nothing trails. */
-class SteadyFilter {
+class TemporalFilter {
 public:
   /** @param width, height  of the view, pixels
    *  @param steady         0 (off) to 1: each new depth counts 1 - 0.9 * steady
    *  @param focal_baseline pixels times depth units: disparity times depth */
   void set (int width, int height, double steady, double focal_baseline);
-  void forget () { held_.setTo (0); }
+  void reset () { held_.setTo (0); }
 
   /** @param image  its depth is replaced; its colour says what moves */
   void apply (const RangeImage &image);

@@ -14,7 +14,7 @@ namespace rangecast {
  */
 class CameraClock {
 public:
-  void forget () { *this = {}; }
+  void reset () { *this = {}; }
 
   /** When the picture was taken, or as long after as the shortest way takes, ns of the host's
    * clock.
@@ -38,7 +38,7 @@ class RecentValues {
 public:
   static constexpr std::size_t kMax = 512;
 
-  void forget () { count_ = 0; }
+  void reset () { count_ = 0; }
   void add (std::int64_t value) { values_[count_++ % kMax] = value; }
   [[nodiscard]] bool empty () const { return count_ == 0; }
   /** Nearest rank. @param share  0 to 1 @return 0 if there are no values */

@@ -6,20 +6,20 @@
 namespace rangecast {
 
 void
-PartnerFinder::start (std::int64_t period_ns)
+FrameAssociator::start (std::int64_t period_ns)
 {
   *this = {};
   period_ns_ = period_ns;
 }
 
 void
-PartnerFinder::leader (std::uint64_t number, std::int64_t taken_ns)
+FrameAssociator::leader (std::uint64_t number, std::int64_t taken_ns)
 {
   leaders_[count_++ % kLeaders] = {number, taken_ns};
 }
 
-const PartnerFinder::Leader *
-PartnerFinder::nearest (std::int64_t taken_ns) const
+const FrameAssociator::Leader *
+FrameAssociator::nearest (std::int64_t taken_ns) const
 {
   const Leader *best = nullptr;
   for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kLeaders; i--) {
@@ -30,8 +30,8 @@ PartnerFinder::nearest (std::int64_t taken_ns) const
   return best;
 }
 
-const PartnerFinder::Leader *
-PartnerFinder::numbered (std::uint64_t number) const
+const FrameAssociator::Leader *
+FrameAssociator::numbered (std::uint64_t number) const
 {
   for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kLeaders; i--)
     if (leaders_[i % kLeaders].number == number - static_cast<std::uint64_t> (difference_))
@@ -41,14 +41,14 @@ PartnerFinder::numbered (std::uint64_t number) const
 
 /* Until it is learnt, one that differs begins anew. */
 void
-PartnerFinder::agree (std::int64_t difference)
+FrameAssociator::agree (std::int64_t difference)
 {
   agreed_ = agreed_ > 0 && difference == difference_ ? agreed_ + 1 : 1;
   difference_ = difference;
 }
 
 std::optional<std::int64_t>
-PartnerFinder::place (std::uint64_t number, std::optional<std::int64_t> taken_ns, bool stamped)
+FrameAssociator::place (std::uint64_t number, std::optional<std::int64_t> taken_ns, bool stamped)
 {
   const Leader *by_time = taken_ns ? nearest (*taken_ns) : nullptr;
   const bool near = by_time && std::llabs (by_time->taken_ns - *taken_ns) < period_ns_ / 4;

@@ -16,7 +16,7 @@ namespace rangecast {
  * count what it did not take, so a time that lies within a quarter of a period of another frame of
  * the leading camera wins: a stamp at once, an arrival when it says the same three times. Nothing
  * is allocated. */
-class PartnerFinder {
+class FrameAssociator {
 public:
   /** @param period_ns  between two signals, > 0 */
   void start (std::int64_t period_ns);

@@ -18,105 +18,105 @@ frame_id_step (std::uint64_t from, std::uint64_t to)
 }
 
 void
-ShotFinder::start (std::int64_t period_ns)
+TriggerMatcher::start (std::int64_t period_ns)
 {
   *this = {};
   period_ns_ = period_ns;
 }
 
 void
-ShotFinder::fired (std::int64_t shot, std::int64_t time_ns, bool alone)
+TriggerMatcher::fired (std::int64_t trigger, std::int64_t time_ns, bool alone)
 {
-  shots_[count_++ % kShots] = {shot, time_ns};
+  triggers_[count_++ % kTriggers] = {trigger, time_ns};
   alone_ = alone;
 }
 
-const ShotFinder::Shot *
-ShotFinder::shot_at (std::int64_t number) const
+const TriggerMatcher::Trigger *
+TriggerMatcher::trigger_at (std::int64_t number) const
 {
-  for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kShots; i--)
-    if (shots_[i % kShots].number == number)
-      return &shots_[i % kShots];
+  for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kTriggers; i--)
+    if (triggers_[i % kTriggers].number == number)
+      return &triggers_[i % kTriggers];
   return nullptr;
 }
 
-/* The shot whose frame is due nearest to that time. */
-ShotFinder::Found
-ShotFinder::nearest (std::int64_t time_ns) const
+/* The trigger whose frame is due nearest to that time. */
+TriggerMatcher::Found
+TriggerMatcher::nearest (std::int64_t time_ns) const
 {
   Found found;
-  for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kShots; i--) {
-    const Shot &shot = shots_[i % kShots];
-    const std::int64_t residual = time_ns - (shot.time_ns + delay_ns_);
+  for (std::int64_t i = count_ - 1; i >= 0 && i >= count_ - kTriggers; i--) {
+    const Trigger &trigger = triggers_[i % kTriggers];
+    const std::int64_t residual = time_ns - (trigger.time_ns + delay_ns_);
     if (found.known && std::llabs (residual) >= std::llabs (found.residual_ns))
       break; /* older ones are farther away still */
-    found = {true, shot.number, residual};
+    found = {true, trigger.number, residual};
   }
   found.known = found.known && std::llabs (found.residual_ns) <= period_ns_;
   return found;
 }
 
 bool
-ShotFinder::by_id (std::uint64_t frame_id, std::int64_t &shot) const
+TriggerMatcher::by_id (std::uint64_t frame_id, std::int64_t &trigger) const
 {
   if (frame_id == 0 || last_id_ == 0)
     return false;
-  shot = last_shot_ + frame_id_step (last_id_, frame_id);
-  return shot_at (shot) != nullptr;
+  trigger = last_trigger_ + frame_id_step (last_id_, frame_id);
+  return trigger_at (trigger) != nullptr;
 }
 
 void
-ShotFinder::accept (std::uint64_t frame_id, const Found &found)
+TriggerMatcher::accept (std::uint64_t frame_id, const Found &found)
 {
   last_id_ = frame_id;
-  last_shot_ = found.shot;
-  strangers_ = 0;
+  last_trigger_ = found.trigger;
+  unmatched_ = 0;
   if (std::llabs (found.residual_ns) < period_ns_ / 4)
     delay_ns_ += found.residual_ns / 16; /* follows the drift of the camera's clock */
 }
 
-ShotFinder::Found
-ShotFinder::stranger ()
+TriggerMatcher::Found
+TriggerMatcher::no_match ()
 {
-  strangers_++;
+  unmatched_++;
   return {};
 }
 
-/* Only one shot is under way: it is that one. The first picture of a stream often comes late, so
+/* Only one trigger is under way: it is that one. The first picture of a stream often comes late, so
  * the least delay counts, and two must agree. */
-ShotFinder::Found
-ShotFinder::learn (std::uint64_t frame_id, std::int64_t time_ns)
+TriggerMatcher::Found
+TriggerMatcher::learn (std::uint64_t frame_id, std::int64_t time_ns)
 {
   if (count_ == 0 || !alone_)
-    return stranger ();
-  const Shot &shot = shots_[(count_ - 1) % kShots];
-  if (learnt_shot_ == shot.number)
-    return {}; /* a second answer to one shot */
-  learnt_shot_ = shot.number;
-  const std::int64_t delay = time_ns - shot.time_ns;
+    return no_match ();
+  const Trigger &trigger = triggers_[(count_ - 1) % kTriggers];
+  if (learnt_trigger_ == trigger.number)
+    return {}; /* a second answer to one trigger */
+  learnt_trigger_ = trigger.number;
+  const std::int64_t delay = time_ns - trigger.time_ns;
   settled_ = learnt_ && std::llabs (delay - delay_ns_) < period_ns_ / 4;
   delay_ns_ = delay;
   learnt_ = true;
-  const Found found{true, shot.number, 0};
+  const Found found{true, trigger.number, 0};
   accept (frame_id, found);
   return found;
 }
 
-ShotFinder::Found
-ShotFinder::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t arrival_ns)
+TriggerMatcher::Found
+TriggerMatcher::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t arrival_ns)
 {
   if (count_ > 0 && !learnt_)
     stamped_ = camera_ns > 0;
   if (stamped_ && camera_ns <= 0)
-    return stranger (); /* its head was lost */
+    return no_match (); /* its head was lost */
   const std::int64_t time_ns = stamped_ ? camera_ns : arrival_ns;
   if (!settled_)
     return learn (frame_id, time_ns);
   Found by_time = nearest (time_ns);
   std::int64_t numbered = 0;
-  if (by_id (frame_id, numbered) && (!by_time.known || numbered != by_time.shot)) {
-    const Found by_number{true, numbered, time_ns - (shot_at (numbered)->time_ns + delay_ns_)};
-    const std::int64_t differs = by_time.shot - numbered;
+  if (by_id (frame_id, numbered) && (!by_time.known || numbered != by_time.trigger)) {
+    const Found by_number{true, numbered, time_ns - (trigger_at (numbered)->time_ns + delay_ns_)};
+    const std::int64_t differs = by_time.trigger - numbered;
     contradictions_ = by_time.known && differs == contradiction_ ? contradictions_ + 1 : 1;
     contradiction_ = differs;
     const bool near = by_time.known && std::llabs (by_time.residual_ns) < period_ns_ / 4;
@@ -127,7 +127,7 @@ ShotFinder::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t a
     contradictions_ = 0;
   }
   if (!by_time.known)
-    return stranger ();
+    return no_match ();
   accept (frame_id, by_time);
   return by_time;
 }

@@ -212,7 +212,7 @@ struct Robust : ::testing::TestWithParam<Mode> {
   /* Brings the decoder to where it has decoded all frame sets before this one. */
   void play_until (std::size_t frame)
   {
-    decoder.forget_references ();
+    decoder.reset_references ();
     if (GetParam ().temporal)
       for (std::size_t i = 0; i < frame; i++)
         (void)decode (decoder, joined (sets[i].units));
@@ -333,7 +333,7 @@ TEST_P (Robust, shuffled_and_duplicated_slices_give_the_same_pictures)
 {
   std::mt19937 random (3);
   for (int i = 0; i < 50; i++) {
-    decoder.forget_references ();
+    decoder.reset_references ();
     for (FrameSet &set : sets) {
       Units units = set.units;
       for (std::size_t n = 0; n < set.units.size (); n++)
@@ -361,7 +361,7 @@ TEST_P (Robust, slices_of_another_stream_cost_nothing_but_themselves)
   const auto strays =
       code (rig, {Roi{3, 30, 7, 110}, Roi{1, 54, 5, 90}}, settings_of (GetParam ()), kFrames);
   for (std::size_t first = 0; first < 3; first++) {
-    decoder.forget_references ();
+    decoder.reset_references ();
     for (std::size_t i = 0; i < sets.size (); i++) {
       /* Of each view two, of the same frame set and of another one; as many as it has they may not
        * be. */
@@ -534,7 +534,7 @@ TEST_P (TemporalLoss, shows_nothing_wrong_and_is_gone_within_the_refresh_period)
     std::mt19937 random (seed);
     Counts counts;
     std::size_t last = 0, whole = 0;
-    decoder.forget_references ();
+    decoder.reset_references ();
     for (std::size_t i = 0; i < sets.size (); i++) {
       const auto lost =
           i < kLossy ? lose_at_random (sets[i], random) : std::vector<bool> (sets[i].units.size ());

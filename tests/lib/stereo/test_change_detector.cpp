@@ -73,7 +73,7 @@ TEST (ChangeDetector, without_memory_or_after_a_new_size_everything_has_changed)
   detector.look (picture (3) (cv::Rect (0, 0, 100, 100)));
   EXPECT_TRUE (detector.changed_outside (kRoi));
   detector.look (picture (2));
-  detector.forget ();
+  detector.reset ();
   EXPECT_TRUE (detector.changed_outside (kRoi));
 }
 

@@ -74,13 +74,13 @@ TEST (Depth, is_focal_length_times_baseline_over_disparity)
   EXPECT_EQ (convert.convert (disparity.view (), other.view ()).code (), StatusCode::kBadSize);
 }
 
-static Pieces
+static Tiles
 all_of (const cv::Mat &picture)
 {
   const cv::Rect all ({0, 0}, picture.size ());
-  Pieces pieces;
-  pieces.set ({&all, 1}, 1);
-  return pieces;
+  Tiles tiles;
+  tiles.set ({&all, 1}, 1);
+  return tiles;
 }
 
 TEST (DisparityFilter, pixel_in_the_air_is_cleared_and_an_edge_stays)

@@ -45,10 +45,10 @@ struct Pair {
   }
   void refine (int turns, const std::vector<cv::Rect> &parts, int threads = 2)
   {
-    Pieces pieces;
-    pieces.set (parts, threads);
+    Tiles tiles;
+    tiles.set (parts, threads);
     DisparityRefiner refiner;
-    refiner.apply ({left, right, colour, kRightX, 16, turns}, pieces, disparity);
+    refiner.apply ({left, right, colour, kRightX, 16, turns}, tiles, disparity);
   }
   void refine (int turns, int threads = 2) { refine (turns, {{0, 0, kWidth, kHeight}}, threads); }
   /* Root of the mean square, pixels, away from the picture's edge. */
@@ -97,7 +97,7 @@ TEST (DisparityRefiner, no_turns_change_nothing)
   EXPECT_EQ (cv::norm (before, pair.disparity, cv::NORM_INF), 0);
 }
 
-TEST (DisparityRefiner, threads_and_pieces_change_nothing)
+TEST (DisparityRefiner, threads_and_tiles_change_nothing)
 {
   Pair one, many;
   one.refine (2, 1);

@@ -119,10 +119,10 @@ TEST (StereoFilters, specks_go_as_with_opencv)
     cv::Mat mine = made_up_disparity (90, 61, seed);
     const auto parts = two_parts (mine);
     cv::Mat theirs = mine.clone (), memory;
-    Pieces pieces;
-    pieces.set (parts, 2);
+    Tiles tiles;
+    tiles.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_specks (40, 48, kMin, kMin, pieces, mine);
+    filter.clear_specks (40, 48, kMin, kMin, tiles, mine);
     cv::filterSpeckles (theirs, kNone, 40, 48, memory);
     EXPECT_EQ (cv::countNonZero (mine != theirs), 0) << seed;
     EXPECT_GT (cv::countNonZero (mine == kNone), 90 * 61 / 5);
@@ -134,11 +134,11 @@ TEST (StereoFilters, specks_farther_than_what_is_of_interest_stay)
   cv::Mat disparity (8, 8, CV_16S, cv::Scalar (kNone));
   disparity.at<std::int16_t> (2, 2) = 100;
   disparity.at<std::int16_t> (2, 3) = 400;
-  Pieces pieces;
+  Tiles tiles;
   const cv::Rect all (0, 0, 8, 8);
-  pieces.set ({&all, 1}, 1);
+  tiles.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_specks (10, 32, kMin, 300, pieces, disparity);
+  filter.clear_specks (10, 32, kMin, 300, tiles, disparity);
   EXPECT_EQ (disparity.at<std::int16_t> (2, 2), 100);
   EXPECT_EQ (disparity.at<std::int16_t> (2, 3), kNone);
 }
@@ -151,10 +151,10 @@ TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
     cv::Mat from = made_up_disparity (83, 50, seed), to (50, 83, CV_16S, cv::Scalar (kNone)),
             expected = from.clone ();
     const auto parts = two_parts (from);
-    Pieces pieces;
-    pieces.set (parts, 2);
+    Tiles tiles;
+    tiles.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_flying (kStep, kSupport, kOffset, kMin, pieces, from, to);
+    filter.clear_flying (kStep, kSupport, kOffset, kMin, tiles, from, to);
     for (int y = 0; y < from.rows; y++)
       for (int x = 0; x < from.cols; x++) {
         const int d = from.at<std::int16_t> (y, x),
@@ -177,11 +177,11 @@ TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
 {
   cv::Mat disparity (1, 64, CV_16S, cv::Scalar (160));
   disparity.colRange (40, 50).setTo (320);
-  Pieces pieces;
+  Tiles tiles;
   const cv::Rect all (0, 0, 64, 1);
-  pieces.set ({&all, 1}, 1);
+  tiles.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_hidden (kMin, pieces, disparity);
+  filter.clear_hidden (kMin, tiles, disparity);
   /* What stands 10 pixels of disparity before the wall hides the 10 pixels left of it. */
   for (int x = 0; x < 64; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) == kNone, x >= 30 && x < 40) << x;
@@ -206,11 +206,11 @@ wall_with_doubled_bar (cv::Mat &left, cv::Mat &right, bool same_colour)
 TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
 {
   cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, true);
-  Pieces pieces;
+  Tiles tiles;
   const cv::Rect all (0, 0, 200, 1);
-  pieces.set ({&all, 1}, 1);
+  tiles.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kMin, pieces, disparity);
+  filter.clear_doubled (left, right, 0, kMin, tiles, disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == kNone), 4);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (20, 90) == 20 * 16), 70);
 }
@@ -218,11 +218,11 @@ TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
 TEST (StereoFilters, thin_thing_before_a_wall_of_another_colour_stays)
 {
   cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, false);
-  Pieces pieces;
+  Tiles tiles;
   const cv::Rect all (0, 0, 200, 1);
-  pieces.set ({&all, 1}, 1);
+  tiles.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kMin, pieces, disparity);
+  filter.clear_doubled (left, right, 0, kMin, tiles, disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == 82 * 16), 4);
 }
 
@@ -280,11 +280,11 @@ TEST (StereoFilters, silhouettes_are_judged_as_without_vectors)
     cv::Mat from = made_up_disparity (71, 46, radius), to (46, 71, CV_16S, cv::Scalar (kNone));
     const cv::Mat colour = made_up_colour (71, 46, radius);
     const auto parts = two_parts (from);
-    Pieces pieces;
-    pieces.set (parts, 2);
+    Tiles tiles;
+    tiles.set (parts, 2);
     SilhouetteFilter filter;
     const SilhouetteFilter::Settings settings = {radius, 0.02, 20, kMin, 250};
-    filter.apply (settings, colour, pieces, from, to);
+    filter.apply (settings, colour, tiles, from, to);
     int changed = 0, differ = 0;
     for (const cv::Rect &part : parts)
       for (int y = part.y; y < part.br ().y; y++)
@@ -353,7 +353,7 @@ TEST (Occupancy, looks_everywhere_while_nothing_is_known)
   EXPECT_EQ (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
   seen.learn ();
   EXPECT_NE (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
-  seen.occupancy.forget ();
+  seen.occupancy.reset ();
   EXPECT_EQ (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
 }
 

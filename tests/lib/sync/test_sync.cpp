@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <random>
 #include <rangecast/sync/camera_clock.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/frame_associator.hpp>
-#include <rangecast/sync/trigger_matcher.hpp>
+#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/ticks.hpp>
+#include <rangecast/sync/trigger_matcher.hpp>
 #include <set>
 
 using namespace rangecast;
@@ -59,14 +59,14 @@ TEST (FrameIds, sixty_four_bits_do_not_wrap)
   EXPECT_EQ (frame_id_step (1'000'000, 1'000'002), 2);
 }
 
-/* ---- which shot a frame answers ---- */
+/* ---- which trigger a frame answers ---- */
 
 namespace {
 
 /* A camera that is fired every period; its clock began elsewhere. */
 struct FakeCamera {
-  ShotFinder finder;
-  std::int64_t shot = 0;
+  TriggerMatcher finder;
+  std::int64_t trigger = 0;
   std::uint64_t id = 1;
   std::int64_t delay = 200'000, clock = 77 * kSecond;
   bool stamps = true;
@@ -76,87 +76,88 @@ struct FakeCamera {
     finder.start (kPeriod);
     settle ();
   }
-  [[nodiscard]] std::int64_t now () const { return 5 * kSecond + shot * kPeriod; }
-  void fire (bool alone = false) { finder.fired (shot, now (), alone); }
-  ShotFinder::Found answer (std::int64_t late = 0)
+  [[nodiscard]] std::int64_t now () const { return 5 * kSecond + trigger * kPeriod; }
+  void fire (bool alone = false) { finder.fired (trigger, now (), alone); }
+  TriggerMatcher::Found answer (std::int64_t late = 0)
   {
     return finder.find (
         id++, stamps ? now () + delay + late - clock + 100 * kSecond : 0, now () + 8 * kMs + late);
   }
   void settle ()
   {
-    for (int i = 0; i < 4 && !finder.settled (); i++, shot++) {
+    for (int i = 0; i < 4 && !finder.settled (); i++, trigger++) {
       fire (true);
       answer ();
     }
   }
-  /* One shot and its answer, which must be known for it. */
+  /* One trigger and its answer, which must be known for it. */
   void expect_in_step (const char *when)
   {
     fire ();
     const auto found = answer ();
-    EXPECT_TRUE (found.known && found.shot == shot) << when << ": shot " << shot;
-    shot++;
+    EXPECT_TRUE (found.known && found.trigger == trigger) << when << ": trigger " << trigger;
+    trigger++;
   }
 };
 
 } // namespace
 
-TEST (ShotFinder, two_lone_shots_settle_it)
+TEST (TriggerMatcher, two_lone_triggers_settle_it)
 {
   FakeCamera camera;
-  EXPECT_EQ (camera.shot, 2);
+  EXPECT_EQ (camera.trigger, 2);
   EXPECT_TRUE (camera.finder.settled ());
 }
 
-TEST (ShotFinder, first_picture_that_comes_late_teaches_nothing_wrong)
+TEST (TriggerMatcher, first_picture_that_comes_late_teaches_nothing_wrong)
 {
-  ShotFinder finder;
+  TriggerMatcher finder;
   finder.start (kPeriod);
   std::int64_t time = kSecond;
-  for (std::int64_t shot = 0; shot < 3; shot++, time += kSecond) {
-    finder.fired (shot, time, true);
-    finder.find (static_cast<std::uint64_t> (shot + 1), time + (shot == 0 ? 95 * kMs : kMs), time);
-    EXPECT_EQ (finder.settled (), shot == 2);
+  for (std::int64_t trigger = 0; trigger < 3; trigger++, time += kSecond) {
+    finder.fired (trigger, time, true);
+    finder.find (
+        static_cast<std::uint64_t> (trigger + 1), time + (trigger == 0 ? 95 * kMs : kMs), time);
+    EXPECT_EQ (finder.settled (), trigger == 2);
   }
   finder.fired (3, time, false);
-  EXPECT_EQ (finder.find (4, time + kMs, time).shot, 3);
+  EXPECT_EQ (finder.find (4, time + kMs, time).trigger, 3);
 }
 
-TEST (ShotFinder, lost_frame_shifts_nothing)
+TEST (TriggerMatcher, lost_frame_shifts_nothing)
 {
   FakeCamera camera;
   for (int i = 0; i < 10; i++) {
     camera.fire ();
     camera.id++; /* its frame was lost */
-    camera.shot++;
+    camera.trigger++;
     camera.expect_in_step ("after a loss");
   }
 }
 
-TEST (ShotFinder, missed_trigger_shifts_nothing)
+TEST (TriggerMatcher, missed_trigger_shifts_nothing)
 {
   FakeCamera camera;
   camera.fire (); /* the camera was busy: no frame, no number */
-  camera.shot++;
+  camera.trigger++;
   for (int i = 0; i < 5; i++)
     camera.expect_in_step ("after a missed trigger");
 }
 
-TEST (ShotFinder, missed_trigger_of_a_camera_without_stamps_is_found_after_three_frames)
+TEST (TriggerMatcher, missed_trigger_of_a_camera_without_stamps_is_found_after_three_frames)
 {
   FakeCamera camera (false);
   camera.fire ();
-  camera.shot++;
+  camera.trigger++;
   int wrong = 0;
-  for (int i = 0; i < 6; i++, camera.shot++) {
+  for (int i = 0; i < 6; i++, camera.trigger++) {
     camera.fire ();
-    wrong += camera.answer ().shot != camera.shot;
+    wrong += camera.answer ().trigger != camera.trigger;
   }
   EXPECT_EQ (wrong, 2);
 }
 
-TEST (ShotFinder, numbers_that_jump_shift_nothing)
+TEST (TriggerMatcher, numbers_that_jump_shift_nothing)
 {
   FakeCamera camera;
   for (std::uint64_t id : {65535u, 1u, 2u, 40000u, 7u, 70000u}) {
@@ -166,28 +167,28 @@ TEST (ShotFinder, numbers_that_jump_shift_nothing)
   }
 }
 
-TEST (ShotFinder, late_frame_of_a_busy_camera_keeps_its_shot)
+TEST (TriggerMatcher, late_frame_of_a_busy_camera_keeps_its_trigger)
 {
   FakeCamera camera;
   camera.fire ();
-  const std::int64_t shot = camera.shot;
+  const std::int64_t trigger = camera.trigger;
   const auto found = camera.answer (kPeriod * 6 / 10);
   EXPECT_TRUE (found.known);
-  EXPECT_EQ (found.shot, shot);
+  EXPECT_EQ (found.trigger, trigger);
 }
 
-TEST (ShotFinder, late_arrival_shifts_nothing_without_stamps)
+TEST (TriggerMatcher, late_arrival_shifts_nothing_without_stamps)
 {
   FakeCamera camera (false);
   for (int i = 0; i < 3; i++) {
     camera.fire ();
-    EXPECT_EQ (camera.answer (i == 0 ? kPeriod : 0).shot, camera.shot);
-    camera.shot++;
+    EXPECT_EQ (camera.answer (i == 0 ? kPeriod : 0).trigger, camera.trigger);
+    camera.trigger++;
   }
 }
 
 /* 200 ppm are a period in 3 minutes. */
-TEST (ShotFinder, drift_of_the_cameras_clock_is_followed)
+TEST (TriggerMatcher, drift_of_the_cameras_clock_is_followed)
 {
   FakeCamera camera;
   for (int i = 0; i < 20000; i++) {
@@ -196,26 +197,26 @@ TEST (ShotFinder, drift_of_the_cameras_clock_is_followed)
   }
 }
 
-TEST (ShotFinder, restarted_camera_is_said_to_have_lost_step)
+TEST (TriggerMatcher, restarted_camera_is_said_to_have_lost_step)
 {
   FakeCamera camera;
   camera.expect_in_step ("before");
   camera.clock += 1000 * kSecond;
   camera.id = 1'000'000;
-  for (int i = 0; i < 8; i++, camera.shot++) {
-    EXPECT_FALSE (camera.finder.lost_step ());
+  for (int i = 0; i < 8; i++, camera.trigger++) {
+    EXPECT_FALSE (camera.finder.lost_sync ());
     camera.fire ();
     EXPECT_FALSE (camera.answer ().known);
   }
-  EXPECT_TRUE (camera.finder.lost_step ());
+  EXPECT_TRUE (camera.finder.lost_sync ());
   camera.finder.start (kPeriod);
   camera.settle ();
   camera.expect_in_step ("after it was learnt anew");
 }
 
-TEST (ShotFinder, frames_before_any_shot_are_not_known)
+TEST (TriggerMatcher, frames_before_any_trigger_are_not_known)
 {
-  ShotFinder finder;
+  TriggerMatcher finder;
   finder.start (kPeriod);
   EXPECT_FALSE (finder.find (1, kSecond, kSecond).known);
 }
@@ -429,17 +430,17 @@ TEST (CameraClock, restarted_clock_begins_anew)
   EXPECT_EQ (clock.host_time (kSecond, 11 * kSecond), 11 * kSecond);
 }
 
-/* ---- PartnerFinder ---- */
+/* ---- FrameAssociator ---- */
 
 namespace {
 
 /* Signals every 20 ms; the leading camera counts from 100, the other from 7. */
 constexpr std::int64_t kSignal = 20 * kMs;
 
-PartnerFinder
+FrameAssociator
 learnt_finder (std::int64_t signals = 10)
 {
-  PartnerFinder finder;
+  FrameAssociator finder;
   finder.start (kSignal);
   for (std::int64_t i = 0; i < signals; i++) {
     finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
@@ -450,9 +451,9 @@ learnt_finder (std::int64_t signals = 10)
 
 } // namespace
 
-TEST (PartnerFinder, frame_with_a_wrong_stamp_is_found_by_its_number)
+TEST (FrameAssociator, frame_with_a_wrong_stamp_is_found_by_its_number)
 {
-  PartnerFinder finder = learnt_finder ();
+  FrameAssociator finder = learnt_finder ();
   ASSERT_TRUE (finder.learnt ());
   finder.leader (110, 10 * kSignal);
   EXPECT_EQ (finder.place (17, 10 * kSignal + kSignal / 2 - kMs, true), 10 * kSignal);
@@ -460,26 +461,26 @@ TEST (PartnerFinder, frame_with_a_wrong_stamp_is_found_by_its_number)
   EXPECT_EQ (finder.place (18, 3600 * kSecond, true), 11 * kSignal);
 }
 
-TEST (PartnerFinder, frame_whose_time_nobody_knows_is_found_by_its_number)
+TEST (FrameAssociator, frame_whose_time_nobody_knows_is_found_by_its_number)
 {
-  PartnerFinder finder = learnt_finder ();
+  FrameAssociator finder = learnt_finder ();
   finder.leader (110, 10 * kSignal);
   EXPECT_EQ (finder.place (17, {}, false), 10 * kSignal);
   EXPECT_EQ (finder.place (18, {}, false), std::nullopt); /* its partner has not come */
 }
 
-TEST (PartnerFinder, numbers_decide_nothing_before_they_agreed_eight_times)
+TEST (FrameAssociator, numbers_decide_nothing_before_they_agreed_eight_times)
 {
-  PartnerFinder finder = learnt_finder (7);
+  FrameAssociator finder = learnt_finder (7);
   finder.leader (110, 10 * kSignal);
   const std::int64_t off = 10 * kSignal + kSignal / 2 - kMs;
   EXPECT_FALSE (finder.learnt ());
   EXPECT_EQ (finder.place (17, off, true), off);
 }
 
-TEST (PartnerFinder, missed_signal_shifts_nothing_where_there_are_stamps)
+TEST (FrameAssociator, missed_signal_shifts_nothing_where_there_are_stamps)
 {
-  PartnerFinder finder = learnt_finder ();
+  FrameAssociator finder = learnt_finder ();
   for (std::int64_t i = 10; i < 30; i++) { /* it missed signal 10 */
     finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
     if (i == 10)
@@ -491,18 +492,18 @@ TEST (PartnerFinder, missed_signal_shifts_nothing_where_there_are_stamps)
   EXPECT_EQ (finder.place (36, {}, false), 30 * kSignal) << "the new difference is not learnt";
 }
 
-TEST (PartnerFinder, arrival_that_is_one_period_late_once_changes_no_partner)
+TEST (FrameAssociator, arrival_that_is_one_period_late_once_changes_no_partner)
 {
-  PartnerFinder finder = learnt_finder ();
+  FrameAssociator finder = learnt_finder ();
   finder.leader (110, 10 * kSignal);
   finder.leader (111, 11 * kSignal);
   EXPECT_EQ (finder.place (17, 11 * kSignal, false), 10 * kSignal);
   EXPECT_EQ (finder.place (18, 11 * kSignal + kMs, false), 11 * kSignal + kMs);
 }
 
-TEST (PartnerFinder, arrivals_that_are_a_period_off_three_times_are_believed)
+TEST (FrameAssociator, arrivals_that_are_a_period_off_three_times_are_believed)
 {
-  PartnerFinder finder = learnt_finder ();
+  FrameAssociator finder = learnt_finder ();
   for (std::int64_t i = 10; i < 13; i++)
     finder.leader (static_cast<std::uint64_t> (100 + i), i * kSignal);
   finder.place (16, 10 * kSignal, false);

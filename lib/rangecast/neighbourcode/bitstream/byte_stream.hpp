@@ -32,7 +32,7 @@ struct StreamPart {
  *  units agree with that; start codes inside it mean nothing then. If they do not agree, it ends at
  *  the next start code or, if that is not in sight, behind the last unit that could be read: so
  *  nobody waits for megabytes that a damaged size promises. `wanted` doubles, which keeps the work
- *  for an access unit that comes in small pieces linear.
+ *  for an access unit that comes in small parts linear.
  *  @param at_end  no more bytes will follow; `wanted` is then always 0 */
 StreamPart next_part (std::span<const std::uint8_t> bytes, bool at_end);
 

@@ -112,10 +112,10 @@ ReferencePair::begin (const SliceHeader &header)
 }
 
 void
-ReferencePair::forget ()
+ReferencePair::reset ()
 {
   for (ReferencePlane &plane : planes_)
-    plane.forget ();
+    plane.reset ();
 }
 
 void

@@ -21,7 +21,7 @@ public:
 
   /** Begins a frame set: all pixels of the ROI are kNone. Keeps its memory. */
   void begin (const SliceHeader &header);
-  void forget () { held_ = false; }
+  void reset () { held_ = false; }
 
   [[nodiscard]] bool held () const { return held_; }
   /** Of the frame set that it holds. */
@@ -75,7 +75,7 @@ class ReferencePair {
 public:
   /** Begins a frame set. One of the same number goes on; one that is older is not kept. */
   void begin (const SliceHeader &header);
-  void forget ();
+  void reset ();
 
   [[nodiscard]] const ReferencePlane &before () const { return planes_[1 - now_]; }
   /** What a frame set of that number may refer to, whether it was begun or not: the latest one that

@@ -26,7 +26,7 @@ constexpr double kFillOfDeltaSlice = 0.8;
 } // namespace
 
 int
-plain_pieces (const SliceHeader &header, int max_slice_size)
+plain_partitions (const SliceHeader &header, int max_slice_size)
 {
   const int bits = kSymbolBits + header.depth_bits + 3 * header.colour_bits;
   /* Symbols and full pixels may each end within a byte; slices that refer to others have a longer
@@ -39,8 +39,8 @@ plain_pieces (const SliceHeader &header, int max_slice_size)
 /* Slices about as wide as high; but with a reference they are as high as their band, if last time
  * is anything to go by. */
 int
-compact_pieces (const SliceHeader &header, const RowBand &band, int max_slice_size, bool is_exact,
-    double delta_bytes_per_pixel)
+compact_partitions (const SliceHeader &header, const RowBand &band, int max_slice_size,
+    bool is_exact, double delta_bytes_per_pixel)
 {
   const int width = header.roi.width;
   double side = columns_of_slice (header.profile, is_exact) * std::sqrt (max_slice_size);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What an encoder cuts range images into, so that slices fit and threads have work: pieces, some
- * columns of a band of rows each. */
+/* What an encoder cuts range images into, so that slices fit and threads have work: partitions,
+ * some columns of a band of rows each. */
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace rangecast {
 
-/** What pieces, views and frame sets came to. */
+/** What partitions, views and frame sets came to. */
 struct EncoderResult {
   std::uint64_t points = 0;      ///< valid pixels
   std::uint64_t full_pixels = 0; ///< of these, written in full
@@ -29,15 +29,15 @@ struct EncoderResult {
   }
 };
 
-/** Into how many pieces a ROI is cut in profile plain: the least of which each row fits into a
+/** Into how many partitions a ROI is cut in profile plain: the least of which each row fits into a
  *  slice, whatever is in it.
  *  @param header  its ROI, bits, and whether it is kept as a reference */
-int plain_pieces (const SliceHeader &header, int max_slice_size);
+int plain_partitions (const SliceHeader &header, int max_slice_size);
 
 /** The same of a band in the profiles packed and entropy: a guess, a row may still not fit.
  *  @param is_exact  all residuals are coded without loss
  *  @param delta_bytes_per_pixel  of the last bands with a reference; 0: there was none */
-int compact_pieces (const SliceHeader &header, const RowBand &band, int max_slice_size,
+int compact_partitions (const SliceHeader &header, const RowBand &band, int max_slice_size,
     bool is_exact, double delta_bytes_per_pixel);
 
 } // namespace rangecast

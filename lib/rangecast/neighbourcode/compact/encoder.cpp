@@ -127,7 +127,7 @@ CompactEncoder::set_thresholds (const CompactSettings &settings)
 }
 
 bool
-CompactEncoder::code_piece (const CompactPicture &picture, const RowBand &band,
+CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &band,
     const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
 {
   reference_ = picture.reference;
@@ -228,7 +228,7 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   const MotionSearch::Pictures pictures = {
       image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
   BlockMotion near_by[2];                   /* to the left, above */
-  if (header_.first_column >= kMotionBlock) /* another piece's: as it was last time */
+  if (header_.first_column >= kMotionBlock) /* another partition's: as it was last time */
     near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
   for (std::size_t i = 0; i < motions_.size (); i++) {
     const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;

@@ -33,7 +33,7 @@ Steps steps_within (int depth_threshold, int colour_threshold);
 /** Thresholds of pixels that are not taken from an earlier frame set. */
 CompactSettings finer_settings (const CompactSettings &settings);
 
-/** What the pieces of a range image have in common. */
+/** What the partitions of a range image have in common. */
 struct CompactPicture {
   const ConstRangeImage &image;
   CodingReference reference;
@@ -42,17 +42,17 @@ struct CompactPicture {
   MotionMemory &motions; ///< of the view
 };
 
-/** Codes pieces of range images in the profiles packed and entropy, each without anything of those
- *  before. Keeps its memory. */
+/** Codes partitions of range images in the profiles packed and entropy, each without anything of
+ * those before. Keeps its memory. */
 class CompactEncoder {
 public:
-  /** Appends the slices of a piece.
+  /** Appends the slices of a partition.
    *  @param band    its rows
    *  @param header  of all slices: profile, bits, ROI, columns, times, what they refer to
    *  @param[out] result  grows
-   *  @return false if a row alone is longer than a slice may be: pieces have to be narrower */
-  bool code_piece (const CompactPicture &picture, const RowBand &band, const SliceHeader &header,
-      std::vector<std::uint8_t> &to, EncoderResult &result);
+   *  @return false if a row alone is longer than a slice may be: partitions have to be narrower */
+  bool code_partition (const CompactPicture &picture, const RowBand &band,
+      const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result);
 
 private:
   /* What a pixel becomes that no neighbour replaces. */
@@ -91,7 +91,7 @@ private:
   [[nodiscard]] bool fits (std::size_t bytes) const;
 
   CompactSettings settings_{};
-  const CompactQuantisers *quantisers_ = nullptr; /* while code_piece() runs */
+  const CompactQuantisers *quantisers_ = nullptr; /* while code_partition() runs */
   MotionMemory *motion_memory_ = nullptr;         /* too */
   SliceHeader header_;
   EncoderResult result_;

@@ -122,7 +122,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
       better |= attempt (x, y + 1);
     }
   }
-  /* Pieces may share a block: the one that has its first pixel keeps its motion. */
+  /* Partitions may share a block: the one that has its first pixel keeps its motion. */
   const auto begins = [] (int at, int of_roi) { return at % kMotionBlock == 0 || at == of_roi; };
   if (begins (area.x, pictures.image.roi.x) && begins (area.y, pictures.image.roi.y))
     memory.keep (area.x, area.y, best.motion);

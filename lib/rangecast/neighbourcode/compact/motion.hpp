@@ -49,8 +49,8 @@ motion_blocks (int x, int columns)
   return static_cast<std::size_t> ((x + columns - 1) / kMotionBlock - x / kMotionBlock + 1);
 }
 
-/** The motion of a view's blocks when it was last found. Pieces of a frame set that are coded at
- * the same time all see that of frame sets before. */
+/** The motion of a view's blocks when it was last found. Partitions of a frame set that are coded
+ * at the same time all see that of frame sets before. */
 class MotionMemory {
 public:
   /** @param width, height  of the view's full image */

@@ -53,7 +53,7 @@ PlainEncoder::slice_size (int rows, std::size_t full) const
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
-/* Makes room for pieces of so many columns. */
+/* Makes room for partitions of so many columns. */
 void
 PlainEncoder::resize (int columns)
 {
@@ -183,9 +183,9 @@ PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
   return rows;
 }
 
-/* In as many slices as the size of the piece asks for. */
+/* In as many slices as the size of the partition asks for. */
 void
-PlainEncoder::code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+PlainEncoder::code_partition (const ConstRangeImage &image, const PlainCodes &codes,
     const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
     EncoderResult &result)
 {

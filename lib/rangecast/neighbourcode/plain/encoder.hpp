@@ -9,9 +9,9 @@
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
 #include "../bitstream/slice_partition.hpp"
-#include "functions.hpp"
 #include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
+#include "functions.hpp"
 
 namespace rangecast {
 
@@ -29,14 +29,14 @@ struct PlainCodes {
   ColourQuantiser colour;
 };
 
-/** Codes pieces of range images in profile plain, each without anything of those before. Keeps its
- *  memory. */
+/** Codes partitions of range images in profile plain, each without anything of those before. Keeps
+ * its memory. */
 class PlainEncoder {
 public:
-  /** Appends the slices of a piece: all rows of some columns of the ROI.
+  /** Appends the slices of a partition: all rows of some columns of the ROI.
    *  @param header  of all slices: bits, ROI, columns, times
    *  @param[out] result  grows */
-  void code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+  void code_partition (const ConstRangeImage &image, const PlainCodes &codes,
       const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
       EncoderResult &result);
 
@@ -60,7 +60,7 @@ private:
 
   PlainSettings settings_{};
   const PlainFunctions *functions_ = nullptr;
-  const PlainCodes *codes_ = nullptr; /* while code_piece() runs */
+  const PlainCodes *codes_ = nullptr; /* while code_partition() runs */
   SliceHeader header_;                /* of the open slice */
   std::size_t full_pixels_ = 0;       /* of the open slice */
   EncoderResult result_;

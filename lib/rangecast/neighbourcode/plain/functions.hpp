@@ -42,7 +42,7 @@ struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
   const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
   const ColourQuantiser &colour;
-  int row; ///< of the piece: its last bit matters
+  int row; ///< of the partition: its last bit matters
 };
 
 /** The columns of a row that have something. */

@@ -170,7 +170,7 @@ PlainTemporalEncoder::code_rows (
 }
 
 void
-PlainTemporalEncoder::code_piece (const ConstRangeImage &image, const RowBand &band,
+PlainTemporalEncoder::code_partition (const ConstRangeImage &image, const RowBand &band,
     const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
     const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
     EncoderResult &result)

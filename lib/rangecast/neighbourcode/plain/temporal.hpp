@@ -16,14 +16,14 @@
 
 namespace rangecast {
 
-/** Codes pieces of range images that are kept as references. Keeps its memory. */
+/** Codes partitions of range images that are kept as references. Keeps its memory. */
 class PlainTemporalEncoder {
 public:
-  /** Appends the slices of a piece.
+  /** Appends the slices of a partition.
    *  @param band    its rows
    *  @param header  of all slices: bits, ROI, columns, times, what they refer to
    *  @param[out] result  grows */
-  void code_piece (const ConstRangeImage &image, const RowBand &band,
+  void code_partition (const ConstRangeImage &image, const RowBand &band,
       const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
       const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
       EncoderResult &result);
@@ -38,7 +38,7 @@ private:
   [[nodiscard]] std::size_t slice_size (std::size_t pixels, std::size_t full) const;
   [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
 
-  const DepthQuantiser *depth_ = nullptr; /* while code_piece() runs */
+  const DepthQuantiser *depth_ = nullptr; /* while code_partition() runs */
   const ColourQuantiser *colour_ = nullptr;
   CodingReference reference_;
   PlainSettings settings_{};

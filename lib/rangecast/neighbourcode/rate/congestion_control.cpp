@@ -52,7 +52,7 @@ seconds (std::uint64_t ns)
   return 1e-9 * static_cast<double> (ns);
 }
 
-/* Whether to judge loss now. Where one or two of few packets were lost, more are waited for. */
+/* Whether to evaluate loss now. Where one or two of few packets were lost, more are waited for. */
 bool
 is_enough (double packets, double lost, std::uint64_t span_ns)
 {
@@ -87,7 +87,7 @@ CongestionControl::bits_per_s () const
 }
 
 void
-CongestionControl::note_report (Source source, std::uint64_t now_ns)
+CongestionControl::record_report (Source source, std::uint64_t now_ns)
 {
   if (halvings_ > 0 && rate_ > 0) {
     rate_ = limited (std::max (rate_, before_silence_ / 2));
@@ -150,9 +150,9 @@ CongestionControl::increase (double delivered, double elapsed_s)
 }
 
 void
-CongestionControl::judge_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
+CongestionControl::evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
 {
-  if (!delays_.take_news ())
+  if (!delays_.poll_update ())
     return;
   queue_s_ = delays_.queue_s ();
   const double growth = delays_.growth_s ();
@@ -182,7 +182,7 @@ CongestionControl::count_losses (const PacketReport &packet)
 }
 
 void
-CongestionControl::judge_loss (std::uint64_t now_ns)
+CongestionControl::evaluate_loss (std::uint64_t now_ns)
 {
   if (static_cast<std::int64_t> (last_sent_ns_ - losses_since_ns_) <
       static_cast<std::int64_t> (kLossIntervalNs)) /* also where old reports come late */
@@ -191,7 +191,7 @@ CongestionControl::judge_loss (std::uint64_t now_ns)
   if (!is_enough (counted_, counted_lost_, span))
     return;
   const double share = counted_lost_ / counted_;
-  const bool congestion = loss_.judge (share, counted_, seconds (span));
+  const bool congestion = loss_.evaluate (share, counted_, seconds (span));
   counted_ = counted_lost_ = 0;
   if (loss_.was_usual ())
     take_back ();
@@ -211,7 +211,7 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
   const bool first = source_ != Source::kPackets;
   const double elapsed =
       first ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* silence is no calm */
-  note_report (Source::kPackets, now_ns);
+  record_report (Source::kPackets, now_ns);
   if (static_cast<std::int64_t> (packets.front ().sent_ns - last_sent_ns_) < -1'000'000'000)
     valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock began anew */
   const bool was_decreased = decreased_;
@@ -223,9 +223,9 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
       delays_.add (packet);
     last_sent_ns_ = packet.sent_ns;
     count_losses (packet);
-    judge_queue (packet.sent_ns, now_ns);
+    evaluate_queue (packet.sent_ns, now_ns);
   }
-  judge_loss (now_ns);
+  evaluate_loss (now_ns);
   const bool waits = last_sent_ns_ < valid_sent_ns_;
   if (!decreased_ && !was_decreased && !waits && !drains_)
     increase (arrivals_.delivered_bits_per_s (), elapsed);
@@ -256,17 +256,17 @@ CongestionControl::receiver_report (
   Receiver &receiver = find_receiver (report.receiver, now_ns);
   const double packets = report.packets > 0 ? report.packets : kMinPackets;
   receiver.time_ns = std::max<std::uint64_t> (now_ns, 1);
-  receiver.has_news = true;
+  receiver.has_report = true;
   receiver.packets += packets;
   receiver.lost += packets * std::clamp (report.lost, 0.0, 1.0);
   if (report.round_trip_s > 0)
     receiver.queue_s = report.round_trip_s - receiver.round_trip.add (now_ns, report.round_trip_s);
   receiver.jitters = report.jitter_s - receiver.jitter.add (now_ns, report.jitter_s) > kJitter;
   if (source_ != Source::kReports)
-    judged_ns_ = 0;
-  note_report (Source::kReports, now_ns);
-  if (judged_ns_ == 0 || now_ns - judged_ns_ >= kReportIntervalNs)
-    judge_receivers (sent_bits_per_s, now_ns);
+    evaluated_ns_ = 0;
+  record_report (Source::kReports, now_ns);
+  if (evaluated_ns_ == 0 || now_ns - evaluated_ns_ >= kReportIntervalNs)
+    evaluate_receivers (sent_bits_per_s, now_ns);
 }
 
 /* Loss of a receiver that has not reported since is still the worst, but no reason to send less
@@ -280,38 +280,39 @@ CongestionControl::find_worst (std::uint64_t now_ns)
     if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
       continue;
     const bool is_old = decrease_ns_ > 0 && receiver.since_ns < decrease_ns_ + kReactionNs;
-    if (is_old && receiver.has_news) { /* the next report is of what comes from now on */
+    if (is_old && receiver.has_report) { /* the next report is of what comes from now on */
       receiver.packets = receiver.lost = 0;
       receiver.since_ns = now_ns;
     }
-    const bool is_judged =
+    const bool is_evaluated =
         !is_old && is_enough (receiver.packets, receiver.lost, now_ns - receiver.since_ns);
-    if (is_judged) {
+    if (is_evaluated) {
       receiver.share = receiver.lost / receiver.packets;
       receiver.of = receiver.packets;
       receiver.packets = receiver.lost = 0;
       receiver.since_ns = now_ns;
     }
-    if (receiver.share > worst.lost || (is_judged && receiver.share == worst.lost))
-      worst = {receiver.share, receiver.of, worst.queue_s, is_judged, worst.jitters, worst.queues};
-    if (receiver.has_news)
+    if (receiver.share > worst.lost || (is_evaluated && receiver.share == worst.lost))
+      worst = {
+          receiver.share, receiver.of, worst.queue_s, is_evaluated, worst.jitters, worst.queues};
+    if (receiver.has_report)
       worst.queue_s = std::max (worst.queue_s, receiver.queue_s);
     worst.jitters = worst.jitters || receiver.jitters;
     worst.queues = worst.queues || receiver.queue_s > kRoundTripQueue;
-    receiver.has_news = false;
+    receiver.has_report = false;
   }
   return worst;
 }
 
 void
-CongestionControl::judge_receivers (double sent_bits_per_s, std::uint64_t now_ns)
+CongestionControl::evaluate_receivers (double sent_bits_per_s, std::uint64_t now_ns)
 {
   const double elapsed =
-      judged_ns_ == 0 ? 0 : std::min (seconds (now_ns - judged_ns_), kLongestElapsed);
+      evaluated_ns_ == 0 ? 0 : std::min (seconds (now_ns - evaluated_ns_), kLongestElapsed);
   const Worst worst = find_worst (now_ns);
   queue_s_ = worst.queue_s;
-  judged_ns_ = now_ns;
-  const bool loses = worst.is_new && loss_.judge (worst.lost, worst.packets, elapsed);
+  evaluated_ns_ = now_ns;
+  const bool loses = worst.is_new && loss_.evaluate (worst.lost, worst.packets, elapsed);
   const bool is_bad = worst.lost - loss_.usual () > kReportedLoss;
   /* A report that comes at once after a decrease is still of the time before. */
   const bool waits = decrease_ns_ > 0 && now_ns - decrease_ns_ < 2 * kReactionNs;

@@ -34,7 +34,7 @@ struct CongestionSettings {
  *  itself makes;
  *  the increase near the last known capacity goes with the square root of the rate, so that
  *  streams which share a link get equal parts of it soon at 1 and at 20 Mbit/s; loss counts beyond
- *  what is *usual*, that is what stays where less is sent (LossJudge).
+ *  what is *usual*, that is what stays where less is sent (LossEvaluator).
  *
  *  A rate of bytes that receivers report: payload where headers are not in `bytes`. Until the first
  *  sign of congestion it is most_bits_per_s, or no limit. Nothing is allocated. Not thread-safe. */
@@ -48,8 +48,8 @@ public:
    *  wrong, by some frame intervals, as its deltas and the packets that they are of do not agree.
    *  @param now_ns  of any steady clock, the same for all calls */
   void packets (std::span<const PacketReport> packets, std::uint64_t now_ns);
-  /** The worst of several receivers counts, of up to 64. Its loss is judged over 20 packets or two
-   *  seconds at least: with early feedback reports are of few packets, and come because one was
+  /** The worst of several receivers counts, of up to 64. Its loss is evaluated over 20 packets or
+   * two seconds at least: with early feedback reports are of few packets, and come because one was
    *  lost.
    *  @param sent_bits_per_s  the rate of what was sent of late */
   void receiver_report (const ReceiverReport &report, double sent_bits_per_s, std::uint64_t now_ns);
@@ -72,22 +72,22 @@ private:
   struct Receiver {
     std::uint32_t id = 0;
     std::uint64_t time_ns = 0;    /* of its last report; 0: free */
-    double packets = 0, lost = 0; /* since its loss was judged */
+    double packets = 0, lost = 0; /* since its loss was evaluated */
     std::uint64_t since_ns = 0;   /* when that was */
-    double share = 0, of = 0;     /* of packets lost, the last that was judged */
-    bool has_news = false;        /* since the last judgement */
+    double share = 0, of = 0;     /* of packets lost, the last that was evaluated */
+    bool has_report = false;      /* since the last evaluation */
     double queue_s = 0;
     bool jitters = false;
-    RecentLeast round_trip, jitter;
+    SlidingMinimum round_trip, jitter;
   };
 
   [[nodiscard]] double limited (double bits_per_s) const;
-  void note_report (Source source, std::uint64_t now_ns);
+  void record_report (Source source, std::uint64_t now_ns);
   void decrease (double delivered, std::uint64_t now_ns);
   void take_back ();
   void increase (double delivered, double elapsed_s);
-  void judge_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
-  void judge_loss (std::uint64_t now_ns);
+  void evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
+  void evaluate_loss (std::uint64_t now_ns);
   void count_losses (const PacketReport &packet);
   struct Worst {
     double lost = 0, packets = 0, queue_s = 0;
@@ -96,7 +96,7 @@ private:
   };
   Receiver &find_receiver (std::uint32_t id, std::uint64_t now_ns);
   Worst find_worst (std::uint64_t now_ns);
-  void judge_receivers (double sent_bits_per_s, std::uint64_t now_ns);
+  void evaluate_receivers (double sent_bits_per_s, std::uint64_t now_ns);
 
   CongestionSettings settings_;
   double rate_ = 0;        /* 0: no limit known */
@@ -111,7 +111,7 @@ private:
 
   ArrivalWindow arrivals_;
   QueueDelay delays_;
-  LossJudge loss_;
+  LossEvaluator loss_;
   double queue_s_ = 0;
   bool drains_ = false; /* the queue of the last decrease is not yet gone */
   std::uint64_t decrease_ns_ = 0;
@@ -122,7 +122,7 @@ private:
   double counted_ = 0, counted_lost_ = 0;
 
   std::array<Receiver, 64> receivers_{}; /* the latest */
-  std::uint64_t judged_ns_ = 0;          /* when receivers were judged last */
+  std::uint64_t evaluated_ns_ = 0;       /* when receivers were evaluated last */
 };
 
 } // namespace rangecast

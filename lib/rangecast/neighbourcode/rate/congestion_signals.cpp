@@ -105,7 +105,7 @@ ArrivalWindow::delivered_bits_per_s () const
 }
 
 double
-RecentLeast::add (std::uint64_t time_ns, double value)
+SlidingMinimum::add (std::uint64_t time_ns, double value)
 {
   if (!known_) {
     known_ = true;
@@ -170,19 +170,19 @@ QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
   growth_s_ = queue_s_ - latest (then).queue_s;
   unrest_s_ += (1 - std::exp (-elapsed / kMemoryOfUnrest)) *
                (std::min (std::abs (growth_s_), kMaxUnrest) - unrest_s_);
-  news_ = known >= kMinBursts;
+  has_update_ = known >= kMinBursts;
 }
 
 bool
-QueueDelay::take_news ()
+QueueDelay::poll_update ()
 {
-  const bool news = news_;
-  news_ = false;
-  return news;
+  const bool has_update = has_update_;
+  has_update_ = false;
+  return has_update;
 }
 
 bool
-LossJudge::judge (double share, double packets, double elapsed_s)
+LossEvaluator::evaluate (double share, double packets, double elapsed_s)
 {
   share_ = share;
   was_usual_ = tries_ && before_ > 0 && share > kStays * before_ && share < kMaxUsualLoss;
@@ -198,7 +198,7 @@ LossJudge::judge (double share, double packets, double elapsed_s)
 }
 
 void
-LossJudge::sends_less ()
+LossEvaluator::sends_less ()
 {
   tries_ = true;
   before_ = share_;

@@ -46,9 +46,9 @@ private:
 };
 
 /** The least of what was seen in the last 10 to 20 seconds. */
-class RecentLeast {
+class SlidingMinimum {
 public:
-  void reset () { *this = RecentLeast (); }
+  void reset () { *this = SlidingMinimum (); }
   /** @return the least, `value` included */
   double add (std::uint64_t time_ns, double value);
 
@@ -73,7 +73,7 @@ public:
   /** How much it grows and falls anyhow, seconds: the mean over some seconds. */
   [[nodiscard]] double unrest_s () const { return unrest_s_; }
   /** A burst was added since this was called last, and enough are known. */
-  bool take_news ();
+  bool poll_update ();
 
 private:
   struct Sample {
@@ -88,22 +88,22 @@ private:
 
   std::array<Sample, 64> samples_{}; /* a ring */
   std::size_t n_ = 0;
-  RecentLeast least_;
+  SlidingMinimum least_;
   std::uint64_t burst_sent_ns_ = 0, first_arrival_ns_ = 0, last_sent_ns_ = 0;
   int burst_packets_ = 0;
   double queue_s_ = 0, growth_s_ = 0, unrest_s_ = 0;
-  bool news_ = false;
+  bool has_update_ = false;
 };
 
 /** Tells losses of a full link from those that come anyhow, as of radio: the latter stay where less
  *  is sent. What stays is the *usual* loss; only more than that is congestion. */
-class LossJudge {
+class LossEvaluator {
 public:
   /** @param share  of packets lost since the last call, 0 to 1
    *  @param packets  that it is of
    *  @param elapsed_s  since the last call
    *  @return whether it is congestion: the caller then sends less, and says so by sends_less() */
-  bool judge (double share, double packets, double elapsed_s);
+  bool evaluate (double share, double packets, double elapsed_s);
   void sends_less ();
   /** The latest call found that sending less had not helped. */
   [[nodiscard]] bool was_usual () const { return was_usual_; }
