@@ -110,13 +110,16 @@ public:
   [[nodiscard]] int old_winner (int slice, int column) const;
 
 private:
-  template <typename L> struct Loops; /* over some columns at a time */
+  template <typename L> struct RowLoops; /* cell_row_loops.hpp */
   enum class Pass { kAlone, kAskNeighbours };
 
+  void decide_slice (const RowRules &rules, std::size_t number, Pass pass);
+  void carry_over (const RowRules &rules);
   [[nodiscard]] const Slice *old_slice (const Slice &slice) const;
   void count_slice (const Slice &slice, RowCounts &counts) const;
 
   template <typename Number> using Plane = std::vector<Number>;
+  template <typename Number> void wrap (Plane<Number> &plane, std::uint32_t row) const;
 
   int columns_ = 0, words_ = 1;
   double slice_height_m_ = 0;
@@ -127,7 +130,7 @@ private:
   std::array<Plane<std::uint32_t>, 2> views_, covering_;
   Plane<std::int32_t> first_, held_;
   Plane<std::int32_t> next_; /* after decide(): as first_, and carry_over() leaves it alone */
-  std::array<std::vector<float>, 2> circle_tangent_; /* tangent of the wall in each column */
+  std::array<std::vector<float>, 2> circle_tangent_; /* x, z in each column */
 
   /* Of the frame before. */
   std::vector<Slice> old_slices_;

@@ -12,7 +12,7 @@
 
 namespace rangecast {
 
-/** How the wall is cut, and how its cells are compared. */
+/** How a cylinder is cut into cells, and how these are compared. */
 struct CellSettings {
   double height_m = 0.004;   ///< height of a slice, metres
   int columns = 360;         ///< cells round a slice
@@ -20,8 +20,7 @@ struct CellSettings {
   double smoothing_m = 0.01; ///< neighbours this far count in a decision, metres; 0 = none
 };
 
-/** The walls hold no more cells than this together; slices become higher where the points would
- * need more. */
+/** All cylinders together have no more cells; slices become higher where points would need more. */
 inline constexpr int kMaxCells = 1 << 21;
 
 /** A run of points of one image that go onto one cylinder. */
@@ -57,7 +56,7 @@ struct CellLayer {
   std::uint32_t first_point = 0, point_count = 0;
 };
 
-/** The points of a frame set, sorted into the cells of the inner walls of some cylinders. Keeps its
+/** The points of a frame set, sorted into the cells of some cylinders. Keeps its
  * memory from frame to frame: 72 bytes a point, 4 a cell, 36 a point of the largest slice for each
  * worker, and what CellRows has. */
 class Cells {
@@ -136,6 +135,7 @@ private:
   void scatter (const WorldPoints &cloud, std::span<const float> radius,
       std::span<const std::int32_t> column, std::span<const PointRun> runs);
   void make_works (int threads);
+  /* Cuts a slice into layers, and finds their tangents (slice_layers.cpp). */
   void cut (Slice &slice, Work &work);
   struct Cutter;
   struct Followers;

@@ -54,7 +54,7 @@ struct CylinderResult {
 /** Clears the points that several views see of the same place, all but those of the view that sees
  * it most squarely.
  *
- *  All points go onto the inner wall of a cylinder about the object's axis, which is cut into cells
+ *  All points go onto a cylinder about the object's axis, which is cut into cells
  * of equal height and angle. In a cell with points of several views, let T be the mean of the
  * views' tangents in the slice, weighted by their numbers of points (Cells). The view whose optical
  * axis has the smallest inner product with T stays; the others' points there become invalid.
@@ -70,7 +70,7 @@ struct CylinderResult {
  *  - A point goes only if the winner's own surface covers what its view draws of it
  *    (RedundantPoints): a cell can be larger than what its winner sees of it, the winner may see
  *    something before the point, have a hole there, or see a thin thing from its other side.
- *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
+ *  - Where no tangent is known, T is the circle's. Of equals, the first image wins.
  *  - Added to |N . a| is something for the view that won the cell in the frame before (hysteresis)
  *    and for those that won its neighbours (agreement).
  *  - Clusters that stand beside each other have a cylinder each (Clusters).

@@ -16,7 +16,7 @@ struct CylinderFrame {
   Mat3 rotation{kIdentity3}; ///< cylinder_from_world; rows are the frame's axes in the world
 };
 
-/** Heights and angles of points on a cylinder's inner wall. */
+/** Heights of points on a cylinder. */
 struct HeightRange {
   float y_min = 0, y_max = 0; ///< metres along the axis; y_min > y_max if there is no point
 };

@@ -50,7 +50,7 @@ public:
   [[nodiscard]] std::size_t size () const { return count_; }
 
 private:
-  template <typename L> struct CoverLoop; /* over some pixels of a row at a time */
+  template <typename L> struct CoverLoop; /* cover_loop.hpp */
 
   /* A byte for each pixel of an image, with a margin. */
   class Plane {
@@ -90,9 +90,11 @@ private:
     int begin = 0, end = 0;
   };
 
+  void begin (const ResolvedFrame &frame);
   void find_nodes (const ResolvedFrame &frame);
-  void list (const ResolvedFrame &frame);
+  void list_winners (const ResolvedFrame &frame);
   void make_surface (const RangeImage &image, Plane &surface) const;
+  bool find_candidates (const RangeImage &image, const Plane &winners, std::size_t winner);
 
   std::array<ImageState, kMaxViews> images_;
   std::size_t count_ = 0;
