@@ -126,66 +126,7 @@ CompactEncoder::set_thresholds (const CompactSettings &settings)
   colour_weight_ = weight (c);
 }
 
-bool
-CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &band,
-    const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
-{
-  reference_ = picture.reference;
-  quantisers_ = &picture.quantisers;
-  motion_memory_ = &picture.motions;
-  header_ = header;
-  result_ = {};
-  set_thresholds (picture.settings);
-  limits_ =
-      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
-  orders_ = {};
-  size_sums_ = size_counts_ = Components{};
-  const bool fits = header.profile == Profile::kPacked
-                        ? code_rows<PackedWriter> (picture.image, band, to)
-                        : code_rows<EntropyWriter> (picture.image, band, to);
-  result += result_;
-  return fits;
-}
-
-template <class Code>
-bool
-CompactEncoder::code_rows (
-    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
-{
-  return band.key ? code_rows<Code, false> (image, band, to)
-                  : code_rows<Code, true> (image, band, to);
-}
-
-std::size_t
-CompactEncoder::header_size () const
-{
-  return (header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize) +
-         !header_.key;
-}
-
-bool
-CompactEncoder::fits (std::size_t bytes) const
-{
-  return bytes + header_size () <= static_cast<std::size_t> (settings_.max_slice_size);
-}
-
-void
-CompactEncoder::resize (int columns)
-{
-  columns_ = columns;
-  const auto n = static_cast<std::size_t> (columns);
-  row_.reset (n, kInvalidKey);
-  upper_.reset (n, kInvalidKey);
-  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
-  others_.resize (own_.size ());
-  earlier_codes_.resize (own_.size ());
-  earlier_keys_.resize (own_.size ());
-  runs_.reserve (n + 1);
-  /* A row is coded whole before anybody looks whether it fits. */
-  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
-                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
-  bytes_.resize (std::max (bytes_.size (), most));
-}
+/* ---- decided: what the pixels of a row become ---- */
 
 /* Quantises a row. */
 inline void
@@ -257,6 +198,19 @@ CompactEncoder::load_earlier (int y, const RowBand &band)
       continue;
     earlier_keys_[x] = key_of (to_rgb (components_of (earlier_codes_[x]), limits_));
     earlier[x] = near_bits (own_[x], earlier_keys_[x], earlier_bias_) == kNearMask;
+  }
+}
+
+/* Makes a row ready to be coded. */
+template <bool Delta>
+void
+CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
+{
+  for_this_cpu ([&] { load_row (image, y); });
+  if constexpr (Delta) {
+    if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
+      find_motions (image, y, band);
+    load_earlier (y, band);
   }
 }
 
@@ -335,6 +289,8 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
   return best;
 }
 
+/* ---- written: the symbols of a row ---- */
+
 /* Codes a pixel that no neighbour replaces. @return its state */
 template <class Code, bool Delta>
 inline PixelState
@@ -384,6 +340,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
         continue;
       }
     }
+    /* Decided: which neighbour replaces the pixel, if any. */
     FullPixel full;
     std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
     if constexpr (Best) {
@@ -394,6 +351,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
       other = others[x];
     }
     const std::uint64_t chosen = either (take_left, kTakeLeft, other);
+    /* Written: the choice, or the pixel in full. */
     if (chosen != kPredict) [[likely]] {
       code.template choice<Delta> (n, static_cast<int> (chosen));
       const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
@@ -483,7 +441,17 @@ CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
     begin = end;
     valid = !valid;
   }
-  return fits (slice_code.bound ());
+  return slice_code.bound () + header_size () <=
+         static_cast<std::size_t> (settings_.max_slice_size);
+}
+
+/* ---- slices ---- */
+
+std::size_t
+CompactEncoder::header_size () const
+{
+  return (header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize) +
+         !header_.key;
 }
 
 template <class Code, bool Delta>
@@ -524,26 +492,22 @@ CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
   result_.delta_slices += !header_.key;
 }
 
-/* Makes a row ready to be coded. */
-template <bool Delta>
 void
-CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
+CompactEncoder::resize (int columns)
 {
-  for_this_cpu ([&] { load_row (image, y); });
-  if constexpr (Delta) {
-    if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
-      find_motions (image, y, band);
-    load_earlier (y, band);
-  }
-}
-
-/* Keeps a coded row for later frame sets to refer to. */
-void
-CompactEncoder::keep_row (int y)
-{
-  if (reference_.now)
-    reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
-        {row_.codes (), static_cast<std::size_t> (columns_)});
+  columns_ = columns;
+  const auto n = static_cast<std::size_t> (columns);
+  row_.reset (n, kInvalidKey);
+  upper_.reset (n, kInvalidKey);
+  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  others_.resize (own_.size ());
+  earlier_codes_.resize (own_.size ());
+  earlier_keys_.resize (own_.size ());
+  runs_.reserve (n + 1);
+  /* A row is coded whole before anybody looks whether it fits. */
+  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
+  bytes_.resize (std::max (bytes_.size (), most));
 }
 
 /* Codes all rows of a band in the columns that the header says.
@@ -574,12 +538,44 @@ CompactEncoder::code_rows (
       if (!code_row<Code, Delta> (code, true))
         return false;
     }
-    keep_row (y);
+    if (reference_.now)
+      reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
+          {row_.codes (), static_cast<std::size_t> (columns_)});
     header_.rows++;
     std::swap (row_, upper_);
   }
   close_slice (code, to);
   return true;
+}
+
+template <class Code>
+bool
+CompactEncoder::code_rows (
+    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
+{
+  return band.key ? code_rows<Code, false> (image, band, to)
+                  : code_rows<Code, true> (image, band, to);
+}
+
+bool
+CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &band,
+    const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
+{
+  reference_ = picture.reference;
+  quantisers_ = &picture.quantisers;
+  motion_memory_ = &picture.motions;
+  header_ = header;
+  result_ = {};
+  set_thresholds (picture.settings);
+  limits_ =
+      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+  orders_ = {};
+  size_sums_ = size_counts_ = Components{};
+  const bool fits = header.profile == Profile::kPacked
+                        ? code_rows<PackedWriter> (picture.image, band, to)
+                        : code_rows<EntropyWriter> (picture.image, band, to);
+  result += result_;
+  return fits;
 }
 
 } // namespace rangecast

@@ -85,10 +85,8 @@ private:
   [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
   void load_earlier (int y, const RowBand &band);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
-  void keep_row (int y);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
-  [[nodiscard]] bool fits (std::size_t bytes) const;
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ = nullptr; /* while code_partition() runs */
