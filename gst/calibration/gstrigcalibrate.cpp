@@ -668,10 +668,8 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   object_class->get_property = gst_rig_calibrate_get_property;
   object_class->finalize = gst_rig_calibrate_finalize;
   calibration_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: examined, taken, skipped, dropped",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: examined, taken, skipped, dropped");
   install_signals (klass);
 
   gst_element_class_add_static_pad_template_with_gtype (

@@ -35,6 +35,7 @@
 #include <utility>
 
 #include "clock.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "session.hpp"
 
@@ -461,9 +462,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->get_property = gst_stereo_cam_src_get_property;
   object_class->finalize = gst_stereo_cam_src_finalize;
   camera_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS, "Counters since the element was started");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
   install_capture (klass);
 

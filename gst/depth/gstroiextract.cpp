@@ -539,11 +539,9 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   object_class->get_property = gst_roi_extract_get_property;
   object_class->finalize = gst_roi_extract_finalize;
   roi_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, points-in, points-out; and the last ROI "
-          "of the first view",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, points-in, points-out; and the last ROI "
+      "of the first view");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   /**

@@ -745,11 +745,9 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   object_class->get_property = gst_stereo_depth_get_property;
   object_class->finalize = gst_stereo_depth_finalize;
   stereo_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, restricted-frames, third-frames, "
-          "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, restricted-frames, third-frames, "
+      "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template :

@@ -29,6 +29,7 @@
 #include <optional>
 #include <span>
 
+#include "common/properties.hpp"
 #include "netarrival.hpp"
 #include "rtcppackets.hpp"
 #include "rtcpreceivers.hpp"
@@ -405,13 +406,10 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
       g_param_spec_uint ("max-receivers", "Maximum receivers",
           "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
           "quarter of it",
-          1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Current number of receivers, and the RTCP packets refused and malformed since the "
-          "element was started",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost, kMutablePlaying));
+  install_stats (object_class, PROP_STATS,
+      "Current number of receivers, and the RTCP packets refused and malformed since the "
+      "element was started");
 
   element_class->change_state = gst_rtcp_reports_change_state;
   gst_element_class_add_static_pad_template (element_class, &sink_template);

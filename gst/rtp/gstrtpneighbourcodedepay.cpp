@@ -31,8 +31,9 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <vector>
 
-#include "common/statsreporter.hpp"
 #include "common/accessunitassembler.hpp"
+#include "common/properties.hpp"
+#include "common/statsreporter.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -454,7 +455,7 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
       g_param_spec_boxed ("unit-stats", "Unit statistics",
           "Counters since the element was started: packets, units, bad-units, access-units, "
           "unmarked, without-rig, lost-packets, bytes",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          GST_TYPE_STRUCTURE, kReadOnly));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -31,6 +31,7 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
 
+#include "common/properties.hpp"
 #include "netarrival.hpp"
 #include "senderfilter.hpp"
 #include "senderprobation.hpp"
@@ -388,7 +389,7 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
   if (verdict == Verdict::kUnsound)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
         ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
-                              "version %d; they belong to another codec, or are encrypted (--key)",
+         "version %d; they belong to another codec, or are encrypted (--key)",
             unsound, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
@@ -579,12 +580,9 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
       g_param_spec_uint64 ("timeout", "Timeout",
           "Silence of the current sender in nanoseconds after which another sender is accepted "
           "(G_MAXUINT64 = never)",
-          0, G_MAXUINT64, kDefaultTimeout,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: passed and foreign packets, and senders",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          0, G_MAXUINT64, kDefaultTimeout, kMutablePlaying));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: passed and foreign packets, and senders");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

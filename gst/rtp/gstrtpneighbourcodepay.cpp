@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "common/codedunits.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
 using rangecast::Status;
@@ -416,8 +417,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       g_param_spec_int ("config-interval", "Config interval",
           "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
           "frame set)",
-          -1, 3600, kDefaultConfigInterval,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          -1, 3600, kDefaultConfigInterval, kMutablePlaying));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -257,9 +257,7 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
   object_class->get_property = gst_avatar_test_src_get_property;
   object_class->finalize = gst_avatar_test_src_finalize;
   avatar_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS, "Counters since the element was started");
 
   for (GstStaticPadTemplate *pad_template :
       {&src_template, &left_template, &right_template, &third_template})

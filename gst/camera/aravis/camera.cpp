@@ -7,13 +7,13 @@
 #include <atomic>
 #include <mutex>
 
+#include "acquisition.hpp"
 #include "clock_reading.hpp"
 #include "control.hpp"
 #include "discovery.hpp"
 #include "format.hpp"
-#include "acquisition.hpp"
-#include "setup.hpp"
 #include "receive_buffer.hpp"
+#include "setup.hpp"
 #include "teardown_queue.hpp"
 
 static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
