@@ -73,7 +73,8 @@ Status validate (const Rig &rig);
 Status merge (Rig &into, const Rig &other);
 
 /** @name The file form
- *  What cv::FileStorage reads and writes: YAML or JSON by the file's ending; layout in docs/rig.md.
+ *  What cv::FileStorage reads and writes, without OpenCV: YAML or JSON by the file's ending; layout
+ *  in docs/rig.md. Not in core but in rangecast_rigfile, which needs libyaml.
  *  Loaded rigs are validated. Messages begin with the path. @{ */
 Status load_rig (const std::string &path, Rig &rig);
 Status save_rig (const std::string &path, const Rig &rig);

@@ -5,14 +5,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <opencv2/core/persistence.hpp>
 
-#include "../storage_check.hpp"
+#include "rig_text.hpp"
+#include "yaml_tree.hpp"
 
 namespace rangecast {
 namespace {
-
-constexpr int kVersion = 1;
 
 /** Thrown and caught in this file only: what is wrong with the file's contents. */
 struct BadFile {
@@ -20,15 +18,16 @@ struct BadFile {
 };
 
 std::vector<double>
-numbers (const cv::FileNode &node, const std::string &name, std::size_t count)
+numbers (const YamlNode &node, const std::string &name, std::size_t count)
 {
   std::vector<double> values;
-  if (!node.isSeq ())
+  if (node.type != YamlNode::Type::kList)
     throw BadFile{name + ": expected a list of numbers"};
-  for (const cv::FileNode &item : node) {
-    if (!item.isReal () && !item.isInt ())
+  for (const YamlNode &item : node.items) {
+    const std::optional<double> value = item.number ();
+    if (!value)
       throw BadFile{name + ": expected only numbers"};
-    values.push_back (item.real ());
+    values.push_back (*value);
   }
   if (count && values.size () != count)
     throw BadFile{name + ": expected " + std::to_string (count) + " numbers, got " +
@@ -37,21 +36,22 @@ numbers (const cv::FileNode &node, const std::string &name, std::size_t count)
 }
 
 double
-number (const cv::FileNode &parent, const std::string &name, double fallback)
+number (const YamlNode &parent, const std::string &name, double fallback)
 {
-  const cv::FileNode node = parent[name];
-  if (node.empty ())
+  const YamlNode &node = parent[name];
+  if (node.type == YamlNode::Type::kNone)
     return fallback;
-  if (!node.isReal () && !node.isInt ())
+  const std::optional<double> value = node.number ();
+  if (!value)
     throw BadFile{name + ": expected a number"};
-  return node.real ();
+  return *value;
 }
 
 Pose
-read_pose (const cv::FileNode &parent, const std::string &name)
+read_pose (const YamlNode &parent, const std::string &name)
 {
-  const cv::FileNode node = parent[name];
-  if (!node.isMap ())
+  const YamlNode &node = parent[name];
+  if (node.type != YamlNode::Type::kMap)
     throw BadFile{name + ": expected a map with rotation and translation"};
   Pose pose;
   const auto r = numbers (node["rotation"], name + ".rotation", 9);
@@ -62,33 +62,33 @@ read_pose (const cv::FileNode &parent, const std::string &name)
 }
 
 void
-read_lens (const cv::FileNode &node, Intrinsics &intrinsics, Distortion &distortion)
+read_lens (const YamlNode &node, Intrinsics &intrinsics, Distortion &distortion)
 {
   const auto k = numbers (node["intrinsics"], "intrinsics", 4);
   intrinsics = {k[0], k[1], k[2], k[3]};
-  if (!node["distortion"].empty ())
+  if (node["distortion"].type != YamlNode::Type::kNone)
     distortion = numbers (node["distortion"], "distortion", 0);
 }
 
 /** A serial number without quotes is a number to YAML, which may have lost digits of it. */
 std::string
-read_camera (const cv::FileNode &parent)
+read_camera (const YamlNode &parent)
 {
-  const cv::FileNode node = parent["camera"];
-  if (node.empty ())
+  const YamlNode &node = parent["camera"];
+  if (node.type == YamlNode::Type::kNone)
     return {};
-  if (!node.isString ())
+  if (node.type != YamlNode::Type::kText)
     throw BadFile{"camera: expected a text (a serial number stands in quotes)"};
-  return node.string ();
+  return node.text;
 }
 
 std::optional<PartnerCamera>
-read_partner (const cv::FileNode &parent, const char *name)
+read_partner (const YamlNode &parent, const char *name)
 {
-  const cv::FileNode node = parent[name];
-  if (node.empty ())
+  const YamlNode &node = parent[name];
+  if (node.type == YamlNode::Type::kNone)
     return {};
-  if (!node.isMap ())
+  if (node.type != YamlNode::Type::kMap)
     throw BadFile{std::string (name) + ": expected a map"};
   PartnerCamera partner;
   partner.camera = read_camera (node);
@@ -98,18 +98,17 @@ read_partner (const cv::FileNode &parent, const char *name)
 }
 
 View
-read_view (const cv::FileNode &node)
+read_view (const YamlNode &node)
 {
-  if (!node.isMap ())
+  if (node.type != YamlNode::Type::kMap)
     throw BadFile{"expected a map"};
   View view;
-  const cv::FileNode id = node["id"];
-  /* OpenCV makes -1 of an integer that is too large, so the value is not worth printing. */
-  if (!id.isInt () || static_cast<int> (id) < 0 || static_cast<int> (id) >= kMaxViews)
+  const std::optional<int> id = node["id"].integer ();
+  if (!id || *id < 0 || *id >= kMaxViews)
     throw BadFile{"id: expected an integer from 0 to " + std::to_string (kMaxViews - 1)};
-  view.id = static_cast<int> (id);
-  if (node["name"].isString ())
-    view.name = node["name"].string ();
+  view.id = *id;
+  if (node["name"].type == YamlNode::Type::kText)
+    view.name = node["name"].text;
   view.camera = read_camera (node);
   const auto size = numbers (node["image_size"], "image_size", 2);
   for (double side : size)
@@ -129,19 +128,19 @@ read_view (const cv::FileNode &node)
 }
 
 Rig
-read_rig (const cv::FileStorage &file)
+read_rig (const YamlNode &file)
 {
-  const cv::FileNode version = file["rangecast_rig"];
-  if (!version.isInt ())
+  const std::optional<int> version = file["rangecast_rig"].integer ();
+  if (!version)
     throw BadFile{"no \"rangecast_rig\" version: this is not a rig file"};
-  if (static_cast<int> (version) != kVersion)
-    throw BadFile{"rangecast_rig version " + std::to_string (static_cast<int> (version)) +
-                  ", expected " + std::to_string (kVersion)};
-  const cv::FileNode views = file["views"];
-  if (!views.isSeq ())
+  if (*version != kRigFileVersion)
+    throw BadFile{"rangecast_rig version " + std::to_string (*version) + ", expected " +
+                  std::to_string (kRigFileVersion)};
+  const YamlNode &views = file["views"];
+  if (views.type != YamlNode::Type::kList)
     throw BadFile{"views: expected a list"};
   Rig rig;
-  for (const cv::FileNode &node : views) {
+  for (const YamlNode &node : views.items) {
     if (rig.views.size () >= kMaxViews)
       throw BadFile{"views: at most " + std::to_string (kMaxViews)};
     try {
@@ -151,71 +150,6 @@ read_rig (const cv::FileStorage &file)
     }
   }
   return rig;
-}
-
-void
-write_numbers (cv::FileStorage &file, const char *name, std::span<const double> values)
-{
-  file.startWriteStruct (name, cv::FileNode::SEQ | cv::FileNode::FLOW);
-  for (double v : values)
-    file << v;
-  file.endWriteStruct ();
-}
-
-void
-write_pose (cv::FileStorage &file, const char *name, const Pose &pose)
-{
-  const double t[] = {pose.translation.x, pose.translation.y, pose.translation.z};
-  file.startWriteStruct (name, cv::FileNode::MAP);
-  write_numbers (file, "rotation", pose.rotation);
-  write_numbers (file, "translation", t);
-  file.endWriteStruct ();
-}
-
-void
-write_lens (cv::FileStorage &file, const Intrinsics &k, const Distortion &distortion)
-{
-  const double values[] = {k.fx, k.fy, k.cx, k.cy};
-  write_numbers (file, "intrinsics", values);
-  if (!distortion.empty ())
-    write_numbers (file, "distortion", distortion);
-}
-
-void
-write_camera (cv::FileStorage &file, const std::string &camera)
-{
-  if (!camera.empty ())
-    file << "camera" << camera;
-}
-
-void
-write_partner (cv::FileStorage &file, const char *name, const std::optional<PartnerCamera> &partner)
-{
-  if (!partner)
-    return;
-  file.startWriteStruct (name, cv::FileNode::MAP);
-  write_camera (file, partner->camera);
-  write_lens (file, partner->intrinsics, partner->distortion);
-  write_pose (file, "partner_from_left", partner->partner_from_left);
-  file.endWriteStruct ();
-}
-
-void
-write_view (cv::FileStorage &file, const View &view)
-{
-  const double size[] = {double (view.width), double (view.height)};
-  file.startWriteStruct ("", cv::FileNode::MAP);
-  file << "id" << view.id;
-  if (!view.name.empty ())
-    file << "name" << view.name;
-  write_camera (file, view.camera);
-  write_numbers (file, "image_size", size);
-  write_lens (file, view.intrinsics, view.distortion);
-  write_pose (file, "world_from_view", view.world_from_view);
-  file << "depth_unit" << view.depth_unit_m << "near" << view.near_m << "far" << view.far_m;
-  write_partner (file, "right", view.right);
-  write_partner (file, "third", view.third);
-  file.endWriteStruct ();
 }
 
 } // namespace
@@ -232,18 +166,14 @@ load_rig (const std::string &path, Rig &rig)
         path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
   if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
     return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
-  if (Status s = check_storage (path, {.max_bytes = kMaxRigFileSize}); !s.ok ())
+  YamlNode file;
+  if (Status s = read_yaml (path, kMaxRigFileSize, file); !s.ok ())
     return {s.code (), s.message () + "; expected a rig file (YAML or JSON)"};
   Rig loaded;
   try {
-    const cv::FileStorage file (path, cv::FileStorage::READ);
-    if (!file.isOpened ())
-      return {StatusCode::kBadData, path + ": cannot be read as YAML or JSON"};
     loaded = read_rig (file);
   } catch (const BadFile &bad) {
     return {StatusCode::kBadData, path + ": " + bad.what};
-  } catch (const std::exception &) { // cv::Exception's own text is many lines of source positions
-    return {StatusCode::kBadData, path + ": is not well-formed YAML or JSON; expected a rig file"};
   }
   if (Status s = validate (loaded); !s.ok ())
     return {s.code (), path + ": " + s.message ()};
@@ -258,18 +188,7 @@ save_rig (const std::string &path, const Rig &rig)
     return {s.code (), path + ": not written: " + s.message ()};
   if (Status s = check_extension (path, kRigExtensions); !s.ok ())
     return s;
-  std::string text; /* OpenCV cannot say what is wrong with a file */
-  try {
-    cv::FileStorage file (path, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
-    file << "rangecast_rig" << kVersion;
-    file.startWriteStruct ("views", cv::FileNode::SEQ);
-    for (const View &view : rig.views)
-      write_view (file, view);
-    file.endWriteStruct ();
-    text = file.releaseAndGetString ();
-  } catch (const std::exception &e) {
-    return {StatusCode::kBadValue, path + ": not written: " + e.what ()};
-  }
+  const std::string text = rig_text (rig, path.ends_with (".json"));
   std::ofstream file (path, std::ios::binary);
   if (!file)
     return {StatusCode::kNotFound, path + ": cannot be opened for writing"};
