@@ -14,6 +14,7 @@
 #include <rangecast/surface/orbit.hpp>
 #include <string>
 #include <vector>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::PartnerCamera;
 using rangecast::Rig;
