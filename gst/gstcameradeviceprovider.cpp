@@ -3,9 +3,9 @@
  * SECTION:provider-rangecastdeviceprovider
  * @title: rangecastdeviceprovider
  *
- * Lists machine-vision cameras, GigE Vision by Aravis' discovery and USB3 Vision by libusb, and the
- * stereo pairs of known rigs whose cameras are all there. While it is started, USB cameras appear
- * and disappear as they are plugged; the networks are asked again every 3 to 12 seconds.
+ * Lists machine-vision cameras (GigE Vision through Aravis, USB3 Vision through libusb) and the
+ * stereo pairs of known rigs whose cameras are present. While it is started, USB cameras are
+ * followed by hotplug events, and networks are searched every 3 to 12 seconds.
  *
  * ## Example launch line
  * |[

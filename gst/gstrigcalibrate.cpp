@@ -3,10 +3,10 @@
  * SECTION:element-rigcalibrate
  * @title: rigcalibrate
  *
- * Calibrates any number of cameras from pictures of a chessboard or ChArUco board: each camera,
- * each stereo pair, and where all of them stand. Picks the frames itself, says by element messages
- * which camera saw the board and what is still missing, and writes the rig file that all elements
- * read, at EOS or on the action signal #GstRigCalibrate::calibrate.
+ * Calibrates any number of cameras, stereo pairs and their poses from images of a chessboard or
+ * ChArUco board. Selects frames automatically, reports in element messages which camera saw the
+ * board and what is still missing, and writes the rig file at EOS or on the action signal
+ * #GstRigCalibrate::calibrate.
  *
  * ## Example launch line
  * |[
@@ -342,9 +342,9 @@ nothing_came (GstRigCalibrate *self, const CalibrationSources &cameras)
   if (const CalibrationSource *camera = without_caps (cameras))
     return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
                                        ": no images arrived; expected some on every pad"};
-  return {
-      StatusCode::kNotFound, "no images with matching times arrived on all pads; expected capture "
-                             "times that differ by less than half a frame, or by max-skew"};
+  return {StatusCode::kNotFound,
+      "no images with matching times arrived on all pads; expected capture "
+      "times that differ by less than half a frame, or by max-skew"};
 }
 
 /* All pads have ended: calibrates, unless that was done already. */

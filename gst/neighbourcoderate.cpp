@@ -33,12 +33,14 @@ NeighbourCodeRateSettings::install (GObjectClass *klass)
           0, G_MAXUINT, defaults.target_bitrate, live));
   g_object_class_install_property (klass, PROP_MAX_DEPTH_THRESHOLD,
       g_param_spec_int ("max-depth-threshold", "Maximum depth threshold",
-          "Upper limit of the depth threshold with target-bitrate, in quantisation steps", 0, 65535,
-          defaults.max_depth_threshold, live));
+          "Upper limit of the depth threshold with target-bitrate, in quantisation steps (at least "
+          "depth-threshold)",
+          0, 65535, defaults.max_depth_threshold, live));
   g_object_class_install_property (klass, PROP_MAX_COLOUR_THRESHOLD,
       g_param_spec_int ("max-colour-threshold", "Maximum colour threshold",
-          "Upper limit of the colour threshold with target-bitrate, in quantisation steps", 0, 255,
-          defaults.max_colour_threshold, live));
+          "Upper limit of the colour threshold with target-bitrate, in quantisation steps (at "
+          "least colour-threshold)",
+          0, 255, defaults.max_colour_threshold, live));
   g_object_class_install_property (klass, PROP_ADAPTIVE_BITRATE,
       g_param_spec_boolean ("adaptive-bitrate", "Adaptive bit rate",
           "Adapt the bit rate between min-bitrate and target-bitrate to the receiver reports "
@@ -46,8 +48,9 @@ NeighbourCodeRateSettings::install (GObjectClass *klass)
           defaults.adaptive, GParamFlags (live & ~GST_PARAM_CONTROLLABLE)));
   g_object_class_install_property (klass, PROP_MIN_BITRATE,
       g_param_spec_uint ("min-bitrate", "Minimum bit rate",
-          "Lower limit of the bit rate with adaptive-bitrate, in bits per second", 1000, G_MAXUINT,
-          defaults.min_bitrate, live));
+          "Lower limit of the bit rate with adaptive-bitrate, in bits per second (at most "
+          "target-bitrate)",
+          1000, G_MAXUINT, defaults.min_bitrate, live));
   g_object_class_install_property (klass, PROP_MIN_FRAMERATE,
       gst_param_spec_fraction ("min-framerate", "Minimum frame rate",
           "Minimum number of frame sets per second to keep when adaptive-bitrate drops frame sets",
