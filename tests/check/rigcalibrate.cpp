@@ -435,7 +435,7 @@ GST_START_TEST (test_calibrate_signal_gives_a_result_and_the_stream_goes_on)
   Calibrate c (1);
   g_signal_emit_by_name (c.element, "calibrate");
   std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
-  fail_unless (text.find ("no pictures") != std::string::npos, text.c_str ());
+  fail_unless (text.find ("no images") != std::string::npos, text.c_str ());
   c.push_boards (10);
   c.wait_until_examined (10);
   g_signal_emit_by_name (c.element, "calibrate");
