@@ -336,8 +336,9 @@ GST_START_TEST (test_boards_that_were_seen_but_not_kept_are_counted)
   for (int i = 0; i < 5; i++)
     c.push_picture (0, i * GST_SECOND, picture);
   c.end ();
-  c.expect_error ("sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
-                  "expected at least 6. Of the rest 4 were as one before: hold the board still");
+  c.expect_error (
+      "sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
+      "expected at least 6. Of the rest 4 were similar to an earlier one: hold the board still");
 }
 GST_END_TEST;
 
