@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Makes the pictures of docs/gallery.md. usage: docs/make-gallery.sh [FOLDER [MODEL.glb]], by default docs/images and the
+# Makes the pictures of docs/guide/viewing.md. usage: docs/make-gallery.sh [FOLDER [MODEL.glb]], by default docs/images and the
 # scanned head of the test data; without that, the built-in figure. Wants ffmpeg for the film (Debian package ffmpeg)
 # and python3-opencv for the bad views.
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Makes the picture of docs/viewing.md: rangecast-viewer in windows that nobody sees (Xvfb, xdotool). usage:
+# Makes the picture of docs/guide/viewing.md: rangecast-viewer in windows that nobody sees (Xvfb, xdotool). usage:
 # docs/make-viewer-picture.sh [FILE [MODEL.glb]], by default docs/images/viewer.jpg and the dressed head of the test data; without
 # that, the built-in figure.
 set -euo pipefail

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Sourced by the scripts of hosts: the part of a launch string between coded frame sets and UDP, on
-# either side, with what the options in rtp_usage_* ask for. docs/streaming.md explains it.
+# either side, with what the options in rtp_usage_* ask for. docs/guide/streaming.md explains it.
 
 rtp_fec= rtp_rtx= rtp_key= rtp_interface= rtp_ttl=1 rtp_feedback= rtp_adaptive= rtp_mtu=
 

@@ -14,7 +14,7 @@ usage: top.sh [options] [SOURCE]
   --forward udp://HOST:PORT  show nothing: send what comes there, for another top.sh
 
 Hosts send there when RANGECAST_STATS=udp://HOST:PORT is set for camera-host.sh, parent-host.sh,
-viewer-host.sh, demo.sh or rangecast-run. Fields and units: docs/statistics.md.
+viewer-host.sh, demo.sh or rangecast-run. Fields and units: docs/guide/statistics.md.
 
 Lost and late count from the host's start; +N is what came with the last message. A row whose
 messages stay away says for how long."""

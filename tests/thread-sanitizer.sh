@@ -12,7 +12,7 @@ tests=("$@")
   neighbourcodedec concealment temporal rangecombine cylinderfilter cylindercolour rangesplit rtploss avatarstream
   avatartestsrc neighbourcodeparse neighbourcodeseek stopqueries)
 [ -d "$build" ] || meson setup "$build" -Db_sanitize=thread -Db_lundef=false -Dbenchmarks=disabled || exit 1
-ninja -C "$build" "${tests[@]/#/tests/check/check_}" gst/libgstrangecast.so >"$build/tsan-build.log" || {
+ninja -C "$build" "${tests[@]/#/tests/check/check_}" plugins >"$build/tsan-build.log" || {
   tail "$build/tsan-build.log"
   exit 1
 }

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "../glshader.hpp"
+#include "glshader.hpp"
 
 const char *const kBackgroundFunction = R"(
 precision highp float;

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
-#include <rangecast/strips/view_matrices.hpp>
+#include <rangecast/surface/view_matrices.hpp>
 #include <string>
 
-#include "../glshader.hpp"
+#include "glshader.hpp"
 
 using rangecast::BlendVertex;
 using rangecast::Mat3;

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string>
 
-#include "../glshader.hpp"
 #include "backgroundpainter.hpp"
+#include "glshader.hpp"
 
 #ifndef GL_DRAW_FRAMEBUFFER_BINDING
 #define GL_DRAW_FRAMEBUFFER_BINDING 0x8CA6

@@ -4,7 +4,7 @@
 #include <gst/gl/gl.h>
 
 #include <rangecast/geometry/range_image.hpp>
-#include <rangecast/strips/view_matrices.hpp>
+#include <rangecast/surface/view_matrices.hpp>
 
 /** Render targets in which views of one surface are blended, and the pass that divides: first the
  *  depth of the nearest surface, then sums of colour times weight and of weights. Their memory does

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <rangecast/geometry/rig.hpp>
-#include <rangecast/strips/orbit.hpp>
-#include <rangecast/strips/strips.hpp>
+#include <rangecast/surface/orbit.hpp>
+#include <rangecast/surface/strips.hpp>
 #include <span>
 
 /** What the painters draw: one picture of a frame set. */

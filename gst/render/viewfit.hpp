@@ -3,10 +3,10 @@
 
 #include <gst/gst.h>
 
-#include <rangecast/strips/scene_fit.hpp>
+#include <rangecast/surface/scene_fit.hpp>
 #include <vector>
 
-#include "../stripscene.hpp"
+#include "scene.hpp"
 
 /** Fits the camera to the first frame sets of a stream: to the first one that has points, then
  * again every half second until the view stays about the same and every view that had points still

@@ -3,7 +3,7 @@
 
 #include <array>
 #include <rangecast/geometry/range_image.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <span>
 
 #include "gstrangemeta.h"

@@ -13,7 +13,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <gige-camera.hpp>
+#include "simulators/gige-camera.hpp"
 #include <string>
 #include <vector>
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Prints the table of docs/benchmarks.md from what codec_bench --json wrote.
+"""Prints the table of tests/bench/results/codec.md from what codec_bench --json wrote.
 
     codec-table.py NAME=FILE.json [NAME=FILE.json ...] [--max-depth-rms MM]
 

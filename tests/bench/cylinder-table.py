@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The tables of docs/benchmarks.md from what cylinder_bench --truth or --colour wrote.
+"""The tables of tests/bench/results/overlap.md from what cylinder_bench --truth or --colour wrote.
 
     cylinder-table.py FILE.json ...
 """

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# What docs/benchmarks.md says of the neighbour code: runs codec_bench on all data and prints the table.
+# What tests/bench/results/codec.md says of the neighbour code: runs codec_bench on all data and prints the table.
 # usage: measure-codecs.sh DATA-DIR OUT-DIR [ROUNDS]. A few minutes. DATA-DIR has lps_head, stanford_bunny_range,
 # open3d_rgbd, luxonis_people_stereo; OUT-DIR gets NAME.json, NAME.txt, head.svg.
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The tables of docs/scaling.md: records streams of 1 to 16 views, measures a parent host with them, and what follows for 64
+# The tables of tests/bench/results/scaling.md: records streams of 1 to 16 views, measures a parent host with them, and what follows for 64
 # views and 10,000 viewers.
 # usage: measure-parent.sh OUT-DIR [SECONDS] [VIEWS...]   (default: 5 seconds each; 1 2 4 8 16)
 # Recordings that are in OUT-DIR already are taken again. OUT-DIR/parent.json holds all numbers.

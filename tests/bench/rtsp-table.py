@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What one more viewer costs rtsp-server, as a table for docs/rtsp.md.
+"""What one more viewer costs rtsp-server, as a table for tests/bench/results/rtsp.md.
 
 usage: rtsp-table.py [--viewers 1,2,5,...] [--frame-sets N] [--source LAUNCH]   (after: source pipelines/env.sh)
 Every row measures the server with N viewers by UDP, then by TCP, and beside it, in the same run, gst-launch-1.0 with the

@@ -7,7 +7,7 @@ usage: scaling-model.py [--measured FILE] [--views N] [--viewers N] [--link-gbit
 
 A simulation, not a forecast: the packets of a frame set pass each hop one after the other; a hop copies each packet for
 all of its receivers, and is as slow as the slower of its CPU and its link. --measured takes the JSON of parent_bench and
-replaces the constants below by what that machine did. docs/scaling.md has the sums. Deterministic: no random numbers.
+replaces the constants below by what that machine did. tests/bench/results/scaling.md has the sums. Deterministic: no random numbers.
 """
 import argparse
 import json
@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 # Bytes of a wire packet beyond its RTP payload: RTP 12, UDP 8, IPv4 20, Ethernet 14 + 4, preamble and gap 20.
 OVERHEAD = 12 + 8 + 20 + 14 + 4 + 20
 SLICE = 1200  # bytes of a slice at most: neighbourcodeenc's max-slice-size
-MAX_VIEWS, MAX_RIG_PIXELS, MAX_ACCESS_UNIT = 64, 1 << 27, 32 << 20  # docs/limits.md
+MAX_VIEWS, MAX_RIG_PIXELS, MAX_ACCESS_UNIT = 64, 1 << 27, 32 << 20  # docs/engineering/limits.md
 
-# Bytes of one view of a frame set: the built-in figure, four views, background cut off (docs/scaling.md).
+# Bytes of one view of a frame set: the built-in figure, four views, background cut off (tests/bench/results/scaling.md).
 BYTES = {
     ("320x240", "plain"): 34100, ("320x240", "packed"): 8700, ("320x240", "entropy"): 6900, ("320x240", "temporal"): 2400,
     ("640x480", "plain"): 93200, ("640x480", "packed"): 23100, ("640x480", "entropy"): 15900, ("640x480", "temporal"): 5700,
@@ -31,7 +31,7 @@ BYTES = {
 
 @dataclass(frozen=True)
 class Constants:
-    """What one machine takes. Measured with parent_bench; see docs/scaling.md."""
+    """What one machine takes. Measured with parent_bench; see tests/bench/results/scaling.md."""
     parent_us: float = 13.0    # CPU of the parent for a packet, in and out
     parent_serial: float = 0.4  # share of that in the one thread that puts frame sets out
     relay_in_us: float = 6.2   # CPU of a relay to take a packet

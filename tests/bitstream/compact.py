@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Pixels of slices in the profiles packed and entropy, written from docs/bitstream.md alone.
+"""Pixels of slices in the profiles packed and entropy, written from docs/formats/bitstream.md alone.
 
 The tables of both profiles are read from that page, so that they are what it says.
 """
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Callable, NamedTuple, Optional, Union
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "bitstream.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "formats" / "bitstream.md"
 PACKED, ENTROPY = 1, 2
 MAX_OVERRUN = 16
 BLOCK = 16  # rows and columns that share motion

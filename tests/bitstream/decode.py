@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Decodes a byte stream of the neighbour code, written from docs/bitstream.md and docs/rig.md alone.
+"""Decodes a byte stream of the neighbour code, written from docs/formats/bitstream.md and docs/formats/rig.md alone.
 
 Shares no line with the plugin, so that where both give the same pictures the documents say what the plugin does.
 
@@ -343,7 +343,7 @@ def parse_rig_blob(blob: bytes) -> View:
 
 
 def is_lens(lens: list[float]) -> bool:
-    """Focal lengths and principal point lie within the limits of docs/rig.md."""
+    """Focal lengths and principal point lie within the limits of docs/formats/rig.md."""
     return all(0 < f <= 1e6 for f in lens[:2]) and all(abs(c) <= 1e6 for c in lens[2:])
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Makes damaged.rcnc of coarse.rcnc: one access unit for each thing that docs/bitstream.md says of damage.
+"""Makes damaged.rcnc of coarse.rcnc: one access unit for each thing that docs/formats/bitstream.md says of damage.
 
 usage: make-damaged.py coarse.rcnc damaged.rcnc
 """

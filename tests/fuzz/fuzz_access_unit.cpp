@@ -8,7 +8,7 @@
 #include <cstring>
 #include <memory>
 #include <rangecast/neighbourcode/access_unit.hpp>
-#include <rangecast/neighbourcode/isa.hpp>
+#include <rangecast/neighbourcode/compact/isa.hpp>
 
 using namespace rangecast;
 

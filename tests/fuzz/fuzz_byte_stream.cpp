@@ -2,7 +2,7 @@
 /* Any bytes as a byte stream: read to its end in growing pieces; and as a file, by time. */
 #include <algorithm>
 #include <cstdlib>
-#include <rangecast/neighbourcode/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 
 using namespace rangecast;
 

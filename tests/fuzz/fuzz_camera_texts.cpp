@@ -2,9 +2,9 @@
 /* Any bytes as what stereocamsrc reads besides pictures: a features string, and a camera's answer
  * that holds its user-defined name. */
 #include <algorithm>
-#include <camera_features.hpp>
+#include "camera/aravis/features.hpp"
 #include <cstdlib>
-#include <user_name.hpp>
+#include "camera/aravis/user_name.hpp"
 
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)

@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeinfo.hpp>
-#include <rangecast/neighbourcode/byte_stream.hpp>
-#include <rangecast/neighbourcode/unit.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
 
 using namespace rangecast;

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <rangecast/cpu.hpp>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
-#include <rangecast/neighbourcode/isa.hpp>
-#include <rangecast/neighbourcode/symbols.hpp>
+#include <rangecast/neighbourcode/compact/isa.hpp>
+#include <rangecast/neighbourcode/bitstream/symbols.hpp>
 
 using namespace rangecast;
 

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <rangecast/neighbourcode/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <string>
 #include <vector>
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Camera hosts, a parent and viewers that are hosts of a network of their own: docs/hosts.md.
+# Camera hosts, a parent and viewers that are hosts of a network of their own: docs/guide/hosts.md.
 source "$source_dir/tests/pipelines/netns.sh"
 
 # Frame sets of a file with points in both views, and all of them.
@@ -204,13 +204,14 @@ test_a_stopped_viewer_costs_no_memory () {
   [ "$(resident_kb "$viewer")" -lt $((viewer_before + 16384)) ] || fail "viewer: $viewer_before kB, then $(resident_kb "$viewer")"
 }
 
-# The launch strings of docs/streaming.md, as they stand there but for the ports.
+# The launch strings of docs/guide/streaming.md, as they stand there but for the ports.
 test_launch_strings_of_the_docs_run () {
   local line i file
   net_need
   net_open
   net_host here
-  awk '/^```$/ { inside = !inside; next } inside' "$source_dir/docs/streaming.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' >lines
+  awk '/^## / { section = $0 } section != "## Launch strings" { next } /^```$/ { inside = !inside; next } inside' \
+    "$source_dir/docs/guide/streaming.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' >lines
   [ "$(wc -l <lines)" = 6 ] || fail "expected three receivers and three senders: $(wc -l <lines)"
   while read -r line; do
     net_on here timeout -k 5 100 bash -c "exec $line" >>launch.log 2>&1 &

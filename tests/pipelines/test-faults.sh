@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Hosts of the main job that fail: camera hosts, the parent and the viewer killed, stopped, started again.
 # What was lost is told from the capture times in what the viewer got (stream-report), which no busy
-# machine changes; each test prints its line of docs/reliability.md.
+# machine changes; each test prints its line of tests/bench/results/reliability.md.
 source "$source_dir/tests/pipelines/faults.sh"
 
 test_a_killed_camera_host_stops_nobody_and_comes_back () {

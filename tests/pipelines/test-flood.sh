@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # What nobody asked for, at every UDP port of the parent and of the viewer, beside a good stream.
-# RANGECAST_FLOOD_SECONDS=60 makes the flood as long as docs/reliability.md has it.
+# RANGECAST_FLOOD_SECONDS=60 makes the flood as long as tests/bench/results/reliability.md has it.
 source "$source_dir/tests/pipelines/faults.sh"
 flood_seconds=${RANGECAST_FLOOD_SECONDS:-12}
 

@@ -18,7 +18,7 @@ test_application_builds_against_the_installed_library () {
   [[ "$(meson introspect --buildoptions "$build" | tr -d ' \n')" != *'"b_sanitize","value":"address'* ]] || skip "sanitized build"
   install_below_here
   # shellcheck disable=SC2046
-  cc "$pipelines/count-points.c" -o count-points \
+  cc "$pipelines/examples/count-points.c" -o count-points \
     $(pkg-config --define-variable="prefix=$prefix" --cflags --libs gstrange-1.0) \
     $(pkg-config --cflags --libs gstreamer-app-1.0) "-Wl,-rpath,$(dirname "$(find "$prefix" -name 'libgstrange-1.0.so')")"
   expect_error "usage" ./count-points
@@ -26,13 +26,58 @@ test_application_builds_against_the_installed_library () {
 
 test_elements_are_found_where_they_were_installed () {
   install_below_here
-  local plugins
+  local plugins plugin elements element
   plugins=$(pkg-config --define-variable="prefix=$prefix" --variable=pluginsdir gstrangecast)
-  [ -f "$plugins/libgstrangecast.so" ] || fail "no plugin in $plugins"
-  GST_PLUGIN_PATH=$plugins GST_REGISTRY=$PWD/registry.bin LD_LIBRARY_PATH= gst-inspect-1.0 rangecast >inspect.txt
-  for element in stereodepth roiextract neighbourcodeenc neighbourcodedec rangemux cylinderfilter striprender; do
-    grep -q "^  $element: " inspect.txt || fail "no element $element: $(cat inspect.txt)"
+  export GST_PLUGIN_PATH=$plugins GST_REGISTRY=$PWD/registry.bin LD_LIBRARY_PATH=
+  while read -r plugin elements; do
+    [ -f "$plugins/libgst$plugin.so" ] || fail "no plugin $plugin in $plugins"
+    gst-inspect-1.0 "$plugin" >inspect.txt
+    for element in $elements; do
+      grep -q "^  $element: " inspect.txt || fail "no element $element: $(cat inspect.txt)"
+    done
+  done <<END
+neighbourcode neighbourcodeenc neighbourcodedec neighbourcodeparse
+rangeconvert rangesplit plyenc
+rangedepth stereodepth roiextract rangecombine
+rangemux rangemux rangedemux
+rangerender cylinderfilter striprender rangerender
+rangetestsrc avatartestsrc
+rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard rtcpreports
+END
+}
+
+test_plugins_for_streams_need_no_heavy_libraries () {
+  local plugin needed
+  for plugin in codec/libgstneighbourcode.so rtp/libgstrtpneighbourcode.so mux/libgstrangemux.so; do
+    needed=$(ldd "${RANGECAST_BUILD:-$source_dir/build}/gst/$plugin")
+    ! grep -E 'opencv|aravis|ceres|assimp|libGL|libgstgl' <<<"$needed" || fail "$plugin needs them"
+    grep -q libgstreamer <<<"$needed" || fail "$plugin: $needed"
   done
+}
+
+# Hides libraries from all plugins, as on a host where their packages are missing.
+without () { # library... -- command...
+  local hide=
+  while [ "$1" != -- ]; do
+    hide+="for file in \$(ldconfig -p | sed -n 's/.*[[:space:]]\($1\.so[^ ]*\) .*=> //p'); do mount --bind /dev/null \"\$file\"; done; "
+    shift
+  done
+  shift
+  unshare -m bash -ec "$hide"' exec "$@"' without "$@"
+}
+
+test_a_missing_library_costs_only_its_own_elements () {
+  unshare -m true 2>/dev/null || skip "no right to make mount namespaces"
+  export GST_REGISTRY=$PWD/registry.bin GST_REGISTRY_FORK=no
+  without libopencv_core libaravis-0.8 libassimp -- gst-inspect-1.0 >inspect.txt 2>/dev/null
+  for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit; do
+    grep -q " $element: " inspect.txt || fail "no element $element"
+  done
+  for element in stereodepth stereocamsrc avatartestsrc; do
+    ! grep -q " $element: " inspect.txt || fail "$element is there without its library"
+  done
+  without libopencv_core libaravis-0.8 libassimp -- gst-launch-1.0 -q filesrc "location=$source_dir/tests/data/default.rcnc" \
+    ! neighbourcodeparse ! neighbourcodedec ! rangesplit name=s s.depth_0 ! fakesink || fail "cannot decode without OpenCV"
 }
 
 test_programs_have_names_that_say_whose_they_are () {

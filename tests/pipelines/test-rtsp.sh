@@ -44,8 +44,8 @@ test_joiner_gets_a_key_frame_set_at_once () {
   trap 'kill -KILL $server $first 2>/dev/null || true' EXIT
   until_true 30 grep -q playing first.txt
   sleep 2
-  timeout -k 5 60 gst-launch-1.0 -v -e rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay \
-    ! identity silent=false eos-after=30 ! fakesink sync=false >joiner.log 2>&1 || fail "$(tail -n 5 joiner.log)"
+  until_eos joiner.log -v rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay \
+    ! identity silent=false eos-after=30 ! fakesink sync=false || fail "$(tail -n 5 joiner.log)"
   grep 'last-message = chain' joiner.log | awk '!/delta-unit/ && !found { print NR; found = 1 }' >place.txt
   [ -s place.txt ] || fail "no key frame set came"
   [ "$(cat place.txt)" -le 10 ] || fail "the first key frame set was number $(cat place.txt)"
@@ -171,9 +171,10 @@ test_parent_of_two_cameras_is_served () {
   stop_server
 }
 
-watch_by_multicast () { # host
-  net_on "$1" timeout -k 5 90 gst-launch-1.0 -e rtspsrc "location=rtsp://$(net_address parent):8554/live" protocols=udp-mcast latency=50 \
-    ! rtpneighbourcodedepay ! neighbourcodedec ! identity eos-after=20 ! fakesink sync=false >"$1.log" 2>&1
+watch_by_multicast () { # host; as until_eos does
+  (net_on "$1" timeout -k 5 90 gst-launch-1.0 -e rtspsrc "location=rtsp://$(net_address parent):8554/live" protocols=udp-mcast latency=50 \
+    ! rtpneighbourcodedepay ! neighbourcodedec ! identity eos-after=20 ! fakesink sync=false >"$1.log" 2>&1) || true
+  grep -q 'Got EOS' "$1.log"
 }
 test_multicast_reaches_two_hosts () {
   net_need
@@ -187,8 +188,6 @@ test_multicast_reaches_two_hosts () {
   near=$!
   watch_by_multicast far || fail "$(tail -n 5 far.log)"
   wait "$near" || fail "$(tail -n 5 near.log)"
-  grep -q 'Got EOS' near.log || fail "$(tail -n 5 near.log)"
-  grep -q 'Got EOS' far.log || fail "$(tail -n 5 far.log)"
   stop_server
 }
 
@@ -209,8 +208,8 @@ test_rig_that_changes_reaches_viewers () {
   serve -- "concat name=c ! rtpneighbourcodepay name=pay0
     avatartestsrc num-buffers=45 is-live=true views=2 ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc ! c.
     avatartestsrc is-live=true views=3 ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc ! c."
-  timeout -k 5 90 gst-launch-1.0 -v -e rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec \
-    ! identity name=decoded eos-after=80 ! fakesink sync=false >player.log 2>&1 || fail "$(tail -n 5 player.log)"
+  until_eos player.log -v rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec \
+    ! identity name=decoded eos-after=80 ! fakesink sync=false || fail "$(tail -n 5 player.log)"
   grep 'decoded.GstPad:src: caps' player.log | grep -q 'views=(int)2' || fail "$(cut -c1-300 player.log)"
   grep 'decoded.GstPad:src: caps' player.log | grep -q 'views=(int)3' || fail "$(cut -c1-300 player.log)"
   stop_server
@@ -219,9 +218,9 @@ test_rig_that_changes_reaches_viewers () {
 test_picture_of_a_stream () {
   need_gl
   serve -- "$figure"
-  timeout -k 5 90 gst-launch-1.0 -e rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec ! cylinderfilter \
+  until_eos player.log rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec ! cylinderfilter \
     ! striprender ! "video/x-raw(memory:GLMemory),width=320,height=240" ! gldownload ! videoconvert ! identity eos-after=5 \
-    ! pngenc ! multifilesink location=view-%02d.png >player.log 2>&1 || fail "$(tail -n 5 player.log)"
+    ! pngenc ! multifilesink location=view-%02d.png || fail "$(tail -n 5 player.log)"
   expect_file view-02.png 5000
   timeout -k 5 90 gst-launch-1.0 playbin "uri=$url" video-sink="videoconvert ! identity eos-after=5 ! pngenc ! multifilesink location=play-%02d.png" \
     >player.log 2>&1 || fail "$(tail -n 5 player.log)"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../for_this_cpu.hpp"
+#include "../base/for_this_cpu.hpp"
 
 namespace rangecast {
 

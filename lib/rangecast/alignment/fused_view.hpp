@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "../geometry/range_image.hpp"
-#include "pixel_transfer.hpp"
+#include "../geometry/pixel_transfer.hpp"
 #include "surface_planes.hpp"
 
 namespace rangecast {

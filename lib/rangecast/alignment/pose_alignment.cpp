@@ -5,9 +5,9 @@
 #include <bit>
 #include <cmath>
 
-#include "../cylinder/world_points.hpp"
-#include "cholesky.hpp"
-#include "pixel_transfer.hpp"
+#include "../geometry/world_points.hpp"
+#include "../base/cholesky.hpp"
+#include "../geometry/pixel_transfer.hpp"
 
 namespace rangecast {
 

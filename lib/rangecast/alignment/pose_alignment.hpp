@@ -10,7 +10,7 @@
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
 #include "surface_planes.hpp"
-#include "view_pairs.hpp"
+#include "../geometry/view_pairs.hpp"
 
 namespace rangecast {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "../guarded.hpp"
+#include "../base/guarded.hpp"
 
 namespace rangecast {
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "../parallel.hpp"
-#include "../status.hpp"
+#include "../base/parallel.hpp"
+#include "../base/status.hpp"
 #include "contradicted_points.hpp"
 #include "depth_agreement.hpp"
 #include "pose_alignment.hpp"

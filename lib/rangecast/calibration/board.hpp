@@ -9,7 +9,7 @@
 
 #include "../geometry/camera.hpp"
 #include "../geometry/image_view.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

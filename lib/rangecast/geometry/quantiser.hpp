@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "rig.hpp"
 
 namespace rangecast {
@@ -17,10 +17,10 @@ enum class DepthScale : std::uint8_t {
 };
 
 /** Depth to codes of `bits` bits and back; near is code 0 and far the greatest, on either scale.
- *  Formulas: docs/bitstream.md, "Quantisation". Codes beyond those that make every depth unit a
- *  code of its own are not used; then nothing is lost. On the inverse scale several codes may have
- *  one depth: code() gives the least of them, decoders take all.
- *  Tables: 128 KiB and up to 128 KiB more. */
+ *  Formulas: docs/formats/bitstream.md, "Quantisation". Codes beyond those that make every depth
+ * unit a code of its own are not used; then nothing is lost. On the inverse scale several codes may
+ * have one depth: code() gives the least of them, decoders take all. Tables: 128 KiB and up to 128
+ * KiB more. */
 class DepthQuantiser {
 public:
   /** @param near, far  depth units, 1 <= near < far; @param bits  6 to 16 */

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "camera.hpp"
 #include "range_image.hpp"
 
@@ -73,14 +73,14 @@ Status validate (const Rig &rig);
 Status merge (Rig &into, const Rig &other);
 
 /** @name The file form
- *  What cv::FileStorage reads and writes: YAML or JSON by the file's ending; layout in docs/rig.md.
+ *  What cv::FileStorage reads and writes: YAML or JSON by the file's ending; layout in docs/formats/rig.md.
  *  Loaded rigs are validated. Messages begin with the path. @{ */
 Status load_rig (const std::string &path, Rig &rig);
 Status save_rig (const std::string &path, const Rig &rig);
 /** @} */
 
 /** @name The binary form
- *  Versioned, little-endian, for caps, byte streams and SDP; layout in docs/rig.md. @{ */
+ *  Versioned, little-endian, for caps, byte streams and SDP; layout in docs/formats/rig.md. @{ */
 std::vector<std::uint8_t> encode_rig (const Rig &rig);
 /** Decodes and validates. Trailing bytes are an error: a blob's length is always known.
  *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadData or kTruncated */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The binary form of a rig; the layout is specified in docs/rig.md. */
+/* The binary form of a rig; the layout is specified in docs/formats/rig.md. */
 #include "rig.hpp"
 
 #include <bit>

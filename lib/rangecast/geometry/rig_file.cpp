@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The file form of a rig; the layout is described in docs/rig.md. */
+/* The file form of a rig; the layout is described in docs/formats/rig.md. */
 #include "rig_file.hpp"
 
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 
-#include "../storage_check.hpp"
+#include "../base/storage_check.hpp"
 
 namespace rangecast {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "../output_path.hpp"
+#include "../base/output_path.hpp"
 #include "rig.hpp"
 
 namespace rangecast {

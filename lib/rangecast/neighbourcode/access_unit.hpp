@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "../parallel.hpp"
+#include "../base/parallel.hpp"
 #include "decoder.hpp"
 #include "encoder.hpp"
 

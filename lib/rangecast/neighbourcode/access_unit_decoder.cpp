@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "slice_place.hpp"
+#include "bitstream/slice_place.hpp"
 
 namespace rangecast {
 

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "slice_place.hpp"
+#include "bitstream/slice_place.hpp"
 
 namespace rangecast {
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "decoder.hpp"
 
-#include "symbols.hpp"
+#include "bitstream/symbols.hpp"
 
 namespace rangecast {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "refresh.hpp"
+#include "bitstream/refresh.hpp"
 
 namespace rangecast {
 

@@ -7,7 +7,7 @@
 #include "../geometry/camera.hpp"
 #include "../geometry/image_view.hpp"
 #include "../geometry/rig.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace cv {
 class FileNode;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "mesh.hpp"
 
 namespace rangecast {

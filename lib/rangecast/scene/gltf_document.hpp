@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "json.hpp"
 
 namespace rangecast {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "mesh.hpp"
 
 namespace rangecast {

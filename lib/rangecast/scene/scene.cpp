@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "../parallel.hpp"
+#include "../base/parallel.hpp"
 #include "furnishing.hpp"
 #include "mesh.hpp"
 #include "model.hpp"

@@ -8,7 +8,7 @@
 
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "mesh.hpp"
 
 namespace rangecast {

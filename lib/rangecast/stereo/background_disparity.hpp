@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "box_sum.hpp"
-#include "pieces.hpp"
+#include "tiles.hpp"
 
 namespace rangecast {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

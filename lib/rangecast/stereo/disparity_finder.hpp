@@ -8,7 +8,7 @@
 #include "disparity_filter.hpp"
 #include "disparity_refiner.hpp"
 #include "matching.hpp"
-#include "pieces.hpp"
+#include "tiles.hpp"
 #include "silhouette_filter.hpp"
 
 namespace rangecast {

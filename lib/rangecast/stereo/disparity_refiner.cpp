@@ -8,7 +8,7 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "../for_this_cpu.hpp"
+#include "../base/for_this_cpu.hpp"
 
 namespace rangecast {
 namespace {

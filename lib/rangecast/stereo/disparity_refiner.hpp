@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "pieces.hpp"
+#include "tiles.hpp"
 
 namespace rangecast {
 

@@ -4,7 +4,7 @@
 #include <opencv2/calib3d.hpp>
 #include <vector>
 
-#include "../status.hpp"
+#include "../base/status.hpp"
 #include "semi_global_matcher.hpp"
 
 namespace rangecast {

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "../geometry/rig.hpp"
-#include "../status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "../for_this_cpu.hpp"
+#include "../base/for_this_cpu.hpp"
 
 namespace rangecast {
 namespace {

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "../parallel.hpp"
+#include "../base/parallel.hpp"
 
 namespace rangecast {
 

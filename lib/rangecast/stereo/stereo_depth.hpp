@@ -11,7 +11,7 @@
 #include "mirror_check.hpp"
 #include "occupancy.hpp"
 #include "rectification.hpp"
-#include "steady_filter.hpp"
+#include "temporal_filter.hpp"
 #include "still_average.hpp"
 #include "third_pair.hpp"
 

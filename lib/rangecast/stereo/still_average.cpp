@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "../for_this_cpu.hpp"
+#include "../base/for_this_cpu.hpp"
 
 namespace rangecast {
 namespace {

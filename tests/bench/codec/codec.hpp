@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <rangecast/neighbourcode/encoder.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <utility>
 #include <vector>

@@ -6,7 +6,7 @@
 #include <rangecast/geometry/range_image.hpp>
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/scene/scene.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Recorded files: the byte stream of docs/bitstream.md, decoded. */
+/* Recorded files: the byte stream of docs/formats/bitstream.md, decoded. */
 #include <fstream>
 #include <iterator>
 #include <rangecast/neighbourcode/access_unit.hpp>
-#include <rangecast/neighbourcode/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 
 #include "input.hpp"
 

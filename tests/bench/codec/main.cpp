@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The neighbour code beside other codes of RGB-D pictures, on the same pixels in the same run.
- * docs/choosing-settings.md says how to read it. */
+ * docs/guide/settings.md says how to read it. */
 #include <cstdio>
 #include <opencv2/core/utils/logger.hpp>
 

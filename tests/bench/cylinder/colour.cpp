@@ -9,7 +9,7 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <rangecast/cylinder/colour_match.hpp>
+#include <rangecast/overlap/colour_match.hpp>
 #include <unordered_map>
 
 using namespace rangecast;

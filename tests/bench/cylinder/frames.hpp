@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <rangecast/geometry/range_image.hpp>
 #include <rangecast/geometry/rig.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <random>
 #include <rangecast/alignment/view_agreement.hpp>
-#include <rangecast/cylinder/cylinder_filter.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
 #include <unordered_map>
 
 #include "peers.hpp"

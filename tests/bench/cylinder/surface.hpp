@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <rangecast/geometry/camera.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

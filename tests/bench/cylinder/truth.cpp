@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <rangecast/strips/strips.hpp>
+#include <rangecast/surface/strips.hpp>
 #include <unordered_map>
 
 using namespace rangecast;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <optional>
-#include <rangecast/cylinder/cylinder_filter.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
 #include <string>
 #include <vector>
 

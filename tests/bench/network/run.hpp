@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "network-faults.hpp"
+#include "simulators/network-faults.hpp"
 
 /** One run. */
 struct NetworkCase {

@@ -10,7 +10,7 @@
 
 #include <algorithm>
 #include <map>
-#include <rangecast/neighbourcode/unit.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
 
 #include "process.hpp"
 #include "traffic.hpp"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 #include <map>
-#include <rangecast/neighbourcode/unit.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -14,7 +14,7 @@ using rangecast::StatusCode;
 namespace bench {
 
 constexpr std::size_t kRtpHeaderSize = 12;
-constexpr std::size_t kCaptureOffset = 12; /* of a slice, docs/bitstream.md */
+constexpr std::size_t kCaptureOffset = 12; /* of a slice, docs/formats/bitstream.md */
 
 double
 Recording::packets_per_frame () const

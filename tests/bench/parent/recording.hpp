@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <mutex>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <thread>
 #include <vector>
 

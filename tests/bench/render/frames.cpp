@@ -5,7 +5,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <rangecast/cylinder/cylinder_filter.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
 #include <rangecast/roi/bounding_box.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>

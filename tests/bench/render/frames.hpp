@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <rangecast/cylinder/cylinder_filter.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <vector>

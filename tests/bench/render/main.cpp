@@ -11,8 +11,8 @@
 #include <list>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
-#include <rangecast/strips/orbit.hpp>
-#include <rangecast/strips/scene_hull.hpp>
+#include <rangecast/surface/orbit.hpp>
+#include <rangecast/surface/scene_hull.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include <algorithm>
 #include <cstddef>
-#include <rangecast/parallel.hpp>
-#include <rangecast/strips/orbit.hpp>
+#include <rangecast/base/parallel.hpp>
+#include <rangecast/surface/orbit.hpp>
 
-#include "../../../gst/glshader.hpp"
+#include "render/glshader.hpp"
 #include "ways.hpp"
 
 using namespace rangecast;

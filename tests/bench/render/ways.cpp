@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "ways.hpp"
 
-#include "../../../gst/stripscene.hpp"
+#include "render/scene.hpp"
 
 using namespace rangecast;
 

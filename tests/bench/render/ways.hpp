@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "../../../gst/strippainter.hpp"
+#include "render/strippainter.hpp"
 #include "frames.hpp"
 
 namespace bench {

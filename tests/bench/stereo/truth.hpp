@@ -3,7 +3,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <rangecast/status.hpp>
+#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "acquisition.hpp"
+
+void
+CameraRun::on_done ()
+{
+  std::lock_guard guard (lock);
+  while (!stopped && stream) {
+    ArvBuffer *buffer = arv_stream_try_pop_buffer (stream);
+    if (!buffer)
+      break;
+    deliver (buffer);
+  }
+}
+
+bool
+CameraRun::fits (ArvBuffer *buffer) const
+{
+  const ArvBufferPayloadType type = arv_buffer_get_payload_type (buffer);
+  if (type != ARV_BUFFER_PAYLOAD_TYPE_IMAGE && type != ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA)
+    return false;
+  std::size_t size = 0, all = 0;
+  gint x_padding = 0, y_padding = 0;
+  if (arv_buffer_get_image_data (buffer, &size) != arv_buffer_get_data (buffer, &all))
+    return false;
+  arv_buffer_get_image_padding (buffer, &x_padding, &y_padding);
+  return size >= format.size () && x_padding == 0 &&
+         arv_buffer_get_image_width (buffer) == format.width &&
+         arv_buffer_get_image_height (buffer) == format.height &&
+         arv_buffer_get_image_pixel_format (buffer) == code;
+}
+
+/* buffer: transfer full */
+void
+CameraRun::deliver (ArvBuffer *buffer)
+{
+  const ArvBufferStatus status = arv_buffer_get_status (buffer);
+  const std::uint64_t id = arv_buffer_get_frame_id (buffer);
+  if (id == FrameStore::kNoId || !counter.is_id (id) || status == ARV_BUFFER_STATUS_ABORTED ||
+      status == ARV_BUFFER_STATUS_CLEARED) { /* nobody knows which one it is: a gap */
+    store->give_back (buffer);
+    return;
+  }
+  CameraFrame frame;
+  frame.id = id;
+  frame.number = counter.number (id);
+  frame.arrived_us = g_get_monotonic_time ();
+  const std::uint64_t taken = arv_buffer_get_timestamp (buffer);
+  if (taken != arv_buffer_get_system_timestamp (buffer) &&
+      taken < kLatestTime_ns) /* else Aravis' makeshift */
+    frame.camera_time_ns = taken;
+  if (ARV_IS_GV_STREAM (stream)) {
+    guint64 missing = 0;
+    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), nullptr, &missing);
+    frame.missing_packets = missing - missing_packets;
+    missing_packets = missing;
+  }
+  if (status != ARV_BUFFER_STATUS_SUCCESS)
+    frame.state = FrameState::kMissing;
+  else
+    frame.state = fits (buffer) ? FrameState::kComplete : FrameState::kUnfit;
+  if (frame.state == FrameState::kComplete)
+    frame.buffer = store->wrap (buffer);
+  else
+    store->give_back (buffer);
+  arrived (std::move (frame));
+}
+
+CameraStatistics
+count_stream (ArvStream *stream)
+{
+  CameraStatistics numbers;
+  guint64 completed = 0, failures = 0, underruns = 0, resent = 0, missing = 0;
+  arv_stream_get_statistics (stream, &completed, &failures, &underruns);
+  if (ARV_IS_GV_STREAM (stream))
+    arv_gv_stream_get_statistics (ARV_GV_STREAM (stream), &resent, &missing);
+  numbers.completed = completed;
+  numbers.failures = failures;
+  numbers.underruns = underruns;
+  numbers.resent_packets = resent;
+  numbers.missing_packets = missing;
+  return numbers;
+}

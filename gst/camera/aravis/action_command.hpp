@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The GigE Vision action command: one datagram that fires all cameras of a group at once. */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <gio/gio.h>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "status.hpp"
+
+/** GigE Vision 2.0, ACTION_CMD. A camera reacts if `device_key` is its ActionDeviceKey, `group_key`
+ *  its ActionGroupKey, and `group_mask` AND its ActionGroupMask is not 0. */
+struct ActionCommand {
+  std::uint32_t device_key = 0, group_key = 0, group_mask = 0;
+  std::optional<std::uint64_t> time_ns; ///< when, on the cameras' IEEE 1588 clock; absent: at once
+  bool acknowledge = false;             ///< cameras answer with an ACTION_ACK
+  std::uint16_t request_id = 1; ///< never 0; cameras ignore a second command with the same one
+};
+
+/** The bytes on the wire. */
+struct ActionCommandBytes {
+  std::array<std::uint8_t, 28> bytes{};
+  std::size_t size = 0; ///< 20, or 28 with a time
+
+  [[nodiscard]] std::span<const std::uint8_t> span () const { return {bytes.data (), size}; }
+};
+[[nodiscard]] ActionCommandBytes action_command_bytes (const ActionCommand &command);
+
+/** Sends action commands by broadcast from this host's interfaces to port 3956. Not thread-safe. */
+class ActionSender {
+public:
+  static constexpr std::uint16_t kPort = 3956; ///< GVCP
+
+  ActionSender () = default;
+  ActionSender (const ActionSender &) = delete;
+  ActionSender &operator= (const ActionSender &) = delete;
+  ~ActionSender () { close (); }
+
+  /** @param interfaces  addresses of this host (Camera::interface_address); doubles are left out
+   *  @param port        other than kPort in tests
+   *  @return kFailed: the text names the interface */
+  CameraStatus open (std::span<const std::string> interfaces, std::uint16_t port = kPort);
+  void close ();
+  /** Sends it from every interface, with a request id of its own. Does not wait for answers.
+   *  @return kFailed: the text names the interface; the others have sent */
+  CameraStatus send (ActionCommand command);
+
+private:
+  struct Exit {
+    std::string interface;
+    GSocket *socket = nullptr;
+    GSocketAddress *destination = nullptr;
+  };
+  std::vector<Exit> exits_;
+  std::uint16_t last_id_ = 0;
+};

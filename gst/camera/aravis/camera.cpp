@@ -1,0 +1,460 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* A camera that is gone lets every call wait for seconds, so what is taken down goes in a thread of
+ * its own, for which nobody waits longer than a second (see TakeDown). */
+#include "camera.hpp"
+
+#include <arv.h>
+#include <atomic>
+#include <mutex>
+
+#include "acquisition.hpp"
+#include "clock_reading.hpp"
+#include "control.hpp"
+#include "discovery.hpp"
+#include "format.hpp"
+#include "receive_buffer.hpp"
+#include "setup.hpp"
+#include "teardown_queue.hpp"
+
+static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
+static constexpr std::size_t kMostExtra = 1 << 20; /* bytes that chunks may add to a picture */
+
+namespace {
+
+/* Outlives the camera where its device's signal is just being emitted. */
+struct LossWatch {
+  std::mutex lock; /* guards report, held while it runs */
+  Camera::Lost report;
+  std::string label;
+  std::atomic<bool> lost{false};
+
+  void on_lost ()
+  {
+    if (lost.exchange (true))
+      return;
+    std::lock_guard guard (lock);
+    if (report)
+      report ({CameraFault::kLost, lost_text (label)});
+  }
+};
+
+} // namespace
+
+struct Camera::Impl {
+  CameraInfo info;
+  std::string interface;
+  std::unique_ptr<CameraControl> control;
+  CameraSettings settings;
+  CameraFormat format;
+  int packet_size = 0;
+  std::shared_ptr<LossWatch> watch = std::make_shared<LossWatch> ();
+  gulong watch_handler = 0;
+  TakeDown take_down;
+
+  std::mutex run_lock; /* guards what follows */
+  std::shared_ptr<CameraRun> run;
+  CameraStatistics last_statistics;
+
+  /* Guards what follows, and features that consist of several (a selector and its value, a latch
+   * and what it keeps). Taken before the control's, which triggers wait for and which is therefore
+   * held for one feature at a time. */
+  std::mutex look_lock;
+  CameraLook written;
+  guint64 tick_frequency = 0; /* of the camera's clock, 1/s; 0: not yet read */
+
+  void describe ();
+  CameraStatus create_stream (const std::shared_ptr<CameraRun> &run);
+  void set_stream_properties (ArvStream *stream) const;
+  CameraStatus fill (CameraRun &run);
+  void end (const std::shared_ptr<CameraRun> &run);
+  /* A fault is a loss where the camera is known to be lost. */
+  CameraStatus judged (CameraStatus status) const
+  {
+    if (status.ok () || !watch->lost)
+      return status;
+    return {CameraFault::kLost, status.message ()};
+  }
+};
+
+/* Opening */
+
+static std::string
+text_of (const char *text)
+{
+  return text ? valid_utf8 (text) : "";
+}
+
+void
+Camera::Impl::describe ()
+{
+  ArvCamera *camera = control->camera ();
+  if (info.vendor.empty ())
+    info.vendor = text_of (arv_camera_get_vendor_name (camera, nullptr));
+  if (info.model.empty ())
+    info.model = text_of (arv_camera_get_model_name (camera, nullptr));
+  if (info.serial.empty ())
+    info.serial = text_of (arv_camera_get_device_serial_number (camera, nullptr));
+  if (info.id.empty ())
+    info.id = info.vendor + "-" + info.serial;
+  if (!ARV_IS_GV_DEVICE (control->device ()))
+    return;
+  const auto address = [] (GSocketAddress *socket_address) {
+    gchar *text = g_inet_address_to_string (
+        g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (socket_address)));
+    std::string copy = text;
+    g_free (text);
+    return copy;
+  };
+  ArvGvDevice *device = ARV_GV_DEVICE (control->device ());
+  interface = address (arv_gv_device_get_interface_address (device));
+  info.address = address (arv_gv_device_get_device_address (device));
+}
+
+CameraStatus
+Camera::open (const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen)
+{
+  auto impl = std::make_unique<Impl> ();
+  ArvDevice *device = nullptr;
+  CameraStatus status = open_camera_device (name, device, impl->info);
+  if (seen)
+    *seen = impl->info;
+  if (!status.ok ())
+    return status;
+  GError *error = nullptr;
+  ArvCamera *arv = arv_camera_new_with_device (device, &error);
+  g_object_unref (device);
+  if (!arv) {
+    status = {CameraFault::kFailed,
+        "camera '" + name + "': " + (error ? error->message : "Aravis cannot use it")};
+    g_clear_error (&error);
+    return status;
+  }
+  g_clear_error (&error);
+  const std::string called = name.empty () ? impl->info.id : name;
+  std::string label = "camera '" + valid_utf8 (called) + "'";
+  if (!impl->info.model.empty () && impl->info.id != called)
+    label +=
+        " (" + impl->info.vendor + " " + impl->info.model + ", serial " + impl->info.serial + ")";
+  impl->control = std::make_unique<CameraControl> (arv, label);
+  impl->describe ();
+  impl->watch->label = label;
+  impl->watch_handler = g_signal_connect_data (
+      impl->control->device (), "control-lost", G_CALLBACK (+[] (ArvDevice *, gpointer watch) {
+        (*static_cast<std::shared_ptr<LossWatch> *> (watch))->on_lost ();
+      }),
+      new std::shared_ptr<LossWatch> (impl->watch),
+      [] (gpointer watch, GClosure *) { delete static_cast<std::shared_ptr<LossWatch> *> (watch); },
+      GConnectFlags (0));
+  camera.reset (new Camera (std::move (impl)));
+  return {};
+}
+
+Camera::Camera (std::unique_ptr<Impl> impl) : impl_ (std::move (impl)) {}
+
+Camera::~Camera ()
+{
+  stop ();
+  g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
+  impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
+                             std::move (impl_->control))] () mutable { control.reset (); },
+      !is_lost ());
+}
+
+const CameraInfo &
+Camera::info () const
+{
+  return impl_->info;
+}
+
+const std::string &
+Camera::label () const
+{
+  return impl_->control->label ();
+}
+
+bool
+Camera::is_gige () const
+{
+  return ARV_IS_GV_DEVICE (impl_->control->device ());
+}
+
+const std::string &
+Camera::interface_address () const
+{
+  return impl_->interface;
+}
+
+/* Configuring */
+
+CameraStatus
+Camera::abilities (CameraAbilities &abilities)
+{
+  return impl_->judged (read_abilities (*impl_->control, abilities));
+}
+
+CameraStatus
+Camera::configure (const CameraSettings &settings)
+{
+  CameraControl &control = *impl_->control;
+  if (settings.n_buffers < 2)
+    return control.refuse (CameraFault::kBadSetting,
+        std::to_string (settings.n_buffers) + " buffers: expected at least 2");
+  double frame_rate = 0;
+  impl_->settings = settings;
+  CameraStatus status = set_transport (control, settings);
+  if (status.ok ())
+    status = set_image (control, settings);
+  if (status.ok ())
+    status = set_trigger (control, settings);
+  if (status.ok ())
+    status = set_look (control, settings, frame_rate);
+  if (status.ok ())
+    status = set_features (control, settings.features);
+  if (status.ok ())
+    status = read_format (control, impl_->format);
+  impl_->format.frame_rate = frame_rate;
+  std::lock_guard guard (impl_->look_lock);
+  impl_->written = {};
+  return impl_->judged (status);
+}
+
+const CameraFormat &
+Camera::format () const
+{
+  return impl_->format;
+}
+
+int
+Camera::packet_size () const
+{
+  return impl_->packet_size;
+}
+
+/* Streaming */
+
+void
+Camera::Impl::set_stream_properties (ArvStream *stream) const
+{
+  if (!ARV_IS_GV_STREAM (stream))
+    return;
+  g_object_set (stream, "packet-timeout", guint (settings.packet_timeout_us), "frame-retention",
+      guint (settings.frame_retention_us), nullptr);
+  if (!settings.packet_resend) /* else as the camera can */
+    g_object_set (stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
+  /* Aravis' own choice is one picture, which for small ones is less than a few packets need. */
+  const std::size_t wanted = settings.socket_buffer > 0
+                                 ? std::size_t (settings.socket_buffer)
+                                 : std::max (2 * format.size (), kLeastSocketBuffer);
+  const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
+  g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+      bytes, nullptr);
+  (void)enlarge_receive_buffer (arv_gv_stream_get_port (ARV_GV_STREAM (stream)), bytes);
+}
+
+CameraStatus
+Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
+{
+  const auto guard = control->lock ();
+  GError *error = nullptr;
+  ArvStream *stream = arv_camera_create_stream_full (
+      control->camera (),
+      [] (void *data, ArvStreamCallbackType type, ArvBuffer *) {
+        if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE)
+          static_cast<CameraRun *> (data)->on_done ();
+      },
+      run.get (), nullptr, &error); /* end() keeps the run until the stream is gone */
+  if (!stream)
+    return error ? control->status ("stream", error, CameraFault::kFailed)
+                 : control->refuse (CameraFault::kFailed, "does not provide a stream");
+  g_clear_error (&error);
+  set_stream_properties (stream);
+  std::lock_guard run_guard (run->lock);
+  run->stream = stream;
+  run->store = std::make_shared<FrameStore> (stream, format);
+  return {};
+}
+
+CameraStatus
+Camera::Impl::fill (CameraRun &run)
+{
+  GError *error = nullptr;
+  const auto guard = control->lock ();
+  const guint payload = arv_camera_get_payload (control->camera (), &error);
+  CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMostExtra))
+    status = control->refuse (CameraFault::kUnsupported,
+        "sends " + std::to_string (payload) + " bytes a picture; expected " +
+            std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
+            std::to_string (format.height) + " " + format.pixel_format);
+  if (!status.ok ())
+    return status;
+  run.store->fill (settings.n_buffers, payload);
+  packet_size = 0;
+  if (arv_camera_is_gv_device (control->camera ()))
+    packet_size = int (arv_camera_gv_get_packet_size (control->camera (), nullptr));
+  return {};
+}
+
+CameraStatus
+Camera::start (Arrived arrived, Lost lost)
+{
+  CameraControl &control = *impl_->control;
+  if (impl_->format.width == 0)
+    return control.refuse (CameraFault::kBadSetting, "was started before it was configured");
+  if (impl_->watch->lost)
+    return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
+  stop ();
+  if (!impl_->take_down.wait (TakeDown::kLongest))
+    return control.refuse (CameraFault::kTimedOut, "is still stopping");
+  auto run = std::make_shared<CameraRun> ();
+  run->arrived = std::move (arrived);
+  run->format = impl_->format;
+  run->code = find_pixel_format (impl_->format.pixel_format)->code;
+  run->counter = FrameCounter (is_gige () ? FrameCounter::Ids::kGigE : FrameCounter::Ids::kUsb);
+  CameraStatus status = impl_->create_stream (run);
+  if (!status.ok ())
+    return impl_->judged (status);
+  {
+    std::lock_guard guard (impl_->watch->lock);
+    impl_->watch->report = std::move (lost);
+  }
+  status = impl_->fill (*run);
+  {
+    std::lock_guard guard (impl_->run_lock);
+    impl_->run = run;
+    impl_->last_statistics = {};
+  }
+  if (status.ok ()) {
+    const auto guard = control.lock ();
+    GError *error = nullptr;
+    arv_camera_start_acquisition (control.camera (), &error);
+    status = control.status ("start of acquisition", error, CameraFault::kFailed);
+  }
+  if (!status.ok ())
+    stop ();
+  return impl_->judged (status);
+}
+
+/* The acquisition ends before the thread that receives it, which ends before its buffers go. */
+void
+Camera::Impl::end (const std::shared_ptr<CameraRun> &run)
+{
+  const bool answers = !watch->lost;
+  take_down.run (
+      [control = control.get (), run, answers] {
+        if (answers) {
+          const auto guard = control->lock ();
+          arv_camera_stop_acquisition (control->camera (), nullptr);
+        }
+        g_object_unref (
+            run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
+      },
+      answers);
+}
+
+void
+Camera::stop ()
+{
+  {
+    std::lock_guard guard (impl_->watch->lock);
+    impl_->watch->report = nullptr;
+  }
+  std::shared_ptr<CameraRun> run;
+  {
+    std::lock_guard guard (impl_->run_lock);
+    run = std::move (impl_->run);
+    impl_->run = nullptr;
+    if (!run)
+      return;
+    impl_->last_statistics = count_stream (run->stream);
+  }
+  {
+    std::lock_guard guard (run->lock);
+    run->stopped = true;
+    run->arrived = nullptr;
+  }
+  run->store->close ();
+  impl_->end (run);
+}
+
+void
+Camera::give_up ()
+{
+  impl_->watch->lost = true;
+}
+
+bool
+Camera::is_lost () const
+{
+  return impl_->watch->lost;
+}
+
+CameraStatistics
+Camera::statistics () const
+{
+  std::lock_guard guard (impl_->run_lock);
+  if (!impl_->run)
+    return impl_->last_statistics;
+  CameraStatistics numbers = count_stream (impl_->run->stream);
+  numbers.buffers_out = impl_->run->store->out ();
+  return numbers;
+}
+
+/* Features while it streams */
+
+CameraStatus
+Camera::trigger_software ()
+{
+  CameraControl &control = *impl_->control;
+  if (is_lost ())
+    return control.refuse (CameraFault::kLost, "cannot be triggered: it was lost");
+  const auto guard = control.lock ();
+  GError *error = nullptr;
+  arv_camera_software_trigger (control.camera (), &error);
+  return impl_->judged (control.status ("software trigger", error));
+}
+
+CameraStatus
+Camera::read_look (CameraLook &look)
+{
+  if (is_lost ())
+    return impl_->control->refuse (CameraFault::kLost, "was lost");
+  std::lock_guard guard (impl_->look_lock);
+  return impl_->judged (::read_look (*impl_->control, look));
+}
+
+CameraStatus
+Camera::write_look (const CameraLook &look)
+{
+  if (is_lost ())
+    return impl_->control->refuse (CameraFault::kLost, "was lost");
+  std::lock_guard guard (impl_->look_lock);
+  return impl_->judged (::write_look (*impl_->control, look, impl_->written));
+}
+
+bool
+Camera::clock_is_ptp ()
+{
+  std::string status;
+  CameraControl &control = *impl_->control;
+  if (is_lost () ||
+      !(control.read ("PtpStatus", status) || control.read ("GevIEEE1588Status", status)))
+    return false;
+  return status == "Slave" || status == "Master";
+}
+
+CameraStatus
+Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
+{
+  CameraControl &control = *impl_->control;
+  camera_time_ns = 0;
+  if (is_lost ())
+    return control.refuse (CameraFault::kLost, "was lost");
+  std::lock_guard guard (impl_->look_lock);
+  CameraStatus status =
+      is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
+                 : read_usb_clock (control, camera_time_ns, read_at_us);
+  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kLatestTime_ns))
+    return control.refuse (CameraFault::kFailed, "has no readable clock");
+  return impl_->judged (status);
+}

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <glib.h>
+
+#include "control.hpp"
+
+/* A camera's clock, and when it was read: the middle of the round trip that latched it,
+ * g_get_monotonic_time, microseconds. */
+
+/** @param frequency  of the clock, 1/s; 0: not yet read, it is then
+ *  @param[out] time_ns  ns on the camera's clock; 0: it does not tell */
+CameraStatus read_gige_clock (
+    CameraControl &control, guint64 &frequency, std::uint64_t &time_ns, std::int64_t &read_at_us);
+CameraStatus read_usb_clock (
+    CameraControl &control, std::uint64_t &time_ns, std::int64_t &read_at_us);

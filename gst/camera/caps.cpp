@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "caps.hpp"
+
+#include <algorithm>
+
+static constexpr int kWidthStep = 4;
+
+/* ---- what the cameras can ---- */
+
+static std::vector<std::string>
+common_formats (std::span<const CameraAbilities> cameras)
+{
+  std::vector<std::string> common = cameras[0].pixel_formats;
+  for (const CameraAbilities &camera : cameras.subspan (1))
+    std::erase_if (common, [&] (const std::string &name) {
+      return std::ranges::find (camera.pixel_formats, name) == camera.pixel_formats.end ();
+    });
+  return common;
+}
+
+struct SizeRange {
+  int least, most, step;
+};
+
+static int
+common_multiple (int a, int b)
+{
+  return a / std::max (1, int (gst_util_greatest_common_divisor (a, b))) * b;
+}
+
+/* Cameras count sizes from their least one in steps; ours are multiples of the steps, which both
+ * are in practice. */
+static SizeRange
+common_range (std::span<const CameraAbilities> cameras, bool widths)
+{
+  SizeRange range{1, G_MAXINT, widths ? kWidthStep : 1};
+  for (const CameraAbilities &c : cameras) {
+    range.least = std::max (range.least, widths ? c.min_width : c.min_height);
+    range.most = std::min (range.most, widths ? c.max_width : c.max_height);
+    range.step = common_multiple (range.step, std::max (1, widths ? c.width_step : c.height_step));
+  }
+  range.least = (range.least + range.step - 1) / range.step * range.step;
+  range.most = range.most / range.step * range.step;
+  return range;
+}
+
+static void
+set_range (GstStructure *structure, const char *field, const SizeRange &range)
+{
+  GValue value = G_VALUE_INIT;
+  if (range.least == range.most) {
+    gst_structure_set (structure, field, G_TYPE_INT, range.least, nullptr);
+    return;
+  }
+  g_value_init (&value, GST_TYPE_INT_RANGE);
+  gst_value_set_int_range_step (&value, range.least, range.most, range.step);
+  gst_structure_take_value (structure, field, &value);
+}
+
+/* The caps of one pixel format, without size. */
+static GstCaps *
+caps_of_format (const std::string &name)
+{
+  GstCaps *all = gst_caps_normalize (camera_caps ()), *found = gst_caps_new_empty ();
+  for (guint i = 0; i < gst_caps_get_size (all); i++) {
+    GstCaps *one = gst_caps_copy_nth (all, i);
+    if (pixel_format_for_caps (one, {name}) == name)
+      gst_caps_append (found, one);
+    else
+      gst_caps_unref (one);
+  }
+  gst_caps_unref (all);
+  return found;
+}
+
+static std::string
+formats_of (const CameraAbilities &camera)
+{
+  std::string text;
+  for (const std::string &name : camera.pixel_formats)
+    text += (text.empty () ? "" : ", ") + name;
+  for (const std::string &name : camera.other_formats)
+    text += (text.empty () ? "" : ", ") + name + " (not carried)";
+  return text.empty () ? "none" : text;
+}
+
+/* Cameras with one list are named together. */
+static std::string
+list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> labels)
+{
+  std::string text, who;
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    who += (who.empty () ? "" : " and ") + labels[i];
+    const std::string formats = formats_of (cameras[i]);
+    if (i + 1 < cameras.size () && formats == formats_of (cameras[i + 1]))
+      continue;
+    text += (text.empty () ? "" : "; ") + who + ": " + formats;
+    who.clear ();
+  }
+  return text;
+}
+
+GstCaps *
+camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const std::string> labels,
+    const std::string &pixel_format, bool single_shot, std::string &why)
+{
+  const SizeRange widths = common_range (cameras, true), heights = common_range (cameras, false);
+  GstCaps *caps = gst_caps_new_empty ();
+  if (widths.least > widths.most || heights.least > heights.most) {
+    why = "the cameras have no image size in common";
+    return caps;
+  }
+  for (const std::string &name : common_formats (cameras))
+    if (pixel_format.empty () || pixel_format == name)
+      gst_caps_append (caps, caps_of_format (name));
+  if (gst_caps_is_empty (caps))
+    why = "the cameras have no pixel format in common that is " +
+          (pixel_format.empty () ? "carried" : pixel_format) +
+          "; they have: " + list_of (cameras, labels);
+  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
+    GstStructure *structure = gst_caps_get_structure (caps, i);
+    set_range (structure, "width", widths);
+    set_range (structure, "height", heights);
+    gst_structure_set (structure, "framerate", GST_TYPE_FRACTION_RANGE, single_shot ? 0 : 1,
+        single_shot ? 1 : 1000, 1000, 1, nullptr);
+  }
+  return caps;
+}
+
+/* ---- what the peers want ---- */
+
+static GstCaps *
+common_caps (GstCaps *offered, std::span<GstPad *const> pads)
+{
+  GstCaps *common = gst_caps_ref (offered);
+  for (GstPad *pad : pads) {
+    GstCaps *both = gst_pad_peer_query_caps (pad, common);
+    gst_caps_unref (common);
+    common = both;
+  }
+  return common;
+}
+
+bool
+choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
+    std::span<const CameraAbilities> cameras, CamSourceFormat &format)
+{
+  GstCaps *common = common_caps (offered, pads);
+  GstCaps *caps = gst_caps_intersect_full (common, offered, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (common);
+  if (gst_caps_is_empty (caps)) {
+    gst_caps_unref (caps);
+    return false;
+  }
+  caps = gst_caps_make_writable (gst_caps_truncate (caps));
+  GstStructure *structure = gst_caps_get_structure (caps, 0);
+  gst_structure_fixate_field_nearest_int (structure, "width", G_MAXINT);
+  gst_structure_fixate_field_nearest_int (structure, "height", G_MAXINT);
+  double most = 30;
+  for (const CameraAbilities &camera : cameras)
+    if (camera.max_frame_rate > 0)
+      most = std::min (most, camera.max_frame_rate);
+  gint n = 30, d = 1;
+  if (most < 30)
+    gst_util_double_to_fraction (most, &n, &d);
+  gst_structure_fixate_field_nearest_fraction (structure, "framerate", n, d);
+  caps = gst_caps_fixate (caps);
+  structure = gst_caps_get_structure (caps, 0);
+  gst_structure_get_int (structure, "width", &format.width);
+  gst_structure_get_int (structure, "height", &format.height);
+  gst_structure_get_fraction (structure, "framerate", &format.fps_n, &format.fps_d);
+  format.pixel_format = pixel_format_for_caps (caps, cameras[0].pixel_formats);
+  gst_caps_take (&format.caps, caps);
+  return !format.pixel_format.empty ();
+}

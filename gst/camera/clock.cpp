@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "clock.hpp"
+
+#include <gst/net/net.h>
+
+#include "common/realtimepriority.hpp"
+
+using rangecast::Status;
+using rangecast::StatusCode;
+
+static bool
+parse_number (const std::string &text, guint64 least, guint64 most, int &number)
+{
+  guint64 value = 0;
+  if (!g_ascii_string_to_unsigned (text.c_str (), 10, least, most, &value, nullptr))
+    return false;
+  number = static_cast<int> (value);
+  return true;
+}
+
+Status
+parse_clock_server (const std::string &text, ClockServer &server)
+{
+  const Status bad = {StatusCode::kBadValue,
+      "clock-server " + text + ": expected HOST:PORT (port 1 to 65535) or ptp:DOMAIN (0 to 255)"};
+  const auto colon = text.rfind (':');
+  if (colon == std::string::npos || colon == 0)
+    return bad;
+  server.host = text.substr (0, colon);
+  server.ptp = server.host == "ptp";
+  if (!parse_number (text.substr (colon + 1), !server.ptp, server.ptp ? 255 : 65535, server.port))
+    return bad;
+  if (server.host.front () == '[') {
+    if (server.host.size () < 3 || server.host.back () != ']')
+      return bad;
+    server.host = server.host.substr (1, server.host.size () - 2);
+  }
+  return {};
+}
+
+/* A net clock begins at 0, before any other: when it is in step it can only go forward. The clock
+ * stays until another is wanted: it is in step already then, and GStreamer 1.22's must not be let
+ * go at the moment when it gets into step. */
+Status
+CamSourceClock::open (const std::string &text)
+{
+  if (clock_ && text == server_)
+    return {};
+  gst_clear_object (&clock_);
+  server_ = text;
+  if (text.empty ())
+    return {};
+  ClockServer server;
+  if (Status s = parse_clock_server (text, server); !s.ok ())
+    return s;
+  if (!server.ptp) {
+    const PromptThread prompt; /* that asks: what it is late is error of the clock */
+    clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
+  } else {
+    if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))
+      return {StatusCode::kNotFound, "clock-server " + text +
+                                         ": PTP is not available; expected gst-ptp-helper with the "
+                                         "right to bind ports 319 and 320"};
+    clock_ = gst_ptp_clock_new ("stereocamsrc-clock", static_cast<guint> (server.port));
+  }
+  if (!clock_)
+    return {StatusCode::kNotFound, "clock-server " + text + ": no such clock"};
+  gst_object_ref_sink (clock_);
+  return {};
+}

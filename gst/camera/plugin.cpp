@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * plugin-rangecamera:
+ *
+ * Stereo cameras through Aravis.
+ */
+#include <gst/gst.h>
+
+GST_ELEMENT_REGISTER_DECLARE (stereocamsrc)
+#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
+GST_DEVICE_PROVIDER_REGISTER_DECLARE (rangecastdeviceprovider)
+#endif
+
+static gboolean
+plugin_init (GstPlugin *plugin)
+{
+  gboolean registered = FALSE;
+  registered |= GST_ELEMENT_REGISTER (stereocamsrc, plugin);
+#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
+  registered |= GST_DEVICE_PROVIDER_REGISTER (rangecastdeviceprovider, plugin);
+#endif
+  return registered;
+}
+
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangecamera,
+    "Stereo cameras through Aravis", plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast",
+    PACKAGE_ORIGIN)

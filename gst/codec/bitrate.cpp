@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "bitrate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <gstrange/gstrange.h>
+
+using rangecast::EncoderSettings;
+using rangecast::Profile;
+
+void
+NeighbourCodeRate::reset ()
+{
+  control_.reset ();
+  meter_.reset ();
+  thinning_.reset ();
+  receivers.reset ();
+  is_on_ = false;
+  time_ = interval_ = 0;
+  told_bits_per_s_ = -1;
+  told_one_of_ = 1;
+}
+
+/* What a point of noisy cameras comes to, about, at a colour threshold of 10, and how that falls
+ * with the threshold. The first frame set then tells. */
+static double
+usual_bits_per_point (Profile profile, int colour_threshold)
+{
+  const double finer = 10.5 / (colour_threshold + 0.5);
+  switch (profile) {
+    case Profile::kPlain:
+      return 13 * std::cbrt (finer);
+    case Profile::kPacked:
+      return 3.5 * std::sqrt (finer);
+    default:
+      return 2.5 * std::sqrt (finer);
+  }
+}
+
+bool
+NeighbourCodeRate::begin (
+    const NeighbourCodeRateSettings &rate, GstBuffer *input, GstClockTime interval)
+{
+  const GstClockTime capture = gst_range_buffer_get_capture_time (input),
+                     time = GST_CLOCK_TIME_IS_VALID (capture) ? capture : GST_BUFFER_PTS (input);
+  time_ = GST_CLOCK_TIME_IS_VALID (time) ? time : time_ + interval;
+  interval_ = interval;
+  rate_ = rate;
+  if (!rate.adaptive) {
+    thinning_.reset ();
+    return true;
+  }
+  const double bits_per_s = receivers.next (
+      {double (rate.min_bitrate), double (rate.target_bitrate)}, meter_.bits_per_s (interval));
+  rate_.target_bitrate = guint (std::min (bits_per_s, double (G_MAXUINT)));
+  return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.least_bits () : 0,
+      double (rate.min_fps_n) / rate.min_fps_d});
+}
+
+EncoderSettings
+NeighbourCodeRate::next (const EncoderSettings &configured, guint64 pixels)
+{
+  if (rate_.target_bitrate == 0) {
+    if (is_on_)
+      control_.reset ();
+    is_on_ = false;
+    return configured;
+  }
+  is_on_ = true;
+  control_.configure (
+      {double (rate_.target_bitrate), {configured.depth_threshold, configured.colour_threshold},
+          {rate_.max_depth_threshold, rate_.max_colour_threshold},
+          usual_bits_per_point (configured.profile, configured.colour_threshold),
+          double (interval_) / GST_SECOND});
+  EncoderSettings settings = configured;
+  const rangecast::Thresholds thresholds = control_.next (time_, pixels);
+  settings.depth_threshold = thresholds.depth;
+  settings.colour_threshold = thresholds.colour;
+  return settings;
+}
+
+void
+NeighbourCodeRate::coded (const rangecast::CodedFrame &frame)
+{
+  meter_.add (time_, frame.bytes);
+  if (is_on_)
+    control_.coded (frame);
+}
+
+/* A tenth of the bit rate is what an application may want to know of. */
+GstMessage *
+NeighbourCodeRate::take_news (GstObject *source)
+{
+  constexpr double kMuch = 0.1;
+  const double now = rate_.adaptive ? receivers.bits_per_s () : 0;
+  if (told_bits_per_s_ < 0)
+    told_bits_per_s_ = now;
+  if (std::abs (now - told_bits_per_s_) <= kMuch * told_bits_per_s_ && one_of () == told_one_of_)
+    return nullptr;
+  told_bits_per_s_ = now;
+  told_one_of_ = one_of ();
+  GstStructure *news = gst_structure_new (
+      "neighbourcodeenc-adaptive-bitrate", "one-of", G_TYPE_INT, told_one_of_, nullptr);
+  receivers.describe (news);
+  return gst_message_new_element (source, news);
+}

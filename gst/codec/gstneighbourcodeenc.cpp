@@ -1,0 +1,577 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-neighbourcodeenc
+ * @title: neighbourcodeenc
+ *
+ * Encodes depth and colour of range images jointly with the neighbour code, in slices that decode
+ * independently. The format is specified in docs/formats/bitstream.md.
+ *
+ * With temporal=true pixels may be predicted from the previous frame set, which halves the bit rate
+ * of a person moving before a still camera. Key frame sets come first, at least every key-interval,
+ * and on GstForceKeyUnit from upstream or downstream (RTP: PLI, FIR); others have the DELTA_UNIT
+ * flag. Damage from losses ends after refresh-period at the latest.
+ *
+ * A buffer is a frame set, or a slice if downstream requires alignment=slice; the last slice of a
+ * frame set has the MARKER flag.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
+ * multifilesink location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstneighbourcodeenc.h"
+
+#include <gst/base/base.h>
+
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <rangecast/neighbourcode/access_unit.hpp>
+
+#include "bitrate.hpp"
+#include "common/bufferpools.hpp"
+#include "common/controlledvalues.hpp"
+#include "common/statsreporter.hpp"
+#include "common/streamlock.hpp"
+#include "encsettings.hpp"
+#include "keyunitrequests.hpp"
+
+using rangecast::EncoderResult;
+using rangecast::EncoderSettings;
+using rangecast::Status;
+
+GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
+#define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
+
+enum : guint {
+  PROP_MAX_DEPTH_ERROR = 1,
+  PROP_ESTIMATED_BITRATE,
+  PROP_STATS,
+  PROP_STATS_INTERVAL,
+  PROP_SETTINGS
+};
+
+struct GstNeighbourCodeEncPrivate {
+  std::mutex lock; /* guards what follows; never held across a push or message */
+  NeighbourCodeEncSettings settings;
+  double max_depth_error_m = 0;
+  guint64 frames = 0, coded_bytes = 0, left_out = 0;
+  EncoderResult totals;
+  EncoderSettings latest; /* of the latest frame set */
+  double bits_per_s = 0;
+
+  KeyUnitRequests key_requests;
+  StatsReporter reporter; /* has locks of its own */
+
+  /* streaming thread only */
+  gstrange::RangeInfo info;
+  rangecast::AccessUnitEncoder encoder;
+  EncoderSettings configured;
+  bool is_configured = false;
+  NeighbourCodeRate rate; /* what its receivers say: any thread */
+  std::uint32_t frame_number = 0;
+  bool is_key = true;                          /* the frame set in encoder */
+  GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
+  RecycledBytes buffers;
+  bool by_slices = false;     /* alignment of the output */
+  GstBuffer *input = nullptr; /* what encoder holds is of this one, and not yet all pushed */
+  std::size_t part = 0;
+  rangecast::UnitReader units{{}}; /* of the part before */
+  std::span<const guint8> slice;   /* the next one; before the first: empty */
+};
+
+struct _GstNeighbourCodeEnc {
+  GstBaseTransform parent;
+  GstNeighbourCodeEncPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
+
+G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
+
+/* ---- caps ---- */
+
+static GstCaps *
+gst_neighbour_code_enc_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
+{
+  return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
+}
+
+static void
+forget_input (GstNeighbourCodeEncPrivate *priv)
+{
+  gst_clear_buffer (&priv->input);
+}
+
+static gboolean
+gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  const GstStructure *structure = gst_caps_get_structure (out, 0);
+  const Status status = gstrange::parse_caps (in, priv->info);
+  priv->is_configured = false;
+  priv->reporter.set_views (priv->info.rig);
+  priv->encoder.request_key (); /* decoders begin anew with new caps */
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  forget_input (priv);
+  return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
+}
+
+/* ---- data ---- */
+
+/* Takes over settings that changed. Thresholds may with every frame set: they cost nothing. */
+static Status
+configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
+{
+  if (priv->is_configured && settings == priv->configured)
+    return {};
+  EncoderSettings same = priv->configured;
+  same.depth_threshold = settings.depth_threshold;
+  same.colour_threshold = settings.colour_threshold;
+  if (priv->is_configured && settings == same)
+    priv->encoder.set_thresholds (settings.depth_threshold, settings.colour_threshold);
+  else if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
+    return s;
+  priv->configured = settings;
+  priv->is_configured = true;
+  std::lock_guard guard (priv->lock);
+  priv->max_depth_error_m = priv->encoder.max_depth_error_m ();
+  return {};
+}
+
+static GstClockTime
+frame_interval (const gstrange::RangeInfo &info)
+{
+  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
+                        : GST_SECOND / 30;
+}
+
+static Status
+encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input,
+    const NeighbourCodeEncSettings &settings, EncoderResult &result)
+{
+  gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  guint64 pixels = 0;
+  for (const rangecast::RangeImage &image : frame.views ())
+    pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
+  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
+  if (settings.coding.temporal && !(priv->is_configured && priv->configured.temporal))
+    priv->frame_number = g_random_int ();
+  if (Status s = configure (priv, priv->rate.next (settings.coding, pixels)); !s.ok ())
+    return s;
+  const Status status =
+      priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
+  if (status.ok ())
+    priv->rate.coded (
+        {priv->encoder.size (), result.points, pixels, result.delta_slices == 0 && !priv->is_key});
+  return status;
+}
+
+static void
+count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
+{
+  std::lock_guard guard (priv->lock);
+  priv->latest = priv->configured;
+  priv->bits_per_s = priv->rate.bits_per_s ();
+  priv->frames++;
+  priv->coded_bytes += size;
+  priv->totals += result;
+}
+
+static GstClockTime
+running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  return gst_segment_to_running_time (
+      &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
+}
+
+/* Asks the encoder for a key frame set where one is due. Requests that come too soon after one
+ * wait, as with GstVideoEncoder. */
+static void
+prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
+  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
+  /* The next frame set would come too late. */
+  const GstClockTime until = now + frame_interval (priv->info);
+  const bool is_old = settings.key_interval_ms > 0 && has_times &&
+                      (now < last || until - last > settings.key_interval_ms * GST_MSECOND);
+  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
+                       now >= last && now - last < settings.min_forced_key_interval;
+  if (is_old || (!is_soon && priv->key_requests.is_due (now)))
+    priv->encoder.request_key ();
+}
+
+/* Any key frame set answers those who asked for one, and is announced to them. */
+static void
+note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &result)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime pts = GST_BUFFER_PTS (input), now = running_time_of (self, input);
+  priv->is_key = result.delta_slices == 0;
+  if (!priv->is_key)
+    return;
+  priv->last_key = now;
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
+  if (GstEvent *announcement = priv->key_requests.answer (pts, stream_time, now))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
+}
+
+/* Downstream learns that nothing comes for this time. */
+static void
+leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->left_out++;
+  }
+  const GstClockTime pts = GST_BUFFER_PTS (input), duration = GST_BUFFER_DURATION (input);
+  forget_input (self->priv);
+  if (GST_CLOCK_TIME_IS_VALID (pts))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (pts, duration));
+}
+
+static void
+tell_news (GstNeighbourCodeEnc *self)
+{
+  GstMessage *news = self->priv->rate.take_news (GST_OBJECT (self));
+  if (!news)
+    return;
+  gst_element_post_message (GST_ELEMENT (self), news);
+  g_object_notify (G_OBJECT (self), "estimated-bitrate");
+}
+
+/* The frame set in `input`; forgets it if it is left out. */
+static GstFlowReturn
+encode_input (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *input = priv->input;
+  sync_controlled_values (GST_BASE_TRANSFORM (self), input);
+  NeighbourCodeEncSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  settings.coding.frame_interval_ns = frame_interval (priv->info);
+  const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
+  tell_news (self);
+  if (!keeps) {
+    leave_out (self, input);
+    return GST_FLOW_OK;
+  }
+  prepare_key (self, input, settings);
+  EncoderResult result;
+  const Status status = encode_frame (priv, input, settings, result);
+  if (!status.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), status);
+  note_key (self, input, result);
+  count_frame (priv, result, priv->encoder.size ());
+  priv->reporter.passed (GST_ELEMENT (self), input);
+  return GST_FLOW_OK;
+}
+
+/* A buffer with times and flags of the input. */
+static GstBuffer *
+make_output (GstNeighbourCodeEnc *self, gsize size)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = priv->buffers.acquire (GST_ELEMENT (self), size, "a coded frame set");
+  if (!buffer)
+    return nullptr;
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
+      GST_BASE_TRANSFORM (self), priv->input, buffer);
+  const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (buffer, capture);
+  if (priv->is_key)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  else
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  return buffer;
+}
+
+static GstBuffer *
+take_access_unit (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  GstBuffer *buffer = make_output (self, priv->encoder.size ());
+  gsize offset = 0;
+  for (std::size_t i = 0; buffer && i < priv->encoder.parts (); i++) {
+    const auto part = priv->encoder.part (i);
+    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
+  }
+  forget_input (priv);
+  return buffer;
+}
+
+/* The encoder's next slice; nothing after the last one. */
+static std::span<const guint8>
+next_slice (GstNeighbourCodeEncPrivate *priv)
+{
+  rangecast::UnitHeader header;
+  while (true) {
+    if (const auto unit = priv->units.next (header))
+      return *unit;
+    if (priv->part == priv->encoder.parts ())
+      return {};
+    priv->units = rangecast::UnitReader (priv->encoder.part (priv->part++));
+  }
+}
+
+static GstBuffer *
+take_slice (GstNeighbourCodeEnc *self)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const bool is_first = priv->slice.empty ();
+  if (is_first)
+    priv->slice = next_slice (priv);
+  GstBuffer *buffer = make_output (self, priv->slice.size ());
+  if (!buffer)
+    return nullptr;
+  gst_buffer_fill (buffer, 0, priv->slice.data (), priv->slice.size ());
+  if (!is_first)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT | GST_BUFFER_FLAG_RESYNC);
+  priv->slice = next_slice (priv);
+  if (priv->slice.empty ()) {
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_MARKER);
+    forget_input (priv);
+  } else {
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_MARKER);
+  }
+  return buffer;
+}
+
+/* Called until it has no more to give; a new input comes where the rest of the last one failed to
+ * be pushed, too. */
+static GstFlowReturn
+gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **output)
+{
+  auto self = GST_NEIGHBOUR_CODE_ENC (base);
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  if (base->queued_buf) {
+    forget_input (priv);
+    priv->input = g_steal_pointer (&base->queued_buf);
+    const GstFlowReturn flow = encode_input (self);
+    if (flow != GST_FLOW_OK) {
+      forget_input (priv);
+      return flow;
+    }
+    priv->part = 0;
+    priv->units = rangecast::UnitReader ({});
+    priv->slice = {};
+  }
+  if (!priv->input)
+    return GST_FLOW_OK;
+  *output = priv->by_slices ? take_slice (self) : take_access_unit (self);
+  return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/* Never called, but without it GstBaseTransform would be passthrough. */
+static GstFlowReturn
+gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_ERROR;
+}
+
+static gboolean
+gst_neighbour_code_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+/* ---- events ---- */
+
+static gboolean
+gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event)) { /* goes on with the frame set that answers it */
+    gst_event_unref (event);
+    return TRUE;
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
+    priv->encoder.request_key ();
+    priv->key_requests.forget ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
+    priv->reporter.finish ();
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->sink_event (base, event);
+}
+
+static gboolean
+gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  if (priv->key_requests.note (event) || priv->rate.receivers.note (event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->src_event (base, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {
+               .frames = priv->frames, .points = priv->totals.points, .bytes = priv->coded_bytes}}};
+}
+
+static gboolean
+gst_neighbour_code_enc_start (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->rate.reset ();
+  priv->last_key = GST_CLOCK_TIME_NONE;
+  priv->encoder.request_key ();
+  priv->key_requests.forget ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
+  std::lock_guard guard (priv->lock);
+  priv->frame_number = 0;
+  priv->bits_per_s = 0;
+  priv->frames = priv->coded_bytes = priv->left_out = 0;
+  priv->totals = {};
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_enc_stop (GstBaseTransform *base)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
+  priv->reporter.stop ();
+  const StreamLock lock (base);
+  priv->is_configured = false;
+  forget_input (priv);
+  priv->buffers.drop ();
+  return TRUE;
+}
+
+static void
+gst_neighbour_code_enc_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
+  std::lock_guard guard (priv->lock);
+  if (!encoder_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static GstStructure *
+make_stats (const GstNeighbourCodeEncPrivate *priv)
+{
+  GstStructure *stats = gst_structure_new ("application/x-neighbourcodeenc-stats", "frames",
+      G_TYPE_UINT64, priv->frames, "left-out", G_TYPE_UINT64, priv->left_out, "points",
+      G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels", G_TYPE_UINT64,
+      guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64, guint64{priv->totals.slices},
+      "delta-slices", G_TYPE_UINT64, guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
+      guint64{priv->totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes,
+      "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
+      priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
+      nullptr);
+  priv->rate.receivers.describe (stats);
+  return stats;
+}
+
+static void
+gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  switch (id) {
+    case PROP_MAX_DEPTH_ERROR:
+      g_value_set_double (value, priv->max_depth_error_m);
+      break;
+    case PROP_ESTIMATED_BITRATE:
+      g_value_set_uint64 (value, guint64 (priv->rate.receivers.bits_per_s () + 0.5));
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value, make_stats (priv));
+      break;
+    case PROP_STATS_INTERVAL:
+      g_value_set_uint (value, priv->reporter.interval ());
+      break;
+    default:
+      if (!encoder_properties ().get (priv->settings, id, value))
+        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_neighbour_code_enc_finalize (GObject *object)
+{
+  delete GST_NEIGHBOUR_CODE_ENC (object)->priv;
+  G_OBJECT_CLASS (gst_neighbour_code_enc_parent_class)->finalize (object);
+}
+
+static void
+gst_neighbour_code_enc_init (GstNeighbourCodeEnc *self)
+{
+  self->priv = new GstNeighbourCodeEncPrivate;
+}
+
+static void
+gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_neighbour_code_enc_set_property;
+  object_class->get_property = gst_neighbour_code_enc_get_property;
+  object_class->finalize = gst_neighbour_code_enc_finalize;
+  encoder_properties ().install (object_class, PROP_SETTINGS);
+  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
+      g_param_spec_double ("max-depth-error", "Maximum depth error",
+          "Maximum difference between a decoded depth and the input depth in metres, over all "
+          "views, with the settings of the latest frame set (0 = no frame set yet)",
+          0, G_MAXDOUBLE, 0, kReadOnly));
+  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
+      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
+          "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
+          "first receiver report: target-bitrate; 0 = no limit known)",
+          0, G_MAXUINT64, 0, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started (frames, left-out, points, full-pixels, slices, "
+      "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds of "
+      "the latest frame set and the state of adaptive-bitrate");
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
+      "Codec/Encoder/Video",
+      "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");
+
+  transform_class->sink_event = gst_neighbour_code_enc_sink_event;
+  transform_class->src_event = gst_neighbour_code_enc_src_event;
+  transform_class->start = gst_neighbour_code_enc_start;
+  transform_class->stop = gst_neighbour_code_enc_stop;
+  transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
+  transform_class->set_caps = gst_neighbour_code_enc_set_caps;
+  transform_class->generate_output = gst_neighbour_code_enc_generate_output;
+  transform_class->transform = gst_neighbour_code_enc_transform;
+  transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");
+}

@@ -1,0 +1,745 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-neighbourcodeparse
+ * @title: neighbourcodeparse
+ *
+ * Converts between files of coded frame sets and access units, as downstream requires. Parsing
+ * resumes at the next start code after damage. Files can be sought by time. Comes with a
+ * typefinder.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=60 ! neighbourcodeenc ! neighbourcodeparse !
+ * application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
+ * ]|
+ * Writes a file.
+ * |[
+ * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
+ * ]|
+ * Plays it.
+ *
+ * Since: 0.1
+ */
+/* Locking: NeighbourCodeSeek has a lock of its own. Messages are posted in any thread: what they
+ * depend on is atomic. */
+#include "gstneighbourcodeparse.h"
+
+#include <gst/base/base.h>
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <atomic>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangestatus.hpp>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/key_check.hpp>
+#include <span>
+#include <vector>
+
+#include "seek.hpp"
+
+using rangecast::AccessUnitHeader;
+using rangecast::kAccessUnitHeaderSize;
+using rangecast::kStartCode;
+using rangecast::kStreamPrefixSize;
+using rangecast::SliceHeader;
+using rangecast::StreamPart;
+using rangecast::UnitHeader;
+using rangecast::UnitReader;
+using rangecast::UnitType;
+
+GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_parse_debug);
+#define GST_CAT_DEFAULT gst_neighbour_code_parse_debug
+
+using Bytes = std::span<const guint8>;
+
+/* The rig is written again after so much time. */
+static constexpr GstClockTime kRigInterval = GST_SECOND;
+/* A stream that begins with more rubbish is taken for something else. */
+static constexpr gsize kMaxLeadingRubbish = 2 << 20;
+
+/* What a stream has shown so far: what to complain of at its end. */
+enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
+
+/* Some bytes of the input. */
+struct Range {
+  gsize offset, size;
+};
+
+struct Stream {               /* streaming thread only */
+  bool reads_stream = true;   /* sink: byte stream; else access units */
+  bool writes_stream = false; /* src: byte stream; else access units */
+  bool src_caps_set = false;
+  bool had_gaps = false;
+  bool discont = false; /* bytes were dropped since the last buffer */
+  bool ending = false;  /* pushed: EOS has come */
+  gsize leading_rubbish = 0;
+  rangecast::RigCollector collector;
+  std::string too_large; /* why a rig was refused */
+  unsigned used_generation = 0;
+  gstrange::RangeInfo info; /* of the source caps */
+  std::vector<Range> output;
+
+  rangecast::KeyCheck key_check;
+  std::vector<guint8> rig_units; /* of access units to be written */
+  GstClockTime last_rig = GST_CLOCK_TIME_NONE;
+};
+
+struct GstNeighbourCodeParsePrivate {
+  NeighbourCodeSeek seek;
+  Stream stream;
+  std::atomic<Seen> seen = Seen::kNothing; /* written by the streaming thread */
+  std::atomic<bool> failed = false;        /* an error was posted since start or flush */
+};
+
+struct _GstNeighbourCodeParse {
+  GstBaseParse parent;
+  GstNeighbourCodeParsePrivate *priv;
+};
+
+#define STREAM_CAPS GST_NEIGHBOUR_CODE_STREAM_CAPS
+#define ACCESS_UNIT_CAPS                                                                           \
+  GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
+  ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (STREAM_CAPS "; " ACCESS_UNIT_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (ACCESS_UNIT_CAPS "; " STREAM_CAPS));
+
+G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PARSE)
+
+/* ---- typefinder ---- */
+
+static void
+find_type (GstTypeFind *find, gpointer)
+{
+  const guint8 *data = gst_type_find_peek (find, 0, kStreamPrefixSize);
+  AccessUnitHeader header;
+  if (!data || !rangecast::begins_access_unit ({data, kStreamPrefixSize}, header))
+    return;
+  GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
+  gst_type_find_suggest (find, GST_TYPE_FIND_MAXIMUM, caps);
+  gst_caps_unref (caps);
+}
+
+static gboolean
+register_with_typefinder (GstPlugin *plugin)
+{
+  GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
+  const gboolean typefinder = gst_type_find_register (plugin, "application/x-neighbour-code",
+      GST_RANK_PRIMARY, find_type, "rcnc", caps, nullptr, nullptr);
+  gst_caps_unref (caps);
+  return typefinder && gst_element_register (plugin, "neighbourcodeparse", GST_RANK_PRIMARY + 1,
+                           GST_TYPE_NEIGHBOUR_CODE_PARSE);
+}
+
+GST_ELEMENT_REGISTER_DEFINE_CUSTOM (neighbourcodeparse, register_with_typefinder)
+
+/* ---- caps ---- */
+
+/* Access units unless downstream takes only the byte stream. Its peer is asked, not the pad: the
+ * base class makes the pad answer with the caps that it already has. */
+static bool
+downstream_wants_stream (GstBaseParse *base)
+{
+  GstPad *pad = GST_BASE_PARSE_SRC_PAD (base);
+  GstCaps *ours = gst_pad_get_pad_template_caps (pad);
+  GstCaps *allowed = gst_pad_peer_query_caps (pad, ours);
+  GstCaps *access_units = gst_caps_from_string (ACCESS_UNIT_CAPS);
+  const bool wants =
+      !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
+  gst_caps_unref (ours);
+  gst_caps_unref (allowed);
+  gst_caps_unref (access_units);
+  return wants;
+}
+
+/* Buffers that do not fill an access unit were left behind: begin small again. */
+static void
+ask_for_the_least (GstBaseParse *base)
+{
+  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kStreamPrefixSize) : 1);
+}
+
+/* For those who ask what a file holds, gst-discoverer-1.0 among them. */
+static void
+name_the_code (GstBaseParse *base)
+{
+  GstTagList *tags = gst_tag_list_new (GST_TAG_VIDEO_CODEC, "Neighbour code", nullptr);
+  gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);
+  gst_tag_list_unref (tags);
+}
+
+static bool
+set_source_caps (GstBaseParse *base)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* done with this */
+  stream.writes_stream = downstream_wants_stream (base);
+  GstCaps *caps = gstrange::make_neighbour_code_caps (
+      stream.info, stream.writes_stream ? "byte-stream" : "access-unit");
+  stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
+  gst_caps_unref (caps);
+  gst_base_parse_set_frame_rate (base, guint (stream.info.fps_n), guint (stream.info.fps_d), 0, 0);
+  name_the_code (base);
+  return stream.src_caps_set;
+}
+
+/* What to return where downstream did not take the caps. */
+static GstFlowReturn
+refused (GstBaseParse *base)
+{
+  return GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)) ? GST_FLOW_FLUSHING
+                                                             : GST_FLOW_NOT_NEGOTIATED;
+}
+
+static gboolean
+gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const gchar *alignment = gst_structure_get_string (gst_caps_get_structure (caps, 0), "alignment");
+  stream.reads_stream = g_strcmp0 (alignment, "access-unit") != 0;
+  ask_for_the_least (base);
+  if (stream.reads_stream)
+    return TRUE;
+  const rangecast::Status status = gstrange::parse_caps (caps, stream.info);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  stream.rig_units.clear ();
+  rangecast::write_rig_units (
+      {stream.info.rig, stream.info.fps_n, stream.info.fps_d}, stream.rig_units);
+  stream.last_rig = GST_CLOCK_TIME_NONE;
+  return set_source_caps (base);
+}
+
+/* ---- errors ---- */
+
+static std::string
+what_is_missing (const GstNeighbourCodeParsePrivate *priv)
+{
+  switch (priv->seen) {
+    case Seen::kNothing:
+      return "No access unit found: expected a neighbour code byte stream of version 1, which "
+             "begins "
+             "with the start code 00 52 43 55";
+    case Seen::kAccessUnit:
+      if (!priv->stream.too_large.empty ())
+        return "The rig is too large: " + priv->stream.too_large;
+      return "No complete rig found: expected the rig views of a neighbour code byte stream in "
+             "front of its slices";
+    default:
+      return "The neighbour code byte stream ends before its first whole slice";
+  }
+}
+
+static void
+post_what_is_missing (GstBaseParse *base)
+{
+  const std::string text = what_is_missing (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", text.c_str ()), (nullptr));
+}
+
+/* Where the base class says "No valid frames found" we know what is missing. */
+static GstMessage *
+say_what_is_missing (GstElement *element, GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  const GstStructure *details = nullptr;
+  gst_message_parse_error (message, &error, &debug);
+  gst_message_parse_error_details (message, &details);
+  if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
+    g_free (error->message);
+    error->message = g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv).c_str ());
+    GstMessage *told = gst_message_new_error_with_details (
+        GST_MESSAGE_SRC (message), error, debug, details ? gst_structure_copy (details) : nullptr);
+    gst_message_set_seqnum (told, gst_message_get_seqnum (message));
+    gst_message_unref (message);
+    message = told;
+  }
+  g_clear_error (&error);
+  g_free (debug);
+  return message;
+}
+
+/* In pull mode the base class adds "Internal data stream error" to any error: one that tells is
+ * enough. */
+static gboolean
+gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
+{
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
+    if (GST_NEIGHBOUR_CODE_PARSE (element)->priv->failed.exchange (true)) {
+      gst_message_unref (message);
+      return TRUE;
+    }
+    message = say_what_is_missing (element, message);
+  }
+  return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
+}
+
+/* Errors after a flush are news again. Asked at the source pad: there alone the flushes of upstream
+ * and those of seeks in files are both seen, and while no data flow. */
+static GstPadProbeReturn
+note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
+    static_cast<GstNeighbourCodeParsePrivate *> (data)->failed = false;
+  return GST_PAD_PROBE_OK;
+}
+
+/* ---- from access units ---- */
+
+/* What the header of an access unit says of its slices. */
+static AccessUnitHeader
+summarise (Bytes access_unit, rangecast::KeyCheck &check)
+{
+  AccessUnitHeader summary;
+  check.reset ();
+  UnitReader units (access_unit);
+  UnitHeader header;
+  SliceHeader slice;
+  bool first = true;
+  while (const auto unit = units.next (header)) {
+    if (!rangecast::read_slice_header (*unit, slice).ok ())
+      continue;
+    if (first)
+      summary.capture_time_ns = slice.capture_time_ns;
+    check.add (slice);
+    first = false;
+  }
+  summary.key = check.is_key ();
+  return summary;
+}
+
+static void
+set_key (GstBuffer *buffer, bool key)
+{
+  if (key)
+    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  else
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+}
+
+static bool
+rig_is_due (Stream &stream, GstClockTime pts)
+{
+  const GstClockTime last = stream.last_rig;
+  const bool due = !GST_CLOCK_TIME_IS_VALID (last) || !GST_CLOCK_TIME_IS_VALID (pts) ||
+                   pts < last || pts - last >= kRigInterval;
+  if (due)
+    stream.last_rig = pts;
+  return due;
+}
+
+/* Start code, header, the rig where it is due. */
+static GstMemory *
+make_stream_prefix (AccessUnitHeader &header, Bytes rig, gsize access_unit_size)
+{
+  header.size = guint32 (rig.size () + access_unit_size);
+  const gsize size = kStreamPrefixSize + rig.size ();
+  auto bytes = static_cast<guint8 *> (g_malloc (size));
+  std::copy (kStartCode.begin (), kStartCode.end (), bytes);
+  rangecast::write_access_unit_header (header, bytes + kStartCode.size ());
+  std::copy (rig.begin (), rig.end (), bytes + kStreamPrefixSize);
+  return gst_memory_new_wrapped (GstMemoryFlags (0), bytes, size, 0, size, bytes, g_free);
+}
+
+/* The access unit in the byte stream; its own bytes are shared, not copied. */
+static GstBuffer *
+make_stream_buffer (Stream &stream, GstBuffer *access_unit, AccessUnitHeader header)
+{
+  header.pts_ns = GST_BUFFER_PTS (access_unit);
+  const Bytes rig = rig_is_due (stream, header.pts_ns) ? Bytes (stream.rig_units) : Bytes ();
+  GstBuffer *buffer = gst_buffer_copy_region (access_unit,
+      GstBufferCopyFlags (
+          GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_MEMORY),
+      0, gst_buffer_get_size (access_unit));
+  gst_buffer_prepend_memory (
+      buffer, make_stream_prefix (header, rig, gst_buffer_get_size (access_unit)));
+  return buffer;
+}
+
+static GstFlowReturn
+refuse_long_access_unit (GstBaseParse *base, gsize size)
+{
+  GST_ELEMENT_ERROR (base, STREAM, FORMAT,
+      ("An access unit of %" G_GSIZE_FORMAT " bytes: expected at most 32 MiB with its rig", size),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+static GstFlowReturn
+refuse_unreadable_buffer (GstBaseParse *base)
+{
+  GST_ELEMENT_ERROR (base, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+  return GST_FLOW_ERROR;
+}
+
+static GstFlowReturn
+handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const gsize size = gst_buffer_get_size (frame->buffer);
+  if (gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)) && !set_source_caps (base))
+    return refused (base);
+  if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
+    return refuse_long_access_unit (base, size);
+  GstMapInfo map;
+  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+    return refuse_unreadable_buffer (base);
+  AccessUnitHeader header = summarise ({map.data, map.size}, stream.key_check);
+  gst_buffer_unmap (frame->buffer, &map);
+  /* Upstream knows more: of lost packets, for one. */
+  header.key = header.key && !GST_BUFFER_FLAG_IS_SET (frame->buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  frame->buffer = gst_buffer_make_writable (frame->buffer);
+  set_key (frame->buffer, header.key);
+  if (stream.writes_stream)
+    frame->out_buffer = make_stream_buffer (stream, frame->buffer, header);
+  return gst_base_parse_finish_frame (base, frame, gint (size));
+}
+
+/* ---- from the byte stream ---- */
+
+static GstFlowReturn
+drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
+{
+  GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.discont = true;
+  frame->flags |= GST_BASE_PARSE_FRAME_FLAG_DROP;
+  return gst_base_parse_finish_frame (base, frame, gint (size));
+}
+
+/* Not by skipping: the base class gives up after 2 MiB, and one access unit can be longer. */
+static GstFlowReturn
+drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  GST_WARNING_OBJECT (base,
+      "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
+      guint64 (frame->offset));
+  if (priv->seen == Seen::kNothing) {
+    priv->stream.leading_rubbish += size;
+    if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
+      post_what_is_missing (base);
+      return GST_FLOW_ERROR;
+    }
+  }
+  return drop (base, frame, size);
+}
+
+static void
+add_rig_view (GstBaseParse *base, Bytes unit)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const rangecast::Status status = stream.collector.add (unit);
+  if (status.code () == rangecast::StatusCode::kBadSize)
+    stream.too_large = status.message ();
+  if (!status.ok ())
+    GST_DEBUG_OBJECT (base, "a bad rig view: %s", status.message ().c_str ());
+}
+
+/* After a seek: the rig that the file had last there. */
+static void
+use_rig_of_seek (GstBaseParse *base, guint64 offset)
+{
+  const std::vector<guint8> units = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.take_rig (offset);
+  UnitReader reader (units);
+  UnitHeader header;
+  while (const auto unit = reader.next (header))
+    if (header.type == guint8 (UnitType::kRigView))
+      add_rig_view (base, *unit);
+}
+
+/* Takes the rig of an access unit, and notes where its other units are. */
+static void
+take_units (GstBaseParse *base, Bytes units)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  stream.output.clear ();
+  UnitReader reader (units);
+  UnitHeader header;
+  gsize offset = kStreamPrefixSize;
+  while (const auto unit = reader.next (header)) {
+    if (header.type == guint8 (UnitType::kRigView))
+      add_rig_view (base, *unit);
+    else if (!stream.output.empty () &&
+             stream.output.back ().offset + stream.output.back ().size == offset)
+      stream.output.back ().size += unit->size ();
+    else
+      stream.output.push_back ({offset, unit->size ()});
+    offset += unit->size ();
+  }
+}
+
+/* New caps where the rig is another, or downstream wants others. */
+static bool
+update_caps (GstBaseParse *base)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const bool wanted = gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base));
+  if (stream.collector.generation () == 0)
+    return true;
+  if (stream.collector.generation () == stream.used_generation && stream.src_caps_set && !wanted)
+    return true;
+  stream.used_generation = stream.collector.generation ();
+  const rangecast::StreamInfo &info = stream.collector.info ();
+  stream.info = gstrange::make_info (info.rig, info.fps_n, info.fps_d);
+  return set_source_caps (base);
+}
+
+static GstMemory *
+copy_ranges (GstBuffer *input, const std::vector<Range> &ranges)
+{
+  gsize size = 0;
+  for (const Range &range : ranges)
+    size += range.size;
+  GstMemory *memory = gst_allocator_alloc (nullptr, size, nullptr);
+  GstMapInfo from, to;
+  if (gst_memory_map (memory, &to, GST_MAP_WRITE)) {
+    guint8 *end = to.data;
+    if (gst_buffer_map (input, &from, GST_MAP_READ)) {
+      for (const Range &range : ranges)
+        end = std::copy_n (from.data + range.offset, range.size, end);
+      gst_buffer_unmap (input, &from);
+    }
+    gst_memory_unmap (memory, &to);
+  }
+  return memory;
+}
+
+/* The units that go on, sharing the input's memory where a buffer can hold that many pieces: with
+ * each one more it would copy all that it has. */
+static GstBuffer *
+make_output (Stream &stream, GstBuffer *input, gsize length)
+{
+  if (stream.writes_stream)
+    stream.output.assign (1, {0, length});
+  GstBuffer *output = gst_buffer_new ();
+  gst_buffer_copy_into (output, input, GST_BUFFER_COPY_FLAGS, 0, gsize (-1));
+  if (stream.output.size () * gst_buffer_n_memory (input) > gst_buffer_get_max_memory ())
+    gst_buffer_append_memory (output, copy_ranges (input, stream.output));
+  else
+    for (const Range &range : stream.output)
+      gst_buffer_copy_into (output, input, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
+  GST_BUFFER_PTS (output) = GST_BUFFER_PTS (input);
+  GST_BUFFER_DTS (output) = GST_BUFFER_DTS (input);
+  return output;
+}
+
+static GstFlowReturn
+finish_access_unit (
+    GstBaseParse *base, GstBaseParseFrame *frame, const AccessUnitHeader &header, gsize length)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  Stream &stream = priv->stream;
+  GstBuffer *output = make_output (stream, frame->buffer, length);
+  const GstClockTime pts = priv->seek.time_of (base, header.pts_ns, stream.info.frame_duration ());
+  /* Where there is none, the base class goes on from the one before, or from where it sought. */
+  if (GST_CLOCK_TIME_IS_VALID (pts))
+    GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = pts;
+  GST_BUFFER_DURATION (output) = stream.info.frame_duration ();
+  set_key (output, header.key);
+  if (stream.discont)
+    GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
+  gst_range_buffer_set_capture_time (output, header.capture_time_ns);
+  stream.discont = false;
+  priv->seen = Seen::kSlices;
+  frame->out_buffer = output;
+  return gst_base_parse_finish_frame (base, frame, gint (length));
+}
+
+/* Whose recorder was killed hears of it: what is left of the last access unit may be shown. */
+static void
+warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
+{
+  const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  const gsize expected = kStreamPrefixSize + part.header.size;
+  const bool at_end = NeighbourCodeSeek::reads_file (base) || stream.ending;
+  if (!at_end || !GST_BASE_PARSE_DRAINING (base) || part.length >= expected)
+    return;
+  GST_ELEMENT_WARNING (base, STREAM, DECODE,
+      ("The stream ends within an access unit: missing %" G_GSIZE_FORMAT " bytes",
+          expected - part.length),
+      ("expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT, expected, part.length));
+}
+
+static GstFlowReturn
+handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const Stream &stream = priv->stream;
+  ask_for_the_least (base);
+  if (!update_caps (base))
+    return refused (base);
+  priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
+  if (!stream.src_caps_set || stream.output.empty ()) /* of no use without its rig, or empty */
+    return drop (base, frame, part.length);
+  return finish_access_unit (base, frame, part.header, part.length);
+}
+
+static GstFlowReturn
+handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
+{
+  GstMapInfo map;
+  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+    return refuse_unreadable_buffer (base);
+  const Bytes bytes (map.data, map.size);
+  const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
+  if (part.length) {
+    use_rig_of_seek (base, guint64 (frame->offset));
+    take_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+  }
+  gst_buffer_unmap (frame->buffer, &map);
+  if (part.rubbish)
+    return drop_rubbish (base, frame, part.rubbish);
+  if (part.length) {
+    warn_if_cut_off (base, part);
+    return handle_access_unit_of_stream (base, frame, part);
+  }
+  gst_base_parse_set_min_frame_size (base, guint (part.wanted));
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn
+gst_neighbour_code_parse_handle_frame (GstBaseParse *base, GstBaseParseFrame *frame, gint *skip)
+{
+  *skip = 0;
+  if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.reads_stream)
+    return handle_stream (base, frame);
+  return handle_access_unit (base, frame);
+}
+
+/* What lies before a segment may be needed to decode what lies in it: the seek began at the last
+ * key access unit. Sinks clip it. */
+static GstFlowReturn
+gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *frame)
+{
+  const GstClockTime pts = GST_BUFFER_PTS (frame->buffer);
+  if (!GST_CLOCK_TIME_IS_VALID (pts) || pts >= base->segment.start)
+    frame->flags |= GST_BASE_PARSE_FRAME_FLAG_CLIP;
+  return GST_FLOW_OK;
+}
+
+/* ---- events ---- */
+
+static gboolean
+gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && NeighbourCodeSeek::reads_file (base))
+    event = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.aim (base, event);
+  if (!event)
+    return FALSE;
+  return GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->src_event (base, event);
+}
+
+static void
+finish_stream (GstBaseParse *base)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  priv->stream.ending = true;
+  if (base->segment.rate > 0)
+    gst_base_parse_drain (base);
+  priv->stream.ending = false;
+  if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
+    post_what_is_missing (base);
+}
+
+/* With the key access unit that the event announces the rig is written again. */
+static void
+note_wanted_headers (GstBaseParse *base, GstEvent *event)
+{
+  gboolean all_headers = FALSE;
+  if (gst_video_event_is_force_key_unit (event) &&
+      gst_video_event_parse_downstream_force_key_unit (
+          event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
+      all_headers)
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.last_rig = GST_CLOCK_TIME_NONE;
+}
+
+static gboolean
+gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
+{
+  const GstEventType type = GST_EVENT_TYPE (event);
+  note_wanted_headers (base, event);
+  if (type == GST_EVENT_EOS)
+    finish_stream (base);
+  else if (type == GST_EVENT_GAP)
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.had_gaps = true;
+  const gboolean done =
+      GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->sink_event (base, event);
+  if (type == GST_EVENT_FLUSH_STOP || type == GST_EVENT_SEGMENT)
+    ask_for_the_least (base);
+  return done;
+}
+
+/* ---- life ---- */
+
+static void
+forget_stream (GstNeighbourCodeParsePrivate *priv)
+{
+  priv->stream = {};
+  priv->seek.reset ();
+  priv->seen = Seen::kNothing;
+  priv->failed = false;
+}
+
+static gboolean
+gst_neighbour_code_parse_start (GstBaseParse *base)
+{
+  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  ask_for_the_least (base);
+  return TRUE;
+}
+
+static gboolean
+gst_neighbour_code_parse_stop (GstBaseParse *base)
+{
+  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  return TRUE;
+}
+
+static void
+gst_neighbour_code_parse_finalize (GObject *object)
+{
+  delete GST_NEIGHBOUR_CODE_PARSE (object)->priv;
+  G_OBJECT_CLASS (gst_neighbour_code_parse_parent_class)->finalize (object);
+}
+
+static void
+gst_neighbour_code_parse_init (GstNeighbourCodeParse *self)
+{
+  self->priv = new GstNeighbourCodeParsePrivate;
+  GST_PAD_SET_ACCEPT_INTERSECT (GST_BASE_PARSE_SINK_PAD (self));
+  GST_PAD_SET_ACCEPT_TEMPLATE (GST_BASE_PARSE_SINK_PAD (self));
+  gst_pad_add_probe (GST_BASE_PARSE_SRC_PAD (self), GST_PAD_PROBE_TYPE_EVENT_FLUSH, note_flush,
+      self->priv, nullptr);
+}
+
+static void
+gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
+{
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto parse_class = GST_BASE_PARSE_CLASS (klass);
+
+  G_OBJECT_CLASS (klass)->finalize = gst_neighbour_code_parse_finalize;
+  element_class->post_message = gst_neighbour_code_parse_post_message;
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
+      "Codec/Parser/Video", "Converts between neighbour code byte streams and access units",
+      "gst-rangecast");
+
+  parse_class->start = gst_neighbour_code_parse_start;
+  parse_class->stop = gst_neighbour_code_parse_stop;
+  parse_class->set_sink_caps = gst_neighbour_code_parse_set_sink_caps;
+  parse_class->sink_event = gst_neighbour_code_parse_sink_event;
+  parse_class->src_event = gst_neighbour_code_parse_src_event;
+  parse_class->handle_frame = gst_neighbour_code_parse_handle_frame;
+  parse_class->pre_push_frame = gst_neighbour_code_parse_pre_push_frame;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_neighbour_code_parse_debug, "neighbourcodeparse", 0, "Neighbour code parser");
+}

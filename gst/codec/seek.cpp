@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "seek.hpp"
+
+#include <algorithm>
+
+#include "bytestreamindex.hpp"
+
+bool
+NeighbourCodeSeek::reads_file (GstBaseParse *base)
+{
+  return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
+}
+
+void
+NeighbourCodeSeek::reset ()
+{
+  std::lock_guard guard (lock_);
+  first_pts_ = GST_CLOCK_TIME_NONE;
+  rig_offset_ = G_MAXUINT64;
+  rig_units_ = {};
+}
+
+/* From the first time of a file to the end of its last access unit. */
+static void
+find_duration (GstBaseParse *base, GstClockTime first_pts, GstClockTime frame_duration)
+{
+  GstClockTime duration =
+      NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
+  if (!GST_CLOCK_TIME_IS_VALID (duration))
+    return; /* the base class goes on estimating */
+  if (GST_CLOCK_TIME_IS_VALID (frame_duration))
+    duration += frame_duration;
+  if (duration <= G_MAXINT64)
+    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
+}
+
+GstClockTime
+NeighbourCodeSeek::time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime frame_duration)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (pts_ns))
+    return GST_CLOCK_TIME_NONE;
+  bool first = false;
+  GstClockTime first_pts;
+  {
+    std::lock_guard guard (lock_);
+    first = !GST_CLOCK_TIME_IS_VALID (first_pts_);
+    if (first)
+      first_pts_ = pts_ns;
+    first_pts = first_pts_;
+  }
+  if (first && reads_file (base))
+    find_duration (base, first_pts, frame_duration);
+  return pts_ns >= first_pts ? pts_ns - first_pts : 0;
+}
+
+std::vector<guint8>
+NeighbourCodeSeek::take_rig (guint64 offset)
+{
+  std::lock_guard guard (lock_);
+  if (rig_offset_ != offset)
+    return {};
+  rig_offset_ = G_MAXUINT64;
+  return std::move (rig_units_);
+}
+
+GstClockTime
+NeighbourCodeSeek::first_pts ()
+{
+  std::lock_guard guard (lock_);
+  return first_pts_;
+}
+
+/* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
+ * played. Returns: the time there; none if it could not be found. */
+GstClockTime
+NeighbourCodeSeek::find_place (
+    GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
+{
+  const GstClockTime first = first_pts ();
+  if (!GST_CLOCK_TIME_IS_VALID (first))
+    return GST_CLOCK_TIME_NONE;
+  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first);
+  auto place = file.find (time, stop, flags);
+  if (!place)
+    return GST_CLOCK_TIME_NONE;
+  {
+    /* The rig is not with each access unit: keep it until the streaming thread is there. */
+    std::lock_guard guard (lock_);
+    rig_offset_ = place->offset;
+    rig_units_ = std::move (place->rig_units);
+  }
+  gst_base_parse_add_index_entry (base, place->offset, place->time, TRUE, TRUE);
+  return place->time;
+}
+
+/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
+static GstClockTime
+end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
+{
+  const GstClockTime end =
+      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
+  return std::min<GstClockTime> (end, G_MAXINT64);
+}
+
+GstEvent *
+NeighbourCodeSeek::aim (GstBaseParse *base, GstEvent *event)
+{
+  gdouble rate;
+  GstFormat format;
+  GstSeekFlags flags;
+  GstSeekType start_type, stop_type;
+  gint64 start, stop;
+  gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
+  if (rate < 0) { /* nothing here reads backwards */
+    gst_event_unref (event);
+    return nullptr;
+  }
+  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
+    return event;
+  const GstClockTime end = end_of (base, stop_type, stop);
+  const GstClockTime found = find_place (base, GstClockTime (start), end, flags);
+  if (!GST_CLOCK_TIME_IS_VALID (found))
+    return event;
+  if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
+    start = gint64 (found);
+  /* The base class uses the place only where it shall be accurate. */
+  flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
+  GstEvent *aimed = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
+  gst_event_set_seqnum (aimed, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return aimed;
+}

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <span>
+
+/** Goes through the units of a buffer that holds whole ones, memory by memory: to map a buffer of
+ *  several memories is to copy it. Where a unit lies across two memories it is mapped as a whole.
+ *  @param take  bool (gsize offset, std::span<const guint8> unit, const UnitHeader &); false: no
+ * more
+ *  @param[out] status  how it ended: kTruncated, kBadData or kUnsupported at damage
+ *  @return FALSE if the buffer cannot be mapped */
+template <typename Take>
+bool
+for_each_unit (GstBuffer *buffer, Take take, rangecast::Status &status)
+{
+  using rangecast::StatusCode;
+  rangecast::UnitHeader header;
+  gsize offset = 0;
+  bool more = true;
+  const auto read = [&] (std::span<const guint8> bytes) {
+    rangecast::UnitReader reader (bytes);
+    while (more) {
+      const auto unit = reader.next (header);
+      if (!unit)
+        break;
+      more = take (offset, *unit, header);
+      offset += unit->size ();
+    }
+    status = reader.status ();
+  };
+  const guint memories = gst_buffer_n_memory (buffer);
+  for (guint i = 0; i < memories && more; i++) {
+    GstMapInfo map;
+    GstMemory *memory = gst_buffer_peek_memory (buffer, i);
+    if (!gst_memory_map (memory, &map, GST_MAP_READ))
+      return false;
+    read ({map.data, map.size});
+    gst_memory_unmap (memory, &map);
+    if (status.ok ())
+      continue;
+    if (status.code () != StatusCode::kTruncated || i + 1 == memories)
+      return true;
+    if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+      return false;
+    read (std::span<const guint8> (map.data, map.size).subspan (offset));
+    gst_buffer_unmap (buffer, &map);
+    return true;
+  }
+  return true;
+}

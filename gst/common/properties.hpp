@@ -1,0 +1,265 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+
+#include <concepts>
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+/* Properties of elements, as tables of rows. A row names a member of the element's struct of
+ * settings; its type makes the GParamSpec, and a default-constructed struct holds the default
+ * value. */
+
+inline constexpr auto kReadWrite = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
+/** A change takes effect in the states NULL and READY. */
+inline constexpr auto kMutableReady = GParamFlags (kReadWrite | GST_PARAM_MUTABLE_READY);
+/** A change takes effect in all states. */
+inline constexpr auto kMutablePlaying = GParamFlags (kReadWrite | GST_PARAM_MUTABLE_PLAYING);
+/** The same, and the element calls gst_object_sync_values() for each buffer. */
+inline constexpr auto kControllable = GParamFlags (kMutablePlaying | GST_PARAM_CONTROLLABLE);
+inline constexpr auto kReadOnly = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
+
+/** A property that is a member of `Settings`, or is stored by functions of its own. */
+template <typename Settings> struct PropertyRow {
+  GParamSpec *spec; ///< floating until it is installed
+  void (*set) (Settings &, const GValue *);
+  void (*get) (const Settings &, GValue *);
+};
+
+namespace properties {
+
+/* The member at the end of a path of pointers to members. */
+template <auto... kPath, typename Settings>
+decltype (auto)
+member (Settings &settings)
+{
+  if constexpr (sizeof...(kPath) == 0)
+    return (settings);
+  else
+    return [&]<auto kFirst, auto... kRest> ()->decltype (auto)
+    {
+      return member<kRest...> (std::invoke (kFirst, settings));
+    }
+  .template operator()<kPath...> ();
+}
+
+template <typename T>
+T
+read (const GValue *value)
+{
+  if constexpr (std::same_as<T, bool>)
+    return g_value_get_boolean (value) != FALSE;
+  else if constexpr (std::same_as<T, double>)
+    return g_value_get_double (value);
+  else if constexpr (std::same_as<T, float>)
+    return g_value_get_float (value);
+  else if constexpr (std::same_as<T, std::string>) {
+    const gchar *text = g_value_get_string (value);
+    return text ? text : "";
+  } else if constexpr (std::is_enum_v<T>)
+    return static_cast<T> (
+        G_VALUE_HOLDS_FLAGS (value) ? int (g_value_get_flags (value)) : g_value_get_enum (value));
+  else if constexpr (std::same_as<T, gint>)
+    return G_VALUE_HOLDS_ENUM (value) ? g_value_get_enum (value) : g_value_get_int (value);
+  else if constexpr (std::same_as<T, guint>)
+    return G_VALUE_HOLDS_FLAGS (value) ? g_value_get_flags (value) : g_value_get_uint (value);
+  else if constexpr (std::signed_integral<T>)
+    return g_value_get_int64 (value);
+  else
+    return g_value_get_uint64 (value);
+}
+
+template <typename T>
+void
+write (const T &member, GValue *value)
+{
+  if constexpr (std::same_as<T, bool>)
+    g_value_set_boolean (value, member);
+  else if constexpr (std::same_as<T, double>)
+    g_value_set_double (value, member);
+  else if constexpr (std::same_as<T, float>)
+    g_value_set_float (value, member);
+  else if constexpr (std::same_as<T, std::string>)
+    g_value_set_string (value, member.empty () ? nullptr : member.c_str ());
+  else if constexpr (std::is_enum_v<T>)
+    G_VALUE_HOLDS_FLAGS (value) ? g_value_set_flags (value, guint (member))
+                                : g_value_set_enum (value, int (member));
+  else if constexpr (std::same_as<T, gint>)
+    G_VALUE_HOLDS_ENUM (value) ? g_value_set_enum (value, member) : g_value_set_int (value, member);
+  else if constexpr (std::same_as<T, guint>)
+    G_VALUE_HOLDS_FLAGS (value) ? g_value_set_flags (value, member)
+                                : g_value_set_uint (value, member);
+  else if constexpr (std::signed_integral<T>)
+    g_value_set_int64 (value, member);
+  else
+    g_value_set_uint64 (value, member);
+}
+
+template <typename Settings, auto... kPath>
+PropertyRow<Settings>
+row (GParamSpec *spec)
+{
+  using Member = std::remove_cvref_t<decltype (member<kPath...> (std::declval<Settings &> ()))>;
+  return {spec,
+      [] (Settings &settings, const GValue *value) {
+        member<kPath...> (settings) = read<Member> (value);
+      },
+      [] (const Settings &settings, GValue *value) {
+        write<Member> (member<kPath...> (settings), value);
+      }};
+}
+
+template <typename T>
+GParamSpec *
+number_spec (const char *name, const char *nick, const char *blurb, T minimum, T maximum,
+    T default_value, GParamFlags flags)
+{
+  if constexpr (std::same_as<T, double>)
+    return g_param_spec_double (name, nick, blurb, minimum, maximum, default_value, flags);
+  else if constexpr (std::same_as<T, float>)
+    return g_param_spec_float (name, nick, blurb, minimum, maximum, default_value, flags);
+  else if constexpr (std::same_as<T, gint>)
+    return g_param_spec_int (name, nick, blurb, minimum, maximum, default_value, flags);
+  else if constexpr (std::same_as<T, guint>)
+    return g_param_spec_uint (name, nick, blurb, minimum, maximum, default_value, flags);
+  else if constexpr (std::signed_integral<T>)
+    return g_param_spec_int64 (name, nick, blurb, minimum, maximum, default_value, flags);
+  else
+    return g_param_spec_uint64 (name, nick, blurb, minimum, maximum, default_value, flags);
+}
+
+} // namespace properties
+
+/** The rows of an element's settings. Made in class_init, never freed, as classes are not. */
+template <typename Settings> class PropertyTable {
+public:
+  using Row = PropertyRow<Settings>;
+
+  PropertyTable (std::initializer_list<Row> rows) : rows_ (rows) {}
+
+  /** A number (gint, guint, gint64, guint64, float or double). @tparam kPath  pointers to members
+   *  that lead from Settings to it, or functions that return it by reference */
+  template <auto... kPath, typename Minimum, typename Maximum>
+  static Row number (const char *name, const char *nick, const char *blurb, Minimum minimum,
+      Maximum maximum, GParamFlags flags)
+  {
+    const Settings defaults{};
+    const auto default_value = properties::member<kPath...> (defaults);
+    using T = std::remove_cv_t<decltype (default_value)>;
+    return properties::row<Settings, kPath...> (properties::number_spec<T> (
+        name, nick, blurb, T (minimum), T (maximum), default_value, flags));
+  }
+
+  /** A bool. */
+  template <auto... kPath>
+  static Row boolean (const char *name, const char *nick, const char *blurb, GParamFlags flags)
+  {
+    const Settings defaults{};
+    return properties::row<Settings, kPath...> (
+        g_param_spec_boolean (name, nick, blurb, properties::member<kPath...> (defaults), flags));
+  }
+
+  /** A std::string; empty is null. */
+  template <auto... kPath>
+  static Row text (const char *name, const char *nick, const char *blurb, GParamFlags flags)
+  {
+    const Settings defaults{};
+    const std::string &default_value = properties::member<kPath...> (defaults);
+    return properties::row<Settings, kPath...> (g_param_spec_string (
+        name, nick, blurb, default_value.empty () ? nullptr : default_value.c_str (), flags));
+  }
+
+  /** An enumeration. @param type  its GType, whose values are those of the member; it is documented
+   *  with the plugin */
+  template <auto... kPath>
+  static Row enumeration (
+      const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
+  {
+    const Settings defaults{};
+    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
+    return properties::row<Settings, kPath...> (g_param_spec_enum (
+        name, nick, blurb, type, int (properties::member<kPath...> (defaults)), flags));
+  }
+
+  /** A set of flags. */
+  template <auto... kPath>
+  static Row flag_set (
+      const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
+  {
+    const Settings defaults{};
+    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
+    return properties::row<Settings, kPath...> (g_param_spec_flags (
+        name, nick, blurb, type, guint (properties::member<kPath...> (defaults)), flags));
+  }
+
+  /** What no single member holds. */
+  static Row custom (GParamSpec *spec, void (*set) (Settings &, const GValue *),
+      void (*get) (const Settings &, GValue *))
+  {
+    return {spec, set, get};
+  }
+
+  /** Installs the rows as properties `first_id` and following. @return the next free number */
+  guint install (GObjectClass *object_class, guint first_id)
+  {
+    first_id_ = first_id;
+    for (const Row &row : rows_)
+      g_object_class_install_property (object_class, first_id++, row.spec);
+    return first_id;
+  }
+
+  /** @return false if the table has no property of that number */
+  bool set (Settings &settings, guint id, const GValue *value) const
+  {
+    const Row *row = find (id);
+    if (row)
+      row->set (settings, value);
+    return row != nullptr;
+  }
+  bool get (const Settings &settings, guint id, GValue *value) const
+  {
+    const Row *row = find (id);
+    if (row)
+      row->get (settings, value);
+    return row != nullptr;
+  }
+
+  /** Calls g_object_notify_by_pspec() for each property whose value differs. Call it without locks.
+   */
+  void notify_changes (GObject *object, const Settings &before, const Settings &after) const
+  {
+    for (const Row &row : rows_) {
+      GValue values[2] = {G_VALUE_INIT, G_VALUE_INIT};
+      g_value_init (&values[0], row.spec->value_type);
+      g_value_init (&values[1], row.spec->value_type);
+      row.get (before, &values[0]);
+      row.get (after, &values[1]);
+      if (g_param_values_cmp (row.spec, &values[0], &values[1]) != 0)
+        g_object_notify_by_pspec (object, row.spec);
+      g_value_unset (&values[0]);
+      g_value_unset (&values[1]);
+    }
+  }
+
+private:
+  const Row *find (guint id) const
+  {
+    return id >= first_id_ && id - first_id_ < rows_.size () ? &rows_[id - first_id_] : nullptr;
+  }
+
+  std::vector<Row> rows_;
+  guint first_id_ = 1;
+};
+
+/** Installs the read-only property `stats`, a GstStructure. @param blurb  names its fields */
+inline void
+install_stats (GObjectClass *object_class, guint id, const char *blurb)
+{
+  g_object_class_install_property (object_class, id,
+      g_param_spec_boxed ("stats", "Statistics", blurb, GST_TYPE_STRUCTURE, kReadOnly));
+}

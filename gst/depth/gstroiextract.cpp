@@ -1,0 +1,570 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-roiextract
+ * @title: roiextract
+ *
+ * Removes the background of range images by depth and colour and crops them to the foreground. The
+ * background of each view is learnt from the first frames or on #GstRoiExtract::capture-background,
+ * or loaded from a file. While learning, views have an empty ROI.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract background-frames=30 !
+ * rangesplit name=s s.depth ! videoconvert ! autovideosink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstroiextract.h"
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <memory>
+#include <mutex>
+#include <rangecast/base/output_path.hpp>
+#include <rangecast/base/parallel.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/roi/background.hpp>
+#include <rangecast/roi/bounding_box.hpp>
+#include <rangecast/roi/segmentation.hpp>
+#include <string>
+
+#include "common/controlledvalues.hpp"
+#include "common/statsreporter.hpp"
+#include "common/streamlock.hpp"
+#include "roisettings.hpp"
+
+using rangecast::BackgroundModel;
+using rangecast::RangeImage;
+using rangecast::Roi;
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::View;
+
+GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
+#define GST_CAT_DEFAULT gst_roi_extract_debug
+
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
+static guint signals[N_SIGNALS];
+
+/* It is taught no more often than this, which nobody sees and saves time, seconds. */
+static constexpr double kShortestStep = 0.2;
+/* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
+ * fits it no more. */
+static constexpr int kAnnouncedMargin = 16;
+
+/* What is kept of one view. */
+struct ViewState {
+  BackgroundModel background;
+  rangecast::Segmenter segmenter;
+  bool learnt = false;
+  int learning_target = 0;
+  int settled = 0;        /* frames seen before learning began */
+  guint64 adapted_ns = 0; /* capture time of the last frame that taught the background, */
+  int adapted_area = 0;   /* and the pixels of its ROI */
+  Roi announced;
+  guint64 points_in = 0, points_out = 0; /* of the present frame */
+  Roi box;
+  Status status;
+};
+
+struct GstRoiExtractPrivate {
+  std::mutex lock; /* guards settings and stats; never held across a push, event or message */
+  RoiSettings settings;
+  guint64 frames = 0, points_in = 0, points_out = 0;
+  Roi last_roi;
+
+  StatsReporter reporter; /* has locks of its own */
+  std::atomic<bool> relearn{false};
+
+  /* streaming thread only */
+  std::string refused; /* what was said of caps last: they come again with each buffer */
+  std::string unsaved; /* a file that cannot be written is told once */
+  gstrange::RangeInfo info;
+  std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
+};
+
+struct _GstRoiExtract {
+  GstBaseTransform parent;
+  GstRoiExtractPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
+
+/* ---- the background ---- */
+
+static RoiSettings
+copy_settings (GstRoiExtractPrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->settings;
+}
+
+static void
+begin_learning (ViewState &state, const View &view, int frames)
+{
+  state.background.reset (view.width, view.height);
+  state.segmenter = {}; /* the light is that of the new background */
+  state.adapted_ns = 0;
+  state.adapted_area = 0;
+  state.learning_target = frames;
+  state.learnt = false;
+}
+
+/* Each view of the caps gets a state; backgrounds of views that keep their size stay. What upstream
+ * was told holds until new caps only. */
+static void
+prepare_views (GstRoiExtractPrivate *priv, int background_frames)
+{
+  for (int id = 0; id < rangecast::kMaxViews; id++) {
+    const View *view = priv->info.rig.find (id);
+    auto &state = priv->views[id];
+    if (!view) {
+      state.reset ();
+      continue;
+    }
+    if (!state)
+      state = std::make_unique<ViewState> ();
+    if (state->background.width () != view->width || state->background.height () != view->height)
+      begin_learning (*state, *view, background_frames);
+    state->announced = {};
+  }
+}
+
+static bool
+all_learnt (GstRoiExtractPrivate *priv)
+{
+  return std::ranges::all_of (
+      priv->info.rig.views, [priv] (const View &view) { return priv->views[view.id]->learnt; });
+}
+
+static Status
+load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
+{
+  std::vector<std::pair<int, BackgroundModel>> loaded;
+  if (Status s = rangecast::load_backgrounds (path, loaded); !s.ok ())
+    return s;
+  for (const View &view : priv->info.rig.views) {
+    const auto found = std::find_if (
+        loaded.begin (), loaded.end (), [&] (const auto &entry) { return entry.first == view.id; });
+    if (found == loaded.end ())
+      return {
+          StatusCode::kNotFound, path + ": has no background of view " + std::to_string (view.id)};
+    if (found->second.width () != view.width || found->second.height () != view.height)
+      return {StatusCode::kBadSize, path + ": the background of view " + std::to_string (view.id) +
+                                        " is " + std::to_string (found->second.width ()) + "x" +
+                                        std::to_string (found->second.height ()) + ", expected " +
+                                        std::to_string (view.width) + "x" +
+                                        std::to_string (view.height)};
+    ViewState &state = *priv->views[view.id];
+    state.background = std::move (found->second);
+    state.learnt = true;
+  }
+  return {};
+}
+
+/* What OpenCV can write, and says more politely than it does. */
+static Status
+check_save_path (const std::string &path)
+{
+  static constexpr std::string_view kExtensions[] = {
+      ".yml", ".yaml", ".json", ".yml.gz", ".yaml.gz", ".json.gz"};
+  return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
+}
+
+static void
+save_when_all_learnt (GstRoiExtract *self, const std::string &path)
+{
+  if (path.empty () || path == self->priv->unsaved || !all_learnt (self->priv))
+    return;
+  std::vector<std::pair<int, const BackgroundModel *>> models;
+  for (const View &view : self->priv->info.rig.views)
+    models.emplace_back (view.id, &self->priv->views[view.id]->background);
+  Status status = check_save_path (path);
+  if (status.ok ())
+    status = rangecast::save_backgrounds (path, models);
+  self->priv->unsaved = status.ok () ? "" : path;
+  gst_range_post_warning (GST_ELEMENT (self), status);
+}
+
+/* Who wants a background in a file should hear that the stream was too short for one. */
+static void
+warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
+{
+  if (settings.save_background.empty () || all_learnt (self->priv))
+    return;
+  int seen = 0;
+  for (const View &view : self->priv->info.rig.views)
+    seen = std::max (seen, self->priv->views[view.id]->background.frames ());
+  gst_range_post_warning (GST_ELEMENT (self),
+      {StatusCode::kNotFound, settings.save_background + ": not written: the stream ended after " +
+                                  std::to_string (seen) +
+                                  " frames of the background; expected background-frames, " +
+                                  std::to_string (settings.background_frames)});
+}
+
+static gboolean
+gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  GstRoiExtractPrivate *priv = self->priv;
+  const RoiSettings settings = copy_settings (priv);
+  Status status = gstrange::parse_caps (caps, priv->info);
+  if (status.ok ()) {
+    priv->reporter.set_views (priv->info.rig);
+    prepare_views (priv, settings.background_frames);
+    if (!settings.background_file.empty () && !all_learnt (priv))
+      status = load_background_file (priv, settings.background_file);
+  }
+  const bool said = !status.ok () && status.message () == priv->refused;
+  priv->refused = status.message ();
+  return !said && gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* ---- one frame set ---- */
+
+/* Lets the background follow slow change, where nobody is. A frame that shows more of it than the
+ * last one always does: stereodepth matches the whole picture only now and then. */
+static void
+adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
+{
+  const guint64 now = image.capture_time_ns;
+  if (state.adapted_ns == 0 || now < state.adapted_ns)
+    state.adapted_ns = now;
+  const double passed = double (now - state.adapted_ns) * 1e-9;
+  const int area = image.roi.width * image.roi.height;
+  if (adapt_time_s <= 0 || area == 0 || (passed < kShortestStep && area <= state.adapted_area))
+    return;
+  state.adapted_ns = now;
+  state.adapted_area = area;
+  const cv::Mat &quiet = state.segmenter.quiet ();
+  state.background.adapt (image,
+      {quiet.data, quiet.cols, quiet.rows, static_cast<std::ptrdiff_t> (quiet.step)},
+      state.segmenter.light (), adapt_time_s);
+}
+
+static void
+process_view (
+    ViewState &state, const View &view, const RangeImage &image, const RoiSettings &settings)
+{
+  state.points_in = rangecast::count_points (image);
+  state.points_out = 0;
+  state.box = {};
+  if (!state.learnt) {
+    state.status = {};
+    if (state.settled < settings.settle_frames)
+      state.settled++;
+    else
+      state.status = state.background.learn (image);
+    return;
+  }
+  state.status =
+      state.segmenter.decide (image, state.background, view.depth_unit_m, settings.segmentation);
+  if (!state.status.ok ())
+    return;
+  adapt_background (state, image, settings.adapt_time_s);
+  state.status =
+      state.segmenter.clear (image, state.background, view.depth_unit_m, settings.segmentation);
+  if (!state.status.ok ())
+    return;
+  state.points_out = rangecast::count_points (image);
+  state.box = rangecast::bounding_box (image, settings.margin);
+}
+
+static void
+push_roi_event (GstRoiExtract *self, int view_id, const Roi &roi)
+{
+  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
+      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
+      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
+  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+}
+
+/* Tells upstream (stereodepth) which part of the picture is still wanted. */
+static void
+announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
+{
+  const Roi &box = state.box, &told = state.announced;
+  /* Upstream gives nothing beyond what it was told, so a box that grows is told before it gets
+   * there: when it comes near an edge that is not the picture's. */
+  const View *full = self->priv->info.rig.find (view_id);
+  constexpr int kNear = kAnnouncedMargin / 2;
+  const int right = told.x + told.width, bottom = told.y + told.height;
+  const bool inside = !told.empty () && (told.x == 0 || box.x >= told.x + kNear) &&
+                      (told.y == 0 || box.y >= told.y + kNear) &&
+                      (right >= full->width || box.x + box.width <= right - kNear) &&
+                      (bottom >= full->height || box.y + box.height <= bottom - kNear);
+  const bool fits = told.width <= box.width + 3 * kAnnouncedMargin &&
+                    told.height <= box.height + 3 * kAnnouncedMargin;
+  if (box.empty () ? told.empty () : inside && fits)
+    return;
+  Roi &roi = state.announced;
+  roi = {};
+  if (!box.empty ()) {
+    roi.x = std::max (0, box.x - kAnnouncedMargin);
+    roi.y = std::max (0, box.y - kAnnouncedMargin);
+    roi.width = std::min (full->width, box.x + box.width + kAnnouncedMargin) - roi.x;
+    roi.height = std::min (full->height, box.y + box.height + kAnnouncedMargin) - roi.y;
+  }
+  push_roi_event (self, view_id, roi);
+}
+
+/* A view that has seen enough of the empty scene is ready. */
+static bool
+finish_learning (ViewState &state)
+{
+  if (state.learnt || state.background.frames () < state.learning_target)
+    return false;
+  state.background.finish ();
+  state.learnt = true;
+  return true;
+}
+
+static void
+relearn_all (GstRoiExtract *self, int frames)
+{
+  for (const View &view : self->priv->info.rig.views) {
+    ViewState &state = *self->priv->views[view.id];
+    begin_learning (state, view, frames);
+    if (!state.announced.empty ())
+      push_roi_event (self, view.id, {}); /* the whole background is to be seen */
+    state.announced = {};
+  }
+}
+
+static Status
+check_views (GstRoiExtractPrivate *priv, const gstrange::RangeFrameMap &frame)
+{
+  for (const RangeImage &image : frame.views ())
+    if (!priv->views[image.view_id])
+      return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
+                                         " is not in the rig of the caps"};
+  return {};
+}
+
+static Status
+process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSettings &settings)
+{
+  GstRoiExtractPrivate *priv = self->priv;
+  const auto images = frame.views ();
+  if (Status s = frame.status (); !s.ok ())
+    return s;
+  if (Status s = check_views (priv, frame); !s.ok ())
+    return s;
+  rangecast::in_parallel (images.size (), settings.n_threads, [&] (std::size_t i) {
+    process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
+        images[i], settings);
+  });
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const ViewState &state = *priv->views[images[i].view_id];
+    if (!state.status.ok ())
+      return state.status;
+    frame.crop (i, state.box);
+  }
+  return {};
+}
+
+static void
+after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const RoiSettings &settings)
+{
+  GstRoiExtractPrivate *priv = self->priv;
+  bool learnt_now = false;
+  guint64 points_in = 0, points_out = 0;
+  for (const RangeImage &image : frame.views ()) {
+    ViewState &state = *priv->views[image.view_id];
+    points_in += state.points_in;
+    points_out += state.points_out;
+    if (state.learnt)
+      announce_roi (self, state, image.view_id);
+    learnt_now |= finish_learning (state);
+  }
+  if (learnt_now)
+    save_when_all_learnt (self, settings.save_background);
+  std::lock_guard guard (priv->lock);
+  priv->frames++;
+  priv->points_in += points_in;
+  priv->points_out += points_out;
+  if (!frame.views ().empty ())
+    priv->last_roi = frame.views ()[0].roi;
+}
+
+static GstFlowReturn
+gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  sync_controlled_values (base, buffer);
+  const RoiSettings settings = copy_settings (self->priv);
+  if (self->priv->relearn.exchange (false))
+    relearn_all (self, settings.background_frames);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  const Status status = process_frame (self, frame, settings);
+  if (status.ok ())
+    after_frame (self, frame, settings);
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+/* At the end the file gets what the background has become. */
+static gboolean
+gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  auto self = GST_ROI_EXTRACT (base);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !self->priv->info.rig.views.empty ()) {
+    const RoiSettings settings = copy_settings (self->priv);
+    warn_if_not_learnt (self, settings);
+    if (settings.adapt_time_s > 0)
+      save_when_all_learnt (self, settings.save_background);
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    self->priv->reporter.finish ();
+  return GST_BASE_TRANSFORM_CLASS (gst_roi_extract_parent_class)->sink_event (base, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (element)->priv;
+  std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->frames, .points = priv->points_out}}};
+}
+
+static gboolean
+gst_roi_extract_start (GstBaseTransform *base)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  const Status status = check_save_path (copy_settings (priv).save_background);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->refused.clear ();
+  priv->unsaved.clear ();
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
+  std::lock_guard guard (priv->lock);
+  priv->frames = priv->points_in = priv->points_out = 0;
+  priv->last_roi = {};
+  return TRUE;
+}
+
+static gboolean
+gst_roi_extract_stop (GstBaseTransform *base)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
+  priv->reporter.stop ();
+  const StreamLock lock (base);
+  priv->info = {};
+  priv->relearn = false;
+  for (auto &state : priv->views)
+    state.reset ();
+  return TRUE;
+}
+
+static void
+gst_roi_extract_capture_background (GstRoiExtract *self)
+{
+  self->priv->relearn = true;
+}
+
+static void
+gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
+  if (id == PROP_STATS_INTERVAL) {
+    priv->reporter.set_interval (g_value_get_uint (value));
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  if (!roi_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static GstStructure *
+make_stats (const GstRoiExtractPrivate *priv)
+{
+  const Roi &roi = priv->last_roi;
+  return gst_structure_new ("application/x-roiextract-stats", "frames", G_TYPE_UINT64, priv->frames,
+      "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64, priv->points_out,
+      "roi-x", G_TYPE_INT, roi.x, "roi-y", G_TYPE_INT, roi.y, "roi-width", G_TYPE_INT, roi.width,
+      "roi-height", G_TYPE_INT, roi.height, nullptr);
+}
+
+static void
+gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
+  std::lock_guard guard (priv->lock);
+  if (id == PROP_STATS)
+    g_value_take_boxed (value, make_stats (priv));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else if (!roi_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_roi_extract_finalize (GObject *object)
+{
+  delete GST_ROI_EXTRACT (object)->priv;
+  G_OBJECT_CLASS (gst_roi_extract_parent_class)->finalize (object);
+}
+
+static void
+gst_roi_extract_init (GstRoiExtract *self)
+{
+  self->priv = new GstRoiExtractPrivate;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_roi_extract_class_init (GstRoiExtractClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_roi_extract_set_property;
+  object_class->get_property = gst_roi_extract_get_property;
+  object_class->finalize = gst_roi_extract_finalize;
+  roi_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, points-in, points-out; and the last ROI "
+      "of the first view");
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  /**
+   * GstRoiExtract::capture-background:
+   *
+   * Forgets the background and learns it anew from the next frames, in which the scene should be
+   * empty.
+   */
+  signals[SIGNAL_CAPTURE_BACKGROUND] = g_signal_new_class_handler ("capture-background",
+      G_TYPE_FROM_CLASS (klass), GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
+      G_CALLBACK (gst_roi_extract_capture_background), nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Region of interest extractor",
+      "Filter/Effect/Video",
+      "Removes the background of range images by depth and colour and crops them to the rest",
+      "gst-rangecast");
+
+  transform_class->start = gst_roi_extract_start;
+  transform_class->stop = gst_roi_extract_stop;
+  transform_class->sink_event = gst_roi_extract_sink_event;
+  transform_class->set_caps = gst_roi_extract_set_caps;
+  transform_class->transform_ip = gst_roi_extract_transform_ip;
+
+  GST_DEBUG_CATEGORY_INIT (gst_roi_extract_debug, "roiextract", 0, "Region of interest extractor");
+}

@@ -1,0 +1,500 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rangedemux
+ * @title: rangedemux
+ *
+ * Splits a stream of frame sets, raw or coded, into one stream per view; the inverse of rangemux.
+ * Pad `src_3` has view 3. Pads are added with caps, whose rig names the views, and removed with a
+ * rig that lacks them. Memories are shared, no pixel is copied. A view missing in a frame set is a
+ * GAP on its pad.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc num-buffers=20 ! rangedemux name=d d.src_0 ! queue ! plyenc !
+ * multifilesink location=front-%05d.ply d.src_1 ! queue ! fakesink
+ * ]|
+ *
+ * Since: 0.1
+ */
+/* Locking: pads belong to the streaming thread, and to state changes while it does not run.
+ * Counters are atomic. */
+#include "gstrangedemux.h"
+
+#include <gst/base/gstflowcombiner.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangestatus.hpp>
+#include <rangecast/geometry/range_image.hpp>
+#include <string>
+#include <vector>
+
+#include "codedviews.hpp"
+#include "common/properties.hpp"
+#include "common/statsreporter.hpp"
+
+using gstrange::RangeInfo;
+using rangecast::kMaxViews;
+using rangecast::Status;
+using rangecast::View;
+
+GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
+#define GST_CAT_DEFAULT gst_range_demux_debug
+
+enum { PROP_0, PROP_STATS, PROP_STATS_INTERVAL };
+
+struct DemuxPad {
+  GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
+  GstCaps *caps = nullptr;
+  bool fresh = true; /* has sent no buffer yet */
+};
+
+struct DemuxCounters {
+  std::atomic<guint64> frames, buffers, gaps, dropped;
+};
+
+struct GstRangeDemuxPrivate {
+  DemuxCounters counters{};
+  StatsReporter reporter; /* has locks of its own */
+  /* A bin sends a seek to all of its sinks, which all come here: once is enough. */
+  std::atomic<guint32> last_seek = GST_SEQNUM_INVALID;
+
+  /* streaming thread only */
+  std::array<DemuxPad, kMaxViews> pads; /* by view-id */
+  GstFlowCombiner *combiner = gst_flow_combiner_new ();
+  RangeInfo info;
+  bool coded = false;
+  bool any_pad = false;       /* there was one since start */
+  CodedViews units;           /* of coded frame sets */
+  GstCaps *refused = nullptr; /* those that the last error was about; they come again with data */
+  guint group_id = GST_GROUP_ID_INVALID;
+
+  ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
+};
+
+struct _GstRangeDemux {
+  GstElement parent;
+  GstRangeDemuxPrivate *priv;
+};
+
+#define DEMUX_CAPS                                                                                 \
+  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
+                 ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (DEMUX_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (DEMUX_CAPS));
+
+G_DEFINE_TYPE (GstRangeDemux, gst_range_demux, GST_TYPE_ELEMENT)
+GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, GST_TYPE_RANGE_DEMUX)
+
+/* ---- data ---- */
+
+/* What the frame set says of all of its views: times, flags, reference times of others. */
+static void
+take_over (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
+{
+  gst_buffer_copy_into (view, frame_set,
+      GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0, gsize (-1));
+  gpointer state = nullptr;
+  while (GstMeta *meta = gst_buffer_iterate_meta_filtered (
+             frame_set, &state, GST_REFERENCE_TIMESTAMP_META_API_TYPE)) {
+    auto told = reinterpret_cast<GstReferenceTimestampMeta *> (meta);
+    gst_buffer_add_reference_timestamp_meta (
+        view, told->reference, told->timestamp, told->duration);
+  }
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (view, capture);
+}
+
+/* One view of the frame set, or nullptr if that lacks it. */
+static GstBuffer *
+view_of (GstRangeDemux *self, GstBuffer *frame_set, int id)
+{
+  GstRangeDemuxPrivate *priv = self->priv;
+  GstBuffer *view = nullptr;
+  GstClockTime capture = GST_CLOCK_TIME_NONE;
+  if (priv->coded) {
+    if (priv->units.has (id)) {
+      view = priv->units.copy_view (frame_set, id);
+      capture = priv->units.capture_time (id);
+    }
+  } else if (const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id))) {
+    view = gst_range_buffer_copy_view (frame_set, meta);
+    capture = meta->capture_time;
+    if (!view)
+      priv->counters.dropped++; /* its planes do not lie in the buffer */
+  }
+  if (!view)
+    return nullptr;
+  take_over (view, frame_set, capture);
+  if (priv->coded && priv->units.is_key (id))
+    GST_BUFFER_FLAG_UNSET (view, GST_BUFFER_FLAG_DELTA_UNIT);
+  return view;
+}
+
+/* Downstream need not wait for what will not come. */
+static GstFlowReturn
+push_gap (GstRangeDemux *self, GstPad *pad, GstBuffer *frame_set)
+{
+  const GstClockTime time = GST_BUFFER_PTS (frame_set);
+  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (frame_set)
+                                    ? GST_BUFFER_DURATION (frame_set)
+                                    : self->priv->info.frame_duration ();
+  self->priv->counters.gaps++;
+  if (GST_CLOCK_TIME_IS_VALID (time))
+    gst_pad_push_event (pad, gst_event_new_gap (time, duration));
+  if (!gst_pad_is_linked (pad))
+    return GST_FLOW_NOT_LINKED;
+  const GstFlowReturn last = GST_PAD_LAST_FLOW_RETURN (pad);
+  return last == GST_FLOW_NOT_LINKED ? GST_FLOW_OK : last; /* it was not, then */
+}
+
+static GstFlowReturn
+push_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
+{
+  DemuxPad &entry = self->priv->pads[id];
+  GstBuffer *view = view_of (self, frame_set, id);
+  if (!view)
+    return push_gap (self, entry.pad, frame_set);
+  if (entry.fresh)
+    GST_BUFFER_FLAG_SET (view, GST_BUFFER_FLAG_DISCONT);
+  entry.fresh = false;
+  self->priv->counters.buffers++;
+  return gst_pad_push (entry.pad, view);
+}
+
+/* Views that the rig does not name: nobody gets them. */
+static guint64
+count_views_without_pad (const GstRangeDemuxPrivate *priv, GstBuffer *frame_set)
+{
+  guint64 n = 0;
+  if (priv->coded) {
+    for (int id = 0; id < kMaxViews; id++)
+      n += !priv->pads[id].pad && priv->units.has (id);
+    return n;
+  }
+  gpointer state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (frame_set, &state))
+    n += meta->view_id >= guint (kMaxViews) || !priv->pads[meta->view_id].pad;
+  return n;
+}
+
+static GstFlowReturn
+push_views (GstRangeDemux *self, GstBuffer *frame_set)
+{
+  GstRangeDemuxPrivate *priv = self->priv;
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (int id = 0; id < kMaxViews; id++) {
+    if (!priv->pads[id].pad)
+      continue;
+    const GstFlowReturn pushed = push_view (self, frame_set, id);
+    flow = gst_flow_combiner_update_pad_flow (priv->combiner, priv->pads[id].pad, pushed);
+    if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED)
+      break;
+  }
+  return flow;
+}
+
+static GstFlowReturn
+gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
+{
+  auto self = GST_RANGE_DEMUX (parent);
+  GstRangeDemuxPrivate *priv = self->priv;
+  GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
+  if (flow == GST_FLOW_OK && priv->coded) {
+    flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
+    priv->counters.dropped += priv->units.dropped ();
+  }
+  if (flow == GST_FLOW_OK) {
+    priv->counters.frames++;
+    priv->counters.dropped += count_views_without_pad (priv, buffer);
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
+    flow = push_views (self, buffer);
+  }
+  gst_buffer_unref (buffer);
+  return flow;
+}
+
+/* ---- pads ---- */
+
+static void
+push_stream_start (GstRangeDemux *self, GstPad *pad, int id)
+{
+  gchar *name = g_strdup_printf ("view-%d", id);
+  gchar *stream_id = gst_pad_create_stream_id (pad, GST_ELEMENT (self), name);
+  GstEvent *event = gst_event_new_stream_start (stream_id);
+  if (self->priv->group_id != GST_GROUP_ID_INVALID)
+    gst_event_set_group_id (event, self->priv->group_id);
+  gst_pad_push_event (pad, event);
+  g_free (stream_id);
+  g_free (name);
+}
+
+/* Caps with the rig of one view alone; its size is the view's own. */
+static void
+push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
+{
+  const RangeInfo &all = self->priv->info;
+  const RangeInfo info = gstrange::make_info ({{view}}, all.fps_n, all.fps_d);
+  GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
+                                    : gstrange::make_range_caps (info);
+  if (!entry.caps || !gst_caps_is_equal (caps, entry.caps))
+    gst_pad_push_event (entry.pad, gst_event_new_caps (caps));
+  gst_caps_replace (&entry.caps, caps);
+  gst_caps_unref (caps);
+}
+
+/* What came before this pad was there: segment, tags and others that stick. */
+static gboolean
+hand_on (GstPad *, GstEvent **event, gpointer pad)
+{
+  const GstEventType type = GST_EVENT_TYPE (*event);
+  if (type != GST_EVENT_STREAM_START && type != GST_EVENT_CAPS && type != GST_EVENT_EOS)
+    gst_pad_push_event (GST_PAD (pad), gst_event_ref (*event));
+  return TRUE;
+}
+
+static gboolean
+gst_range_demux_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK &&
+      GST_RANGE_DEMUX (parent)->priv->last_seek.exchange (gst_event_get_seqnum (event)) ==
+          gst_event_get_seqnum (event)) {
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return gst_pad_event_default (pad, parent, event);
+}
+
+static void
+add_pad (GstRangeDemux *self, const View &view, GstPad *sink)
+{
+  DemuxPad &entry = self->priv->pads[view.id];
+  gchar *name = g_strdup_printf ("src_%d", view.id);
+  entry.pad = gst_pad_new_from_static_template (&src_template, name);
+  entry.fresh = true;
+  g_free (name);
+  gst_pad_use_fixed_caps (entry.pad);
+  gst_pad_set_event_function (entry.pad, gst_range_demux_src_event);
+  gst_pad_set_active (entry.pad, TRUE);
+  push_stream_start (self, entry.pad, view.id);
+  push_caps (self, entry, view);
+  gst_pad_sticky_events_foreach (sink, hand_on, entry.pad);
+  gst_flow_combiner_add_pad (self->priv->combiner, entry.pad);
+  gst_element_add_pad (GST_ELEMENT (self), entry.pad);
+  self->priv->any_pad = true;
+}
+
+static void
+remove_pad (GstRangeDemux *self, DemuxPad &entry)
+{
+  gst_flow_combiner_remove_pad (self->priv->combiner, entry.pad);
+  gst_pad_set_active (entry.pad, FALSE);
+  gst_element_remove_pad (GST_ELEMENT (self), entry.pad);
+  entry.pad = nullptr;
+  gst_caps_replace (&entry.caps, nullptr);
+}
+
+/* New pads come before old ones go, so that an application always has one to show. */
+static void
+follow_rig (GstRangeDemux *self, GstPad *sink)
+{
+  GstRangeDemuxPrivate *priv = self->priv;
+  bool changed = false;
+  for (const View &view : priv->info.rig.views)
+    if (DemuxPad &entry = priv->pads[view.id]; entry.pad) {
+      push_caps (self, entry, view);
+    } else {
+      add_pad (self, view, sink);
+      changed = true;
+    }
+  for (int id = 0; id < kMaxViews; id++)
+    if (DemuxPad &entry = priv->pads[id]; entry.pad && !priv->info.rig.find (id)) {
+      gst_pad_push_event (entry.pad, gst_event_new_eos ());
+      remove_pad (self, entry);
+      changed = true;
+    }
+  if (changed)
+    gst_element_no_more_pads (GST_ELEMENT (self));
+}
+
+/* ---- events ---- */
+
+static gboolean
+take_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
+{
+  GstRangeDemuxPrivate *priv = self->priv;
+  GstCaps *caps;
+  gst_event_parse_caps (event, &caps);
+  const bool coded =
+      gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
+  const Status status = gstrange::parse_caps (caps, priv->info);
+  const bool told = !status.ok () && priv->refused && gst_caps_is_equal (priv->refused, caps);
+  gst_caps_replace (&priv->refused, status.ok () ? nullptr : caps);
+  gst_event_unref (event);
+  if (told || gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->coded = coded;
+  priv->reporter.set_views (priv->info.rig);
+  follow_rig (self, sink);
+  return TRUE;
+}
+
+static gboolean
+take_stream_start (GstRangeDemux *self, GstEvent *event)
+{
+  GstRangeDemuxPrivate *priv = self->priv;
+  if (!gst_event_parse_group_id (event, &priv->group_id))
+    priv->group_id = GST_GROUP_ID_INVALID;
+  gst_event_unref (event);
+  for (int id = 0; id < kMaxViews; id++)
+    if (priv->pads[id].pad) {
+      push_stream_start (self, priv->pads[id].pad, id);
+      gst_caps_replace (&priv->pads[id].caps, nullptr); /* sent again */
+    }
+  return TRUE;
+}
+
+/* Sinks without a pad would wait for the end for ever. */
+static void
+complain_without_pads (GstRangeDemux *self)
+{
+  if (!self->priv->any_pad)
+    GST_ELEMENT_ERROR (self, STREAM, DEMUX,
+        ("The stream ended before caps with a rig, which names the views"), (nullptr));
+}
+
+static gboolean
+gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
+{
+  auto self = GST_RANGE_DEMUX (parent);
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_CAPS:
+      return take_caps (self, sink, event);
+    case GST_EVENT_STREAM_START:
+      return take_stream_start (self, event);
+    case GST_EVENT_FLUSH_STOP:
+      gst_flow_combiner_reset (self->priv->combiner);
+      break;
+    case GST_EVENT_EOS:
+      complain_without_pads (self);
+      self->priv->reporter.finish ();
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default (sink, parent, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const DemuxCounters &counters = GST_RANGE_DEMUX (element)->priv->counters;
+  return {{.counters = {.frames = counters.frames.load (), .lost = counters.gaps.load ()}}};
+}
+
+static GstStateChangeReturn
+gst_range_demux_change_state (GstElement *element, GstStateChange transition)
+{
+  auto self = GST_RANGE_DEMUX (element);
+  GstRangeDemuxPrivate *priv = self->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    for (auto *counter : {&priv->counters.frames, &priv->counters.buffers, &priv->counters.gaps,
+             &priv->counters.dropped})
+      *counter = 0;
+    priv->reporter.start (element, collect_stats);
+  }
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS (gst_range_demux_parent_class)->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* pads are inactive: nobody streams */
+    priv->reporter.stop ();
+    for (DemuxPad &entry : priv->pads)
+      if (entry.pad)
+        remove_pad (self, entry);
+    gst_flow_combiner_reset (priv->combiner);
+    priv->info = {};
+    gst_caps_replace (&priv->refused, nullptr);
+    priv->any_pad = false;
+    priv->group_id = GST_GROUP_ID_INVALID;
+    priv->last_seek = GST_SEQNUM_INVALID;
+  }
+  return result;
+}
+
+static void
+gst_range_demux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_STATS_INTERVAL)
+    GST_RANGE_DEMUX (object)->priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_range_demux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  const DemuxCounters &counters = GST_RANGE_DEMUX (object)->priv->counters;
+  if (id == PROP_STATS)
+    g_value_take_boxed (
+        value, gst_structure_new ("application/x-rangedemux-stats", "frames", G_TYPE_UINT64,
+                   counters.frames.load (), "buffers", G_TYPE_UINT64, counters.buffers.load (),
+                   "gaps", G_TYPE_UINT64, counters.gaps.load (), "dropped", G_TYPE_UINT64,
+                   counters.dropped.load (), nullptr));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, GST_RANGE_DEMUX (object)->priv->reporter.interval ());
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_range_demux_finalize (GObject *object)
+{
+  GstRangeDemuxPrivate *priv = GST_RANGE_DEMUX (object)->priv;
+  for (DemuxPad &entry : priv->pads)
+    gst_caps_replace (&entry.caps, nullptr);
+  gst_caps_replace (&priv->refused, nullptr);
+  delete priv;
+  G_OBJECT_CLASS (gst_range_demux_parent_class)->finalize (object);
+}
+
+static void
+gst_range_demux_init (GstRangeDemux *self)
+{
+  self->priv = new GstRangeDemuxPrivate;
+  GstPad *sink = gst_pad_new_from_static_template (&sink_template, "sink");
+  gst_pad_set_chain_function (sink, gst_range_demux_chain);
+  gst_pad_set_event_function (sink, gst_range_demux_sink_event);
+  gst_element_add_pad (GST_ELEMENT (self), sink);
+}
+
+static void
+gst_range_demux_class_init (GstRangeDemuxClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+
+  object_class->set_property = gst_range_demux_set_property;
+  object_class->get_property = gst_range_demux_get_property;
+  object_class->finalize = gst_range_demux_finalize;
+
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, buffers, gaps, dropped");
+
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Range demultiplexer", "Demuxer/Video",
+      "Splits a stream of range frame sets into one stream per view", "gst-rangecast");
+
+  element_class->change_state = gst_range_demux_change_state;
+
+  GST_DEBUG_CATEGORY_INIT (gst_range_demux_debug, "rangedemux", 0, "Range demultiplexer");
+}

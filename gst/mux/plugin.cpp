@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * plugin-rangemux:
+ *
+ * Combines the streams of several range cameras into frame sets, and splits them.
+ */
+#include <gst/gst.h>
+
+GST_ELEMENT_REGISTER_DECLARE (rangedemux)
+GST_ELEMENT_REGISTER_DECLARE (rangemux)
+
+static gboolean
+plugin_init (GstPlugin *plugin)
+{
+  gboolean registered = FALSE;
+  registered |= GST_ELEMENT_REGISTER (rangedemux, plugin);
+  registered |= GST_ELEMENT_REGISTER (rangemux, plugin);
+  return registered;
+}
+
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangemux,
+    "Combines the streams of several range cameras into frame sets, and splits them", plugin_init,
+    PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

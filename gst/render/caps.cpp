@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "caps.hpp"
+
+#include <gst/video/video.h>
+
+#include "outputschedule.hpp"
+
+static constexpr int kMostPicturesASecond = PictureGrid::kMostRate;
+
+/* The frame rate of caps that are one structure, else nullptr. */
+static const GValue *
+frame_rate (const GstCaps *caps)
+{
+  return gst_caps_get_size (caps) == 1
+             ? gst_structure_get_value (gst_caps_get_structure (caps, 0), "framerate")
+             : nullptr;
+}
+
+static GstCaps *
+filtered (GstCaps *caps, GstCaps *filter)
+{
+  if (!filter)
+    return caps;
+  GstCaps *result = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (caps);
+  return result;
+}
+
+/* One structure, and the input's rate chosen at last: elements downstream that simplify caps make
+ * of two that differ in their rates alone what is no longer a subset of them (GStreamer 1.22). */
+GstCaps *
+strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filter)
+{
+  GstCaps *output = gst_caps_copy (output_template);
+  const GValue *rate = frame_rate (input);
+  const bool too_fast = rate && GST_VALUE_HOLDS_FRACTION (rate) &&
+                        gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
+                            gst_value_get_fraction_denominator (rate), kMostPicturesASecond, 1) > 0;
+  if (too_fast)
+    gst_caps_set_value (output, "framerate", rate);
+  else
+    gst_caps_set_simple (
+        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMostPicturesASecond, 1, nullptr);
+  return filtered (output, filter);
+}
+
+GstCaps *
+strip_input_caps (const GstCaps *output, GstCaps *input_template, GstCaps *filter)
+{
+  GstCaps *input = gst_caps_copy (input_template);
+  if (const GValue *rate = frame_rate (output)) {
+    GstCaps *same = gst_caps_copy (input);
+    gst_caps_set_value (same, "framerate", rate);
+    input = gst_caps_merge (same, input);
+  }
+  return filtered (input, filter);
+}
+
+/* The input's, or near it; 30 if the input has none and downstream wants one. */
+static void
+fixate_rate (GstStructure *s, const GstCaps *input)
+{
+  int n = 0, d = 1;
+  gst_structure_get_fraction (gst_caps_get_structure (input, 0), "framerate", &n, &d);
+  GValue none = G_VALUE_INIT;
+  g_value_init (&none, GST_TYPE_FRACTION);
+  gst_value_set_fraction (&none, 0, 1);
+  const GValue *wanted = gst_structure_get_value (s, "framerate");
+  if (n == 0 && wanted && !gst_value_intersect (nullptr, wanted, &none))
+    n = 30;
+  g_value_unset (&none);
+  gst_structure_fixate_field_nearest_fraction (s, "framerate", n, d);
+}
+
+/* Width and height for both eyes together. */
+static void
+fixate_size (GstStructure *s)
+{
+  const gchar *mode = gst_structure_get_string (s, "multiview-mode");
+  guint flags = 0, mask = 0;
+  gst_structure_get_flagset (s, "multiview-flags", &flags, &mask);
+  const bool half = (flags & mask & GST_VIDEO_MULTIVIEW_FLAGS_HALF_ASPECT) != 0;
+  const bool wide = !half && g_strcmp0 (mode, "side-by-side") == 0;
+  const bool high = !half && g_strcmp0 (mode, "top-bottom") == 0;
+  gst_structure_fixate_field_nearest_int (s, "width", wide ? 1280 : 640);
+  gst_structure_fixate_field_nearest_int (s, "height", high ? 960 : 480);
+}
+
+GstCaps *
+strip_fixate_output (GstCaps *caps, const GstCaps *input)
+{
+  caps = gst_caps_make_writable (gst_caps_truncate (caps));
+  GstStructure *s = gst_caps_get_structure (caps, 0);
+  fixate_rate (s, input);
+  gst_structure_fixate_field_string (s, "multiview-mode", "mono");
+  if (g_strcmp0 (gst_structure_get_string (s, "multiview-mode"), "separated") == 0)
+    gst_structure_set (s, "views", G_TYPE_INT, 2, nullptr);
+  fixate_size (s);
+  if (gst_structure_has_field (s, "pixel-aspect-ratio"))
+    gst_structure_fixate_field_nearest_fraction (s, "pixel-aspect-ratio", 1, 1);
+  else
+    gst_structure_set (s, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
+  return gst_caps_fixate (caps);
+}
+
+bool
+strip_has_flags_as_text (const GstCaps *output)
+{
+  const GstStructure *s = gst_caps_get_structure (output, 0);
+  return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
+}
+
+FrameRate
+strip_output_rate (const GstCaps *input, const GstCaps *output)
+{
+  int in_n = 0, in_d = 1;
+  FrameRate rate;
+  gst_structure_get_fraction (gst_caps_get_structure (input, 0), "framerate", &in_n, &in_d);
+  gst_structure_get_fraction (gst_caps_get_structure (output, 0), "framerate", &rate.n, &rate.d);
+  rate.is_inputs = gst_util_fraction_compare (rate.n, rate.d, in_n, in_d) == 0;
+  return rate;
+}

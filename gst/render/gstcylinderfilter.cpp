@@ -1,0 +1,491 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-cylinderfilter
+ * @title: cylinderfilter
+ *
+ * Removes redundant points: where several views of a frame set see the same surface, the points of
+ * the view that faces it most directly stay and the others are cleared. Before that, pose errors
+ * are corrected, views and points that contradict others are left out (#GstCylinderFilter:agree),
+ * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with agree=depth.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc views=4 num-buffers=30 ! cylinderfilter ! plyenc ! multifilesink
+ * location=cloud-%05d.ply
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstcylinderfilter.h"
+
+#include <cmath>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <optional>
+#include <rangecast/alignment/view_agreement.hpp>
+#include <rangecast/base/guarded.hpp>
+#include <rangecast/overlap/colour_match.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
+
+#include "common/controlledvalues.hpp"
+#include "common/statsreporter.hpp"
+#include "common/streamlock.hpp"
+#include "cylindersettings.hpp"
+
+GST_DEBUG_CATEGORY (gst_cylinder_filter_debug);
+#define GST_CAT_DEFAULT gst_cylinder_filter_debug
+
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+
+struct CylinderCounts {
+  guint64 frames = 0, points_contradicted = 0, points_in = 0, points_out = 0, units = 0,
+          units_shared = 0, units_held = 0, units_changed = 0,
+          untouched = 0; /* frame sets while the mode is off */
+  int bodies = 0;
+  rangecast::Axis axis;
+};
+
+struct GstCylinderFilterPrivate {
+  std::mutex lock; /* guards all settings and counts; never held while working on a frame */
+  CylinderFilterSettings settings;
+  CylinderCounts counts;
+  std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
+  StatsReporter reporter;                                        /* has locks of its own */
+
+  /* Streaming thread only. */
+  rangecast::ViewAgreement agreement;
+  rangecast::ColourMatch colours;
+  rangecast::CylinderFilter core;
+  bool has_rig = false;     /* set_caps gave agreement, core and colours one */
+  bool rig_pending = false; /* the source's caps may have another one than agreement */
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  bool was_off = false;
+  guint64 left_out = 0; /* views that a warning was posted for, a bit each */
+};
+
+struct _GstCylinderFilter {
+  GstBaseTransform parent;
+  GstCylinderFilterPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
+GST_ELEMENT_REGISTER_DEFINE (
+    cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
+
+/* ---- streaming ---- */
+
+/* After a jump in time: people and light are others, the cameras stand where they stood. */
+static void
+gst_cylinder_filter_forget_moment (GstCylinderFilterPrivate *priv)
+{
+  priv->core.reset ();
+  priv->colours.reset ();
+  priv->last_pts = GST_CLOCK_TIME_NONE;
+}
+
+/* All that is of one stream. */
+static void
+gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
+{
+  gst_cylinder_filter_forget_moment (priv);
+  priv->agreement.reset ();
+  priv->rig_pending = true;
+}
+
+/* Gives the rig that the views have now to those who work with it, here and downstream. */
+static rangecast::Status
+gst_cylinder_filter_send_rig (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  rangecast::Status good = validate (priv->agreement.rig ());
+  if (!good.ok ())
+    GST_WARNING_OBJECT (self, "the rig stays as it came; corrected, %s", good.message ().c_str ());
+  const rangecast::Rig &rig = good.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
+  priv->rig_pending = false;
+  if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->colours.change_rig (rig); !status.ok ())
+    return status;
+  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
+  GstCaps *present = gst_pad_get_current_caps (pad);
+  if (!present)
+    return {};
+  GstCaps *caps = gstrange::with_rig (present, rig);
+  if (!gst_caps_is_equal (caps, present)) {
+    GST_DEBUG_OBJECT (self, "poses of the rig change");
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "they were not taken downstream"); /* and the buffer says why */
+  }
+  gst_caps_unref (caps);
+  gst_caps_unref (present);
+  return {};
+}
+
+static gboolean
+gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    gstrange::RangeInfo info;
+    rangecast::Status result = gstrange::parse_caps (in, info);
+    /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
+    if (result.ok () && priv->has_rig &&
+        encode_rig (info.rig) == encode_rig (priv->agreement.nominal_rig ())) {
+      priv->rig_pending = true;
+      return result;
+    }
+    priv->has_rig = false;
+    gst_cylinder_filter_forget (priv);
+    priv->reporter.set_views (info.rig);
+    {
+      const std::lock_guard guard (priv->lock);
+      priv->views.clear ();
+      for (const rangecast::View &view : info.rig.views)
+        priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
+    }
+    if (result.ok ())
+      result = priv->agreement.set_rig (info.rig);
+    if (result.ok ())
+      result = priv->core.set_rig (info.rig);
+    if (result.ok ())
+      result = priv->colours.set_rig (info.rig);
+    priv->has_rig = result.ok ();
+    return result;
+  });
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
+ */
+static bool
+gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  return !known || now <= last || now - last > GST_SECOND / 2;
+}
+
+/* Every buffer comes by here, also those that are too late or pass untouched. */
+static GstFlowReturn
+gst_cylinder_filter_submit_input_buffer (
+    GstBaseTransform *base, gboolean is_discont, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
+    gst_cylinder_filter_forget_moment (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
+      ->submit_input_buffer (base, is_discont, buffer);
+}
+
+/* Controlled properties take their values of this buffer's time; the mode may be one of them. */
+static void
+gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  sync_controlled_values (base, buffer);
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
+  priv->counts.untouched += off;
+  guard.unlock ();
+  if (off)
+    priv->reporter.passed (GST_ELEMENT (base), buffer);
+  if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
+    gst_cylinder_filter_forget (priv);
+    priv->last_pts = GST_BUFFER_PTS (buffer);
+    const rangecast::Status status = rangecast::guarded ("cylinderfilter",
+        [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
+    if (!status.ok ())
+      GST_WARNING_OBJECT (base, "%s", status.message ().c_str ());
+  }
+  priv->was_off = off;
+  gst_base_transform_set_passthrough (base, off);
+}
+
+static void
+gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
+{
+  const std::lock_guard guard (priv->lock);
+  CylinderCounts &counts = priv->counts;
+  counts.frames++;
+  counts.points_contradicted += priv->agreement.contradicted_points ();
+  counts.points_in += result.points_in;
+  counts.points_out += result.points_out;
+  counts.units += result.units;
+  counts.units_shared += result.units_shared;
+  counts.units_held += result.units_held;
+  counts.units_changed += result.units_changed;
+  counts.bodies = result.bodies;
+  counts.axis = result.axis;
+  for (auto &[view_id, consistency] : priv->views)
+    consistency = priv->agreement.view (view_id);
+}
+
+/* Works on the mapped views of a frame set. */
+static rangecast::Status
+gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast::RangeImage> views,
+    const rangecast::AgreementSettings &agree, const rangecast::ColourSettings &colours,
+    const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
+{
+  auto priv = self->priv;
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
+  for (const rangecast::RangeImage &view : views)
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
+  if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
+    return status;
+  if (priv->rig_pending || priv->agreement.rig_changed ())
+    if (rangecast::Status status = gst_cylinder_filter_send_rig (self); !status.ok ())
+      return status;
+  if (rangecast::Status status = priv->colours.before (views, colours); !status.ok ())
+    return status;
+  if (rangecast::Status status = priv->core.process (views, settings, result); !status.ok ())
+    return status;
+  return priv->colours.after (views, colours);
+}
+
+/* One warning for each view that is left out from now on. */
+static void
+gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  for (const auto &[view_id, view] : priv->views) {
+    const guint64 bit = guint64{1} << view_id;
+    if (view.left_out && !(priv->left_out & bit))
+      GST_ELEMENT_WARNING (self, STREAM, FAILED,
+          ("View %d contradicts the other views and is left out.", view_id),
+          ("%.0f %% of its points agree with the other views; check its pose in the rig and its "
+           "depth",
+              100 * view.consistency));
+    else if (!view.left_out && (priv->left_out & bit))
+      GST_INFO_OBJECT (self, "view %d agrees again", view_id);
+    priv->left_out = view.left_out ? priv->left_out | bit : priv->left_out & ~bit;
+  }
+}
+
+static GstFlowReturn
+gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
+{
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
+  std::unique_lock guard (priv->lock);
+  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
+  const CylinderFilterSettings settings = priv->settings;
+  const rangecast::ColourSettings colours = {settings.balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
+      settings.mode == GST_CYLINDER_FILTER_BLEND ? settings.blend_width_m : 0,
+      settings.core.threads};
+  const auto checks = [&] (GstCylinderFilterAgree check) {
+    return (settings.consistency & check) != 0;
+  };
+  const rangecast::AgreementSettings agree = {checks (GST_CYLINDER_FILTER_AGREE_POSES),
+      checks (GST_CYLINDER_FILTER_AGREE_DEPTH), checks (GST_CYLINDER_FILTER_AGREE_VIEWS),
+      checks (GST_CYLINDER_FILTER_AGREE_POINTS), settings.core.threads};
+  guard.unlock ();
+  if (off)
+    return GST_FLOW_OK;
+
+  rangecast::CylinderResult result;
+  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+    const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+    return frame.status ().ok () ? gst_cylinder_filter_process (
+                                       self, frame.views (), agree, colours, settings.core, result)
+                                 : frame.status ();
+  });
+  if (status.ok ()) {
+    gst_cylinder_filter_count (priv, result);
+    gst_cylinder_filter_warn_left_out (self);
+  }
+  GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
+      result.points_out, result.points_in);
+  priv->reporter.passed (GST_ELEMENT (self), buffer);
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+static gboolean
+gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  /* Serialised with the data: axis, winners and gains start anew after a seek, what is known of the
+   * rig with another stream. */
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    gst_cylinder_filter_forget_moment (priv);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
+    const gchar *stream_id = nullptr;
+    gst_event_parse_stream_start (event, &stream_id);
+    gchar *last = gst_pad_get_stream_id (base->sinkpad); /* it takes this event afterwards */
+    gst_cylinder_filter_forget_moment (priv);
+    if (g_strcmp0 (last, stream_id) != 0)
+      gst_cylinder_filter_forget (priv);
+    g_free (last);
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    priv->reporter.finish ();
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
+}
+
+static std::vector<StatsRow>
+gst_cylinder_filter_collect (GstElement *element)
+{
+  auto priv = GST_CYLINDER_FILTER (element)->priv;
+  const std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->counts.frames + priv->counts.untouched,
+               .points = priv->counts.points_out}}};
+}
+
+static gboolean
+gst_cylinder_filter_start (GstBaseTransform *base)
+{
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  gst_cylinder_filter_forget (priv);
+  priv->was_off = false;
+  priv->left_out = 0;
+  priv->reporter.start (GST_ELEMENT (base), gst_cylinder_filter_collect);
+  const std::lock_guard guard (priv->lock);
+  priv->counts = {};
+  return TRUE;
+}
+
+static gboolean
+gst_cylinder_filter_stop (GstBaseTransform *base)
+{
+  GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
+  const StreamLock lock (base);
+  /* With the stream its memory goes too. */
+  GST_CYLINDER_FILTER (base)->priv->has_rig = false;
+  GST_CYLINDER_FILTER (base)->priv->core = {};
+  GST_CYLINDER_FILTER (base)->priv->agreement = {};
+  GST_CYLINDER_FILTER (base)->priv->colours = {};
+  return TRUE;
+}
+
+/* ---- properties ---- */
+
+/* A GstValueArray of three doubles. */
+static void
+gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstCylinderFilterPrivate *priv = GST_CYLINDER_FILTER (object)->priv;
+  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
+  const std::lock_guard guard (priv->lock);
+  if (!cylinder_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
+{
+  GValue array = G_VALUE_INIT;
+  g_value_init (&array, GST_TYPE_ARRAY);
+  for (const auto &[view_id, view] : priv->views) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, GST_TYPE_STRUCTURE);
+    g_value_take_boxed (&value,
+        gst_structure_new ("view", "view-id", G_TYPE_INT, view_id, "moved", G_TYPE_DOUBLE,
+            1000 * norm (view.correction.translation), "turned", G_TYPE_DOUBLE,
+            180 / M_PI * norm (view.correction.rotation), "consistency", G_TYPE_DOUBLE,
+            view.consistency, "left-out", G_TYPE_BOOLEAN, gboolean (view.left_out), nullptr));
+    gst_value_array_append_and_take_value (&array, &value);
+  }
+  gst_structure_take_value (stats, "views", &array);
+}
+
+static GstStructure *
+gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
+{
+  const CylinderCounts &counts = priv->counts;
+  GstStructure *stats =
+      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
+          counts.frames, "points-contradicted", G_TYPE_UINT64, counts.points_contradicted,
+          "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
+          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
+          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
+  const char *names[] = {"axis-position", "axis-direction"};
+  const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
+  for (int i = 0; i < 2; i++) {
+    GValue array = G_VALUE_INIT;
+    g_value_init (&array, GST_TYPE_ARRAY);
+    set_vector (&array, vectors[i]);
+    gst_structure_take_value (stats, names[i], &array);
+  }
+  add_view_stats (stats, priv);
+  return stats;
+}
+
+static void
+gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto priv = GST_CYLINDER_FILTER (object)->priv;
+  const std::lock_guard guard (priv->lock);
+  if (id == PROP_STATS)
+    g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else if (!cylinder_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+/* ---- life ---- */
+
+static void
+gst_cylinder_filter_finalize (GObject *object)
+{
+  delete GST_CYLINDER_FILTER (object)->priv;
+  G_OBJECT_CLASS (gst_cylinder_filter_parent_class)->finalize (object);
+}
+
+static void
+gst_cylinder_filter_init (GstCylinderFilter *self)
+{
+  self->priv = new GstCylinderFilterPrivate;
+  gst_base_transform_set_in_place (GST_BASE_TRANSFORM (self), TRUE);
+}
+
+static void
+gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
+
+  object_class->set_property = gst_cylinder_filter_set_property;
+  object_class->get_property = gst_cylinder_filter_get_property;
+  object_class->finalize = gst_cylinder_filter_finalize;
+
+  cylinder_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS,
+      "Counters since READY: frames, points-contradicted, points-in, points-out, units, "
+      "units-shared, units-held, units-changed; of the last frame: bodies, axis-position, "
+      "axis-direction, views");
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
+      "Removes redundant points of overlapping views and matches the views' poses and colours",
+      "gst-rangecast");
+
+  transform_class->set_caps = gst_cylinder_filter_set_caps;
+  transform_class->submit_input_buffer = gst_cylinder_filter_submit_input_buffer;
+  transform_class->before_transform = gst_cylinder_filter_before_transform;
+  transform_class->transform_ip = gst_cylinder_filter_transform_ip;
+  transform_class->transform_ip_on_passthrough = FALSE;
+  transform_class->sink_event = gst_cylinder_filter_sink_event;
+  transform_class->start = gst_cylinder_filter_start;
+  transform_class->stop = gst_cylinder_filter_stop;
+
+  GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
+}

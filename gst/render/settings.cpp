@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "settings.hpp"
+
+using rangecast::StripMode;
+
+GType
+gst_strip_render_mode_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (StripMode::kBlend), "Surfaces of all views, blended where they overlap", "blend"},
+        {int (StripMode::kStrips), "Triangle strips along the rows", "strips"},
+        {int (StripMode::kRectangles), "One rectangle per pixel", "rectangles"},
+        {int (StripMode::kPoints), "One point per pixel", "points"}, {}};
+    return g_enum_register_static ("GstStripRenderMode", values);
+  }();
+  return type;
+}
+
+PropertyTable<OrbitControl> &
+camera_properties ()
+{
+  using S = OrbitControl;
+  using rangecast::Orbit;
+  using rangecast::Vec3;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::number<&S::orbit, &Orbit::azimuth_deg> ("azimuth", "Azimuth",
+          "Camera angle around the scene in degrees, positive to the right of the first view", -360,
+          360, kControllable),
+      P::number<&S::orbit, &Orbit::elevation_deg> ("elevation", "Elevation",
+          "Camera angle above the first view in degrees", -89, 89, kControllable),
+      P::number<&S::orbit, &Orbit::distance_m> ("distance", "Distance",
+          "Distance of the camera from its target in metres (0 = as the first view)", 0, 1000,
+          kControllable),
+      P::number<&S::orbit, &Orbit::fov_deg> ("field-of-view", "Field of view",
+          "Vertical field of view in degrees (0 = as the first view)", 0, 170, kControllable),
+      P::number<&S::orbit, &Orbit::pan, &Vec3::x> ("pan-x", "Pan x",
+          "Shift of the camera target to the first view's right in metres", -1000, 1000,
+          kControllable),
+      P::number<&S::orbit, &Orbit::pan, &Vec3::y> ("pan-y", "Pan y",
+          "Shift of the camera target upwards in metres", -1000, 1000, kControllable),
+      P::number<&S::orbit, &Orbit::pan, &Vec3::z> ("pan-z", "Pan z",
+          "Shift of the camera target towards the first view in metres", -1000, 1000,
+          kControllable),
+      P::number<&S::auto_orbit> ("auto-orbit", "Auto orbit",
+          "Speed of automatic rotation in degrees per second", -3600, 3600, kControllable),
+  };
+  return table;
+}
+
+PropertyTable<StripRenderSettings> &
+strip_properties ()
+{
+  using S = StripRenderSettings;
+  using Strips = rangecast::StripSettings;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::number<&S::strips, &Strips::depth_step> ("depth-step", "Depth step",
+          "Depth difference, as a fraction of depth, beyond which neighbouring pixels are not "
+          "joined",
+          0, 1, kControllable),
+      P::number<&S::strips, &Strips::merge> ("merge", "Merge tolerance",
+          "Tolerance of strip simplification (0 = keep every pixel, 1 = 0.07 % of depth and 1.5 "
+          "colour levels)",
+          0, 100, kControllable),
+      P::number<&S::view_gap_m> ("view-gap", "View gap",
+          "Metres by which a view is moved behind the others, times 1 - cosine of its angle to the "
+          "viewing direction; not used by mode=blend",
+          0, 1, kControllable),
+      P::number<&S::blend_range_m> ("blend-range", "Blend range",
+          "Depth behind the nearest surface in metres within which views are blended with "
+          "mode=blend",
+          0, 1, kControllable),
+      P::number<&S::background_shade> ("background-shade", "Background shade",
+          "Vertical gradient of an opaque background, as a fraction of its colour (0 = none)", 0, 1,
+          kControllable),
+      P::number<&S::point_size> ("point-size", "Point size",
+          "Size of a point relative to the footprint of its pixel, for mode=points", 0.1, 100,
+          kControllable),
+      P::number<&S::eye_distance_m> ("eye-distance", "Eye distance",
+          "Distance between the eyes in metres, for stereoscopic output", 0, 10, kControllable),
+      P::number<&S::convergence_m> ("convergence", "Convergence",
+          "Distance of zero parallax in metres, for stereoscopic output (0 = camera target, 1000 = "
+          "headsets)",
+          0, 1000, kControllable),
+      P::boolean<&S::fit> ("fit", "Fit to content",
+          "Fit the view to the content at the start of the stream and on the keys r and Home; "
+          "camera "
+          "properties then count from that view",
+          kControllable),
+      P::boolean<&S::show_cameras> ("show-cameras", "Show cameras",
+          "Draw the rig's cameras and their frusta from near to far", kControllable),
+      P::boolean<&S::back_faces> ("back-faces", "Back faces",
+          "Draw back faces where no front face covers them, for mode=strips (always on for rigs of "
+          "one camera)",
+          kControllable),
+      P::boolean<&S::tint_views> ("show-units", "Tint views", "Former name of tint-views",
+          GParamFlags (kControllable | G_PARAM_DEPRECATED)),
+      P::boolean<&S::show_stats> (
+          "show-stats", "Show statistics", "Overlay statistics on the output", kControllable),
+      P::boolean<&S::keep_rate> ("keep-rate", "Keep rate",
+          "Output at the negotiated frame rate even if it is the input's, repeating frames while a "
+          "live stream stalls",
+          kMutablePlaying),
+      P::boolean<&S::tint_views> (
+          "tint-views", "Tint views", "Tint each point with the colour of its view", kControllable),
+      P::enumeration<&S::strips, &Strips::mode> (
+          "mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE, kControllable),
+      P::number<&S::background> (
+          "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),
+      P::number<&S::view_mask> ("view-mask", "View mask",
+          "Bit mask of the views to draw; bit n is view-id n", 0, G_MAXUINT64, kControllable),
+      P::number<&S::strips, &Strips::max_gap> ("max-gap", "Maximum gap",
+          "Maximum number of invalid pixels in a row or column that strips bridge", 0, 1000,
+          kControllable),
+      P::number<&S::samples> ("samples", "Multisampling",
+          "Number of samples per pixel for antialiasing, limited by OpenGL (0 or 1 = off); not "
+          "used by mode=blend",
+          0, 64, kControllable),
+      P::number<&S::hold_time> ("hold-time", "Hold time",
+          "Time in nanoseconds for which the last frame set is repeated when no other follows, if "
+          "the output has a frame rate of its own (G_MAXUINT64 = forever; not live: one minute at "
+          "most)",
+          0, G_MAXUINT64, kMutablePlaying),
+  };
+  return table;
+}

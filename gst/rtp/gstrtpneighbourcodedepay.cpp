@@ -1,0 +1,474 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rtpneighbourcodedepay
+ * @title: rtpneighbourcodedepay
+ *
+ * Extracts coded frame sets from RTP packets. Incomplete frame sets are output; damaged packets are
+ * counted and dropped. The rig comes with the caps (from SDP) or in band; nothing is output before
+ * it is known. The format is specified in docs/formats/rtp-payload.md.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 udpsrc port=5004
+ * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrtpneighbourcodedepay.h"
+
+#include <gst/rtp/rtp.h>
+
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangestatus.hpp>
+#include <mutex>
+#include <optional>
+#include <rangecast/neighbourcode/bitstream/key_check.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <vector>
+
+#include "common/accessunitassembler.hpp"
+#include "common/properties.hpp"
+#include "common/statsreporter.hpp"
+
+using rangecast::Status;
+using rangecast::StatusCode;
+using rangecast::UnitHeader;
+using rangecast::UnitReader;
+using rangecast::UnitType;
+
+GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
+#define GST_CAT_DEFAULT gst_rtp_neighbour_code_depay_debug
+
+enum { PROP_0, PROP_UNIT_STATS, PROP_STATS_INTERVAL };
+
+struct DepayCounters {
+  guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
+          lost_packets = 0, bytes = 0;
+};
+
+struct GstRtpNeighbourCodeDepayPrivate {
+  std::mutex lock; /* guards counters */
+  DepayCounters counters;
+  StatsReporter reporter; /* has locks of its own */
+
+  /* streaming thread only */
+  rangecast::RigCollector collector;
+  bool warned_of_size = false;
+  unsigned used_generation = 0;
+  bool have_caps = false;
+  std::size_t rig_views = 0;
+  guint64 view_bits = 0;              /* of the rig, by view-id; 0: not known yet */
+  UnitGatherer access_unit;           /* slices that arrived so far */
+  rangecast::KeyCheck key_check;      /* of them */
+  bool has_gap = false;               /* packets were lost before or between them */
+  guint32 timestamp = 0;              /* RTP time of them */
+  std::optional<guint16> sequence;    /* of the last packet */
+  std::optional<guint8> payload_type; /* of the last packet that was sound */
+  GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
+};
+
+struct _GstRtpNeighbourCodeDepay {
+  GstRTPBaseDepayload parent;
+  GstRtpNeighbourCodeDepayPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+                         "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE"));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 1, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+
+G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
+GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,
+    GST_TYPE_RTP_NEIGHBOUR_CODE_DEPAY)
+
+static void
+forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
+{
+  priv->access_unit.clear ();
+  priv->key_check.reset ();
+  priv->has_gap = false;
+  priv->pts = priv->capture_time = GST_CLOCK_TIME_NONE;
+}
+
+/* ---- caps ---- */
+
+static void
+set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
+{
+  const auto info = gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d);
+  GstCaps *caps = gstrange::make_neighbour_code_caps (info, "access-unit");
+  gst_pad_set_caps (GST_RTP_BASE_DEPAYLOAD_SRCPAD (base), caps);
+  gst_caps_unref (caps);
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->view_bits = view_bits (stream.rig);
+  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.set_views (stream.rig);
+}
+
+static Status
+rig_from_caps (const GstStructure *structure, rangecast::StreamInfo &stream)
+{
+  gsize size = 0;
+  guchar *blob = g_base64_decode (gst_structure_get_string (structure, "rig"), &size);
+  Status status = rangecast::decode_rig ({blob, size}, stream.rig);
+  g_free (blob);
+  if (!status.ok ())
+    return {status.code (), "RTP caps: field \"rig\" (base64): " + status.message ()};
+  for (const rangecast::View &view : stream.rig.views)
+    if (!view.is_range_view ())
+      return {StatusCode::kBadData,
+          "RTP caps: field \"rig\": view " + std::to_string (view.id) + " is not rectified"};
+  const gchar *rate = gst_structure_get_string (structure, "framerate");
+  int n = 0, d = 1;
+  if (rate && sscanf (rate, "%d/%d", &n, &d) == 2 && n >= 0 && d > 0) {
+    stream.fps_n = n;
+    stream.fps_d = d;
+  }
+  return {};
+}
+
+static gboolean
+gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv;
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  const gchar *version = gst_structure_get_string (structure, "version");
+  base->clock_rate = 90000;
+  forget_access_unit (priv);
+  if (version && g_strcmp0 (version, "1") != 0) {
+    gst_range_flow_return (GST_ELEMENT (base),
+        {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 1"});
+    return FALSE;
+  }
+  if (!gst_structure_has_field_typed (structure, "rig", G_TYPE_STRING))
+    return TRUE; /* it will come in band */
+  rangecast::StreamInfo stream;
+  const Status status = rig_from_caps (structure, stream);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  set_source_caps (base, stream);
+  return TRUE;
+}
+
+/* ---- packets ---- */
+
+/* Nobody can begin at an access unit in which key slices are missing, or where all those of a view
+ * may be.
+ * @param has_end  its last packet came */
+static bool
+is_key_unit (GstRtpNeighbourCodeDepayPrivate *priv, bool has_end)
+{
+  const bool is_whole = has_end && !priv->has_gap;
+  return priv->key_check.is_key () && (is_whole || priv->key_check.views () == priv->rig_views);
+}
+
+/* The access unit as a buffer; nullptr if there is none or its rig is not known. */
+static GstBuffer *
+take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  GstBuffer *buffer = nullptr;
+  if (!priv->access_unit.empty ()) {
+    std::lock_guard guard (priv->lock);
+    if (priv->have_caps) {
+      buffer = priv->access_unit.take ();
+      GST_BUFFER_PTS (buffer) = priv->pts;
+      if (!is_key_unit (priv, has_end))
+        GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+      priv->counters.access_units++;
+      priv->counters.bytes += gst_buffer_get_size (buffer);
+    } else {
+      priv->counters.without_rig++;
+    }
+  }
+  if (buffer && GST_CLOCK_TIME_IS_VALID (priv->capture_time))
+    gst_range_buffer_set_capture_time (buffer, priv->capture_time);
+  if (buffer)
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
+  forget_access_unit (priv);
+  return buffer;
+}
+
+/* The earliest capture time of its slices, because views of one frame set may differ by parts of a
+ * frame; and what makes a key unit. */
+static void
+note_slice (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
+{
+  rangecast::SliceHeader slice;
+  if (!rangecast::read_slice_header (unit, slice).ok ())
+    return;
+  priv->key_check.add (slice);
+  if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
+    priv->capture_time = slice.capture_time_ns;
+}
+
+/* Without a rig nothing can be decoded, so one that is too large is worth telling, once. */
+static bool
+take_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  const Status status = priv->collector.add (unit);
+  if (status.code () == rangecast::StatusCode::kBadSize && !priv->warned_of_size) {
+    priv->warned_of_size = true;
+    gst_range_post_warning (GST_ELEMENT (self), status);
+  }
+  return status.ok ();
+}
+
+/* Packets of FEC, which rtpulpfecdec lets pass under a payload type of their own. */
+static bool
+is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
+{
+  const guint8 type = gst_rtp_buffer_get_payload_type (rtp);
+  if (priv->payload_type == type)
+    return false;
+  UnitReader reader ({static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+      gst_rtp_buffer_get_payload_len (rtp)});
+  UnitHeader header;
+  while (reader.next (header)) {
+  }
+  if (reader.status ().ok ())
+    priv->payload_type = type;
+  return priv->payload_type && priv->payload_type != type;
+}
+
+/* A slice of a view that the rig of this stream has not: behind a rangemux it would be drawn over
+ * the one that another host sends. */
+static bool
+is_foreign (const GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
+{
+  constexpr std::size_t kViewId = 4;
+  return priv->view_bits != 0 && unit.size () > kViewId && unit[kViewId] < rangecast::kMaxViews &&
+         !(priv->view_bits >> unit[kViewId] & 1);
+}
+
+static void
+take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  UnitReader reader (payload);
+  UnitHeader header;
+  guint64 good = 0, bad = 0;
+  while (const auto unit = reader.next (header)) {
+    if (header.type == static_cast<guint8> (UnitType::kRigView)) {
+      bad += !take_rig_view (self, *unit);
+    } else if (header.type == static_cast<guint8> (UnitType::kSlice) && is_foreign (priv, *unit)) {
+      bad++;
+    } else if (!priv->access_unit.add (*unit)) {
+      bad++; /* it is hostile */
+    } else {
+      good++;
+      if (header.type == static_cast<guint8> (UnitType::kSlice))
+        note_slice (priv, *unit);
+    }
+  }
+  bad += !reader.status ().ok ();
+  if (bad)
+    GST_DEBUG_OBJECT (self, "%" G_GUINT64_FORMAT " damaged units", bad);
+  std::lock_guard guard (priv->lock);
+  priv->counters.packets++;
+  priv->counters.units += good;
+  priv->counters.bad_units += bad;
+}
+
+/* @return whether packets before this one are missing */
+static bool
+count_lost (GstRtpNeighbourCodeDepayPrivate *priv, guint16 sequence)
+{
+  const std::optional<guint16> last = std::exchange (priv->sequence, sequence);
+  const guint16 missing = last ? guint16 (sequence - *last - 1) : 0;
+  if (missing > 0 && missing < 0x8000) { /* else it goes back: another sender, or too late */
+    std::lock_guard guard (priv->lock);
+    priv->counters.lost_packets += missing;
+  }
+  return missing > 0;
+}
+
+/* The packet with the marker was lost: what came of the frame set goes out. */
+static void
+push_unmarked (GstRtpNeighbourCodeDepay *self)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  if (priv->access_unit.empty ())
+    return;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->counters.unmarked++;
+  }
+  if (GstBuffer *buffer = take_access_unit (self, false))
+    gst_rtp_base_depayload_push (GST_RTP_BASE_DEPAYLOAD (self), buffer);
+}
+
+static GstBuffer *
+gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *rtp)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
+  const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
+  const bool after_gap = count_lost (priv, sequence);
+  if (is_of_other_payload (priv, rtp)) {
+    priv->has_gap = priv->has_gap || after_gap;
+    return nullptr;
+  }
+  if (timestamp != priv->timestamp)
+    push_unmarked (self);
+  priv->has_gap = priv->has_gap || after_gap;
+  if (priv->access_unit.empty ()) {
+    priv->timestamp = timestamp;
+    priv->pts = GST_BUFFER_PTS (rtp->buffer);
+  }
+  take_units (self, {static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+                        gst_rtp_buffer_get_payload_len (rtp)});
+  if (priv->collector.generation () != priv->used_generation) {
+    priv->used_generation = priv->collector.generation ();
+    set_source_caps (base, priv->collector.info ());
+  }
+  return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self, true) : nullptr;
+}
+
+/* A packet that is lost is no gap in time: what came of its frame set goes out all the same. */
+static gboolean
+gst_rtp_neighbour_code_depay_packet_lost (GstRTPBaseDepayload *, GstEvent *)
+{
+  return TRUE;
+}
+
+static gboolean
+gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
+    forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->sequence.reset ();
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
+    push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.finish ();
+  }
+  return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
+      ->handle_event (base, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const DepayCounters &c = priv->counters;
+  return {{.counters = {.frames = c.access_units,
+               .bytes = c.bytes,
+               .packets = c.packets,
+               .lost = c.lost_packets}}};
+}
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    priv->reporter.start (element, collect_stats);
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_depay_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv->reporter.stop ();
+    forget_access_unit (priv);
+    priv->collector.reset ();
+    priv->used_generation = 0;
+    priv->have_caps = priv->warned_of_size = false;
+    priv->view_bits = 0;
+    priv->sequence.reset ();
+    priv->payload_type.reset ();
+    std::lock_guard guard (priv->lock);
+    priv->counters = {};
+  }
+  return result;
+}
+
+static void
+gst_rtp_neighbour_code_depay_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  if (id == PROP_STATS_INTERVAL)
+    GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rtp_neighbour_code_depay_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  if (id == PROP_STATS_INTERVAL) {
+    g_value_set_uint (value, priv->reporter.interval ());
+    return;
+  }
+  if (id != PROP_UNIT_STATS) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  const DepayCounters &c = priv->counters;
+  g_value_take_boxed (value,
+      gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
+          c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
+          "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
+          "without-rig", G_TYPE_UINT64, c.without_rig, "lost-packets", G_TYPE_UINT64,
+          c.lost_packets, "bytes", G_TYPE_UINT64, c.bytes, nullptr));
+}
+
+static void
+gst_rtp_neighbour_code_depay_finalize (GObject *object)
+{
+  delete GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
+  G_OBJECT_CLASS (gst_rtp_neighbour_code_depay_parent_class)->finalize (object);
+}
+
+static void
+gst_rtp_neighbour_code_depay_init (GstRtpNeighbourCodeDepay *self)
+{
+  self->priv = new GstRtpNeighbourCodeDepayPrivate;
+}
+
+static void
+gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS (klass);
+
+  object_class->set_property = gst_rtp_neighbour_code_depay_set_property;
+  object_class->get_property = gst_rtp_neighbour_code_depay_get_property;
+  object_class->finalize = gst_rtp_neighbour_code_depay_finalize;
+
+  g_object_class_install_property (object_class, PROP_UNIT_STATS,
+      g_param_spec_boxed ("unit-stats", "Unit statistics",
+          "Counters since the element was started: packets, units, bad-units, access-units, "
+          "unmarked, without-rig, lost-packets, bytes",
+          GST_TYPE_STRUCTURE, kReadOnly));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "RTP neighbour code depayloader",
+      "Codec/Depayloader/Network/RTP", "Extracts neighbour-coded frame sets from RTP packets",
+      "gst-rangecast");
+
+  element_class->change_state = gst_rtp_neighbour_code_depay_change_state;
+  depayload_class->set_caps = gst_rtp_neighbour_code_depay_set_caps;
+  depayload_class->process_rtp_packet = gst_rtp_neighbour_code_depay_process;
+  depayload_class->packet_lost = gst_rtp_neighbour_code_depay_packet_lost;
+  depayload_class->handle_event = gst_rtp_neighbour_code_depay_handle_event;
+
+  GST_DEBUG_CATEGORY_INIT (gst_rtp_neighbour_code_depay_debug, "rtpneighbourcodedepay", 0,
+      "RTP neighbour code depayloader");
+}

@@ -1,0 +1,595 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rtpneighbourcodeguard
+ * @title: rtpneighbourcodeguard
+ *
+ * Passes the RTP packets of one sender of coded frame sets and drops everything else that arrives
+ * at its port. A sender is accepted after consecutive valid packets, and replaced by another when
+ * it has been silent, sooner from the same address and port. Place it between udpsrc and
+ * rtpjitterbuffer, which accepts any RTP packet. Directly behind udpsrc it attaches a socket
+ * filter, so that the kernel drops floods of foreign packets.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 udpsrc port=5004
+ * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrtpneighbourcodeguard.h"
+
+#include <gst/net/gstnet.h>
+#include <gst/rtp/rtp.h>
+
+#include <mutex>
+#include <new>
+#include <optional>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <span>
+
+#include "common/properties.hpp"
+#include "netarrival.hpp"
+#include "senderfilter.hpp"
+#include "senderprobation.hpp"
+#include "senderrivals.hpp"
+
+GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
+#define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
+
+enum { PROP_0, PROP_TIMEOUT, PROP_STATS };
+
+static constexpr GstClockTime kDefaultTimeout = 500 * GST_MSECOND;
+/* Of two streams from one address and port the second waits so long: it may be a program that began
+ * again, but also two that share a socket or a relay. */
+static constexpr GstClockTime kBeginsAgain = 250 * GST_MSECOND;
+/* Without a sender, so many packets that are not sound, the first of them so long ago. */
+static constexpr guint kUnsoundPackets = 20;
+static constexpr GstClockTime kUnsoundTime = 3 * GST_SECOND;
+static constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
+
+struct GuardCounters {
+  guint64 passed = 0, foreign = 0, senders = 0;
+};
+
+struct GstRtpNeighbourCodeGuardPrivate {
+  std::mutex lock; /* guards what follows; never held while pushing or posting */
+  GstClockTime timeout = kDefaultTimeout;
+  GuardCounters counters;
+  std::optional<guint32> ssrc; /* of the sender whose packets pass */
+  guint8 payload_type = 0;     /* of its packets of slices */
+
+  /* streaming thread only */
+  GstClockTime last_time = 0;        /* of its last packet */
+  std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
+  GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
+  SenderProbation probation;
+  SenderRivals rivals, other_versions; /* while it sends */
+  guint64 unsound = 0;                 /* packets since the last one that passed */
+  GstClockTime unsound_since = 0;
+  bool warned_of_version = false, warned_of_unsound = false;
+  GSocket *filtered = nullptr; /* udpsrc's, while the kernel filters for us */
+  bool filter_rests = false;   /* while the sender is silent */
+  GstCaps *caps = nullptr;     /* as they came */
+};
+
+struct _GstRtpNeighbourCodeGuard {
+  GstElement parent;
+  GstPad *sinkpad, *srcpad;
+  GstRtpNeighbourCodeGuardPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-rtp"));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-rtp"));
+
+G_DEFINE_TYPE (GstRtpNeighbourCodeGuard, gst_rtp_neighbour_code_guard, GST_TYPE_ELEMENT);
+GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST_RANK_NONE,
+    GST_TYPE_RTP_NEIGHBOUR_CODE_GUARD)
+
+/* ---- packets ---- */
+
+/* As version_of_units(), but that there may be no memory for what is wrong. */
+static int
+read_units (std::span<const guint8> payload)
+{
+  using namespace rangecast;
+  UnitReader reader (payload);
+  UnitHeader header;
+  SliceHeader slice;
+  bool any = false;
+  while (const auto unit = reader.next (header)) {
+    if (header.type == static_cast<guint8> (UnitType::kSlice)) {
+      if (!read_slice_header (*unit, slice).ok ())
+        return 0;
+      any = true;
+    }
+    any |= header.type == static_cast<guint8> (UnitType::kRigView);
+  }
+  if (reader.status ().ok ())
+    return any ? kBitstreamVersion : 0;
+  /* Of another version only the sizes are known: they lead to the end. */
+  const int version = payload.empty () ? 0 : payload[0] >> 4;
+  if (version == kBitstreamVersion)
+    return 0;
+  while (payload.size () >= kUnitHeaderSize) {
+    const gsize size = payload[2] | payload[3] << 8;
+    if (payload[0] >> 4 != version || size < kUnitHeaderSize || size > payload.size ())
+      return 0;
+    payload = payload.subspan (size);
+  }
+  return payload.empty () ? version : 0;
+}
+
+/* The version of the neighbour code if the bytes are its units from the first to the last, with a
+ * slice or a view of the rig among them: what no other codec's are, nor a FEC packet's. 0 if they
+ * are not. */
+static int
+version_of_units (std::span<const guint8> payload) noexcept
+{
+  try {
+    return read_units (payload);
+  } catch (const std::bad_alloc &) { /* the text of a Status */
+    return 0;
+  }
+}
+
+/* What of a packet the guard looks at. */
+struct Packet {
+  bool is_rtp = false; /* else only its address is known */
+  guint32 ssrc = 0;
+  guint16 sequence = 0;
+  guint8 payload_type = 0;
+  int version = 0; /* of its units; 0: it is none of the neighbour code */
+  bool units = false, repeated_units = false;
+  GSocketAddress *address = nullptr; /* the buffer's */
+};
+
+static Packet
+read_packet (GstBuffer *buffer)
+{
+  Packet packet;
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  if (const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer))
+    packet.address = meta->addr;
+  if (!gst_rtp_buffer_map (buffer, GST_MAP_READ, &rtp))
+    return packet;
+  packet.is_rtp = true;
+  const std::span<const guint8> payload (
+      static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
+      gst_rtp_buffer_get_payload_len (&rtp));
+  packet.ssrc = gst_rtp_buffer_get_ssrc (&rtp);
+  packet.sequence = gst_rtp_buffer_get_seq (&rtp);
+  packet.payload_type = gst_rtp_buffer_get_payload_type (&rtp);
+  packet.version = version_of_units (payload);
+  packet.units = packet.version == rangecast::kBitstreamVersion;
+  packet.repeated_units =
+      !packet.units && payload.size () > kRtxHeader &&
+      version_of_units (payload.subspan (kRtxHeader)) == rangecast::kBitstreamVersion;
+  gst_rtp_buffer_unmap (&rtp);
+  return packet;
+}
+
+/* ---- the kernel's help ---- */
+
+/* The socket of the udpsrc that is linked to the sink pad, or nullptr. */
+static GSocket *
+find_socket (GstRtpNeighbourCodeGuard *self)
+{
+  GSocket *socket = nullptr;
+  GstPad *peer = gst_pad_get_peer (self->sinkpad);
+  GstElement *source = peer ? gst_pad_get_parent_element (peer) : nullptr;
+  if (source && g_object_class_find_property (G_OBJECT_GET_CLASS (source), "used-socket"))
+    g_object_get (source, "used-socket", &socket, nullptr);
+  gst_clear_object (&source);
+  gst_clear_object (&peer);
+  return socket;
+}
+
+static void
+stop_filter (GstRtpNeighbourCodeGuardPrivate *priv)
+{
+  if (priv->filtered && !priv->filter_rests)
+    SenderFilter::detach (priv->filtered);
+  g_clear_object (&priv->filtered);
+  priv->filter_rests = false;
+}
+
+/* The next sender may be among those that it keeps out; or this one comes back. */
+static void
+rest_filter (GstRtpNeighbourCodeGuardPrivate *priv, bool rests)
+{
+  if (!priv->filtered || priv->filter_rests == rests)
+    return;
+  priv->filter_rests = rests;
+  if (rests)
+    SenderFilter::detach (priv->filtered);
+  else
+    SenderFilter::attach (priv->filtered, priv->address);
+}
+
+static void
+start_filter (GstRtpNeighbourCodeGuard *self)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  stop_filter (priv);
+  GSocket *socket = priv->address ? find_socket (self) : nullptr;
+  if (socket && SenderFilter::attach (socket, priv->address))
+    priv->filtered = G_SOCKET (g_object_ref (socket));
+  g_clear_object (&socket);
+}
+
+/* Downstream learns whose packets these are; a payload type, which would keep FEC packets from the
+ * jitter buffer, is left out. */
+static void
+push_caps (GstRtpNeighbourCodeGuard *self)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  if (!priv->caps)
+    return;
+  GstCaps *caps = gst_caps_copy (priv->caps);
+  gst_structure_remove_field (gst_caps_get_structure (caps, 0), "payload");
+  if (priv->ssrc)
+    gst_caps_set_simple (caps, "ssrc", G_TYPE_UINT, *priv->ssrc, nullptr);
+  gst_pad_push_event (self->srcpad, gst_event_new_caps (caps));
+  gst_caps_unref (caps);
+}
+
+enum class Verdict { kPasses, kPassesAsFirst, kForeign, kUnsound, kRival, kOtherVersion };
+
+/* Under the lock: a packet of the sender, or one that was lost and comes again.
+ * @param here  it comes from the sender's address and port */
+static bool
+is_senders (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
+{
+  if (!priv->ssrc || !here || !packet.is_rtp)
+    return false;
+  if (packet.ssrc == *priv->ssrc) /* slices, or FEC */
+    return packet.units || packet.payload_type != priv->payload_type;
+  if (packet.payload_type == priv->payload_type ||
+      (!packet.repeated_units && packet.ssrc != priv->rtx_ssrc))
+    return false;
+  priv->rtx_ssrc = packet.ssrc;
+  return true;
+}
+
+/* Under the lock. */
+static void
+take_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
+{
+  priv->ssrc = packet.ssrc;
+  priv->payload_type = packet.payload_type;
+  g_set_object (&priv->address, packet.address);
+  priv->rtx_ssrc.reset ();
+  priv->probation.clear ();
+  priv->rivals.clear ();
+  priv->other_versions.clear ();
+  priv->warned_of_unsound = false;
+  priv->counters.senders++;
+}
+
+/* Under the lock: a packet that nobody can use, while nobody sends what we can. */
+static Verdict
+judge_unsound (GstRtpNeighbourCodeGuardPrivate *priv, GstClockTime now)
+{
+  if (priv->unsound++ == 0)
+    priv->unsound_since = now;
+  const bool tell = !priv->warned_of_unsound && priv->unsound >= kUnsoundPackets &&
+                    now >= priv->unsound_since && now - priv->unsound_since >= kUnsoundTime;
+  priv->warned_of_unsound |= tell;
+  return tell ? Verdict::kUnsound : Verdict::kForeign;
+}
+
+/* Under the lock: a sound packet of somebody else while the sender sends. */
+static Verdict
+judge_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packet &packet)
+{
+  if (packet.version == rangecast::kBitstreamVersion)
+    return priv->rivals.add (packet, priv->last_time) ? Verdict::kRival : Verdict::kForeign;
+  /* Who sends packets of our version as well sends damaged copies. */
+  if (packet.ssrc == *priv->ssrc || priv->rivals.comes_from (packet.address) ||
+      priv->warned_of_version || !priv->other_versions.add (packet, priv->last_time))
+    return Verdict::kForeign;
+  priv->warned_of_version = true;
+  return Verdict::kOtherVersion;
+}
+
+/* Under the lock. @param[out] stream  the packets that pass with kPassesAsFirst */
+static Verdict
+judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
+    GstBuffer *buffer, SenderProbation::Stream &stream)
+{
+  /* What rtprtxreceive put together again has no address; what comes from the network has. */
+  const bool here = !packet.address || same_sender (packet.address, priv->address);
+  if (is_senders (priv, packet, here)) {
+    if (packet.ssrc == *priv->ssrc)
+      priv->last_time = now;
+    priv->unsound = 0;
+    rest_filter (priv, false);
+    return Verdict::kPasses;
+  }
+  const GstClockTime waited = now > priv->last_time ? now - priv->last_time : 0;
+  const bool silent = !priv->ssrc || waited >= priv->timeout || (here && waited >= kBeginsAgain);
+  if (!priv->ssrc || waited >= priv->timeout)
+    rest_filter (priv, true);
+  if (packet.version == 0)
+    return silent ? judge_unsound (priv, now) : Verdict::kForeign;
+  const SenderProbation::Packet known = {
+      packet.address, packet.ssrc, packet.sequence, packet.version, now};
+  if (!silent)
+    return judge_rival (priv, known);
+  if (!packet.units && priv->warned_of_version)
+    return Verdict::kForeign;
+  if (!priv->probation.add (known, buffer, stream))
+    return Verdict::kForeign;
+  if (!packet.units) {
+    priv->warned_of_version = true;
+    return Verdict::kOtherVersion;
+  }
+  take_sender (priv, packet);
+  priv->last_time = now;
+  priv->unsound = 0;
+  return Verdict::kPassesAsFirst;
+}
+
+/* What came of the sender so far, in order; `stream` is empty afterwards. */
+static GstFlowReturn
+push_first (GstRtpNeighbourCodeGuard *self, SenderProbation::Stream &stream)
+{
+  GST_INFO_OBJECT (self, "SSRC %08x passes", *self->priv->ssrc);
+  start_filter (self);
+  push_caps (self);
+  GstFlowReturn flow = GST_FLOW_OK;
+  bool first = true;
+  for (GstBuffer *buffer : stream) {
+    if (flow != GST_FLOW_OK) {
+      gst_buffer_unref (buffer);
+      continue;
+    }
+    if (first) {
+      buffer = gst_buffer_make_writable (buffer);
+      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+    }
+    first = false;
+    flow = gst_pad_push (self->srcpad, buffer);
+  }
+  stream.forget ();
+  return flow;
+}
+
+/* (transfer full) */
+static gchar *
+text_of (GSocketAddress *address)
+{
+  return G_IS_INET_SOCKET_ADDRESS (address)
+             ? g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address))
+             : g_strdup ("somewhere");
+}
+
+static void
+warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
+{
+  gchar *rival = text_of (packet.address), *sender = text_of (self->priv->address);
+  GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
+      ("Two senders at one port: dropping packets of SSRC %08x from %s, accepting those of %08x "
+       "from %s",
+          packet.ssrc, rival, *self->priv->ssrc, sender),
+      (nullptr));
+  g_free (sender);
+  g_free (rival);
+}
+
+static void
+warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 unsound)
+{
+  if (verdict == Verdict::kUnsound)
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
+         "version %d; they belong to another codec, or are encrypted (--key)",
+            unsound, rangecast::kBitstreamVersion),
+        (nullptr));
+  if (verdict == Verdict::kRival)
+    warn_of_rival (self, packet);
+  if (verdict == Verdict::kOtherVersion)
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("A sender uses version %d of the neighbour code: dropped; expected version %d",
+            packet.version, rangecast::kBitstreamVersion),
+        (nullptr));
+}
+
+static GstFlowReturn
+gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  const Packet packet = read_packet (buffer);
+  Verdict verdict = Verdict::kForeign;
+  SenderProbation::Stream stream; /* empty but when a sender begins */
+  const GstClockTime now = arrival_time (GST_ELEMENT (self), buffer);
+  guint64 unsound = 0;
+  {
+    std::lock_guard guard (priv->lock);
+    verdict = judge (priv, packet, now, buffer, stream);
+    unsound = priv->unsound;
+    priv->counters.passed += verdict == Verdict::kPasses          ? 1
+                             : verdict == Verdict::kPassesAsFirst ? stream.size ()
+                                                                  : 0;
+    if (verdict == Verdict::kPassesAsFirst)
+      priv->counters.foreign -= stream.size () - 1; /* they were, on probation */
+    else
+      priv->counters.foreign += verdict != Verdict::kPasses;
+  }
+  if (verdict == Verdict::kPasses)
+    return gst_pad_push (self->srcpad, buffer);
+  if (verdict == Verdict::kPassesAsFirst) {
+    gst_buffer_unref (buffer); /* the stream has it */
+    return push_first (self, stream);
+  }
+  warn_of (self, verdict, packet, unsound);
+  stream.unref ();
+  gst_buffer_unref (buffer);
+  return GST_FLOW_OK;
+}
+
+/* Under the lock. */
+static void
+forget_sender (GstRtpNeighbourCodeGuardPrivate *priv)
+{
+  stop_filter (priv);
+  priv->ssrc.reset ();
+  priv->rtx_ssrc.reset ();
+  priv->probation.clear ();
+  priv->rivals.clear ();
+  priv->other_versions.clear ();
+  priv->unsound = 0;
+  g_clear_object (&priv->address);
+}
+
+/* ---- events ---- */
+
+static gboolean
+gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may begin anew */
+    std::lock_guard guard (self->priv->lock);
+    forget_sender (self->priv);
+  }
+  if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
+    return gst_pad_event_default (pad, parent, event);
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  gst_caps_replace (&self->priv->caps, caps);
+  gst_event_unref (event);
+  push_caps (self);
+  return TRUE;
+}
+
+/* Requests for a key frame set and for a lost packet say which stream they are about, as rtpbin's
+ * demultiplexers do it: rtpsession makes a PLI or a NACK of such ones. A request that a viewer sent
+ * to a parent names the parent's own stream, so whatever it names is replaced. */
+static gboolean
+gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
+  const GstStructure *structure = gst_event_get_structure (event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && structure &&
+      (gst_structure_has_name (structure, "GstForceKeyUnit") ||
+          gst_structure_has_name (structure, "GstRTPRetransmissionRequest"))) {
+    std::lock_guard guard (self->priv->lock);
+    if (self->priv->ssrc) {
+      event = gst_event_make_writable (event);
+      gst_structure_set (gst_event_writable_structure (event), "ssrc", G_TYPE_UINT,
+          *self->priv->ssrc, "payload", G_TYPE_UINT, guint (self->priv->payload_type), nullptr);
+    }
+  }
+  return gst_pad_event_default (pad, parent, event);
+}
+
+/* ---- life ---- */
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange transition)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (element);
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_guard_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    gst_caps_replace (&self->priv->caps, nullptr);
+    std::lock_guard guard (self->priv->lock);
+    forget_sender (self->priv);
+    self->priv->warned_of_version = self->priv->warned_of_unsound = false;
+    self->priv->counters = {};
+  }
+  return result;
+}
+
+static void
+gst_rtp_neighbour_code_guard_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
+  if (id != PROP_TIMEOUT) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  priv->timeout = g_value_get_uint64 (value);
+}
+
+static void
+gst_rtp_neighbour_code_guard_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
+  std::lock_guard guard (priv->lock);
+  switch (id) {
+    case PROP_TIMEOUT:
+      g_value_set_uint64 (value, priv->timeout);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed (value,
+          gst_structure_new ("application/x-rtpneighbourcodeguard-stats", "passed", G_TYPE_UINT64,
+              priv->counters.passed, "foreign", G_TYPE_UINT64, priv->counters.foreign, "senders",
+              G_TYPE_UINT64, priv->counters.senders, nullptr));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  }
+}
+
+static void
+gst_rtp_neighbour_code_guard_finalize (GObject *object)
+{
+  GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
+  gst_caps_replace (&priv->caps, nullptr);
+  forget_sender (priv);
+  delete priv;
+  G_OBJECT_CLASS (gst_rtp_neighbour_code_guard_parent_class)->finalize (object);
+}
+
+static void
+gst_rtp_neighbour_code_guard_init (GstRtpNeighbourCodeGuard *self)
+{
+  self->priv = new GstRtpNeighbourCodeGuardPrivate;
+  self->sinkpad = gst_pad_new_from_static_template (&sink_template, "sink");
+  gst_pad_set_chain_function (self->sinkpad, gst_rtp_neighbour_code_guard_chain);
+  gst_pad_set_event_function (self->sinkpad, gst_rtp_neighbour_code_guard_sink_event);
+  GST_PAD_SET_PROXY_ALLOCATION (self->sinkpad);
+  gst_element_add_pad (GST_ELEMENT (self), self->sinkpad);
+  self->srcpad = gst_pad_new_from_static_template (&src_template, "src");
+  gst_pad_set_event_function (self->srcpad, gst_rtp_neighbour_code_guard_src_event);
+  gst_element_add_pad (GST_ELEMENT (self), self->srcpad);
+}
+
+static void
+gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+
+  object_class->set_property = gst_rtp_neighbour_code_guard_set_property;
+  object_class->get_property = gst_rtp_neighbour_code_guard_get_property;
+  object_class->finalize = gst_rtp_neighbour_code_guard_finalize;
+
+  g_object_class_install_property (object_class, PROP_TIMEOUT,
+      g_param_spec_uint64 ("timeout", "Timeout",
+          "Silence of the current sender in nanoseconds after which another sender is accepted "
+          "(G_MAXUINT64 = never)",
+          0, G_MAXUINT64, kDefaultTimeout, kMutablePlaying));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: passed and foreign packets, and senders");
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "RTP neighbour code guard",
+      "Filter/Network/RTP", "Passes the RTP packets of one sender and drops those of all others",
+      "gst-rangecast");
+  element_class->change_state = gst_rtp_neighbour_code_guard_change_state;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_rtp_neighbour_code_guard_debug, "rtpneighbourcodeguard", 0, "RTP neighbour code guard");
+}

@@ -1,0 +1,436 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rtpneighbourcodepay
+ * @title: rtpneighbourcodepay
+ *
+ * Packs coded frame sets into RTP packets of whole units, which decode independently. With
+ * alignment=slice a packet is sent as soon as its slice arrives. The format is specified in
+ * docs/formats/rtp-payload.md.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc is-live=true num-buffers=100 ! neighbourcodeenc !
+ * rtpneighbourcodepay ! udpsink host=127.0.0.1 port=5004
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrtpneighbourcodepay.h"
+
+#include <gst/rtp/rtp.h>
+#include <gst/video/video.h>
+
+#include <atomic>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangestatus.hpp>
+#include <optional>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <string>
+#include <vector>
+
+#include "common/codedunits.hpp"
+#include "common/properties.hpp"
+#include "common/statsreporter.hpp"
+
+using rangecast::Status;
+using rangecast::UnitHeader;
+using rangecast::UnitType;
+
+GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
+#define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
+
+enum { PROP_0, PROP_CONFIG_INTERVAL, PROP_STATS_INTERVAL };
+
+static constexpr int kDefaultConfigInterval = 1;
+/* The least max-slice-size of neighbourcodeenc. */
+static constexpr gsize kSmallestSliceLimit = 256;
+
+struct GstRtpNeighbourCodePayPrivate {
+  std::atomic<int> config_interval{kDefaultConfigInterval};
+  std::atomic<guint64> frame_sets{0}, packets{0}, bytes{0}; /* since start */
+  StatsReporter reporter;
+
+  /* streaming thread only */
+  std::vector<guint8> rig_units;
+  GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
+  bool by_slices = false;                         /* alignment of the input */
+  bool within_frame_set = false;                  /* slices of this one came before */
+  GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
+  gsize header_size = 0;                          /* of a packet, bytes */
+  GstCaps *header_caps = nullptr;                 /* for which that holds */
+};
+
+struct _GstRtpNeighbourCodePay {
+  GstRTPBasePayload parent;
+  GstRtpNeighbourCodePayPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+                         "payload = (int) [ 96, 127 ], clock-rate = (int) 90000, "
+                         "encoding-name = (string) X-NEIGHBOUR-CODE"));
+
+G_DEFINE_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST_TYPE_RTP_BASE_PAYLOAD)
+GST_ELEMENT_REGISTER_DEFINE (
+    rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY, GST_TYPE_RTP_NEIGHBOUR_CODE_PAY)
+
+/* ---- caps ---- */
+
+/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes
+ * the requests for key frame sets (PLI, FIR) that an encoder before us answers. */
+static gboolean
+set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
+{
+  const std::vector<guint8> blob = rangecast::encode_rig (info.rig);
+  gchar *rig = g_base64_encode (blob.data (), blob.size ());
+  const std::string rate = std::to_string (info.fps_n) + "/" + std::to_string (info.fps_d);
+  gst_rtp_base_payload_set_options (base, "application", TRUE, "X-NEIGHBOUR-CODE", 90000);
+  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "1",
+      "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
+      std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
+      std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",
+      G_TYPE_STRING, rig, "rtcp-fb-nack-pli", G_TYPE_BOOLEAN, TRUE, "rtcp-fb-ccm-fir",
+      G_TYPE_BOOLEAN, TRUE, nullptr);
+  g_free (rig);
+  return set;
+}
+
+static gboolean
+gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv;
+  gstrange::RangeInfo info;
+  const Status status = gstrange::parse_caps (caps, info);
+  priv->reporter.set_views (info.rig);
+  if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  priv->rig_units.clear ();
+  rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, priv->rig_units);
+  priv->last_config = GST_CLOCK_TIME_NONE;
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  priv->within_frame_set = false;
+  return set_output_caps (base, info);
+}
+
+/* ---- packets ---- */
+
+/* Packets of one access unit that share its bytes. */
+struct Packer {
+  GstRTPBasePayload *base;
+  GstBufferList *packets;
+  gsize room; /* payload bytes of a packet */
+  GstClockTime pts, dts;
+  bool unreadable = false; /* memory that could not be mapped */
+
+  void add (GstBuffer *units, gsize offset, gsize size)
+  {
+    GstBuffer *packet = gst_rtp_base_payload_allocate_output_buffer (base, 0, 0, 0);
+    GST_BUFFER_PTS (packet) = pts;
+    GST_BUFFER_DTS (packet) = dts;
+    GstBuffer *payload = gst_buffer_copy_region (units, GST_BUFFER_COPY_MEMORY, offset, size);
+    gst_buffer_list_add (packets, gst_buffer_append (packet, payload));
+  }
+
+  /* @return the first unit that is too long for a packet, if there is one */
+  std::optional<UnitHeader> pack (GstBuffer *buffer)
+  {
+    gsize begin = 0, end = 0;
+    std::optional<UnitHeader> too_long;
+    Status damage; /* what is behind it is left out */
+    const auto take = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+      if (unit.size () > room) {
+        too_long = header;
+        return false;
+      }
+      if (end - begin + unit.size () > room) {
+        add (buffer, begin, end - begin);
+        begin = end;
+      }
+      end = offset + unit.size ();
+      return true;
+    };
+    if (!for_each_unit (buffer, take, damage)) {
+      unreadable = true;
+      return {};
+    }
+    if (!too_long && end > begin)
+      add (buffer, begin, end - begin);
+    return too_long;
+  }
+};
+
+/* Bytes that an extension takes in the header at most; 0: the base class does not make it either.
+ */
+static gsize
+extension_size (const char *uri, const GstBuffer *buffer)
+{
+  GstRTPHeaderExtension *extension = gst_rtp_header_extension_create_from_uri (uri);
+  if (!extension)
+    return 0;
+  const gsize size = 2 + gst_rtp_header_extension_get_max_size (extension, buffer);
+  gst_object_unref (extension);
+  return size;
+}
+
+/* The fixed header, and the extensions that were agreed on: the base class writes them into packets
+ * that are made already. */
+static gsize
+find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
+{
+  GstRtpNeighbourCodePayPrivate *priv = self->priv;
+  GstCaps *caps = gst_pad_get_current_caps (GST_RTP_BASE_PAYLOAD_SRCPAD (self));
+  if (caps && caps == priv->header_caps) {
+    gst_caps_unref (caps);
+    return priv->header_size;
+  }
+  const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
+  gsize extensions = 0;
+  for (int i = 0; structure && i < gst_structure_n_fields (structure); i++) {
+    const char *name = gst_structure_nth_field_name (structure, guint (i));
+    const GValue *value = gst_structure_get_value (structure, name);
+    if (!g_str_has_prefix (name, "extmap-"))
+      continue;
+    if (GST_VALUE_HOLDS_ARRAY (value) && gst_value_array_get_size (value) > 1)
+      value = gst_value_array_get_value (value, 1); /* direction, URI, attributes */
+    if (G_VALUE_HOLDS_STRING (value))
+      extensions += extension_size (g_value_get_string (value), buffer);
+  }
+  gst_caps_take (&priv->header_caps, caps);
+  return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + (extensions + 3) / 4 * 4 : 0);
+}
+
+/* Notes where frame sets begin and end. The end of one without MARKER is known only afterwards; its
+ * packets have no marker, and receivers go by the next timestamp. */
+static bool
+begins_frame_set (GstRtpNeighbourCodePayPrivate *priv, GstBuffer *buffer, bool is_last)
+{
+  const bool begins = !priv->within_frame_set || GST_BUFFER_PTS (buffer) != priv->pts;
+  priv->within_frame_set = !is_last;
+  priv->pts = GST_BUFFER_PTS (buffer);
+  return begins;
+}
+
+static bool
+config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
+{
+  GstRtpNeighbourCodePayPrivate *priv = self->priv;
+  const int interval = priv->config_interval;
+  if (interval == 0)
+    return false;
+  const bool due = interval < 0 || !GST_CLOCK_TIME_IS_VALID (priv->last_config) ||
+                   !GST_CLOCK_TIME_IS_VALID (running) || running < priv->last_config ||
+                   running - priv->last_config >= GstClockTime (interval) * GST_SECOND;
+  if (due)
+    priv->last_config = running;
+  return due;
+}
+
+static void
+set_marker (GstBufferList *packets)
+{
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  GstBuffer *last = gst_buffer_list_get_writable (packets, gst_buffer_list_length (packets) - 1);
+  if (gst_rtp_buffer_map (last, GST_MAP_WRITE, &rtp)) {
+    gst_rtp_buffer_set_marker (&rtp, TRUE);
+    gst_rtp_buffer_unmap (&rtp);
+  }
+  GST_BUFFER_FLAG_SET (last, GST_BUFFER_FLAG_MARKER);
+}
+
+/* What to change so that a unit fits. */
+static std::string
+advice (const UnitHeader &unit, gsize room, gsize mtu_needed)
+{
+  const std::string larger_mtu = "mtu=" + std::to_string (mtu_needed) + " at least";
+  if (unit.type == guint8 (UnitType::kRigView))
+    return larger_mtu + ", or config-interval=0 where receivers have the rig from caps or SDP";
+  if (unit.type == guint8 (UnitType::kSlice) && room >= kSmallestSliceLimit)
+    return "max-slice-size=" + std::to_string (room) + " of neighbourcodeenc at most, or " +
+           larger_mtu;
+  return larger_mtu;
+}
+
+static GstFlowReturn
+refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gsize room)
+{
+  const char *name = unit.type == guint8 (UnitType::kSlice)     ? "slice"
+                     : unit.type == guint8 (UnitType::kRigView) ? "rig view"
+                                                                : "unit";
+  const gsize mtu_needed = unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size;
+  GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
+      ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
+          int (unit.size), mtu, advice (unit, room, mtu_needed).c_str ()),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+/* Makes packets of a frame set, or of some of its slices, and of the rig where that is due. */
+static std::optional<UnitHeader>
+pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool with_rig)
+{
+  std::optional<UnitHeader> too_long;
+  if (with_rig) {
+    GstBuffer *rig =
+        gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
+    too_long = packer.pack (rig);
+    gst_buffer_unref (rig);
+  }
+  return too_long ? too_long : packer.pack (buffer);
+}
+
+static GstFlowReturn
+gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *buffer)
+{
+  auto self = GST_RTP_NEIGHBOUR_CODE_PAY (base);
+  const guint mtu = GST_RTP_BASE_PAYLOAD_MTU (base);
+  const gsize header = self->priv->header_size = find_header_size (self, buffer);
+  Packer packer = {base, gst_buffer_list_new (), mtu > header ? mtu - header : 0,
+      GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
+  const GstClockTime running =
+      gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  const bool is_last =
+      !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
+  const bool begins = begins_frame_set (self->priv, buffer, is_last);
+  self->priv->frame_sets += begins;
+  const auto too_long = pack_all (self, packer, buffer, begins && config_is_due (self, running));
+  self->priv->reporter.passed (GST_ELEMENT (self), buffer);
+  gst_buffer_unref (buffer);
+  if (packer.unreadable) {
+    gst_buffer_list_unref (packer.packets);
+    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+    return GST_FLOW_ERROR;
+  }
+  if (too_long) {
+    gst_buffer_list_unref (packer.packets);
+    return refuse_long_unit (base, *too_long, mtu, packer.room);
+  }
+  if (gst_buffer_list_length (packer.packets) == 0) {
+    gst_buffer_list_unref (packer.packets);
+    return GST_FLOW_OK;
+  }
+  if (is_last)
+    set_marker (packer.packets);
+  self->priv->packets += gst_buffer_list_length (packer.packets);
+  self->priv->bytes += gst_buffer_list_calculate_size (packer.packets);
+  return gst_rtp_base_payload_push_list (base, packer.packets);
+}
+
+/* ---- events ---- */
+
+/* With the key frame set that the event announces the rig is sent again. */
+static gboolean
+gst_rtp_neighbour_code_pay_sink_event (GstRTPBasePayload *base, GstEvent *event)
+{
+  gboolean all_headers = FALSE;
+  if (gst_video_event_is_force_key_unit (event) &&
+      gst_video_event_parse_downstream_force_key_unit (
+          event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
+      all_headers)
+    GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->last_config = GST_CLOCK_TIME_NONE;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+    GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->reporter.finish ();
+  return GST_RTP_BASE_PAYLOAD_CLASS (gst_rtp_neighbour_code_pay_parent_class)
+      ->sink_event (base, event);
+}
+
+/* ---- life ---- */
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  return {
+      {.counters = {.frames = priv->frame_sets, .bytes = priv->bytes, .packets = priv->packets}}};
+}
+
+static GstStateChangeReturn
+gst_rtp_neighbour_code_pay_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    priv->frame_sets = priv->packets = priv->bytes = 0;
+    priv->reporter.start (element, collect_stats);
+  }
+  const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_pay_parent_class)
+                                          ->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    priv->reporter.stop ();
+  return result;
+}
+
+static void
+gst_rtp_neighbour_code_pay_set_property (
+    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
+  if (id == PROP_CONFIG_INTERVAL)
+    priv->config_interval = g_value_get_int (value);
+  else if (id == PROP_STATS_INTERVAL)
+    priv->reporter.set_interval (g_value_get_uint (value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rtp_neighbour_code_pay_get_property (
+    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
+  if (id == PROP_CONFIG_INTERVAL)
+    g_value_set_int (value, priv->config_interval);
+  else if (id == PROP_STATS_INTERVAL)
+    g_value_set_uint (value, priv->reporter.interval ());
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_rtp_neighbour_code_pay_finalize (GObject *object)
+{
+  gst_clear_caps (&GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->header_caps);
+  delete GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
+  G_OBJECT_CLASS (gst_rtp_neighbour_code_pay_parent_class)->finalize (object);
+}
+
+static void
+gst_rtp_neighbour_code_pay_init (GstRtpNeighbourCodePay *self)
+{
+  self->priv = new GstRtpNeighbourCodePayPrivate;
+}
+
+static void
+gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto payload_class = GST_RTP_BASE_PAYLOAD_CLASS (klass);
+
+  object_class->set_property = gst_rtp_neighbour_code_pay_set_property;
+  object_class->get_property = gst_rtp_neighbour_code_pay_get_property;
+  object_class->finalize = gst_rtp_neighbour_code_pay_finalize;
+
+  g_object_class_install_property (object_class, PROP_CONFIG_INTERVAL,
+      g_param_spec_int ("config-interval", "Config interval",
+          "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
+          "frame set)",
+          -1, 3600, kDefaultConfigInterval, kMutablePlaying));
+  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "RTP neighbour code payloader",
+      "Codec/Payloader/Network/RTP", "Packs neighbour-coded frame sets into RTP packets",
+      "gst-rangecast");
+
+  element_class->change_state = gst_rtp_neighbour_code_pay_change_state;
+  payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
+  payload_class->sink_event = gst_rtp_neighbour_code_pay_sink_event;
+  payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;
+
+  GST_DEBUG_CATEGORY_INIT (
+      gst_rtp_neighbour_code_pay_debug, "rtpneighbourcodepay", 0, "RTP neighbour code payloader");
+}

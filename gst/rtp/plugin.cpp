@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * plugin-rtpneighbourcode:
+ *
+ * Neighbour code over RTP: payloader, depayloader, source guard and RTCP reports.
+ */
+#include <gst/gst.h>
+
+GST_ELEMENT_REGISTER_DECLARE (rtcpreports)
+GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodedepay)
+GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodeguard)
+GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodepay)
+
+static gboolean
+plugin_init (GstPlugin *plugin)
+{
+  gboolean registered = FALSE;
+  registered |= GST_ELEMENT_REGISTER (rtcpreports, plugin);
+  registered |= GST_ELEMENT_REGISTER (rtpneighbourcodedepay, plugin);
+  registered |= GST_ELEMENT_REGISTER (rtpneighbourcodeguard, plugin);
+  registered |= GST_ELEMENT_REGISTER (rtpneighbourcodepay, plugin);
+  return registered;
+}
+
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rtpneighbourcode,
+    "Neighbour code over RTP: payloader, depayloader, source guard and RTCP reports", plugin_init,
+    PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

@@ -1,0 +1,272 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-avatartestsrc
+ * @title: avatartestsrc
+ *
+ * Renders a moving head and shoulders in a textured room, as seen by a rig of stereo cameras. The
+ * figure is built in, with accessories (#GstAvatarTestSrc:dress), or a glTF or OBJ model
+ * (#GstAvatarTestSrc:location, #GstAvatarTestSrc:model-top).
+ *
+ * Request pads `left`, `right` and `third` output the cameras of one view, `src` outputs exact
+ * range images. One thread feeds all pads: put a queue behind each where there are several. Pads
+ * may be requested and released in any state.
+ *
+ * The same properties, size and time give the same images in every process. Live, frames are at
+ * multiples of the frame period on the pipeline clock. Not live, the source can be sought in TIME.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 avatartestsrc ! rangesplit name=s s.depth ! videoconvert ! autovideosink
+ * ]|
+ * |[
+ * gst-launch-1.0 avatartestsrc location=head.glb name=s s.left ! videoconvert ! autovideosink
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstavatartestsrc.h"
+
+#include <gst/video/video.h>
+
+#include <gstrange/gstrange.h>
+#include <mutex>
+
+#include "settings.hpp"
+#include "stream.hpp"
+
+GST_DEBUG_CATEGORY (gst_avatar_test_src_debug); /* avatarstream.cpp logs to it too */
+
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
+
+struct GstAvatarTestSrcPrivate {
+  std::mutex lock; /* guards settings */
+  AvatarSettings settings;
+  AvatarStream stream;
+
+  explicit GstAvatarTestSrcPrivate (GstElement *element) : stream (element) {}
+};
+
+struct _GstAvatarTestSrc {
+  GstElement parent;
+  GstAvatarTestSrcPrivate *priv;
+};
+
+#define RAW_CAPS GST_VIDEO_CAPS_MAKE ("{ RGBx, BGRx, RGB, BGR, GRAY8 }")
+
+static GstStaticPadTemplate left_template =
+    GST_STATIC_PAD_TEMPLATE ("left", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
+static GstStaticPadTemplate right_template =
+    GST_STATIC_PAD_TEMPLATE ("right", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
+static GstStaticPadTemplate third_template =
+    GST_STATIC_PAD_TEMPLATE ("third", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (GST_RANGE_CAPS));
+
+G_DEFINE_TYPE (GstAvatarTestSrc, gst_avatar_test_src, GST_TYPE_ELEMENT)
+GST_ELEMENT_REGISTER_DEFINE (
+    avatartestsrc, "avatartestsrc", GST_RANK_NONE, GST_TYPE_AVATAR_TEST_SRC)
+
+/* ---- queries and events ---- */
+
+static gboolean
+gst_avatar_test_src_query (GstPad *pad, GstObject *parent, GstQuery *query)
+{
+  AvatarStream &stream = GST_AVATAR_TEST_SRC (parent)->priv->stream;
+  switch (GST_QUERY_TYPE (query)) {
+    case GST_QUERY_LATENCY: { /* a picture is sent when its time has come, and lasts one frame */
+      const bool live = stream.is_live ();
+      gst_query_set_latency (query, live, live ? stream.period () : 0, GST_CLOCK_TIME_NONE);
+      return TRUE;
+    }
+    case GST_QUERY_SEEKING: {
+      GstFormat format;
+      gst_query_parse_seeking (query, &format, nullptr, nullptr, nullptr);
+      const bool seekable = format == GST_FORMAT_TIME && !stream.is_live ();
+      gst_query_set_seeking (query, format, seekable, 0, -1);
+      return TRUE;
+    }
+    default:
+      return gst_pad_query_default (pad, parent, query);
+  }
+}
+
+static gboolean
+gst_avatar_test_src_event (GstPad *, GstObject *parent, GstEvent *event)
+{
+  bool handled = false;
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_SEEK:
+      handled = GST_AVATAR_TEST_SRC (parent)->priv->stream.seek (event);
+      break;
+    case GST_EVENT_RECONFIGURE: /* has marked the pad already; a new link says it, too */
+      GST_AVATAR_TEST_SRC (parent)->priv->stream.pad_linked ();
+      handled = true;
+      break;
+    case GST_EVENT_QOS: /* these two ask for nothing that we could do */
+    case GST_EVENT_LATENCY:
+      handled = true;
+      break;
+    default:
+      break;
+  }
+  gst_event_unref (event);
+  return handled;
+}
+
+static gboolean
+gst_avatar_test_src_send_event (GstElement *element, GstEvent *event)
+{
+  AvatarStream &stream = GST_AVATAR_TEST_SRC (element)->priv->stream;
+  bool handled;
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_EOS:
+      handled = stream.end ();
+      break;
+    case GST_EVENT_FLUSH_START:
+      handled = stream.flush_start (event);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      handled = stream.flush_stop (event);
+      break;
+    default:
+      return GST_ELEMENT_CLASS (gst_avatar_test_src_parent_class)->send_event (element, event);
+  }
+  gst_event_unref (event);
+  return handled;
+}
+
+/* ---- request pads ---- */
+
+static AvatarPadKind
+kind_of (const gchar *name)
+{
+  return g_str_equal (name, "left")    ? AvatarPadKind::kLeft
+         : g_str_equal (name, "right") ? AvatarPadKind::kRight
+         : g_str_equal (name, "third") ? AvatarPadKind::kThird
+                                       : AvatarPadKind::kRange;
+}
+
+static GstPad *
+gst_avatar_test_src_request_new_pad (
+    GstElement *element, GstPadTemplate *pad_template, const gchar *, const GstCaps *)
+{
+  const gchar *name = GST_PAD_TEMPLATE_NAME_TEMPLATE (pad_template);
+  GstPad *pad = gst_pad_new_from_template (pad_template, name);
+  gst_pad_set_query_function (pad, gst_avatar_test_src_query);
+  gst_pad_set_event_function (pad, gst_avatar_test_src_event);
+  if (!gst_element_add_pad (element, pad)) /* the name is taken; says so itself */
+    return nullptr;
+  GST_AVATAR_TEST_SRC (element)->priv->stream.add_pad (pad, kind_of (name));
+  return pad;
+}
+
+static void
+gst_avatar_test_src_release_pad (GstElement *element, GstPad *pad)
+{
+  GST_AVATAR_TEST_SRC (element)->priv->stream.remove_pad (pad);
+  gst_pad_set_active (pad, FALSE);
+  gst_element_remove_pad (element, pad);
+}
+
+/* ---- life ---- */
+
+static bool
+start (GstAvatarTestSrc *self)
+{
+  AvatarSettings settings;
+  {
+    std::lock_guard guard (self->priv->lock);
+    settings = self->priv->settings;
+  }
+  return self->priv->stream.start (settings);
+}
+
+static GstStateChangeReturn
+gst_avatar_test_src_change_state (GstElement *element, GstStateChange transition)
+{
+  auto self = GST_AVATAR_TEST_SRC (element);
+  AvatarStream &stream = self->priv->stream;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start (self))
+    return GST_STATE_CHANGE_FAILURE;
+  if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
+    stream.set_playing (false);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    stream.ask_to_stop ();
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS (gst_avatar_test_src_parent_class)->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    stream.stop ();
+  if (result == GST_STATE_CHANGE_FAILURE)
+    return result;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    stream.run ();
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
+    stream.set_playing (true);
+  const bool to_paused = transition == GST_STATE_CHANGE_READY_TO_PAUSED ||
+                         transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED;
+  return to_paused && stream.is_live () ? GST_STATE_CHANGE_NO_PREROLL : result;
+}
+
+static void
+gst_avatar_test_src_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+{
+  auto priv = GST_AVATAR_TEST_SRC (object)->priv;
+  std::lock_guard guard (priv->lock);
+  if (!avatar_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_avatar_test_src_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+{
+  auto priv = GST_AVATAR_TEST_SRC (object)->priv;
+  if (id == PROP_STATS) {
+    g_value_take_boxed (value,
+        gst_structure_new ("application/x-avatartestsrc-stats", "frames", G_TYPE_UINT64,
+            priv->stream.frames (), "skipped", G_TYPE_UINT64, priv->stream.skipped (), nullptr));
+    return;
+  }
+  std::lock_guard guard (priv->lock);
+  if (!avatar_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+}
+
+static void
+gst_avatar_test_src_finalize (GObject *object)
+{
+  delete GST_AVATAR_TEST_SRC (object)->priv;
+  G_OBJECT_CLASS (gst_avatar_test_src_parent_class)->finalize (object);
+}
+
+static void
+gst_avatar_test_src_init (GstAvatarTestSrc *self)
+{
+  self->priv = new GstAvatarTestSrcPrivate (GST_ELEMENT (self));
+  GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
+}
+
+static void
+gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  object_class->set_property = gst_avatar_test_src_set_property;
+  object_class->get_property = gst_avatar_test_src_get_property;
+  object_class->finalize = gst_avatar_test_src_finalize;
+  avatar_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS, "Counters since the element was started");
+
+  for (GstStaticPadTemplate *pad_template :
+      {&src_template, &left_template, &right_template, &third_template})
+    gst_element_class_add_static_pad_template (element_class, pad_template);
+  gst_element_class_set_static_metadata (element_class, "Avatar test source", "Source/Video",
+      "Renders a moving head and shoulders as seen by a rig of stereo cameras, with exact depth",
+      "gst-rangecast");
+
+  element_class->request_new_pad = gst_avatar_test_src_request_new_pad;
+  element_class->release_pad = gst_avatar_test_src_release_pad;
+  element_class->send_event = gst_avatar_test_src_send_event;
+  element_class->change_state = gst_avatar_test_src_change_state;
+
+  GST_DEBUG_CATEGORY_INIT (gst_avatar_test_src_debug, "avatartestsrc", 0, "Avatar test source");
+}

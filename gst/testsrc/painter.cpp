@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "painter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <gstrange/gstrange.h>
+#include <gstrange/gstrangeframe.hpp>
+#include <gstrange/gstrangeinfo.hpp>
+#include <new>
+
+using rangecast::PixelFormat;
+using rangecast::Rgbx;
+using rangecast::Roi;
+using rangecast::Scene;
+using rangecast::SceneCamera;
+using rangecast::Status;
+using rangecast::StatusCode;
+
+void
+AvatarPainter::start (const AvatarSettings &settings)
+{
+  settings_ = settings;
+  scene_.reset ();
+  forget_loop ();
+}
+
+void
+AvatarPainter::forget_loop ()
+{
+  for (Loop &loop : loops_)
+    loop = {};
+}
+
+Status
+AvatarPainter::set_size (int width, int height)
+{
+  rangecast::SceneSettings &s = settings_.scene;
+  if (settings_.view_id >= s.views)
+    return {StatusCode::kBadValue, "view-id " + std::to_string (settings_.view_id) +
+                                       ": expected less than views, " + std::to_string (s.views)};
+  if (scene_ && s.width == width && s.height == height)
+    return {};
+  s.width = width;
+  s.height = height;
+  forget_loop ();
+  scene_.reset (); /* a model and its rooms are large: not two at a time */
+  if (Status status = Scene::create (s, scene_); !status.ok ())
+    return status;
+  scratch_.resize (static_cast<std::size_t> (width) * static_cast<std::size_t> (height));
+  return settings_.rig_export.empty () ? Status ()
+                                       : rangecast::save_rig (settings_.rig_export, scene_->rig ());
+}
+
+GstCaps *
+AvatarPainter::make_range_caps (int fps_n, int fps_d) const
+{
+  rangecast::Rig rig = scene_->range_rig ();
+  if (settings_.view_id != AvatarSettings::kAllViews)
+    rig.views = {*rig.find (settings_.view_id)};
+  return gstrange::make_range_caps (gstrange::make_info (rig, fps_n, fps_d));
+}
+
+GstCaps *
+AvatarPainter::make_raw_caps (int fps_n, int fps_d) const
+{
+  return gst_caps_new_simple ("video/x-raw", "width", G_TYPE_INT, settings_.scene.width, "height",
+      G_TYPE_INT, settings_.scene.height, "framerate", GST_TYPE_FRACTION, fps_n, fps_d,
+      "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, "interlace-mode", G_TYPE_STRING, "progressive",
+      nullptr);
+}
+
+static PixelFormat
+pixel_format (const GstVideoInfo &info)
+{
+  switch (GST_VIDEO_INFO_FORMAT (&info)) {
+    case GST_VIDEO_FORMAT_BGRx:
+      return PixelFormat::kBgrx;
+    case GST_VIDEO_FORMAT_RGB:
+      return PixelFormat::kRgb;
+    case GST_VIDEO_FORMAT_BGR:
+      return PixelFormat::kBgr;
+    case GST_VIDEO_FORMAT_GRAY8:
+      return PixelFormat::kGray;
+    default:
+      return PixelFormat::kRgbx;
+  }
+}
+
+static double
+seconds (GstClockTime time)
+{
+  return static_cast<double> (time) / GST_SECOND;
+}
+
+Status
+AvatarPainter::make_loop (SceneCamera camera)
+{
+  constexpr std::size_t kMostPixels = std::size_t{1} << 28; /* 1 GiB */
+  const int width = settings_.scene.width, height = settings_.scene.height;
+  const std::size_t pixels = std::size_t (width) * std::size_t (height);
+  if (settings_.loop_frames > kMostPixels / pixels)
+    return {StatusCode::kBadValue,
+        "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
+            std::to_string (kMostPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
+            std::to_string (height) + ", which take 1 GiB per camera"};
+  try {
+    Loop &loop = loops_[int (camera)];
+    loop.drawn.assign (settings_.loop_frames, false);
+    loop.pictures.resize (settings_.loop_frames * pixels);
+  } catch (const std::bad_alloc &) {
+    return {StatusCode::kNoSpace, "loop-frames: out of memory for that many frames"};
+  }
+  return {};
+}
+
+/* Forwards, and back again without showing either end twice. */
+Status
+AvatarPainter::find_looped (SceneCamera camera, const AvatarMoment &moment, double period_s,
+    rangecast::ImageView<const Rgbx> &found)
+{
+  Loop &loop = loops_[int (camera)];
+  if (loop.pictures.empty ())
+    if (Status s = make_loop (camera); !s.ok ())
+      return s;
+  const int width = settings_.scene.width, height = settings_.scene.height;
+  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : moment.tick % (2 * n - 2),
+                i = at < n ? at : 2 * n - 2 - at;
+  const rangecast::ImageView<Rgbx> picture{
+      loop.pictures.data () + i * std::size_t (width) * std::size_t (height), width, height,
+      static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+  if (!loop.drawn[i])
+    if (Status s = scene_->render (
+            MAX (settings_.view_id, 0), camera, double (i) * period_s, false, picture, {}, {});
+        !s.ok ())
+      return s;
+  loop.drawn[i] = true;
+  found = picture;
+  return {};
+}
+
+Status
+AvatarPainter::render (SceneCamera camera, const AvatarMoment &moment, double period_s,
+    rangecast::ImageView<Rgbx> picture)
+{
+  if (settings_.loop_frames == 0 || empty_at (moment))
+    return scene_->render (MAX (settings_.view_id, 0), camera, seconds (moment.capture_time),
+        empty_at (moment), picture, {}, {});
+  rangecast::ImageView<const Rgbx> from;
+  if (Status s = find_looped (camera, moment, period_s, from); !s.ok ())
+    return s;
+  for (int y = 0; y < picture.height; y++)
+    std::copy_n (from.row (y), picture.width, picture.row (y));
+  return {};
+}
+
+Status
+AvatarPainter::draw_raw (
+    SceneCamera camera, const GstVideoInfo &video, const AvatarMoment &moment, GstBuffer *buffer)
+{
+  GstVideoFrame frame;
+  if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
+    return {StatusCode::kNoSpace, "cannot map an output buffer"};
+  auto pixels = static_cast<std::uint8_t *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0));
+  const int stride = GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0);
+  const int width = settings_.scene.width;
+  const PixelFormat format = pixel_format (video);
+  const bool direct = format == PixelFormat::kRgbx;
+  const rangecast::ImageView<Rgbx> picture{
+      direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
+      direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+  const double period_s = double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video);
+  const Status status = render (camera, moment, period_s, picture);
+  if (status.ok () && !direct)
+    rangecast::convert_pixels (picture, format, pixels, stride);
+  gst_video_frame_unmap (&frame);
+  return status;
+}
+
+Status
+AvatarPainter::draw_range (const AvatarMoment &moment, GstBuffer *buffer)
+{
+  for (const auto &view : scene_->range_rig ().views)
+    if (settings_.view_id == AvatarSettings::kAllViews || settings_.view_id == view.id)
+      if (Status s = gstrange::add_view (
+              buffer, view.id, {0, 0, view.width, view.height}, moment.capture_time);
+          !s.ok ())
+        return s;
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  std::array<Roi, rangecast::kMaxViews> boxes;
+  const std::size_t count = frame.views ().size ();
+  const Status status = scene_->render_range (frame.views (), seconds (moment.capture_time),
+      empty_at (moment), {boxes.data (), count}, settings_.n_threads);
+  for (std::size_t i = 0; status.ok () && settings_.person_only && i < count; i++)
+    frame.crop (i, boxes[i]);
+  return status;
+}

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/video/video.h>
+
+#include <memory>
+#include <rangecast/scene/scene.hpp>
+#include <vector>
+
+#include "clock.hpp"
+#include "settings.hpp"
+
+/** Draws the scene into buffers. Streaming thread only. */
+class AvatarPainter {
+public:
+  /** Forgets the scene. */
+  void start (const AvatarSettings &settings);
+  /** Makes the scene, if its size is another one, and writes its rig file. */
+  rangecast::Status set_size (int width, int height);
+  /** Its pictures are drawn again: for a new frame rate. */
+  void forget_loop ();
+
+  /** Fixed but for the pixel format of raw pictures. */
+  [[nodiscard]] GstCaps *make_range_caps (int fps_n, int fps_d) const;
+  [[nodiscard]] GstCaps *make_raw_caps (int fps_n, int fps_d) const;
+
+  rangecast::Status draw_raw (rangecast::SceneCamera camera, const GstVideoInfo &video,
+      const AvatarMoment &moment, GstBuffer *buffer);
+  /** @param buffer  of a GstRangeBufferPool */
+  rangecast::Status draw_range (const AvatarMoment &moment, GstBuffer *buffer);
+
+private:
+  /* What one camera shows again and again. */
+  struct Loop {
+    std::vector<rangecast::Rgbx> pictures; // one below the other; none before the first is shown
+    std::vector<bool> drawn;               // each when it is first shown
+  };
+
+  rangecast::Status render (rangecast::SceneCamera camera, const AvatarMoment &moment,
+      double period_s, rangecast::ImageView<rangecast::Rgbx> picture);
+  rangecast::Status make_loop (rangecast::SceneCamera camera);
+  rangecast::Status find_looped (rangecast::SceneCamera camera, const AvatarMoment &moment,
+      double period_s, rangecast::ImageView<const rangecast::Rgbx> &found);
+  [[nodiscard]] bool empty_at (const AvatarMoment &moment) const
+  {
+    return moment.index < settings_.empty_frames;
+  }
+
+  AvatarSettings settings_;
+  std::unique_ptr<rangecast::Scene> scene_;
+  std::vector<rangecast::Rgbx> scratch_; ///< a picture before it gets its pixel format
+  Loop loops_[3];                        ///< by camera
+};

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "world_points.hpp"
+
+namespace rangecast {
+
+/** Where one view's plane has what a pixel of another view's plane sees. Column, row and depth d of
+ *  a pixel are, in the other plane's pixels times depth and in its depth:
+ *  origin + d * (corner + column * right + row * down). Planes are cut to their ROIs. */
+struct PixelTransfer {
+  PixelTransfer () = default;
+  PixelTransfer (const PixelRays &rays, const Roi &from, const PixelLookup &lookup, const Roi &to)
+  {
+    const int box[] = {to.x, to.y, 0};
+    const auto &rows = lookup.rows;
+    for (int k = 0; k < 3; k++) {
+      const auto turned = [&] (const float *ray) {
+        double sum = 0;
+        for (int c = 0; c < 3; c++)
+          sum += (double{rows[k][c]} - box[k] * double{rows[2][c]}) * ray[c];
+        return sum;
+      };
+      const double to_right = turned (rays.right), to_down = turned (rays.down);
+      origin[k] =
+          static_cast<float> (turned (rays.origin) + rows[k][3] - box[k] * double{rows[2][3]});
+      corner[k] = static_cast<float> (turned (rays.corner) + from.x * to_right + from.y * to_down);
+      right[k] = static_cast<float> (to_right);
+      down[k] = static_cast<float> (to_down);
+    }
+  }
+
+  /** @param[out] place  column and row times depth, and depth, of the other plane */
+  void find (int x, int y, std::uint16_t depth, float place[3]) const
+  {
+    for (int k = 0; k < 3; k++)
+      place[k] =
+          origin[k] + static_cast<float> (depth) * (corner[k] + static_cast<float> (x) * right[k] +
+                                                       static_cast<float> (y) * down[k]);
+  }
+
+  float origin[3] = {}, corner[3] = {}, right[3] = {}, down[3] = {};
+};
+
+} // namespace rangecast

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "../../geometry/range_image.hpp"
+
+namespace rangecast {
+
+/** Some rows of a ROI, coded without rows of others. */
+struct RowBand {
+  int first_row = 0, rows = 0; ///< of the ROI
+  bool key = true;             ///< without reference to an earlier frame set
+  std::size_t index = 0;       ///< of the band, from the top of the view's full image
+};
+
+/** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
+ *  without reference to earlier frame sets at least once in a period, one after the other. Slices
+ *  do not cross bands, so what a lost packet damaged is whole again when its band has been
+ *  refreshed: after a period, and a frame interval more where those grow. */
+class RefreshSchedule {
+public:
+  struct Time {
+    std::uint64_t now_ns;      ///< of the frame set
+    std::uint64_t interval_ns; ///< of frame sets whose times do not grow
+    std::uint64_t period_ns;   ///< 0: no refresh
+  };
+
+  /** Rows of a band: a quarter of the image, but not so few that slices become small. */
+  [[nodiscard]] int band_rows () const { return band_rows_; }
+  /** Bands of the image. */
+  [[nodiscard]] std::size_t bands () const { return age_ns_.size (); }
+
+  /** @param view_id  spreads the bands of several views over time */
+  void reset (int view_height, int view_id);
+
+  /** Which bands of a ROI are coded how.
+   *  @param key  everything without reference */
+  void plan (const Roi &roi, const Time &time, bool key, std::vector<RowBand> &bands);
+
+private:
+  std::uint64_t advance (const Time &time);
+
+  std::vector<std::uint64_t> age_ns_; /* of each band, since it was refreshed */
+  std::uint64_t last_time_ns_ = 0;
+  int view_id_ = 0, band_rows_ = 1;
+};
+
+} // namespace rangecast

@@ -1,0 +1,295 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What encoder and decoder of the profiles packed and entropy know of a pixel, and how they predict
+ * one. docs/formats/bitstream.md specifies it. */
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <span>
+
+#include "../bitstream/reference.hpp"
+
+namespace rangecast {
+
+/** Where a pixel came from. Contexts are made of it. */
+enum class Origin : std::uint8_t {
+  kNone = 0,      ///< invalid, or outside the slice
+  kLeft = 1,      ///< equals the left pixel
+  kUpper = 2,     ///< equals one of the three above
+  kPredicted = 3, ///< is what the neighbours let expect
+  kCorrected = 4, ///< the same and a residual
+};
+
+/** What a slice of these profiles holds for one pixel. The first four are places of neighbours.
+ *  kTakeEarlier is said apart from the others: a pixel of an earlier frame set. */
+enum PixelChoice : int {
+  kTakeLeft,
+  kTakeUpperLeft,
+  kTakeUpper,
+  kTakeUpperRight,
+  kPredict,
+  kCorrect,
+  kTakeEarlier
+};
+inline constexpr int kChoices = 6;
+
+/** Depth code and colour of a pixel as one number that can be compared: from bit 0 upwards, 16 bits
+ *  each, depth, Y, Co, Cg. */
+using PixelCode = std::uint64_t;
+
+/** Depth, Y, Co, Cg side by side; compilers make vector code of it where there is some. */
+typedef std::int32_t Components __attribute__ ((vector_size (16)));
+inline constexpr int kComponents = 4;
+
+typedef std::int16_t ComponentHalves __attribute__ ((vector_size (16)));
+typedef std::uint64_t ComponentPairs __attribute__ ((vector_size (16)));
+
+inline Components
+components_of (PixelCode code)
+{
+  if constexpr (std::endian::native == std::endian::big)
+    return Components{static_cast<std::uint16_t> (code), static_cast<std::int16_t> (code >> 16),
+        static_cast<std::int16_t> (code >> 32), static_cast<std::int16_t> (code >> 48)};
+  const auto halves = reinterpret_cast<ComponentHalves> (ComponentPairs{code, 0});
+  const auto doubled = __builtin_shufflevector (halves, halves, 0, 0, 1, 1, 2, 2, 3, 3);
+  return reinterpret_cast<Components> (doubled) >> 16 & Components{0xffff, -1, -1, -1};
+}
+
+inline PixelCode
+pack_components (Components c)
+{
+  if constexpr (std::endian::native == std::endian::big) {
+    PixelCode code = 0;
+    for (int i = 0; i < kComponents; i++)
+      code |= PixelCode{static_cast<std::uint16_t> (c[i])} << 16 * i;
+    return code;
+  }
+  const auto halves = reinterpret_cast<ComponentHalves> (c);
+  const auto packed = __builtin_shufflevector (halves, halves, 0, 2, 4, 6, 0, 2, 4, 6);
+  return reinterpret_cast<ComponentPairs> (packed)[0];
+}
+
+inline Components
+cut (Components c, Components least, Components most)
+{
+  c = c < least ? least : c;
+  return c > most ? most : c;
+}
+
+inline bool
+is_zero (Components c)
+{
+  typedef std::int64_t Halves __attribute__ ((vector_size (16)));
+  const Halves halves = reinterpret_cast<Halves> (c);
+  return (halves[0] | halves[1]) == 0;
+}
+
+/** Of an invalid pixel, and of a valid one that refers to something that was not received. No other
+ *  has it, because Y is not negative. */
+inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
+
+/** Sizes of a residual, at most 9 each, one a byte from the least significant; 0 for copies. */
+using Activity = std::uint32_t;
+
+/** What contexts are made of: a pixel's origin, from bit 8 its kind, from bit 16 its choice and one
+ *  (see copy_state()), from bit 32 its activity. 0 for invalid pixels only. Several of them are
+ * added up at once. */
+using PixelState = std::uint64_t;
+
+constexpr PixelState
+state_of (Origin origin, Activity activity = 0)
+{
+  return static_cast<PixelState> (origin) |
+         static_cast<PixelState> (std::min (static_cast<int> (origin), 3)) << 8 |
+         PixelState{activity} << 32;
+}
+
+/** Of a pixel that equals another, in a slice that refers to an earlier frame set: there contexts
+ *  need to know which one it was. */
+constexpr PixelState
+copy_state (std::uint64_t choice)
+{
+  const bool upper = choice >= kTakeUpperLeft && choice <= kTakeUpperRight;
+  return state_of (upper ? Origin::kUpper : Origin::kLeft) | (choice + 1) << 16;
+}
+
+/** Whether it is copy_state (choice). */
+constexpr bool
+took (PixelState state, PixelChoice choice)
+{
+  return (state >> 16 & 0xff) == static_cast<PixelState> (choice + 1);
+}
+
+/** All bits set if `v`, which is below 2^63, is 0; else none. */
+[[gnu::always_inline]] inline std::uint64_t
+mask_of_zero (std::uint64_t v)
+{
+  auto mask = static_cast<std::uint64_t> (static_cast<std::int64_t> (v - 1) >> 63);
+  asm("" : "+r"(mask)); /* else compilers may find a condition in it, and jump */
+  return mask;
+}
+
+/** `a` where the mask is set, else `b`. Without a jump: whether it would be taken nobody could
+ *  foretell. */
+constexpr std::uint64_t
+either (std::uint64_t mask, std::uint64_t a, std::uint64_t b)
+{
+  return b ^ ((a ^ b) & mask);
+}
+
+/** Two plain numbers: it is copied for every pixel, and whole. */
+struct CodedPixel {
+  PixelCode code = kNoPixel;
+  PixelState state = 0;
+
+  [[nodiscard]] constexpr bool valid () const { return state != 0; }
+  [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
+  /** The same, without a difference between predicted and corrected pixels. */
+  [[nodiscard]] constexpr int kind () const { return static_cast<int> (state >> 8 & 3); }
+};
+
+/** Limits of the components, and of depth, R, G, B. */
+struct Limits {
+  Components least{}, most{}; ///< of depth, Y, Co, Cg
+  Components brightest{};     ///< most of depth, R, G, B; the least are 0
+  Components most_steps{};    ///< of a residual: as many as change a component as far as it goes
+
+  Limits () = default;
+  /** @param last_depth, maximum  greatest codes of depth and colour */
+  Limits (std::int32_t last_depth, std::int32_t maximum, Components steps)
+      : least{0, 0, -maximum, -maximum}, most{last_depth, maximum, maximum, maximum},
+        brightest (most), most_steps ((1 << 17) / steps + 1)
+  {
+  }
+};
+
+/** The last pixel before the first one of a slice. */
+inline PixelCode
+first_expected (const Limits &limits)
+{
+  return pack_components (Components{limits.most[0] / 2, limits.most[1] / 2, 0, 0});
+}
+
+/** Depth, R, G, B of depth and YCoCg-R; cut to the limits, because residuals may have been rounded.
+ */
+inline Components
+to_rgb (Components c, const Limits &limits)
+{
+  const Components half =
+      c >> 1; /* t = Y - half of Cg; G = t + Cg; B = t - half of Co; R = B + Co */
+  const Components base =
+      __builtin_shufflevector (c, c, 0, 1, 1, 1) -
+      (__builtin_shufflevector (half, half, 3, 3, 3, 3) & Components{0, -1, -1, -1});
+  const Components plus = __builtin_shufflevector (c, c, 2, 2, 3, 3) & Components{0, -1, -1, 0};
+  const Components minus =
+      __builtin_shufflevector (half, half, 2, 2, 2, 2) & Components{0, -1, 0, -1};
+  return cut (base + plus - minus, Components{}, limits.brightest);
+}
+
+/** The four neighbours that a pixel may equal: the left one, and where those above are. */
+struct Neighbours {
+  CodedPixel left;
+  const PixelCode *codes;   ///< of the row above, at the upper pixel
+  const PixelState *states; ///< the same
+
+  [[nodiscard]] CodedPixel upper_left () const { return {codes[-1], states[-1]}; }
+  [[nodiscard]] CodedPixel upper () const { return {codes[0], states[0]}; }
+  [[nodiscard]] CodedPixel upper_right () const { return {codes[1], states[1]}; }
+  [[nodiscard]] bool any () const { return (left.state | states[-1] | states[0] | states[1]) != 0; }
+  /** kind (L) + 4 kind (U) + 16 kind (UR). */
+  [[nodiscard]] std::size_t kinds () const
+  {
+    return (left.state + (states[0] << 2) + (states[1] << 4)) >> 8 & 63;
+  }
+  /** Of left, upper and upper-right, added up. */
+  [[nodiscard]] Activity activities () const
+  {
+    return static_cast<Activity> ((left.state + states[0] + states[1]) >> 32);
+  }
+};
+
+/** What the neighbours let expect: depth on the plane through three of them, colour as their mean.
+ *  `last` is the latest valid pixel of the slice, for pixels without a neighbour. */
+inline Components
+predict (const Neighbours &n, PixelCode last, Components most)
+{
+  const bool l = n.left.valid (), u = n.states[0] != 0, ur = n.states[1] != 0;
+  if (!l && !u)
+    return components_of (n.states[-1] != 0 ? n.codes[-1] : ur ? n.codes[1] : last);
+  const Components left = components_of (l ? n.left.code : n.codes[0]);
+  if (!l || !u)
+    return left;
+  const Components upper = components_of (n.codes[0]), right = components_of (n.codes[ur]);
+  const Components mean = (2 * left + upper + right + 2) >> 2;
+  const Components plane =
+      n.states[-1] != 0 ? left + upper - components_of (n.codes[-1]) : (left + upper + 1) >> 1;
+  const Components depth_only = {-1, 0, 0, 0};
+  return (mean & ~depth_only) | (cut (plane, Components{}, most) & depth_only);
+}
+
+/** Whether predict () uses only pixels that were received. */
+inline bool
+can_predict (const Neighbours &n, PixelCode last)
+{
+  const auto known = [&] (int i) { return n.states[i] == 0 || n.codes[i] != kNoPixel; };
+  const bool l = n.left.valid (), u = n.states[0] != 0, ur = n.states[1] != 0;
+  if (!l && !u)
+    return (n.states[-1] != 0 ? n.codes[-1] : ur ? n.codes[1] : last) != kNoPixel;
+  if (!l || !u)
+    return (l ? n.left.code : n.codes[0]) != kNoPixel;
+  return n.left.code != kNoPixel && known (-1) && known (0) && known (1);
+}
+
+/** By how much one step of a residual changes each component. */
+struct Steps {
+  std::int32_t depth = 1;  ///< 1 to 65535
+  std::int32_t luma = 1;   ///< 1 to 255
+  std::int32_t chroma = 1; ///< 1 to 255
+
+  [[nodiscard]] Components components () const { return Components{depth, luma, chroma, chroma}; }
+};
+
+/** A predicted pixel and its residual, of any size. */
+inline Components
+correct (Components predicted, Components residual, Components steps, const Limits &limits)
+{
+  const Components bounded = cut (residual, -limits.most_steps, limits.most_steps);
+  return cut (predicted + bounded * steps, limits.least, limits.most);
+}
+
+/** Residuals of greater size are damage: no pixel needs one. */
+inline constexpr std::uint32_t kMaxResidual = 1u << 18;
+
+inline Activity
+activity_of (Components residual)
+{
+  const Components size = residual < 0 ? -residual : residual;
+  const Components most = {9, 9, 9, 9}, least = size > most ? most : size;
+  const auto pairs = reinterpret_cast<ComponentPairs> (least << Components{0, 8, 0, 8});
+  const auto low = pairs[0] | pairs[0] >> 32, high = pairs[1] | pairs[1] >> 32;
+  return static_cast<Activity> ((low & 0xffff) | (high & 0xffff) << 16);
+}
+
+/** Where the run that begins at `begin` ends, in a row of one byte a pixel, 0 = invalid. */
+inline int
+run_end (std::span<const std::uint8_t> row, int begin, bool valid)
+{
+  const auto at = static_cast<std::size_t> (begin);
+  const void *end = std::memchr (row.data () + at, !valid, row.size () - at);
+  return end ? static_cast<int> (static_cast<const std::uint8_t *> (end) - row.data ())
+             : static_cast<int> (row.size ());
+}
+
+/** Bytes behind the slice header: u16 depth step, u8 luma step, u8 chroma step. */
+inline constexpr std::size_t kStepsSize = 4;
+inline constexpr std::size_t kEntropyHeaderSize = kSliceHeaderSize + kStepsSize;
+/** Packed slices say also the orders of their codes of residual sizes, 0 to 15: four bits each. */
+using GolombOrders = std::array<std::uint8_t, kComponents>;
+inline constexpr std::size_t kOrdersSize = 2;
+inline constexpr std::size_t kPackedHeaderSize = kEntropyHeaderSize + kOrdersSize;
+
+} // namespace rangecast

@@ -1,0 +1,353 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "decoder.hpp"
+
+#include "entropy_code.hpp"
+#include "packed_code.hpp"
+
+namespace rangecast {
+namespace {
+
+/* An EntropyCode that looks like a PackedReader. */
+class EntropyReader : public EntropyCode<EntropyReading> {
+public:
+  static constexpr bool kEarlierInRuns = false;
+
+  EntropyReader (
+      std::span<const std::uint8_t> bytes, EntropyModel &model, const EntropyModel &initial)
+      : EntropyCode (EntropyReading (bytes.data (), bytes.size ()), model)
+  {
+    model = initial;
+  }
+  bool earlier (const Neighbours &n) { return EntropyCode::earlier (n, false); }
+  template <bool Delta> int choice (const Neighbours &n)
+  {
+    return EntropyCode::choice<Delta> (n, kNoSymbol);
+  }
+  [[nodiscard]] bool overrun () const { return coder ().overrun (); }
+  [[nodiscard]] bool at_clean_end () const { return coder ().at_end (); }
+};
+
+/* As it goes into the image: R, G, B in the lower half, depth in the upper. */
+inline std::uint64_t
+shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
+{
+  const Components c = to_rgb (components_of (code), limits);
+  const std::uint64_t depth = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
+  std::uint32_t rgb = static_cast<std::uint32_t> (c[1] | c[2] << 8 | c[3] << 16);
+  if (quantisers.colour.bits () < 8) {
+    const auto value = [&] (int i) {
+      return std::uint32_t{quantisers.colour.value (static_cast<std::uint8_t> (c[i]))};
+    };
+    rgb = value (1) | value (2) << 8 | value (3) << 16;
+  }
+  return rgb | depth << 32;
+}
+
+void
+write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, Rgbx *colour)
+{
+  for (std::size_t x = 0; x < columns; x++)
+    depth[x] = static_cast<std::uint16_t> (row[x] >> 32);
+  for (std::size_t x = 0; x < columns; x++) {
+    auto rgbx = static_cast<std::uint32_t> (row[x]);
+    if constexpr (std::endian::native == std::endian::big)
+      rgbx = __builtin_bswap32 (rgbx);
+    std::memcpy (&colour[x].r, &rgbx, sizeof rgbx);
+  }
+}
+
+constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
+
+} // namespace
+
+/* A pixel that equals no neighbour. */
+template <class Code, bool Delta>
+inline bool
+CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
+{
+  const Components expected = predict (n, last_, limits_.most);
+  const bool known = !Delta || can_predict (n, last_);
+  if (!corrected) {
+    pixel = {known ? pack_components (expected) : kNoPixel, state_of (Origin::kPredicted)};
+    return true;
+  }
+  Components residual;
+  if (!code.residual (n, n.any (), residual))
+    return false;
+  const Components made = correct (expected, residual, steps_, limits_);
+  pixel = {known ? pack_components (made) : kNoPixel,
+      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0)};
+  return true;
+}
+
+/* Decodes a run of valid pixels, behind an invalid one. What the loop needs of this object it holds
+ * in variables of its own, the code too, so that it stays in registers. */
+template <class Code, bool Delta>
+inline bool
+CompactDecoder::decode_run (
+    Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  PixelCode *const codes = row_.codes ();
+  PixelState *const states = row_.states ();
+  std::uint64_t *const shown = row_.shown ();
+  const PixelCode *const upper_codes = upper_.codes ();
+  const PixelState *const upper_states = upper_.states ();
+  const std::uint64_t *const upper_shown = upper_.shown ();
+  CodedPixel left;
+  std::uint64_t left_shown = 0;
+  Code code = slice_code;
+  for (std::size_t x = begin; x < end; x++) {
+    const Neighbours n = {left, upper_codes + x, upper_states + x};
+    if constexpr (Delta) {
+      bool earlier;
+      if constexpr (Code::kEarlierInRuns)
+        earlier = row_.earlier ()[x];
+      else
+        earlier = code.earlier (n);
+      if (earlier) {
+        codes[x] = left.code = earlier_codes_[x];
+        states[x] = left.state = copy_state (kTakeEarlier);
+        shown[x] = left_shown =
+            left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
+        continue;
+      }
+    }
+    const auto chosen = static_cast<unsigned> (
+        x > begin || n.any () ? code.template choice<Delta> (n) : int{kCorrect});
+    if (chosen < kPredict) [[likely]] {
+      const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
+      const std::uint64_t take_left = mask_of_zero (chosen);
+      left_shown = either (take_left, left_shown, upper_shown[from]);
+      if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */
+        if ((take_left ? left.state : upper_states[from]) == 0)
+          return false;
+      left = {either (take_left, left.code, upper_codes[from]),
+          Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
+    } else {
+      if (chosen > kCorrect || !decode_full<Code, Delta> (code, n, chosen == kCorrect, left))
+        return false;
+      left_shown = Delta && left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
+    }
+    if (!Delta && left.code == kNoPixel) /* equals an invalid one */
+      return false;
+    codes[x] = left.code;
+    states[x] = left.state;
+    shown[x] = left_shown;
+  }
+  last_ = left.code;
+  slice_code = code;
+  return true;
+}
+
+template <class Code, bool Delta>
+bool
+CompactDecoder::decode_run_every (
+    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  return decode_run<Code, Delta> (code, quantisers, begin, end);
+}
+
+template <class Code, bool Delta>
+bool
+CompactDecoder::decode_run_v3 (
+    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+{
+  return decode_run<Code, Delta> (code, quantisers, begin, end);
+}
+
+/* Reads which pixels of a row are valid, and where its runs end. */
+template <class Code>
+bool
+CompactDecoder::decode_runs (Code &code, int columns)
+{
+  const std::vector<std::uint8_t> &upper = upper_.valid ();
+  std::vector<std::uint8_t> &valid = row_.valid ();
+  runs_.clear ();
+  bool now = false;
+  for (int x = 0; x < columns; now = !now) {
+    std::int32_t later = 0;
+    if (!code.run (now, later))
+      return false;
+    const int end = run_end (upper, x, now) + later;
+    if (end > columns || end < x || (end == x && (x > 0 || now)))
+      return false;
+    std::fill (valid.begin () + x, valid.begin () + end, std::uint8_t{now});
+    runs_.push_back (end);
+    x = end;
+  }
+  return true;
+}
+
+template <class Code>
+bool
+CompactDecoder::decode_motions (Code &code)
+{
+  BlockMotion expected;
+  for (BlockMotion &m : motions_) {
+    if (!code.motion (expected, m) || std::abs (m.dx) > kMaxMotion ||
+        std::abs (m.dy) > kMaxMotion || std::abs (m.dz) > kMaxMotionDepth)
+      return false;
+    expected = m;
+  }
+  return true;
+}
+
+/* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
+template <class Code>
+bool
+CompactDecoder::decode_earlier_runs (Code &code, std::size_t begin, std::size_t end)
+{
+  const std::span<const std::uint8_t> upper (upper_.earlier ().data (), end);
+  const int first = static_cast<int> (begin), last = static_cast<int> (end);
+  bool now = false;
+  for (int x = first; x < last; now = !now) {
+    std::int32_t later = 0;
+    if (!code.earlier_run (later))
+      return false;
+    const int to = run_end (upper, x, now) + later;
+    if (to > last || to < x || (to == x && (x > first || now)))
+      return false;
+    std::fill (row_.earlier ().begin () + x, row_.earlier ().begin () + to, std::uint8_t{now});
+    x = to;
+  }
+  return true;
+}
+
+template <class Code, bool Delta>
+bool
+CompactDecoder::decode_row (
+    Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
+{
+  if (!decode_runs (code, columns))
+    return false;
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if constexpr (Delta && Code::kEarlierInRuns)
+      if (valid && !decode_earlier_runs (code, begin, end))
+        return false;
+    if (!valid)
+      row_.invalidate (begin, end, 0);
+    else if (!(has_v3_ ? decode_run_v3<Code, Delta> (code, quantisers, begin, end)
+                       : decode_run_every<Code, Delta> (code, quantisers, begin, end)))
+      return false;
+    points += valid ? end - begin : 0;
+    begin = end;
+    valid = !valid;
+  }
+  return !code.overrun ();
+}
+
+/* Fills the pixels of a row that are unknown from what was shown before. @return how many there are
+ */
+std::uint64_t
+CompactDecoder::show_older_row (
+    const DecoderReference &reference, const SliceHeader &header, int row, const RangeImage &image)
+{
+  const PixelCode *const codes = row_.codes ();
+  const PixelState *const states = row_.states ();
+  std::uint64_t unknown = 0;
+  for (int x = 0; x < header.columns; x++)
+    if (states[x] != 0 && codes[x] == kNoPixel) {
+      show_older (reference, image, header.first_column + x, row);
+      unknown++;
+    }
+  return unknown;
+}
+
+/* Finds what the pixels of row y of the slice may equal. */
+template <class Code>
+bool
+CompactDecoder::load_earlier (
+    Code &code, const SliceHeader &header, const DecoderReference &reference, int y)
+{
+  const int full_x = header.roi.x + header.first_column;
+  const int full_y = header.roi.y + header.first_row + y;
+  if ((y == 0 || full_y % kMotionBlock == 0) && !decode_motions (code))
+    return false;
+  if (reference.before)
+    fetch_displaced (*reference.before, full_x, full_y, motions_, limits_.most[0], 0, kMaxImageSide,
+        earlier_codes_);
+  std::ranges::fill (row_.earlier (), std::uint8_t{0});
+  return true;
+}
+
+template <class Code, bool Delta>
+bool
+CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
+    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
+    DecodedPixels &decoded)
+{
+  const auto columns = static_cast<std::size_t> (header.columns);
+  row_.reset (columns, 0);
+  upper_.reset (columns, 0);
+  runs_.reserve (columns + 1);
+  if constexpr (Delta) {
+    earlier_codes_.assign (columns, kNoPixel);
+    motions_.assign (
+        motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});
+  }
+  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
+  last_ = first_expected (limits_);
+  for (int y = 0; y < header.rows; y++) {
+    if constexpr (Delta)
+      if (!load_earlier (code, header, reference, y))
+        return false;
+    std::uint64_t points = 0, unknown = 0;
+    if (!decode_row<Code, Delta> (code, quantisers, header.columns, points))
+      return false;
+    const int image_row = header.first_row + y;
+    write_row (row_.shown (), columns, image.depth.row (image_row) + header.first_column,
+        image.colour.row (image_row) + header.first_column);
+    if constexpr (Delta)
+      unknown = show_older_row (reference, header, image_row, image);
+    decoded.points += points - unknown;
+    decoded.unknown += unknown;
+    if (reference.now)
+      reference.now->keep (
+          header.roi.x + header.first_column, header.roi.y + image_row, {row_.codes (), columns});
+    std::swap (row_, upper_);
+  }
+  return code.at_clean_end ();
+}
+
+template <class Code>
+bool
+CompactDecoder::decode_code (Code code, const SliceHeader &header,
+    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
+    DecodedPixels &decoded)
+{
+  return header.key ? decode_rows<Code, false> (code, header, quantisers, reference, image, decoded)
+                    : decode_rows<Code, true> (code, header, quantisers, reference, image, decoded);
+}
+
+bool
+CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
+    DecodedPixels &decoded)
+{
+  const bool packed = header.profile == Profile::kPacked;
+  const std::size_t own_header = packed ? kStepsSize + kOrdersSize : kStepsSize;
+  if (body.size () < own_header)
+    return false;
+  const Steps steps = {body[0] | body[1] << 8, body[2], body[3]};
+  if (steps.depth == 0 || steps.luma == 0 || steps.chroma == 0)
+    return false;
+  steps_ = steps.components ();
+  const auto data = body.subspan (own_header);
+  if (!packed)
+    return decode_code (
+        EntropyReader (data, model_, header.key ? kInitialModel : kInitialDeltaModel), header,
+        quantisers, reference, image, decoded);
+  const auto order = [&] (std::size_t i) {
+    return static_cast<std::uint8_t> (body[kStepsSize + i / 2] >> 4 * (i % 2) & 15);
+  };
+  bytes_.assign (data.begin (), data.end ());
+  bytes_.resize (data.size () + PackedReader::kPadding);
+  return decode_code (PackedReader (bytes_.data (), data.size (),
+                          {{order (0), order (1), order (2), order (3)}, is_zero (steps_ - 1)}),
+      header, quantisers, reference, image, decoded);
+}
+
+} // namespace rangecast

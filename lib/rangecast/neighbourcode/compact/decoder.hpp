@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../../geometry/range_image.hpp"
+#include "encoder.hpp"
+#include "row.hpp"
+#include "entropy_code.hpp"
+
+namespace rangecast {
+
+/** Decodes slices of the profiles packed and entropy. Keeps its memory. */
+class CompactDecoder {
+public:
+  /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
+   *  @param body    what is behind the slice header
+   *  @param header  checked, and not empty; its ROI is the image's
+   *  @param[out] decoded  grows
+   *  @return false for damage: the pixels may then be partly written */
+  bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+      const CompactQuantisers &quantisers, const DecoderReference &reference,
+      const RangeImage &image, DecodedPixels &decoded);
+
+private:
+  template <class Code>
+  bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
+  template <class Code, bool Delta>
+  bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
+      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
+  template <class Code>
+  bool load_earlier (
+      Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
+  template <class Code> bool decode_motions (Code &code);
+  template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code> bool decode_runs (Code &code, int columns);
+  template <class Code, bool Delta>
+  bool decode_row (
+      Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] bool decode_run (
+      Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[RANGECAST_EVERY_CPU]] bool decode_run_every (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[RANGECAST_X86_64_V3]] bool decode_run_v3 (
+      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] bool decode_full (
+      Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
+  std::uint64_t show_older_row (const DecoderReference &reference, const SliceHeader &header,
+      int row, const RangeImage &image);
+
+  const bool has_v3_ = has_x86_64_v3 ();
+  CompactRow row_, upper_;
+  std::vector<int> runs_;                /* ends of the row's runs */
+  std::vector<PixelCode> earlier_codes_; /* what its pixels may equal in the earlier frame set */
+  std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
+  std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
+  EntropyModel model_{};
+  Components steps_{};
+  Limits limits_;
+  PixelCode last_ = kNoPixel;
+};
+
+} // namespace rangecast

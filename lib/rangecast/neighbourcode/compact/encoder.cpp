@@ -1,0 +1,622 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "encoder.hpp"
+
+#include "entropy_code.hpp"
+#include "packed_code.hpp"
+
+namespace rangecast {
+namespace {
+
+/* What one pixel may add to a slice at most, whatever its code; and one run. */
+constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
+
+/* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
+ * residuals come to on average in recordings; their price was found by trying. */
+constexpr float kPriceOfBit = 0.2f;
+constexpr float kBitsOfChoice[] = {0.7f, 3.5f, 2.5f, 3.5f};
+
+float
+bits_of (const Components &residual)
+{
+  constexpr float kBitsOfZero[] = {0.4f, 0.4f, 0.25f, 0.25f};
+  constexpr float kBitsOfSign[] = {2.5f, 2.5f, 3, 3};
+  float bits = 2.5f;
+  if (is_zero (residual))
+    return bits;
+  for (int i = 0; i < kComponents; i++) {
+    const auto size = static_cast<std::uint32_t> (std::abs (residual[i]));
+    bits += size == 0 ? kBitsOfZero[i] : kBitsOfSign[i] + 2 * float (std::bit_width (size) - 1);
+  }
+  return bits;
+}
+
+/* An EntropyCode that looks like a PackedWriter. */
+class EntropyWriter : public EntropyCode<EntropyWriting> {
+public:
+  static constexpr bool kEarlierInRuns = false;
+
+  EntropyWriter (
+      std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const ResidualCodes &)
+      : EntropyCode (EntropyWriting (to), model)
+  {
+    model = initial;
+  }
+  void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
+  template <bool Delta> void full (const Neighbours &n, bool has_neighbour, Components r)
+  {
+    if (has_neighbour && choice<Delta> (n, is_zero (r) ? kPredict : kCorrect) == kPredict)
+      return;
+    (void)residual (n, has_neighbour, r);
+  }
+  [[nodiscard]] std::size_t bound () const { return coder ().bound (); }
+  std::size_t finish () { return coder ().finish (); }
+};
+
+/* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
+ * lacks: sizes are below 2^17 and so float's 24 bits are enough for every step. */
+typedef float Floats __attribute__ ((vector_size (16)));
+
+Components
+rounded (Components difference, Components half_steps, Floats reciprocals)
+{
+  const Components sign = difference >> 31;
+  const Components size = (difference ^ sign) - sign + half_steps;
+  const Floats quotient = (__builtin_convertvector(size, Floats) + 0.5f) * reciprocals;
+  return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
+}
+
+/* What a copy of a neighbour, left or above, has. */
+constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
+
+/* Order of the exponential Golomb code that suits sizes of this mean. */
+std::uint8_t
+golomb_order (std::int32_t sum, std::int32_t count)
+{
+  const auto mean = static_cast<std::uint32_t> (sum / count);
+  return static_cast<std::uint8_t> (std::min<int> (std::bit_width (mean + mean / 2), 15));
+}
+
+} // namespace
+
+Steps
+steps_within (int depth_threshold, int colour_threshold)
+{
+  /* A rounded residual may be wrong by half its step. A wrong Y changes R, G and B as much; wrong
+   * Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an encoder chooses").
+   * Coarse depth steps save more than they cost; a third for Y leaves chroma the rest. */
+  const int depth = (3 * depth_threshold + 2) / 4;
+  const int luma = (9 * colour_threshold + 12) / 25;
+  const int chroma = std::max (0, colour_threshold - luma - 1);
+  const auto step = [] (int error, int most) { return std::min (2 * error + 1, most); };
+  return {step (depth, 65535), step (luma, 255), step (chroma, 255)};
+}
+
+CompactSettings
+finer_settings (const CompactSettings &settings)
+{
+  CompactSettings finer = settings;
+  if (settings.fine) {
+    finer.depth_threshold = (3 * settings.depth_threshold + 2) / 4;
+    finer.colour_threshold = (3 * settings.colour_threshold + 2) / 4;
+  }
+  return finer;
+}
+
+void
+CompactEncoder::set_thresholds (const CompactSettings &settings)
+{
+  const auto bias = [] (int depth, int colour) {
+    return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
+  };
+  settings_ = finer_settings (settings);
+  const int d = settings_.depth_threshold, c = settings_.colour_threshold;
+  earlier_bias_ = bias (settings.depth_threshold, settings.colour_threshold);
+  earlier_threshold_ = Components{settings.depth_threshold, settings.colour_threshold,
+      settings.colour_threshold, settings.colour_threshold};
+  bias_ = bias (d, c);
+  steps_ = steps_within (d, c).components ();
+  half_steps_ = steps_ / 2;
+  reciprocals_ = 1.0f / __builtin_convertvector(steps_, Floats);
+  const auto weight = [] (int threshold) {
+    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
+  };
+  depth_weight_ = weight (d);
+  colour_weight_ = weight (c);
+}
+
+bool
+CompactEncoder::code_piece (const CompactPicture &picture, const RowBand &band,
+    const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
+{
+  reference_ = picture.reference;
+  quantisers_ = &picture.quantisers;
+  motion_memory_ = &picture.motions;
+  header_ = header;
+  result_ = {};
+  set_thresholds (picture.settings);
+  limits_ =
+      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+  orders_ = {};
+  size_sums_ = size_counts_ = Components{};
+  const bool fits = header.profile == Profile::kPacked
+                        ? code_rows<PackedWriter> (picture.image, band, to)
+                        : code_rows<EntropyWriter> (picture.image, band, to);
+  result += result_;
+  return fits;
+}
+
+template <class Code>
+bool
+CompactEncoder::code_rows (
+    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
+{
+  return band.key ? code_rows<Code, false> (image, band, to)
+                  : code_rows<Code, true> (image, band, to);
+}
+
+std::size_t
+CompactEncoder::header_size () const
+{
+  return (header_.profile == Profile::kPacked ? kPackedHeaderSize : kEntropyHeaderSize) +
+         !header_.key;
+}
+
+bool
+CompactEncoder::fits (std::size_t bytes) const
+{
+  return bytes + header_size () <= static_cast<std::size_t> (settings_.max_slice_size);
+}
+
+void
+CompactEncoder::resize (int columns)
+{
+  columns_ = columns;
+  const auto n = static_cast<std::size_t> (columns);
+  row_.reset (n, kInvalidKey);
+  upper_.reset (n, kInvalidKey);
+  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  others_.resize (own_.size ());
+  earlier_codes_.resize (own_.size ());
+  earlier_keys_.resize (own_.size ());
+  runs_.reserve (n + 1);
+  /* A row is coded whole before anybody looks whether it fits. */
+  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
+                           (kMostBytesOfPixel + kMostBytesOfRun) * (n + 1);
+  bytes_.resize (std::max (bytes_.size (), most));
+}
+
+/* Quantises a row. */
+inline void
+CompactEncoder::load_row (const ConstRangeImage &image, int y)
+{
+  const std::uint16_t *depth = image.depth.row (y) + header_.first_column;
+  const Rgbx *colour = image.colour.row (y) + header_.first_column;
+  const DepthQuantiser &d = quantisers_->depth;
+  const ColourQuantiser &c = quantisers_->colour;
+  const auto columns = static_cast<std::size_t> (columns_);
+  PixelKey *const own = own_.data ();
+  std::uint8_t *const valid = row_.valid ().data ();
+  for (std::size_t x = 0; x < columns; x++)
+    valid[x] = d.valid (depth[x]);
+  for (std::size_t x = 0; x < columns; x++)
+    own[x] = d.code (depth[x]);
+  if (c.bits () < 8)
+    for (std::size_t x = 0; x < columns; x++)
+      own[x] |=
+          key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+  else
+    for (std::size_t x = 0; x < columns; x++) {
+      std::uint32_t rgbx = 0;
+      std::memcpy (&rgbx, colour + x, sizeof rgbx);
+      if constexpr (std::endian::native == std::endian::big)
+        rgbx = __builtin_bswap32 (rgbx);
+      own[x] |= key_of (0, rgbx);
+    }
+}
+
+void
+CompactEncoder::load_row_every (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
+}
+
+void
+CompactEncoder::load_row_v3 (const ConstRangeImage &image, int y)
+{
+  load_row (image, y);
+}
+
+/* Motion of the blocks that begin in row y, or go on there. They refer to rows of their band only,
+ * so that damage stays in it. */
+void
+CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand &band)
+{
+  const Roi &roi = header_.roi;
+  const int first_x = roi.x + header_.first_column, end_x = first_x + columns_;
+  const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
+  const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
+  const MotionSearch::Pictures pictures = {
+      image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
+  BlockMotion near_by[2];                   /* to the left, above */
+  if (header_.first_column >= kMotionBlock) /* another piece's: as it was last time */
+    near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
+  for (std::size_t i = 0; i < motions_.size (); i++) {
+    const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
+    const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
+    near_by[1] = motions_[i];
+    motions_[i] = search_.find (pictures, earlier_threshold_,
+        {x, first_y, next - x, height, band_y, end_y}, near_by, *motion_memory_);
+    near_by[0] = motions_[i];
+  }
+}
+
+/* Finds the pixels that equal those of the earlier frame set, as far as thresholds go. */
+void
+CompactEncoder::load_earlier (int y, const RowBand &band)
+{
+  const auto columns = static_cast<std::size_t> (columns_);
+  const Roi &roi = header_.roi;
+  const int band_y = roi.y + band.first_row;
+  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
+      limits_.most[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+  std::uint8_t *const earlier = row_.earlier ().data ();
+  const std::uint8_t *const valid = row_.valid ().data ();
+  for (std::size_t x = 0; x < columns; x++) {
+    earlier[x] = 0;
+    if (!valid[x] || earlier_codes_[x] == kNoPixel)
+      continue;
+    earlier_keys_[x] = key_of (to_rgb (components_of (earlier_codes_[x]), limits_));
+    earlier[x] = near_bits (own_[x], earlier_keys_[x], earlier_bias_) == kNearMask;
+  }
+}
+
+/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
+inline void
+CompactEncoder::find_upper (std::size_t begin, std::size_t end)
+{
+  /* Two keys, compared as four halves: every processor can do that. */
+  typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
+  typedef std::int32_t Halves __attribute__ ((vector_size (16)));
+  constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
+  const auto load = [] (const std::uint64_t *from) {
+    Keys keys;
+    std::memcpy (&keys, from, sizeof keys);
+    return keys;
+  };
+  const PixelKey *const upper = upper_.shown (), *const pixels = own_.data ();
+  std::uint64_t *const others = others_.data ();
+  const PixelKey bias = bias_;
+  for (std::size_t x = begin; x < end; x += step) {
+    const Keys own = load (pixels + x);
+    const auto first = [&] (const PixelKey *other, std::uint64_t choice, Keys next) {
+      const auto halves =
+          reinterpret_cast<Halves> (near_bits (own, load (other), bias) ^ kNearMask) == 0;
+      const auto both = halves & __builtin_shufflevector (halves, halves, 1, 0, 3, 2);
+      const auto mask = reinterpret_cast<Keys> (both);
+      return (mask & choice) | (~mask & next);
+    };
+    const Keys right = first (upper + x + 1, kTakeUpperRight, Keys{} + std::uint64_t{kPredict});
+    const Keys choice = first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
+    std::memcpy (others + x, &choice, sizeof choice);
+  }
+}
+
+/* What the decoder will make of a prediction and a residual. */
+inline CompactEncoder::FullPixel
+CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
+{
+  const Components expected = predict (n, last_, limits_.most);
+  const Components residual =
+      rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  const Components made = cut (expected + residual * steps_, limits_.least, limits_.most);
+  return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
+}
+
+/* The neighbour with the least sum of error and price, or kPredict if the pixel in full has less.
+ * @param[out] full  that */
+int
+CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full)
+{
+  const PixelKey own = own_[x];
+  const auto error = [&] (PixelKey other) {
+    const auto d = [&] (int at, int mask) {
+      return static_cast<std::int32_t> (own >> at & mask) -
+             static_cast<std::int32_t> (other >> at & mask);
+    };
+    const std::int32_t z = d (0, 0xffff), r = d (32, 0xff), g = d (18, 0xff), b = d (50, 0xff);
+    return depth_weight_ * float (z) * float (z) + colour_weight_ * float (r * r + g * g + b * b);
+  };
+  full = make_full (own, n);
+  int best = kPredict;
+  float least = error (full.key) + kPriceOfBit * bits_of (full.residual);
+  const PixelCode codes[] = {n.left.code, n.codes[-1], n.codes[0], n.codes[1]};
+  for (std::size_t i = 0; i < 4; i++) {
+    const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
+    /* Profile entropy cannot name one that equals an earlier one. */
+    if (near_bits (own, other, bias_) != kNearMask ||
+        std::find (codes, codes + i, codes[i]) != codes + i)
+      continue;
+    const float sum = error (other) + kPriceOfBit * kBitsOfChoice[i];
+    if (sum < least) {
+      best = static_cast<int> (i);
+      least = sum;
+    }
+  }
+  return best;
+}
+
+/* Codes a pixel that no neighbour replaces. @return its state */
+template <class Code, bool Delta>
+inline PixelState
+CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
+{
+  const bool has_neighbour = n.any (), predicted = has_neighbour & is_zero (residual);
+  result_.full_pixels++;
+  code.template full<Delta> (n, has_neighbour, residual);
+  const Components size = residual < 0 ? -residual : residual;
+  size_sums_ += size + (size > 0);
+  size_counts_ -= size > 0;
+  return either (mask_of_zero (!predicted), state_of (Origin::kPredicted),
+      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0));
+}
+
+/* Codes a run of valid pixels, behind an invalid one.
+ *
+ * What the loop needs of this object it holds in variables of its own, the code too: bytes are
+ * written in it, and for all that the compiler knows any byte may be one of this object's. */
+template <class Code, bool Best, bool Delta>
+inline void
+CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
+{
+  PixelCode *const codes = row_.codes ();
+  PixelState *const states = row_.states ();
+  PixelKey *const keys = row_.shown ();
+  const PixelCode *const upper_codes = upper_.codes ();
+  const PixelState *const upper_states = upper_.states ();
+  const PixelKey *const upper_keys = upper_.shown (), *const own = own_.data ();
+  const std::uint64_t *const others = others_.data ();
+  [[maybe_unused]] const std::uint8_t *const earlier = row_.earlier ().data ();
+  const PixelKey bias = bias_;
+  CodedPixel left;
+  PixelKey left_key = kInvalidKey;
+  Code code = slice_code;
+  if constexpr (!Best)
+    find_upper (begin, end);
+  for (std::size_t x = begin; x < end; x++) {
+    const Neighbours n = {left, upper_codes + x, upper_states + x};
+    if constexpr (Delta) {
+      if constexpr (!Code::kEarlierInRuns)
+        (void)code.earlier (n, earlier[x]);
+      if (earlier[x]) {
+        codes[x] = left.code = earlier_codes_[x];
+        states[x] = left.state = copy_state (kTakeEarlier);
+        keys[x] = left_key = earlier_keys_[x];
+        continue;
+      }
+    }
+    FullPixel full;
+    std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
+    if constexpr (Best) {
+      other = static_cast<std::uint64_t> (best_choice (x, n, full));
+      take_left = mask_of_zero (other);
+    } else {
+      take_left = mask_of_zero (near_bits (own[x], left_key, bias) ^ kNearMask);
+      other = others[x];
+    }
+    const std::uint64_t chosen = either (take_left, kTakeLeft, other);
+    if (chosen != kPredict) [[likely]] {
+      code.template choice<Delta> (n, static_cast<int> (chosen));
+      const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
+      left_key = either (take_left, left_key, upper_keys[from]);
+      left = {either (take_left, left.code, upper_codes[from]),
+          Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
+    } else {
+      if constexpr (!Best)
+        full = make_full (own[x], n);
+      left.state = code_full<Code, Delta> (code, n, full.residual);
+      left.code = full.code;
+      left_key = full.key;
+    }
+    codes[x] = left.code;
+    states[x] = left.state;
+    keys[x] = left_key;
+  }
+  last_ = left.code;
+  slice_code = code;
+}
+
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_every (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best, Delta> (code, begin, end);
+}
+
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_v3 (Code &code, std::size_t begin, std::size_t end)
+{
+  code_run<Code, Best, Delta> (code, begin, end);
+}
+
+template <class Code, bool Best, bool Delta>
+void
+CompactEncoder::code_run_here (Code &code, std::size_t begin, std::size_t end)
+{
+  if (has_v3_)
+    code_run_v3<Code, Best, Delta> (code, begin, end);
+  else
+    code_run_every<Code, Best, Delta> (code, begin, end);
+}
+
+/* Codes which pixels of the row are valid, and finds where its runs end. */
+template <class Code>
+void
+CompactEncoder::code_runs (Code &code)
+{
+  const std::vector<std::uint8_t> &valid = row_.valid (), &upper = upper_.valid ();
+  runs_.clear ();
+  bool now = false;
+  for (int x = 0; x < columns_; now = !now) {
+    const int end = run_end (valid, x, now);
+    code.run (now, end - run_end (upper, x, now));
+    result_.points += now ? static_cast<std::uint64_t> (end - x) : 0;
+    runs_.push_back (end);
+    x = end;
+  }
+}
+
+template <class Code>
+void
+CompactEncoder::code_motions (Code &code)
+{
+  BlockMotion expected;
+  for (BlockMotion &m : motions_) {
+    (void)code.motion (expected, m);
+    expected = m;
+  }
+}
+
+/* Codes which pixels of a run of valid ones equal those of the earlier frame set. */
+template <class Code>
+void
+CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t end)
+{
+  const std::span<const std::uint8_t> own (row_.earlier ().data (), end),
+      upper (upper_.earlier ().data (), end);
+  bool now = false;
+  for (auto x = static_cast<int> (begin); x < static_cast<int> (end); now = !now) {
+    const int to = run_end (own, x, now);
+    code.earlier_run (to - run_end (upper, x, now));
+    x = to;
+  }
+}
+
+/* @return false if the slice has become too long; the row is then to be coded again */
+template <class Code, bool Delta>
+bool
+CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
+{
+  if constexpr (Delta)
+    if (begins_block)
+      code_motions (slice_code);
+  code_runs (slice_code);
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if constexpr (Delta && Code::kEarlierInRuns)
+      if (valid)
+        code_earlier_runs (slice_code, begin, end);
+    if (!valid)
+      row_.invalidate (begin, end, kInvalidKey);
+    else if (settings_.best)
+      code_run_here<Code, true, Delta> (slice_code, begin, end);
+    else
+      code_run_here<Code, false, Delta> (slice_code, begin, end);
+    begin = end;
+    valid = !valid;
+  }
+  return fits (slice_code.bound ());
+}
+
+template <class Code, bool Delta>
+Code
+CompactEncoder::begin_slice (int first_row)
+{
+  for (int i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
+    if (size_counts_[i] > 0)
+      orders_[static_cast<std::size_t> (i)] = golomb_order (size_sums_[i], size_counts_[i]);
+  size_sums_ = size_counts_ = Components{};
+  header_.first_row = first_row;
+  header_.rows = 0;
+  last_ = first_expected (limits_);
+  upper_.reset (static_cast<std::size_t> (columns_), kInvalidKey);
+  return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel,
+      {orders_, is_zero (steps_ - 1)});
+}
+
+template <class Code>
+void
+CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
+{
+  const std::size_t begin = to.size (), header_bytes = header_size (), size = code.finish ();
+  to.resize (begin + header_bytes + size);
+  std::uint8_t *p = to.data () + begin;
+  write_slice_header (header_, header_bytes + size, p);
+  p += header_size_of (header_);
+  *p++ = static_cast<std::uint8_t> (steps_[0]);
+  *p++ = static_cast<std::uint8_t> (steps_[0] >> 8);
+  *p++ = static_cast<std::uint8_t> (steps_[1]);
+  *p++ = static_cast<std::uint8_t> (steps_[2]);
+  if (header_.profile == Profile::kPacked) {
+    *p++ = static_cast<std::uint8_t> (orders_[0] | orders_[1] << 4);
+    *p++ = static_cast<std::uint8_t> (orders_[2] | orders_[3] << 4);
+  }
+  std::copy_n (bytes_.data (), size, p);
+  result_.slices++;
+  result_.delta_slices += !header_.key;
+}
+
+/* Makes a row ready to be coded. */
+template <bool Delta>
+void
+CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
+{
+  if (has_v3_)
+    load_row_v3 (image, y);
+  else
+    load_row_every (image, y);
+  if constexpr (Delta) {
+    if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
+      find_motions (image, y, band);
+    load_earlier (y, band);
+  }
+}
+
+/* Keeps a coded row for later frame sets to refer to. */
+void
+CompactEncoder::keep_row (int y)
+{
+  if (reference_.now)
+    reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
+        {row_.codes (), static_cast<std::size_t> (columns_)});
+}
+
+/* Codes all rows of a band in the columns that the header says.
+ * @return false if one row alone is longer than a slice may be */
+template <class Code, bool Delta>
+bool
+CompactEncoder::code_rows (
+    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
+{
+  resize (header_.columns);
+  motions_.assign (
+      motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
+  Code code = begin_slice<Code, Delta> (band.first_row);
+  for (int y = band.first_row; y < band.first_row + band.rows; y++) {
+    load<Delta> (image, y, band);
+    const EncoderResult result = result_;
+    const Components sums = size_sums_, counts = size_counts_;
+    Code before = code;
+    const bool begins_block = header_.rows == 0 || (header_.roi.y + y) % kMotionBlock == 0;
+    if (!code_row<Code, Delta> (code, begins_block)) {
+      if (header_.rows == 0)
+        return false;
+      result_ = result;
+      size_sums_ = sums;
+      size_counts_ = counts;
+      close_slice (before, to);
+      code = begin_slice<Code, Delta> (y);
+      if (!code_row<Code, Delta> (code, true))
+        return false;
+    }
+    keep_row (y);
+    header_.rows++;
+    std::swap (row_, upper_);
+  }
+  close_slice (code, to);
+  return true;
+}
+
+} // namespace rangecast

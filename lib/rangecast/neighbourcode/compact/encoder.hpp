@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../../geometry/quantiser.hpp"
+#include "../../geometry/range_image.hpp"
+#include "row.hpp"
+#include "entropy_code.hpp"
+#include "isa.hpp"
+#include "../bitstream/slice_partition.hpp"
+#include "pixel_key.hpp"
+#include "../bitstream/refresh.hpp"
+
+namespace rangecast {
+
+struct CompactSettings {
+  int depth_threshold, colour_threshold; ///< codes
+  int max_slice_size;                    ///< bytes
+  bool best; ///< what costs least in error and bits, not the first that is near enough
+  bool fine; ///< finer than need be: later frame sets can then take pixels again for longer
+};
+
+struct CompactQuantisers {
+  const DepthQuantiser &depth;
+  const ColourQuantiser &colour;
+};
+
+/** The steps of residuals that keep every pixel within the thresholds; all 1 for thresholds of 0.
+ */
+Steps steps_within (int depth_threshold, int colour_threshold);
+/** Thresholds of pixels that are not taken from an earlier frame set. */
+CompactSettings finer_settings (const CompactSettings &settings);
+
+/** What the pieces of a range image have in common. */
+struct CompactPicture {
+  const ConstRangeImage &image;
+  CodingReference reference;
+  CompactQuantisers quantisers;
+  CompactSettings settings;
+  MotionMemory &motions; ///< of the view
+};
+
+/** Codes pieces of range images in the profiles packed and entropy, each without anything of those
+ *  before. Keeps its memory. */
+class CompactEncoder {
+public:
+  /** Appends the slices of a piece.
+   *  @param band    its rows
+   *  @param header  of all slices: profile, bits, ROI, columns, times, what they refer to
+   *  @param[out] result  grows
+   *  @return false if a row alone is longer than a slice may be: pieces have to be narrower */
+  bool code_piece (const CompactPicture &picture, const RowBand &band, const SliceHeader &header,
+      std::vector<std::uint8_t> &to, EncoderResult &result);
+
+private:
+  typedef float Reciprocals __attribute__ ((vector_size (16)));
+  /* What a pixel becomes that no neighbour replaces. */
+  struct FullPixel {
+    Components residual;
+    PixelCode code;
+    PixelKey key;
+  };
+
+  void set_thresholds (const CompactSettings &settings);
+  template <class Code>
+  bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  template <class Code, bool Delta>
+  bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  template <bool Delta> void load (const ConstRangeImage &image, int y, const RowBand &band);
+  template <class Code, bool Delta> bool code_row (Code &slice_code, bool begins_block);
+  template <class Code> void code_runs (Code &code);
+  template <class Code> void code_motions (Code &code);
+  template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[RANGECAST_EVERY_CPU]] void code_run_every (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  [[RANGECAST_X86_64_V3]] void code_run_v3 (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Best, bool Delta>
+  void code_run_here (Code &code, std::size_t begin, std::size_t end);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] PixelState code_full (
+      Code &code, const Neighbours &n, Components residual);
+  template <class Code, bool Delta> Code begin_slice (int first_row);
+  template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
+  int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
+  [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
+  [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
+  [[RANGECAST_EVERY_CPU]] void load_row_every (const ConstRangeImage &image, int y);
+  [[RANGECAST_X86_64_V3]] void load_row_v3 (const ConstRangeImage &image, int y);
+  [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
+  void load_earlier (int y, const RowBand &band);
+  void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
+  void keep_row (int y);
+  void resize (int columns);
+  [[nodiscard]] std::size_t header_size () const;
+  [[nodiscard]] bool fits (std::size_t bytes) const;
+
+  const bool has_v3_ = has_x86_64_v3 ();
+  CompactSettings settings_{};
+  const CompactQuantisers *quantisers_ = nullptr; /* while code_piece() runs */
+  MotionMemory *motion_memory_ = nullptr;         /* too */
+  SliceHeader header_;
+  EncoderResult result_;
+  Components steps_{}, half_steps_{};
+  Reciprocals reciprocals_{};
+  Limits limits_;
+  PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
+  Components earlier_threshold_{};
+  CodingReference reference_;
+  float depth_weight_ = 0, colour_weight_ = 0;
+
+  CompactRow row_, upper_;
+  std::vector<PixelKey> own_;            /* the row as it is to be coded */
+  std::vector<std::uint64_t> others_;    /* for each pixel, the first of those above that is near */
+  std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
+  std::vector<PixelKey> earlier_keys_;
+  std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
+  MotionSearch search_;
+  PixelCode last_ = kNoPixel;
+  int columns_ = 0;
+  std::vector<int> runs_; /* ends of the row's runs */
+  EntropyModel model_{};
+  std::vector<std::uint8_t> bytes_;        /* of the open slice, behind its header */
+  Components size_sums_{}, size_counts_{}; /* of its residuals */
+  GolombOrders orders_{};
+};
+
+} // namespace rangecast

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../../geometry/quantiser.hpp"
+#include "../../geometry/range_image.hpp"
+#include "functions.hpp"
+#include "../bitstream/symbols.hpp"
+#include "../bitstream/unit.hpp"
+
+namespace rangecast {
+
+/** Decodes slices of profile plain. Keeps its memory. */
+class PlainDecoder {
+public:
+  /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
+   *  @param body    what is behind the slice header; not shorter than its symbols
+   *  @param header  checked, and not empty; its ROI is the image's
+   *  @param[out] points  grows by the valid pixels
+   *  @return false for damage: the pixels may then be partly written */
+  bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+      const DepthQuantiser &depth, const ColourQuantiser &colour, const RangeImage &image,
+      std::uint64_t &points);
+
+private:
+  void decode_rows (const LittleEndianBits &symbols, const SliceHeader &header,
+      const RangeImage &image, std::size_t &points);
+
+  const PlainFunctions *functions_ = nullptr;
+  std::vector<ShownPixel> rows_; /* the present row and the one above it, padded */
+  std::vector<ShownPixel> full_; /* pixels of the slice, and one more that nothing asks for */
+};
+
+} // namespace rangecast

@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "encoder.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <tuple>
+
+#include "../bitstream/symbols.hpp"
+
+namespace rangecast {
+namespace {
+
+/* In memory the writer would be waited for. */
+[[gnu::always_inline]] inline void
+put_invalid (BitWriter &bits, int count)
+{
+  for (; count >= kGroup; count -= kGroup)
+    bits.put (kInvalidGroup, kGroupBits);
+  if (count > 0)
+    bits.put (kInvalidGroup & ((std::uint64_t{1} << count * kSymbolBits) - 1), count * kSymbolBits);
+}
+
+} // namespace
+
+/* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
+ * nearly so. */
+void
+PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
+{
+  colour = colours;
+  const auto last = static_cast<std::uint16_t> (depth.codes () - 1);
+  std::tie (near, far) = std::minmax ({depth.depth (0), depth.depth (last)});
+  while (near > 1 && depth.valid (static_cast<std::uint16_t> (near - 1)))
+    near--;
+  while (far < 65535 && depth.valid (static_cast<std::uint16_t> (far + 1)))
+    far++;
+  codes.assign (65536, 0);
+  for (std::size_t d = near; d <= far; d++)
+    codes[d] = depth.code (static_cast<std::uint16_t> (d));
+}
+
+std::size_t
+PlainEncoder::pixels_of (int rows) const
+{
+  return static_cast<std::size_t> (rows) * static_cast<std::size_t> (header_.columns);
+}
+
+std::size_t
+PlainEncoder::slice_size (int rows, std::size_t full) const
+{
+  return kSliceHeaderSize + symbol_bytes (pixels_of (rows)) +
+         (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
+}
+
+/* Makes room for pieces of so many columns. */
+void
+PlainEncoder::resize (int columns)
+{
+  const auto padded = static_cast<std::size_t> (kPixelsBefore + columns + kPixelsBehind);
+  for (Row &row : rows_)
+    row.pixels.assign (padded, kOutsidePixel);
+  upper_.assign (padded, kOutsidePixel);
+  outside_.assign (padded, kOutsidePixel);
+  const auto size = static_cast<std::size_t> (columns);
+  for (auto &symbols : row_symbols_)
+    symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
+  row_full_.resize (std::max (row_full_.size (), size + kGroup));
+  const auto most = static_cast<std::size_t> (settings_.max_slice_size) + 16;
+  symbols_.resize (std::max (symbols_.size (), most));
+  full_.resize (std::max (full_.size (), most));
+}
+
+void
+PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
+{
+  const PlainQuantising how = {codes_->near, codes_->far, codes_->codes.data (), codes_->colour, y};
+  row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
+      image.colour.row (y) + header_.first_column, header_.columns,
+      row.pixels.data () + kPixelsBefore);
+  result_.points += static_cast<std::uint64_t> (row.span.valid);
+}
+
+/* Codes the first rows that wait. @return where they have valid pixels */
+PlainSpan
+PlainEncoder::code_band (int rows)
+{
+  PlainBand band;
+  band.upper = upper_.data () + kPixelsBefore;
+  PlainSpan span = {header_.columns, 0, 0};
+  for (int i = 0; i < kBandRows; i++) {
+    const auto at = static_cast<std::size_t> (i);
+    band.rows[i] = (i < rows ? rows_[at].pixels : outside_).data () + kPixelsBefore;
+    band.symbols[i] = row_symbols_[at].data ();
+    if (i >= rows || rows_[at].span.valid == 0)
+      continue;
+    span.begin = std::min (span.begin, rows_[at].span.begin);
+    span.end = std::max (span.end, rows_[at].span.end);
+  }
+  if (span.end == 0)
+    span.begin = 0;
+  band.begin = span.begin;
+  band.end = span.end;
+  band.threshold = plain_pixel (settings_.colour_threshold, settings_.colour_threshold,
+      settings_.colour_threshold, settings_.depth_threshold);
+  if (span.end > 0)
+    functions_->code_band (band);
+  std::fill (band.upper - 1, band.upper + span.begin, kOutsidePixel);
+  std::fill (band.upper + span.end, band.upper + header_.columns + 1, kOutsidePixel);
+  return span;
+}
+
+/* The symbols of a coded row and what was coded. */
+PlainRow
+PlainEncoder::coded_row (int row, const PlainSpan &span) const
+{
+  const auto at = static_cast<std::size_t> (row);
+  return {row_symbols_[at].data (), at * static_cast<std::size_t> (functions_->skip_bits),
+      rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
+}
+
+/* Appends a coded row to the slice. */
+void
+PlainEncoder::add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full)
+{
+  BitWriter symbols (symbols_.data (), pixels_of (header_.rows) * kSymbolBits);
+  put_invalid (symbols, span.begin);
+  std::size_t bit = row.first_bit;
+  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits)
+    symbols.put (plain_group (row.symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
+  put_invalid (symbols, header_.columns - span.end);
+
+  const int bits = bits_of_full ();
+  functions_->pack_pixels (full.data (), full.size (), header_.depth_bits, header_.colour_bits);
+  BitWriter pixels (full_.data (), full_pixels_ * static_cast<std::size_t> (bits));
+  for (const std::uint64_t pixel : full)
+    pixels.put (pixel, bits);
+  full_pixels_ += full.size ();
+  header_.rows++;
+}
+
+void
+PlainEncoder::begin_slice (int first_row)
+{
+  header_.first_row = first_row;
+  header_.rows = 0;
+  full_pixels_ = 0;
+  std::ranges::fill (upper_, kOutsidePixel);
+}
+
+void
+PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
+{
+  const std::size_t symbols = symbol_bytes (pixels_of (header_.rows));
+  const std::size_t begin = to.size (), size = slice_size (header_.rows, full_pixels_);
+  to.resize (begin + size);
+  std::uint8_t *const p = to.data () + begin;
+  write_slice_header (header_, size, p);
+  std::memcpy (p + kSliceHeaderSize, symbols_.data (), symbols);
+  std::memcpy (p + kSliceHeaderSize + symbols, full_.data (), size - kSliceHeaderSize - symbols);
+  result_.slices++;
+  result_.full_pixels += full_pixels_;
+}
+
+/* Codes the first rows that wait, as far as the open slice has room for them. Where it has not, the
+ * next slice is open then, and its first row is without upper neighbours. @return rows done */
+int
+PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
+{
+  const PlainSpan span = code_band (rows);
+  const auto limit = static_cast<std::size_t> (settings_.max_slice_size);
+  for (int i = 0; i < rows; i++) {
+    const PlainRow row = coded_row (i, span);
+    const std::span<PlainPixel> full (
+        row_full_.data (), functions_->gather_full (row, row_full_.data ()));
+    if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) > limit) {
+      close_slice (to);
+      begin_slice (header_.first_row + header_.rows);
+      return i;
+    }
+    add_row (row, span, full);
+  }
+  return rows;
+}
+
+/* In as many slices as the size of the piece asks for. */
+void
+PlainEncoder::code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+    EncoderResult &result)
+{
+  codes_ = &codes;
+  settings_ = settings;
+  header_ = header;
+  result_ = {};
+  functions_ = &plain_functions (cpu_level ());
+  resize (header.columns);
+  begin_slice (0);
+  int waiting = 0;
+  for (int done = 0; done < image.roi.height;) {
+    for (; waiting < functions_->band_rows && done + waiting < image.roi.height; waiting++)
+      load_row (image, done + waiting, rows_[static_cast<std::size_t> (waiting)]);
+    const int more = add_band (waiting, to);
+    std::rotate (rows_.begin (), rows_.begin () + more, rows_.end ());
+    waiting -= more;
+    done += more;
+  }
+  close_slice (to);
+  result += result_;
+}
+
+} // namespace rangecast

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../../geometry/quantiser.hpp"
+#include "../../geometry/range_image.hpp"
+#include "../bitstream/slice_partition.hpp"
+#include "functions.hpp"
+#include "../bitstream/symbols.hpp"
+#include "../bitstream/unit.hpp"
+
+namespace rangecast {
+
+struct PlainSettings {
+  int depth_threshold, colour_threshold; ///< codes
+  int max_slice_size;                    ///< bytes
+};
+
+/** The codes of depths and colours, as vectors look them up. */
+struct PlainCodes {
+  void set (const DepthQuantiser &depth, const ColourQuantiser &colour);
+
+  std::uint16_t near = 1, far = 0;  ///< of valid depths
+  std::vector<std::uint16_t> codes; ///< of all depths
+  ColourQuantiser colour;
+};
+
+/** Codes pieces of range images in profile plain, each without anything of those before. Keeps its
+ *  memory. */
+class PlainEncoder {
+public:
+  /** Appends the slices of a piece: all rows of some columns of the ROI.
+   *  @param header  of all slices: bits, ROI, columns, times
+   *  @param[out] result  grows */
+  void code_piece (const ConstRangeImage &image, const PlainCodes &codes,
+      const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+      EncoderResult &result);
+
+private:
+  /* A row that waits to be coded. */
+  struct Row {
+    std::vector<PlainPixel> pixels; /* from kPixelsBefore before its first one on */
+    PlainSpan span;
+  };
+  void resize (int columns);
+  void load_row (const ConstRangeImage &image, int y, Row &row);
+  PlainSpan code_band (int rows);
+  [[nodiscard]] PlainRow coded_row (int row, const PlainSpan &span) const;
+  void add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full);
+  int add_band (int rows, std::vector<std::uint8_t> &to);
+  void begin_slice (int first_row);
+  void close_slice (std::vector<std::uint8_t> &to);
+  [[nodiscard]] std::size_t slice_size (int rows, std::size_t full) const;
+  [[nodiscard]] std::size_t pixels_of (int rows) const;
+  [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
+
+  PlainSettings settings_{};
+  const PlainFunctions *functions_ = nullptr;
+  const PlainCodes *codes_ = nullptr; /* while code_piece() runs */
+  SliceHeader header_;                /* of the open slice */
+  std::size_t full_pixels_ = 0;       /* of the open slice */
+  EncoderResult result_;
+
+  std::array<Row, kBandRows> rows_;
+  std::vector<PlainPixel> upper_, outside_;
+  std::array<std::vector<std::uint8_t>, kBandRows> row_symbols_;
+  std::vector<PlainPixel> row_full_;
+  std::vector<std::uint8_t> symbols_, full_; /* of the open slice */
+};
+
+} // namespace rangecast

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Profile plain where frame sets refer to one another. One pixel at a time: the other profiles are
+ * what saves most then. */
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../../geometry/quantiser.hpp"
+#include "../../geometry/range_image.hpp"
+#include "pixel_lanes.hpp"
+#include "encoder.hpp"
+#include "../bitstream/reference.hpp"
+#include "../bitstream/refresh.hpp"
+
+namespace rangecast {
+
+/** Codes pieces of range images that are kept as references. Keeps its memory. */
+class PlainTemporalEncoder {
+public:
+  /** Appends the slices of a piece.
+   *  @param band    its rows
+   *  @param header  of all slices: bits, ROI, columns, times, what they refer to
+   *  @param[out] result  grows */
+  void code_piece (const ConstRangeImage &image, const RowBand &band,
+      const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
+      const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+      EncoderResult &result);
+
+private:
+  void load_row (const ConstRangeImage &image, int y);
+  [[nodiscard]] int symbol_of (int x) const;
+  std::size_t code_row (std::size_t symbols_at, std::size_t full_at);
+  void code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
+  void begin_slice (int first_row);
+  void close_slice (std::size_t pixels, std::size_t full, std::vector<std::uint8_t> &to);
+  [[nodiscard]] std::size_t slice_size (std::size_t pixels, std::size_t full) const;
+  [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
+
+  const DepthQuantiser *depth_ = nullptr; /* while code_piece() runs */
+  const ColourQuantiser *colour_ = nullptr;
+  CodingReference reference_;
+  PlainSettings settings_{};
+  Lanes threshold_{};
+  SliceHeader header_; /* of the open slice */
+  EncoderResult result_;
+
+  std::vector<Lanes> row_, upper_; /* with an invalid pixel on each side */
+  std::vector<std::uint64_t> earlier_, kept_;
+  std::vector<std::uint8_t> symbols_; /* of the open slice, one a byte */
+  std::vector<std::uint64_t> full_;
+};
+
+/** Decodes slices that are kept as references, or refer to one. Keeps its memory. */
+class PlainTemporalDecoder {
+public:
+  /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
+   *  @param body    what is behind the slice header; not shorter than its symbols
+   *  @param header  checked, and not empty; its ROI is the image's
+   *  @param[out] decoded  grows
+   *  @return false for damage: the pixels may then be partly written */
+  bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
+      const DepthQuantiser &depth, const ColourQuantiser &colour, const DecoderReference &reference,
+      const RangeImage &image, DecodedPixels &decoded);
+
+private:
+  std::vector<std::uint64_t> rows_; /* the present row and the one above it, padded */
+  std::vector<std::uint64_t> earlier_, kept_;
+};
+
+} // namespace rangecast

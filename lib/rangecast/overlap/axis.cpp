@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "axis.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "../base/lanes.hpp"
+
+namespace rangecast {
+
+/* Below this ratio of the two largest variances the points are as good as round. */
+constexpr double kLeastSpreadRatio = 1.3;
+/* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
+ * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
+struct Follow {
+  double least, most, far;
+  [[nodiscard]] double share (double off) const
+  {
+    return least + (most - least) * std::min (1.0, off / far);
+  }
+};
+constexpr Follow kFollowPosition{0.2, 0.8, 0.02};             /* metres */
+constexpr Follow kFollowDirection{0.05, 0.7, 8 * M_PI / 180}; /* radians */
+
+/* Sums of what Moments holds, eight points at a time. Floats add up exactly enough over a block. */
+struct MomentsLoop {
+  const float *x, *y, *z;
+  std::size_t n;
+  static constexpr std::size_t kBlock = 512;
+
+  static constexpr int kLanes = 8;
+
+  static void add (float (&sum)[9][kLanes], const float *x, const float *y, const float *z, int n)
+  {
+    for (int l = 0; l < n; l++) {
+      sum[0][l] += x[l], sum[1][l] += y[l], sum[2][l] += z[l];
+      sum[3][l] += x[l] * x[l], sum[4][l] += x[l] * y[l], sum[5][l] += x[l] * z[l];
+      sum[6][l] += y[l] * y[l], sum[7][l] += y[l] * z[l], sum[8][l] += z[l] * z[l];
+    }
+  }
+
+  void run (double (&total)[9]) const
+  {
+    for (std::size_t begin = 0; begin < n; begin += kBlock) {
+      const std::size_t end = std::min (n, begin + kBlock);
+      float sum[9][kLanes] = {};
+      std::size_t i = begin;
+      for (; i + kLanes <= end; i += kLanes)
+        add (sum, x + i, y + i, z + i, kLanes);
+      add (sum, x + i, y + i, z + i, static_cast<int> (end - i));
+      for (int k = 0; k < 9; k++)
+        for (float s : sum[k])
+          total[k] += s;
+    }
+  }
+
+  [[RANGECAST_CYLINDER_ANY]] void run_any (double (&total)[9]) const { run (total); }
+  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 (double (&total)[9]) const { run (total); }
+};
+
+void
+Moments::add (const WorldPoints &points, WorldPoints::Part part)
+{
+  const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
+      points.z.data () + part.begin, part.size ()};
+  double total[9] = {};
+  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 (total) : loop.run_any (total);
+  for (int k = 0; k < 9; k++)
+    (k < 3 ? sum[k] : product[k - 3]) += total[k];
+  n += static_cast<double> (part.size ());
+}
+
+Moments &
+Moments::operator+= (const Moments &other)
+{
+  n += other.n;
+  for (int k = 0; k < 3; k++)
+    sum[k] += other.sum[k];
+  for (int k = 0; k < 6; k++)
+    product[k] += other.product[k];
+  return *this;
+}
+
+Vec3
+Moments::centroid () const
+{
+  return n > 0 ? Vec3{sum[0] / n, sum[1] / n, sum[2] / n} : Vec3{};
+}
+
+/* One Jacobi rotation that makes a[p][q] zero; v collects the eigenvectors in its columns. */
+static void
+rotate (double (&a)[3][3], double (&v)[3][3], int p, int q)
+{
+  if (a[p][q] == 0)
+    return;
+  const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+  const double t = (theta >= 0 ? 1 : -1) / (std::abs (theta) + std::sqrt (theta * theta + 1));
+  const double c = 1 / std::sqrt (t * t + 1), s = t * c;
+  for (auto &row : a)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+  for (int k = 0; k < 3; k++)
+    std::tie (a[p][k], a[q][k]) = std::pair (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+  for (auto &row : v)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+}
+
+void
+eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
+{
+  double a[3][3] = {{m[0], m[1], m[2]}, {m[1], m[3], m[4]}, {m[2], m[4], m[5]}};
+  double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int sweep = 0; sweep < 12; sweep++)
+    for (auto [p, q] : {std::pair (0, 1), std::pair (0, 2), std::pair (1, 2)})
+      rotate (a, v, p, q);
+  int order[3] = {0, 1, 2};
+  std::sort (order, order + 3, [&] (int i, int j) { return a[i][i] > a[j][j]; });
+  for (int k = 0; k < 3; k++) {
+    values[k] = a[order[k]][order[k]];
+    vectors[k] = {v[0][order[k]], v[1][order[k]], v[2][order[k]]};
+  }
+}
+
+/* How nearly a camera looks along that direction: the largest |cosine| of all. */
+static double
+end_on (Vec3 direction, std::span<const PixelRays> cameras)
+{
+  double most = 0;
+  for (const PixelRays &camera : cameras) {
+    const float *a = camera.optical_axis;
+    most = std::max (most, std::abs (dot (direction, {a[0], a[1], a[2]})));
+  }
+  return most;
+}
+
+Axis
+axis_of_points (AxisMode mode, const Moments &moments, std::span<const PixelRays> cameras)
+{
+  Axis axis;
+  axis.position = moments.centroid ();
+  if (mode != AxisMode::kPrincipal || moments.n < 3)
+    return axis;
+  const Vec3 c = axis.position;
+  const double n = moments.n, *p = moments.product;
+  const double covariance[6] = {p[0] / n - c.x * c.x, p[1] / n - c.x * c.y, p[2] / n - c.x * c.z,
+      p[3] / n - c.y * c.y, p[4] / n - c.y * c.z, p[5] / n - c.z * c.z};
+  double values[3];
+  Vec3 vectors[3];
+  eigen_symmetric (covariance, values, vectors);
+  if (!(values[0] > kLeastSpreadRatio * values[1]) || !(values[0] > 1e-12))
+    return axis;
+  const Vec3 direction = vectors[0].y < 0 ? -1.0 * vectors[0] : vectors[0];
+  const double along = end_on (direction, cameras);
+  if (along > 0.8 && along > end_on (axis.direction, cameras))
+    return axis;
+  axis.direction = direction;
+  return axis;
+}
+
+const Axis &
+AxisTracker::follow (const Axis &measured)
+{
+  if (!started_) {
+    started_ = true;
+    axis_ = measured;
+    return axis_;
+  }
+  const Vec3 move = measured.position - axis_.position;
+  axis_.position = axis_.position + kFollowPosition.share (norm (move)) * move;
+  /* A nearly level axis may come back the other way round; it is the same line. */
+  const double cosine = dot (axis_.direction, measured.direction);
+  const double share = kFollowDirection.share (std::acos (std::min (1.0, std::abs (cosine))));
+  const Vec3 blend =
+      (1 - share) * axis_.direction + (cosine < 0 ? -share : share) * measured.direction;
+  axis_.direction = 1 / norm (blend) * blend;
+  return axis_;
+}
+
+} // namespace rangecast

@@ -1,0 +1,500 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "cells.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "../base/parallel.hpp"
+#include "../base/lanes.hpp"
+
+namespace rangecast {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+/* Cells of rows, at most; slices beyond have fewer planes. */
+constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
+
+void
+Units::lay_out (std::span<const WallRange> ranges)
+{
+  double height = 0;
+  for (const WallRange &range : ranges)
+    height += std::max (0.0, double{range.y_max} - range.y_min);
+  const double most = kMaxUnits / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
+  const double step = slice_height_m = std::max (settings_.unit_height_m, height / most);
+  slices.clear ();
+  for (std::size_t body = 0; body < ranges.size (); body++) {
+    const WallRange &range = ranges[body];
+    Stack &stack = stacks_[body];
+    stack = {static_cast<int> (slices.size ()), 0, 0};
+    if (!(range.y_min <= range.y_max))
+      continue;
+    /* Slices begin at multiples of their height from the axis' origin, not at the lowest point. */
+    const double first = std::floor (range.y_min / step);
+    stack.count = static_cast<int> (std::floor (range.y_max / step) - first) + 1;
+    stack.first_y = static_cast<float> (first * step);
+    for (int i = 0; i < stack.count; i++) {
+      Slice &slice = slices.emplace_back ();
+      slice.body = static_cast<int> (body);
+      slice.number = static_cast<int> (std::clamp (first, -1e9, 1e9)) + i;
+    }
+  }
+}
+
+void
+Units::count_units (
+    const WorldPoints &cloud, std::span<const std::int32_t> column, std::span<const PointRun> runs)
+{
+  if (slice_of.size () < cloud.x.size ())
+    slice_of.resize (cloud.x.size ());
+  begin_.assign (slices.size () * settings_.columns + 1, 0);
+  const auto per_metre = static_cast<float> (1 / slice_height_m);
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
+  for (const PointRun &run : runs) {
+    const Stack &stack = stacks_[run.body];
+    const float first_y = stack.first_y;
+    const int last = stack.count - 1, first = stack.first_slice;
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const int slice = static_cast<int> ((cloud.y[i] - first_y) * per_metre);
+      slice_of[i] = static_cast<std::uint32_t> (first + std::clamp (slice, 0, last));
+    }
+    for (std::size_t i = run.begin; i < run.end; i++)
+      begin_[slice_of[i] * columns + static_cast<std::uint32_t> (column[i])]++;
+  }
+}
+
+void
+Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, std::span<const PointRun> runs)
+{
+  std::uint32_t total = 0;
+  for (std::size_t s = 0; s < slices.size (); s++) {
+    slices[s].begin = total;
+    for (int c = 0; c < settings_.columns; c++) {
+      std::uint32_t &begin = begin_[s * settings_.columns + c];
+      const std::uint32_t count = begin;
+      begin = total;
+      total += count;
+    }
+  }
+  if (layers.size () < total) { /* the last to grow: all have grown */
+    points.resize (total);
+    layers.resize (total);
+  }
+  const auto columns = static_cast<std::uint32_t> (settings_.columns);
+  std::uint32_t *ends = begin_.data ();
+  Point *to = points.data ();
+  for (const PointRun &run : runs)
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const auto at = static_cast<std::uint32_t> (column[i]);
+      to[ends[slice_of[i] * columns + at]++] = {radius[i], cloud.x[i], cloud.z[i],
+          static_cast<std::uint32_t> (i), at * kMaxViews + run.view};
+    }
+  /* Now each element is its unit's end, which is the next one's begin. */
+}
+
+/* Makes room for as many entries as the largest slice has points. */
+void
+Units::make_works (int threads)
+{
+  const std::size_t workers = workers_for (slices.size (), threads);
+  std::size_t most = 0;
+  for (std::size_t s = 0; s < slices.size (); s++)
+    most = std::max<std::size_t> (
+        most, begin_[(s + 1) * static_cast<std::size_t> (settings_.columns) - 1] - slices[s].begin);
+  if (works_.size () < workers)
+    works_.resize (workers);
+  for (Work &work : works_)
+    if (work.chain.size () < most) {
+      work.entries.resize (most + most / 4);
+      work.chain.resize (most + most / 4);
+    }
+}
+
+/* Cuts the units of a slice into layers, and links the entries of each view in their order. */
+struct Units::Cutter {
+  Units &units;
+  Slice &slice;
+  Work &work;
+  float gap;
+  int column = 0;
+  std::uint32_t entry_end = 0, layer_end;
+  std::uint64_t views = 0; /* of the slice */
+  std::uint32_t first[kMaxViews], last[kMaxViews];
+
+  Cutter (Units &owner, Slice &cut, Work &memory)
+      : units (owner), slice (cut), work (memory),
+        gap (static_cast<float> (owner.settings_.layer_gap_m)), layer_end (cut.begin)
+  {
+  }
+
+  void link (std::uint32_t entry, std::uint32_t view)
+  {
+    const std::uint64_t bit = std::uint64_t{1} << view;
+    (views & bit ? work.chain[last[view]] : first[view]) = entry;
+    last[view] = entry;
+    views |= bit;
+  }
+
+  void close_rings ()
+  {
+    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+      const int view = std::countr_zero (rest);
+      work.chain[last[view]] = first[view];
+    }
+  }
+
+  /* Adds up the points of each entry of the slice as if its units had one layer each. Without
+   * branches: runs of one or two points, which all here are, are what processors guess worst.
+   * @return whether they have: no unit's radii lie further apart than a gap */
+  bool sum_entries (std::uint32_t end)
+  {
+    typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    typedef std::int32_t I4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    const F4 one = {0, 0, 0, 1};
+    const I4 three = {-1, -1, -1, 0};
+    F4 sum = {};
+    float low = 0, high = 0, span = 0;
+    std::uint32_t before = UINT32_MAX, to = UINT32_MAX;
+    /* Not through the vectors: stores of vectors may alias them, for all that compilers know. */
+    const Point *points = units.points.data ();
+    UnitEntry *entries = work.entries.data ();
+    for (std::uint32_t i = slice.begin; i < end; i++) {
+      const Point &point = points[i];
+      const std::uint32_t differs = point.key ^ before;
+      before = point.key;
+      const std::int32_t goes_on = -static_cast<std::int32_t> (differs == 0);
+      to += differs != 0;
+      const I4 keep = {goes_on, goes_on, goes_on, goes_on};
+      const F4 values = (F4)((I4) * reinterpret_cast<const F4 *> (&point.radius) & three) + one;
+      sum = (F4)((I4)sum & keep) + values;
+      *reinterpret_cast<F4 *> (&entries[to].radius) = sum;
+      entries[to].key = point.key;
+      const bool new_unit = differs >= kMaxViews;
+      low = new_unit || point.radius < low ? point.radius : low;
+      high = new_unit || point.radius > high ? point.radius : high;
+      span = high - low > span ? high - low : span;
+    }
+    entry_end = to + 1;
+    return span <= gap;
+  }
+
+  /* Makes the layers of those entries. Layers are written anew with each of their entries, for the
+   * same reason. */
+  void finish_entries ()
+  {
+    typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
+    UnitEntry *entries = work.entries.data ();
+    UnitLayer *layer = units.layers.data () + slice.begin - 1;
+    layer_end = slice.begin - 1;
+    std::uint32_t *chain = work.chain.data ();
+    std::uint32_t column_before = UINT32_MAX, first_entry = 0, shared = 0;
+    std::uint64_t layer_views = 0;
+    float weight = 0, radii = 0;
+    for (std::uint32_t e = 0; e < entry_end; e++) {
+      UnitEntry &entry = entries[e];
+      const std::uint32_t at = entry.key / kMaxViews, view = entry.key % kMaxViews;
+      const bool fresh = at != column_before;
+      const std::uint64_t bit = std::uint64_t{1} << view;
+      column_before = at;
+      layer += fresh;
+      layer_end += fresh;
+      weight = (fresh ? 0 : weight) + entry.weight;
+      radii = (fresh ? 0 : radii) + entry.radius;
+      layer_views = (fresh ? 0 : layer_views) | bit;
+      first_entry = fresh ? e : first_entry;
+      layer->views = layer_views;
+      layer->first_entry = first_entry;
+      layer->entry_count = e + 1 - first_entry;
+      layer->column = static_cast<int> (at);
+      layer->plane = 0;
+      layer->radius = radii / weight;
+      shared += layer->entry_count == 2;
+      F4 &values = *reinterpret_cast<F4 *> (&entry.radius);
+      const float share = 1 / entry.weight;
+      values *= F4{share, share, share, 1};
+      entry.tangent[0] = entry.tangent[1] = 0;
+      entry.layer = layer_end;
+      (views & bit ? chain[last[view]] : first[view]) = e;
+      last[view] = e;
+      views |= bit;
+    }
+    layer_end++;
+    slice.occupied = layer_end - slice.begin;
+    slice.shared = shared;
+    slice.planes = layer_end > slice.begin;
+  }
+
+  /* Makes a layer of points, which come in the order of the cloud, so view after view.
+   * @param any  whether they may lie further apart than a gap
+   * @return whether they do; then nothing has been made */
+  bool add_layer (std::uint32_t begin, std::uint32_t end, int plane, bool any)
+  {
+    UnitLayer &layer = units.layers[layer_end];
+    layer = {0, entry_end, 0, column, plane, 0, {}, begin, end - begin};
+    const Point *points = units.points.data ();
+    float radii = 0, low = kNowhere, high = 0;
+    std::uint32_t to = entry_end;
+    for (std::uint32_t i = begin; i < end; to++) {
+      float x = 0, z = 0, radius = 0;
+      const std::uint32_t from = i, key = points[i].key;
+      for (; i < end && points[i].key == key; i++) {
+        x += points[i].x;
+        z += points[i].z;
+        radius += points[i].radius;
+        low = std::min (low, points[i].radius);
+        high = std::max (high, points[i].radius);
+      }
+      radii += radius;
+      const auto weight = static_cast<float> (i - from);
+      const float share = 1 / weight;
+      work.entries[to] = {radius * share, x * share, z * share, weight, {}, key, layer_end};
+      layer.views |= std::uint64_t{1} << work.entries[to].view ();
+    }
+    if (any && high - low > gap)
+      return true;
+    layer.radius = radii / static_cast<float> (end - begin);
+    layer.entry_count = to - entry_end;
+    for (; entry_end < to; entry_end++)
+      link (entry_end, work.entries[entry_end].view ());
+    layer_end++;
+    return false;
+  }
+
+  /* @return the number of layers */
+  int cut_apart (std::uint32_t begin, std::uint32_t end)
+  {
+    auto by_radius = [] (const Point &a, const Point &b) {
+      return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
+    };
+    auto by_index = [] (const Point &a, const Point &b) { return a.index < b.index; };
+    Point *points = units.points.data ();
+    std::sort (points + begin, points + end, by_radius);
+    int plane = 0;
+    for (std::uint32_t from = begin, to = begin + 1; to <= end; to++)
+      if (to == end || points[to].radius - points[to - 1].radius > gap) {
+        std::sort (points + from, points + to, by_index);
+        add_layer (from, to, plane++, false);
+        from = to;
+      }
+    return plane;
+  }
+
+  void cut_units (const std::uint32_t *ends, int columns)
+  {
+    std::uint32_t begin = slice.begin;
+    for (column = 0; column < columns; column++) {
+      const std::uint32_t end = ends[column];
+      if (begin == end)
+        continue;
+      const std::uint32_t first_layer = layer_end;
+      const int planes = add_layer (begin, end, 0, true) ? cut_apart (begin, end) : 1;
+      slice.planes = std::max (slice.planes, planes);
+      std::uint64_t all = 0;
+      for (std::uint32_t i = first_layer; i < layer_end; i++)
+        all |= units.layers[i].views;
+      slice.occupied++;
+      slice.shared += (all & (all - 1)) != 0;
+      begin = end;
+    }
+  }
+
+  void cut (const std::uint32_t *ends, int columns)
+  {
+    if (sum_entries (ends[columns - 1])) {
+      finish_entries ();
+    } else {
+      entry_end = 0;
+      cut_units (ends, columns);
+    }
+    close_rings ();
+    slice.layer_count = layer_end - slice.begin;
+  }
+};
+
+/* A view's next entries where slices have several layers. A unit may have as many as a view has
+ * points, and going through all of them for each of them would take minutes. But both a view's
+ * entries in a unit and those in the units after it come from the axis outwards: where the search
+ * for one entry ended the one for the next begins. */
+struct Units::Followers {
+  int column = -1;               /* of the view's entries asked for */
+  int count = 0;                 /* columns with entries of the view that follow it within reach */
+  std::uint32_t entry[kReach]{}; /* of each, the next to be looked at; kNone after its last */
+
+  void begin_column (const Work &work, std::uint32_t number, int reach, int columns)
+  {
+    int at = column = work.entries[number].column ();
+    count = 0;
+    for (std::uint32_t next = work.chain[number]; next != number; next = work.chain[next]) {
+      const int found = work.entries[next].column ();
+      const int distance = found - column + (found < column ? columns : 0);
+      if (distance > reach)
+        return;
+      if (found != at)
+        entry[count++] = next;
+      at = found;
+    }
+  }
+
+  std::uint32_t find (const Units &units, const Work &work, std::uint32_t number)
+  {
+    const float radius = work.entries[number].radius;
+    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    const auto radius_of = [&] (std::uint32_t other) {
+      return units.layers[work.entries[other].layer].radius;
+    };
+    for (int k = 0; k < count; k++) {
+      while (entry[k] != kNone && radius_of (entry[k]) - radius < -gap) {
+        const std::uint32_t next = work.chain[entry[k]];
+        const bool same = work.entries[next].column () == work.entries[entry[k]].column ();
+        entry[k] = same ? next : kNone;
+      }
+      if (entry[k] != kNone && std::abs (radius_of (entry[k]) - radius) <= gap)
+        return entry[k];
+    }
+    return kNone;
+  }
+};
+
+/* Gives entries of a slice their tangents, and cells their sums. In its class, so that it becomes
+ * part of the twins. */
+struct Units::Tangents {
+  Units &units;
+  const Slice &slice;
+  Work &work;
+  std::uint32_t entry_count;
+  int reach;
+
+  /* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
+   * slices of one layer a unit, where each step goes a column further. */
+  [[nodiscard]] std::uint32_t next_entry (std::uint32_t from) const
+  {
+    const UnitEntry &entry = work.entries[from];
+    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    int column = entry.column ();
+    for (std::uint32_t next = work.chain[from], before = from; next != from;
+         before = next, next = work.chain[next]) {
+      const UnitEntry &other = work.entries[next];
+      if (next < before)
+        column -= units.settings_.columns;
+      const int distance = other.column () - column;
+      if (distance > reach)
+        return kNone;
+      if (std::abs (units.layers[other.layer].radius - entry.radius) <= gap)
+        return next;
+    }
+    return kNone;
+  }
+
+  void point_at (std::uint32_t from, std::uint32_t found)
+  {
+    if (found == kNone)
+      return;
+    UnitEntry &entry = work.entries[from], &next = work.entries[found];
+    const float dx = next.x - entry.x, dz = next.z - entry.z;
+    const float squared = dx * dx + dz * dz;
+    if (!(squared > 1e-18f))
+      return;
+    const float per_length = 1 / std::sqrt (squared);
+    entry.tangent[0] = dx * per_length;
+    entry.tangent[1] = dz * per_length;
+    if (next.tangent[0] == 0 && next.tangent[1] == 0)
+      std::copy_n (entry.tangent, 2, next.tangent);
+  }
+
+  void find ()
+  {
+    if (slice.planes > 1) {
+      find_layered ();
+      return;
+    }
+    for (std::uint32_t e = 0; e < entry_count; e++)
+      point_at (e, next_entry (e));
+  }
+
+  void find_layered ()
+  {
+    std::array<Followers, kMaxViews> followers;
+    for (std::uint32_t e = 0; e < entry_count; e++) {
+      Followers &of_view = followers[work.entries[e].view ()];
+      if (of_view.column != work.entries[e].column ())
+        of_view.begin_column (work, e, reach, units.settings_.columns);
+      point_at (e, of_view.find (units, work, e));
+    }
+  }
+
+  void sum ()
+  {
+    for (std::uint32_t l = slice.begin; l < slice.begin + slice.layer_count; l++) {
+      UnitLayer &layer = units.layers[l];
+      const UnitEntry *entry = work.entries.data () + layer.first_entry;
+      float x = 0, z = 0;
+      for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++) {
+        x += entry->weight * entry->tangent[0];
+        z += entry->weight * entry->tangent[1];
+      }
+      layer.tangent[0] = x;
+      layer.tangent[1] = z;
+    }
+  }
+};
+
+/* What each processor runs; plain code, but made for it. */
+struct Units::Twins {
+  static bool avx2 () { return cpu_level () >= CpuLevel::kAvx2; }
+  static void cut (Units &units, Slice &slice, Work &work)
+  {
+    const int columns = units.settings_.columns;
+    const std::size_t number = static_cast<std::size_t> (&slice - units.slices.data ());
+    Cutter cutter (units, slice, work);
+    cutter.cut (units.begin_.data () + number * static_cast<std::size_t> (columns), columns);
+    Tangents tangents{units, slice, work, cutter.entry_end, std::min (kReach, columns / 4)};
+    tangents.find ();
+    tangents.sum ();
+  }
+  [[RANGECAST_CYLINDER_ANY]] static void cut_any (Units &units, Slice &slice, Work &work)
+  {
+    cut (units, slice, work);
+  }
+  [[RANGECAST_CYLINDER_AVX2]] static void cut_avx2 (Units &units, Slice &slice, Work &work)
+  {
+    cut (units, slice, work);
+  }
+};
+
+void
+Units::sort (const WorldPoints &cloud, std::span<const float> radius,
+    std::span<const std::int32_t> column, std::span<const PointRun> runs,
+    std::span<const WallRange> ranges, const UnitSettings &settings, int threads)
+{
+  settings_ = settings;
+  lay_out (ranges);
+  count_units (cloud, column, runs);
+  scatter (cloud, radius, column, runs);
+  make_works (threads);
+  in_parallel (slices.size (), threads, [&] (std::size_t s, std::size_t worker) {
+    Twins::avx2 () ? Twins::cut_avx2 (*this, slices[s], works_[worker])
+                   : Twins::cut_any (*this, slices[s], works_[worker]);
+  });
+  const auto images = static_cast<int> (cloud.parts ().size ());
+  rows.begin (settings.columns, slice_height_m, images, slices.size ());
+  int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
+  for (const Slice &slice : slices) {
+    const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
+    rows.add_slice (slice.body, slice.number, planes);
+    most -= planes;
+  }
+  rows.make_room ();
+}
+
+void
+Units::fill_rows (int number)
+{
+  const int planes = rows.slices ()[number].planes;
+  for (const UnitLayer &layer : layers_of (slices[number]))
+    if (layer.plane < planes)
+      rows.put (rows.cell (number, layer.plane, layer.column),
+          {layer.radius, {layer.tangent[0], layer.tangent[1]}, layer.views});
+}
+
+} // namespace rangecast

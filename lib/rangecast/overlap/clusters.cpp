@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "clusters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rangecast {
+
+/* One point in so many tells where somebody stands. */
+constexpr std::size_t kStep = 4;
+
+void
+Bodies::lay_grid (const WorldPoints &cloud)
+{
+  constexpr float kHuge = std::numeric_limits<float>::max ();
+  float x_max = -kHuge, z_max = -kHuge;
+  x_min_ = z_min_ = kHuge;
+  for (const WorldPoints::Part &part : cloud.parts ())
+    for (std::size_t i = part.begin; i < part.end; i += kStep) {
+      x_min_ = std::min (x_min_, cloud.x[i]);
+      x_max = std::max (x_max, cloud.x[i]);
+      z_min_ = std::min (z_min_, cloud.z[i]);
+      z_max = std::max (z_max, cloud.z[i]);
+    }
+  const float side = std::max ({x_max - x_min_, z_max - z_min_, 0.f});
+  places_per_metre_ = 1 / std::max (kPlace, side / (kSide - 1));
+}
+
+void
+Bodies::count_points (const WorldPoints &cloud)
+{
+  points_.assign (kSide * kSide, 0);
+  counted_ = 0;
+  for (const WorldPoints::Part &part : cloud.parts ())
+    for (std::size_t i = part.begin; i < part.end; i += kStep, counted_++)
+      points_[place_of (cloud.x[i], cloud.z[i])]++;
+}
+
+/* Calls work for the places beside a place. */
+template <typename Work>
+static void
+for_neighbours (int place, int side, const Work &work)
+{
+  const int column = place % side, row = place / side;
+  for (int r = std::max (row - 1, 0); r <= std::min (row + 1, side - 1); r++)
+    for (int c = std::max (column - 1, 0); c <= std::min (column + 1, side - 1); c++)
+      work (r * side + c);
+}
+
+/* Labels all that is connected with a place. @return its points */
+std::uint32_t
+Bodies::fill_body (std::uint16_t place, std::uint16_t label)
+{
+  std::uint32_t points = 0;
+  queue_.clear ();
+  queue_.push_back (place);
+  labels_[place] = label;
+  for (std::size_t next = 0; next < queue_.size (); next++) {
+    points += points_[queue_[next]];
+    for_neighbours (queue_[next], kSide, [&] (int other) {
+      if (points_[other] > 0 && labels_[other] == 0) {
+        labels_[other] = label;
+        queue_.push_back (static_cast<std::uint16_t> (other));
+      }
+    });
+  }
+  return points;
+}
+
+/* Places of nobody go to the nearest body. */
+void
+Bodies::spread ()
+{
+  queue_.clear ();
+  for (int place = 0; place < kSide * kSide; place++)
+    if (body_[place] != kNobody)
+      queue_.push_back (static_cast<std::uint16_t> (place));
+  for (std::size_t next = 0; next < queue_.size (); next++)
+    for_neighbours (queue_[next], kSide, [&] (int other) {
+      if (body_[other] == kNobody) {
+        body_[other] = body_[queue_[next]];
+        queue_.push_back (static_cast<std::uint16_t> (other));
+      }
+    });
+}
+
+/* Labels connected places, and lists the largest. @return how many are listed */
+int
+Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
+{
+  /* A place with a point or two is noise between bodies, not a bridge. */
+  const std::uint32_t least = 1 + counted_ / 5000;
+  for (std::uint32_t &points : points_)
+    points = points > least ? points : 0;
+  labels_.assign (kSide * kSide, 0);
+  queue_.reserve (kSide * kSide);
+  int count = 0;
+  std::uint16_t label = 0;
+  const auto enough = static_cast<std::uint32_t> (kLeastShare * counted_);
+  for (int place = 0; place < kSide * kSide; place++) {
+    if (points_[place] == 0 || labels_[place] != 0)
+      continue;
+    const std::uint32_t points = fill_body (static_cast<std::uint16_t> (place), ++label);
+    if (points <= enough)
+      continue;
+    found[count] = {points, label};
+    count = std::min (count + 1, most);
+    std::sort (found.begin (), found.end (), [] (const Found &a, const Found &b) {
+      return a.points != b.points ? a.points > b.points : a.label < b.label;
+    });
+    found[most] = {};
+  }
+  return count;
+}
+
+int
+Bodies::find (const WorldPoints &cloud, int most)
+{
+  count_ = 1;
+  if (most <= 1 || cloud.size () == 0)
+    return 1;
+  lay_grid (cloud);
+  count_points (cloud);
+  std::array<Found, kMaxBodies + 1> found{};
+  count_ = std::max (1, label_places (most, found));
+  if (count_ == 1)
+    return 1;
+  body_.assign (kSide * kSide, kNobody);
+  for (int place = 0; place < kSide * kSide; place++)
+    for (int body = 0; body < count_; body++)
+      if (labels_[place] == found[body].label)
+        body_[place] = static_cast<std::uint8_t> (body);
+  spread ();
+  const std::size_t points = cloud.x.size ();
+  if (pixel_.size () < points) { /* the last to grow: all have grown */
+    for (auto *array : {&x_, &y_, &z_})
+      array->resize (points);
+    pixel_.resize (points);
+  }
+  return count_;
+}
+
+void
+Bodies::sort_part (
+    WorldPoints &cloud, std::size_t number, std::array<std::size_t, kMaxBodies> &ends)
+{
+  const WorldPoints::Part part = cloud.parts ()[number];
+  const auto body_of = [&] (std::size_t i) { return body_[place_of (cloud.x[i], cloud.z[i])]; };
+  std::array<std::size_t, kMaxBodies + 1> to{};
+  for (std::size_t i = part.begin; i < part.end; i++)
+    to[body_of (i) + 1]++;
+  to[0] = part.begin;
+  for (int body = 0; body < kMaxBodies; body++)
+    to[body + 1] += to[body];
+  for (std::size_t i = part.begin; i < part.end; i++) {
+    const std::size_t at = to[body_of (i)]++;
+    x_[at] = cloud.x[i];
+    y_[at] = cloud.y[i];
+    z_[at] = cloud.z[i];
+    pixel_[at] = cloud.pixel[i];
+  }
+  const auto put_back = [&] (const auto &from, auto &into) {
+    std::copy (from.begin () + part.begin, from.begin () + part.end, into.begin () + part.begin);
+  };
+  put_back (x_, cloud.x);
+  put_back (y_, cloud.y);
+  put_back (z_, cloud.z);
+  put_back (pixel_, cloud.pixel);
+  std::copy_n (to.begin (), kMaxBodies, ends.begin ());
+}
+
+} // namespace rangecast

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "cell_rows.hpp"
+#include "../geometry/world_points.hpp"
+
+namespace rangecast {
+
+/** Tells apart what stands beside each other: connected places of the floor plan, seen from above
+ *  (world x, z) on a coarse grid. Keeps its memory from frame to frame: some 100 KB, and 16 bytes a
+ *  point once there are two bodies. */
+class Bodies {
+public:
+  /** Side of a place, metres, unless the points spread over more than kSide of them: bodies are
+   *  two if nothing stands in a gap of two places, so 8 cm at most. */
+  static constexpr float kPlace = 0.04f;
+  /** Share of all points that a body has at least; what is smaller goes to the nearest body. */
+  static constexpr double kLeastShare = 0.05;
+
+  /** Finds the bodies.
+   *  @param most  bodies, 1 .. kMaxBodies; of more the largest are taken
+   *  @return how many there are, at least 1 */
+  int find (const WorldPoints &cloud, int most);
+
+  /** Brings the points of each body together in a part.
+   *  @param[out] ends  end of each body in the part; the first one begins with it. Parts may be
+   *                    sorted at the same time */
+  void sort_part (WorldPoints &cloud, std::size_t part, std::array<std::size_t, kMaxBodies> &ends);
+
+private:
+  static constexpr int kSide = 128; /* places each way */
+  static constexpr std::uint8_t kNobody = 255;
+
+  void lay_grid (const WorldPoints &cloud);
+  void count_points (const WorldPoints &cloud);
+  struct Found {
+    std::uint32_t points = 0;
+    std::uint16_t label = 0;
+  };
+  int label_places (int most, std::array<Found, kMaxBodies + 1> &found);
+  std::uint32_t fill_body (std::uint16_t place, std::uint16_t label);
+  void spread ();
+  [[nodiscard]] int place_of (float x, float z) const
+  {
+    const int column = static_cast<int> ((x - x_min_) * places_per_metre_),
+              row = static_cast<int> ((z - z_min_) * places_per_metre_);
+    return std::clamp (row, 0, kSide - 1) * kSide + std::clamp (column, 0, kSide - 1);
+  }
+
+  float x_min_ = 0, z_min_ = 0, places_per_metre_ = 0;
+  std::uint32_t counted_ = 0;
+  int count_ = 1;
+  std::vector<std::uint32_t> points_; /* of each place */
+  std::vector<std::uint16_t> labels_; /* of each place */
+  std::vector<std::uint8_t> body_;    /* of each place */
+  std::vector<std::uint16_t> queue_;
+
+  std::vector<float> x_, y_, z_; /* while a part is sorted; as large as the cloud */
+  std::vector<std::uint32_t> pixel_;
+};
+
+} // namespace rangecast

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/view_pairs.hpp"
+#include "colour_cameras.hpp"
+
+namespace rangecast {
+
+/** Makes the cameras of a rig agree on colour: a gain for each view and channel, found where views
+ *  see the same surface.
+ *
+ *  A grid of pixels of each view (another grid in each frame) is looked up in the other views;
+ *  where the depths agree, and both see the surface well, the ratio of both colours is taken. For
+ * each pair of views and each channel the median of the ratios' logarithms tells how their gains
+ * differ; least squares over all pairs, each weighted by how much it shares, makes one gain of each
+ * view. Their median stays 1: nobody knows which camera is right, but one whose exposure is wrong
+ * is not to change the others. A gain on values that went through a camera's gamma curve stands for
+ * exposure and white balance, which are gains before it, as long as the curve is near a power. */
+class ColourBalance {
+public:
+  using Gains = std::array<float, 3>; ///< red, green, blue
+
+  /** No gain is larger than this, or smaller than its inverse. */
+  static constexpr float kMaxGain = 1.75f;
+  /** A new frame counts that much. */
+  static constexpr float kShareOfNew = 0.1f;
+  /** This much of a gain (2 in 1000, a quarter of a level) is left undone, so that cameras which
+   *  agree are left alone, bit by bit. */
+  static constexpr float kLeftUndone = 0.002f;
+
+  /** Takes the cameras and forgets the stream. */
+  Status set_rig (const Rig &rig);
+  /** Takes other poses and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig);
+  void reset ();
+
+  /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
+   *  be as it was before overlaps were cleared. Images without colour are left alone.
+   *  What a pair of views shared is kept while one of them is missing.
+   *  Nothing is allocated once all views have been seen together.
+   *  @return as ColourCameras::check(), kNoSpace without memory; colours are then untouched */
+  Status process (std::span<const RangeImage> images, int threads);
+
+  /** What the colours of a view were multiplied with in the last frame. */
+  [[nodiscard]] Gains gains (int view_id) const;
+  /** Whether they have been learnt. */
+  [[nodiscard]] bool has_gains (int view_id) const
+  {
+    return view_id >= 0 && view_id < kMaxViews && (started_ >> view_id & 1);
+  }
+
+private:
+  static constexpr int kBins = 640; /* of a histogram */
+  using Histogram = std::array<float, kBins>;
+  /* Of log (colour of `first` / colour of `second`), for each channel. */
+  struct Pair {
+    int first = 0, second = 0; /* view-ids, the smaller one first */
+    std::array<Histogram, 3> ratios{};
+  };
+
+  void learn (std::span<const RangeImage> images);
+  void age (std::span<const RangeImage> images);
+  void count_ratios (std::span<const RangeImage> images, std::size_t from);
+  void compare (std::span<const RangeImage> images, std::size_t from, int x, int y);
+  void solve ();
+  void follow (std::span<const RangeImage> images);
+  double middle_of_linked (std::uint64_t views);
+
+  ColourCameras cameras_;
+  std::uint64_t started_ = 0; /* bit i: the log gains of view-id i are known */
+  std::uint64_t linked_ = 0;  /* bit i: view-id i shares surface with another one */
+  std::uint32_t frame_ = 0;
+  std::array<Gains, kMaxViews> log_gains_{}; /* by view-id; smoothed */
+  std::array<int, kMaxViews> frames_{};      /* by view-id: that its gains were learnt from */
+  std::array<Gains, kMaxViews> measured_{};  /* by view-id, of this frame */
+  ViewPairs<Pair> pairs_;                    /* of views that were there together */
+  bool fresh_ = true; /* some of this frame's pairs have counted nothing yet */
+  std::vector<double> matrix_, right_, sorted_; /* of the least squares */
+};
+
+} // namespace rangecast

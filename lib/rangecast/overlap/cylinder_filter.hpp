@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "../geometry/range_image.hpp"
+#include "../geometry/rig.hpp"
+#include "../base/status.hpp"
+#include "axis.hpp"
+#include "clusters.hpp"
+#include "redundant_points.hpp"
+#include "cells.hpp"
+#include "../geometry/world_points.hpp"
+
+namespace rangecast {
+
+inline constexpr double kMaxOverlap = 16; ///< pixels
+
+struct CylinderSettings {
+  AxisMode axis = AxisMode::kPrincipal;
+  Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
+  UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
+  /** How far round a point the winner's surface must cover its view's own before it goes, 0 ..
+   *  kMaxOverlap pixels of its view; 1: as far as its triangles reach, and no hole opens. */
+  double overlap = 1;
+  int threads = 1; ///< views, and slices, at a time; 0 = number of cores
+  /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
+   *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
+  double hysteresis = 0.2;
+  /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
+   *  each), 0 .. 2. 0 = none. */
+  double agreement = 0.1;
+  /** Bodies that stand beside each other get a cylinder each, so many at most, 1 .. kMaxBodies; 1:
+   *  one cylinder for all. Not with AxisMode::kFixed. */
+  int bodies = 4;
+};
+
+/** What one frame came to. */
+struct CylinderResult {
+  std::uint64_t points_in = 0;    ///< valid pixels before
+  std::uint64_t points_out = 0;   ///< valid pixels after
+  std::uint64_t units = 0;        ///< units with points
+  std::uint64_t units_shared = 0; ///< units with points of more than one view
+  Axis axis;                      ///< of the cylinder of the largest body
+  int bodies = 0;                 ///< cylinders
+  /** Surfaces in units that some view won in the frame before, too; and those of them that another
+   *  view won now. */
+  std::uint64_t units_held = 0, units_changed = 0;
+};
+
+/** Clears the points that several views see of the same place, all but those of the view that sees
+ * it most squarely.
+ *
+ *  All points go onto the inner wall of a cylinder about the object's axis, which is cut into units
+ * of equal height and angle. In a unit with points of several views, let T be the mean of the
+ * views' tangents in the slice, weighted by their numbers of points (Units). The view whose optical
+ * axis has the smallest inner product with T stays; the others' points there become invalid.
+ *
+ *  Beyond that plain rule:
+ *  - Points of a unit with a gap in radius between them are different surfaces and do not compete.
+ *  - T is summed over a neighbourhood, and a view competes in a unit that it has no point in, but
+ *    points on both sides of. Without either, winners along a seam are a matter of chance.
+ *  - Optical axes need not lie in the slice plane. What is compared is |N . a| (N: normal of T in
+ *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
+ *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
+ *    being shorter in the plane.
+ *  - A point goes only if the winner's own surface covers what its view draws of it
+ *    (RedundantPoints): a unit can be larger than what its winner sees of it, the winner may see
+ *    something before the point, have a hole there, or see a thin thing from its other side.
+ *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
+ *  - Added to |N . a| is something for the view that won the unit in the frame before (hysteresis)
+ *    and for those that won its neighbours (agreement).
+ *  - Bodies that stand beside each other have a cylinder each (Bodies).
+ *  - Of more than four surfaces in a unit, those beyond the fourth stay (UnitRows).
+ *  Coordinates and colours are never changed. */
+class CylinderFilter {
+public:
+  /** Takes the cameras and forgets the stream. All views must be range views. */
+  Status set_rig (const Rig &rig);
+  /** Takes other poses, or other cameras, and keeps what it knows of the stream. */
+  Status change_rig (const Rig &rig);
+  /** Forgets where the axis was and who won. */
+  void reset ();
+
+  /** Clears depths in place. A frame set of less than two images with points is left alone.
+   *  Nothing is allocated once the largest frame set has been seen.
+   *  @return kBadValue for settings out of range, kNotFound for a view that the rig has not,
+   *  kBadSize for more than kMaxViews images, kNoSpace without memory; depth is then untouched. */
+  Status process (
+      std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
+
+  /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
+   *  the other, from the lowest up. None if it had points of fewer than two views. */
+  [[nodiscard]] int unit_slices () const { return decided_ ? units_.rows.old_slices () : 0; }
+  /** The view-id of the winner of a unit's outermost surface; -1 where the frame set has no points.
+   */
+  [[nodiscard]] int unit_winner (int slice, int column) const
+  {
+    return decided_ ? units_.rows.old_winner (slice, column) : -1;
+  }
+
+private:
+  Status work (
+      std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
+  Status take_cameras (std::span<const RangeImage> images);
+  void forget_other_geometry (const CylinderSettings &settings);
+  void make_points (std::span<const RangeImage> images, int threads);
+  void find_bodies (const CylinderSettings &settings);
+  void choose_axes (const CylinderSettings &settings, std::size_t images);
+  void choose_slots (const std::array<Axis, kMaxBodies> &measured);
+  void unroll (const CylinderSettings &settings, std::size_t images);
+  void look_from (int body, const CylinderFrame &frame, std::size_t images);
+  void set_rules (const CylinderSettings &settings, std::size_t images);
+  void decide_units (const CylinderSettings &settings, CylinderResult &result);
+  void clear_redundant (std::span<const RangeImage> images, const CylinderSettings &settings);
+
+  std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
+  std::array<PixelLookup, kMaxViews> rig_lookups_;
+  std::array<float, kMaxViews> rig_units_per_metre_{};
+  std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
+  /* Of each body. A body keeps its place in these as long as it is there. */
+  std::array<AxisTracker, kMaxBodies> trackers_;
+  Bodies bodies_;
+  AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set, and its */
+  Axis fixed_axis_;
+  bool decided_ = false; /* it had winners */
+
+  /* Of the present frame; kept for their memory. By number of the image. */
+  std::array<PixelRays, kMaxViews> rays_;
+  std::array<int, kMaxViews> ids_{};
+  std::vector<Moments> moments_; /* of each run */
+  /* Where images see points of each body's cylinder. */
+  std::array<std::array<PixelLookup, kMaxViews>, kMaxBodies> lookups_;
+  Axis axis_; /* of the largest body */
+  std::array<Axis, kMaxBodies> axes_;
+  int body_count_ = 0;
+  std::array<int, kMaxBodies> slots_{}; /* of the bodies, the largest first */
+  WorldPoints cloud_;
+  std::vector<PointRun> runs_;
+  std::vector<WallRange> run_ranges_;
+  std::array<WallRange, kMaxBodies> ranges_;
+  std::vector<float> radius_;
+  std::vector<std::int32_t> column_;
+  Units units_;
+  RowRules rules_;
+  RedundantPoints redundant_;
+};
+
+} // namespace rangecast

@@ -1,0 +1,413 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "redundant_points.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "../geometry/pixel_transfer.hpp"
+#include "../base/parallel.hpp"
+#include "../base/lanes.hpp"
+
+namespace rangecast {
+
+/* Neighbours whose depths differ by more than this share are not joined; as striprender's
+ * depth-step. */
+constexpr float kDepthStep = 0.03f;
+/* How far off a surface a point may lie, in footprints of that view's pixels along the surface.
+ * Exact depth needs none; what is farther off may be another surface. */
+constexpr float kTolerance = 1;
+
+void
+RedundantPoints::Plane::reset (int width, int height, std::uint8_t value)
+{
+  stride_ = static_cast<std::size_t> (width + 2 * kMargin);
+  const std::size_t size = stride_ * static_cast<std::size_t> (height + 2);
+  if (bytes_.size () < size)
+    bytes_.resize (size);
+  std::fill_n (bytes_.begin (), size, value);
+}
+
+/* Where units of a slice have several layers, a point's column does not tell its cell. */
+void
+RedundantPoints::find_cells (const ResolvedFrame &frame)
+{
+  const Units &units = frame.units;
+  const UnitRows &rows = units.rows;
+  cell_of_.resize (std::max (cell_of_.size (), frame.cloud.x.size ()));
+  first_cell_.resize (units.slices.size ());
+  for (std::size_t s = 0; s < units.slices.size (); s++) {
+    const auto number = static_cast<int> (s);
+    const bool plain = units.is_plain (static_cast<std::uint32_t> (s));
+    first_cell_[s] = plain ? rows.cell (number, 0, 0) : kNoCell;
+    if (plain)
+      continue;
+    for (const UnitLayer &layer : units.layers_of (units.slices[s])) {
+      const std::uint32_t cell =
+          units.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
+      for (std::uint32_t i = 0; i < layer.point_count; i++)
+        cell_of_[units.points[layer.first_point + i].index] = cell;
+    }
+  }
+}
+
+/* Who won the unit of each point. */
+void
+RedundantPoints::list (const ResolvedFrame &frame)
+{
+  find_cells (frame);
+  const UnitRows &rows = frame.units.rows;
+  const std::uint32_t *slice_of = frame.units.slice_of.data ();
+  for (const PointRun &run : frame.runs) {
+    ImageState &image = images_[run.view];
+    for (std::size_t i = run.begin; i < run.end; i++) {
+      const std::uint32_t first = first_cell_[slice_of[i]];
+      const std::uint32_t cell =
+          first != kNoCell ? first + static_cast<std::uint32_t> (frame.column[i]) : cell_of_[i];
+      const int winner = cell == kNoCell ? -1 : rows.winner (cell);
+      if (winner < 0 || winner == static_cast<int> (run.view))
+        continue;
+      const std::uint32_t pixel = frame.cloud.pixel[i];
+      image.winner.row (static_cast<int> (pixel >> 16))[pixel & 0xffff] =
+          static_cast<std::uint8_t> (winner);
+      image.winners |= std::uint64_t{1} << winner;
+    }
+  }
+}
+
+/* Whether pixels of one image cover those of another that it won: the winner, called "other". */
+template <typename L> struct RedundantPoints::CoverLoop {
+  using F = typename L::F;
+  using I = typename L::I;
+  static constexpr int kLanes = L::kLanes;
+  /* Elements of a Row before its first pixel, and after its last. */
+  static constexpr int kPad = kMostLanes;
+
+  RedundantPoints &owner;
+  const RangeImage &image, &other;
+  ImageState &state, &other_state;
+  int winner;
+  float overlap;
+  PixelTransfer transfer; /* to the other image */
+  float per_focal;        /* of the other image */
+
+  CoverLoop (RedundantPoints &points, const ResolvedFrame &frame, std::size_t own,
+      std::size_t rival, double reach)
+      : owner (points), image (frame.images[own]), other (frame.images[rival]),
+        state (points.images_[own]), other_state (points.images_[rival]),
+        winner (static_cast<int> (rival)), overlap (static_cast<float> (reach)),
+        transfer (frame.rays[own], image.roi, frame.lookups[rival], other.roi)
+  {
+    const auto length = [] (const float *v) { return std::hypot (v[0], v[1], v[2]); };
+    per_focal = length (frame.rays[rival].right) * length (frame.lookups[rival].rows[2]);
+  }
+
+  /* Which columns of each row have candidates. */
+  bool find_candidates () const
+  {
+    auto &ranges = owner.candidates_;
+    bool any = false;
+    for (int y = 0; y < image.depth.height; y++) {
+      const std::uint8_t *row = state.winner.row (y), *end = row + image.depth.width;
+      const auto number = static_cast<std::uint8_t> (winner);
+      const std::uint8_t *first = std::find (row, end, number);
+      Range &range = ranges[static_cast<std::size_t> (y)];
+      range = {};
+      if (first == end)
+        continue;
+      while (end[-1] != number)
+        end--;
+      range = {static_cast<int> (first - row), static_cast<int> (end - row)};
+      any = true;
+    }
+    return any;
+  }
+
+  /* The places of a row's pixels that are candidates, or beside one. */
+  Row &make_row (int y) const
+  {
+    Row &row = owner.rows_[static_cast<std::size_t> (y + 3) % 3];
+    if (row.y == y)
+      return row;
+    row.y = y;
+    const bool is_in = y >= 0 && y < image.depth.height;
+    int begin = image.depth.width, end = 0;
+    for (int near = std::max (0, y - 1); near <= std::min (y + 1, image.depth.height - 1); near++) {
+      const Range &range = owner.candidates_[static_cast<std::size_t> (near)];
+      if (range.begin < range.end) {
+        begin = std::min (begin, range.begin - 1);
+        end = std::max (end, range.end + 1);
+      }
+    }
+    float *depth = row.depth.data () + kPad;
+    std::fill (depth + begin, depth + std::max (begin, end) + kLanes, 0.f);
+    if (is_in)
+      for (int x = std::max (0, begin); x < std::min (end, image.depth.width); x++)
+        depth[x] = image.depth.row (y)[x];
+    for (int x = begin; x < end; x += kLanes)
+      place (row, x, y);
+    return row;
+  }
+
+  /* A place so near a pixel is that pixel, so that the outline of one view ends at another's. */
+  static constexpr float kSnap = 1.f / 32;
+  static float snapped (float place)
+  {
+    const auto pixel = static_cast<float> (static_cast<int> (place + 0.5f));
+    return std::abs (place - pixel) < kSnap ? pixel : place;
+  }
+
+  /* Where the other image sees some pixels of a row, and whether they lie on its surface. */
+  void place (Row &row, int first, int y) const
+  {
+    const std::size_t at = static_cast<std::size_t> (kPad + first);
+    F x;
+    for (int i = 0; i < kLanes; i++)
+      x[i] = static_cast<float> (first + i);
+    const F depth = L::at (&row.depth[at]);
+    F seen_at[3];
+    for (int k = 0; k < 3; k++)
+      seen_at[k] = transfer.origin[k] +
+                   depth * (transfer.corner[k] + static_cast<float> (y) * transfer.down[k] +
+                               x * transfer.right[k]);
+    const F z = seen_at[2];
+    F u = seen_at[0] / z, v = seen_at[1] / z;
+    const I seen = (depth > 0) & (z > 0) & (u > -kSnap) & (v > -kSnap) &
+                   (u < static_cast<float> (other.depth.width - 1) + kSnap) &
+                   (v < static_cast<float> (other.depth.height - 1) + kSnap);
+    for (int i = 0; i < kLanes; i++)
+      if (seen[i]) {
+        u[i] = snapped (u[i]);
+        v[i] = snapped (v[i]);
+      }
+    L::at (&row.u[at]) = u;
+    L::at (&row.v[at]) = v;
+    compare_depths (u, v, z, seen, L::at (&row.on_surface[at]));
+  }
+
+  /* Whether what is seen at a place lies on the surface of the four pixels round it. */
+  void compare_depths (const F &u, const F &v, const F &z, const I &seen, I &on_surface) const
+  {
+    F corners[4] = {}, right_share = {}, down_share = {};
+    for (int i = 0; i < kLanes; i++) {
+      if (!seen[i])
+        continue;
+      const int left = static_cast<int> (u[i]), top = static_cast<int> (v[i]);
+      right_share[i] = u[i] - static_cast<float> (left);
+      down_share[i] = v[i] - static_cast<float> (top);
+      const int beside = right_share[i] > 0 ? 1 : 0;
+      const std::uint16_t *upper = other.depth.row (top) + left,
+                          *lower = other.depth.row (top + (down_share[i] > 0 ? 1 : 0)) + left;
+      corners[0][i] = upper[0];
+      corners[1][i] = upper[beside];
+      corners[2][i] = lower[0];
+      corners[3][i] = lower[beside];
+    }
+    F least = corners[0], most = corners[0];
+    for (int k = 1; k < 4; k++) {
+      least = corners[k] < least ? corners[k] : least;
+      most = corners[k] > most ? corners[k] : most;
+    }
+    const F above = corners[0] + right_share * (corners[1] - corners[0]),
+            below = corners[2] + right_share * (corners[3] - corners[2]);
+    F off = z - (above + down_share * (below - above));
+    L::make_positive (off);
+    on_surface = seen & (least > 0) & (off <= kTolerance * (z * per_focal + (most - least)));
+  }
+
+  /* What goes with a pixel, in the other image's plane. */
+  struct Extent {
+    F left, right, top, bottom;
+  };
+
+  static void widen (Extent &extent, const F &u, const F &v)
+  {
+    extent.left = u < extent.left ? u : extent.left;
+    extent.right = u > extent.right ? u : extent.right;
+    extent.top = v < extent.top ? v : extent.top;
+    extent.bottom = v > extent.bottom ? v : extent.bottom;
+  }
+
+  /* Where a pixel and its neighbours are seen, row by row; the pixel itself for those that do not
+   * join it. */
+  struct Patch {
+    F u[9], v[9];
+    I on_surface; /* all of them are */
+  };
+
+  void make_patch (Patch &patch, const Row *const (&rows)[3], int first) const
+  {
+    const auto at = static_cast<std::ptrdiff_t> (kPad + first);
+    const F depth = L::at (rows[1]->depth.data () + at), u = L::at (rows[1]->u.data () + at),
+            v = L::at (rows[1]->v.data () + at);
+    patch.on_surface = I{} - 1;
+    for (int k = 0; k < 9; k++) {
+      const Row &row = *rows[k / 3];
+      const std::ptrdiff_t there = at + k % 3 - 1;
+      const F neighbour = L::at (row.depth.data () + there);
+      F step = neighbour - depth;
+      L::make_positive (step);
+      const I joined =
+          (step <= kDepthStep * (neighbour < depth ? neighbour : depth)) & (neighbour > 0);
+      patch.u[k] = joined ? L::at (row.u.data () + there) : u;
+      patch.v[k] = joined ? L::at (row.v.data () + there) : v;
+      patch.on_surface &= L::at (row.on_surface.data () + there) | ~joined;
+    }
+  }
+
+  /* -1 where the other image sees the same side of the surface. */
+  static void find_facing (const Patch &patch, I &facing)
+  {
+    const F *u = patch.u, *v = patch.v;
+    const F right_u = u[2] + u[5] + u[8] - u[0] - u[3] - u[6],
+            right_v = v[2] + v[5] + v[8] - v[0] - v[3] - v[6],
+            down_u = u[6] + u[7] + u[8] - u[0] - u[1] - u[2],
+            down_v = v[6] + v[7] + v[8] - v[0] - v[1] - v[2];
+    facing = right_u * down_v - right_v * down_u >= 0; /* 0: a point alone */
+  }
+
+  /* Finds the candidates among some pixels that go. */
+  void decide (const Row *const (&rows)[3], int first, int end, int y) const
+  {
+    Patch patch;
+    make_patch (patch, rows, first);
+    I covered;
+    find_facing (patch, covered);
+    covered &= patch.on_surface;
+    if (!L::any (covered))
+      return;
+    const F u = patch.u[4], v = patch.v[4];
+    Extent extent = {u, u, v, v};
+    for (int k = 0; k < 9; k++)
+      widen (extent, u + overlap * (patch.u[k] - u), v + overlap * (patch.v[k] - v));
+    covered &= (extent.left >= 0) & (extent.top >= 0) &
+               (extent.right <= static_cast<float> (other.depth.width - 1)) &
+               (extent.bottom <= static_cast<float> (other.depth.height - 1));
+    std::uint8_t *won = state.winner.row (y) + first;
+    for (int i = 0; i < std::min (kLanes, end - first); i++)
+      if (covered[i] && won[i] == winner &&
+          is_closed (static_cast<int> (extent.left[i]), last_before (extent.right[i]),
+              static_cast<int> (extent.top[i]), last_before (extent.bottom[i]))) {
+        won[i] = kGoes;
+        remove (first + i, y);
+      }
+  }
+
+  /* The last pixel before a place. */
+  static int last_before (float place) { return static_cast<int> (std::ceil (place)) - 1; }
+
+  /* Whether the other image has a closed surface between these pixels, and one further each way. */
+  [[nodiscard]] bool is_closed (int left, int right_most, int top, int bottom) const
+  {
+    for (int y = top; y <= std::max (top, bottom); y++) {
+      const std::uint8_t *row = other_state.surface.row (y);
+      for (int x = left; x <= std::max (left, right_most); x += 8) {
+        std::uint64_t eight;
+        std::memcpy (&eight, row + x, sizeof eight);
+        const int beyond = std::max (0, x + 7 - std::max (left, right_most));
+        if ((~eight & ~std::uint64_t{0} >> 8 * beyond) != 0)
+          return false;
+      }
+    }
+    return true;
+  }
+
+  void remove (int x, int y) const
+  {
+    for (int row = y - 1; row <= y; row++)
+      std::fill_n (state.surface.row (row) + x - 1, 2, std::uint8_t{0});
+    owner.count_++;
+  }
+
+  void run () const
+  {
+    if (!find_candidates ())
+      return;
+    for (Row &row : owner.rows_)
+      row.y = -2;
+    for (int y = 0; y < image.depth.height; y++) {
+      const Range &range = owner.candidates_[static_cast<std::size_t> (y)];
+      if (range.begin == range.end)
+        continue;
+      const Row *const rows[] = {&make_row (y - 1), &make_row (y), &make_row (y + 1)};
+      for (int x = range.begin; x < range.end; x += kLanes)
+        decide (rows, x, range.end, y);
+    }
+  }
+};
+
+/* What each processor runs. */
+struct RedundantPoints::Twins {
+  [[RANGECAST_CYLINDER_ANY]] static void run (const CoverLoop<Narrow> &loop) { loop.run (); }
+  [[RANGECAST_CYLINDER_AVX2]] static void run (const CoverLoop<Wide> &loop) { loop.run (); }
+};
+
+void
+RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
+{
+  constexpr std::uint32_t kStep = static_cast<std::uint32_t> (kDepthStep * 65536);
+  for (int y = 0; y + 1 < image.depth.height; y++) {
+    const std::uint16_t *upper = image.depth.row (y), *lower = image.depth.row (y + 1);
+    std::uint8_t *to = surface.row (y);
+    for (int x = 0; x + 1 < image.depth.width; x++) {
+      const std::uint32_t least = std::min (
+                              std::min (upper[x], upper[x + 1]), std::min (lower[x], lower[x + 1])),
+                          most = std::max (
+                              std::max (upper[x], upper[x + 1]), std::max (lower[x], lower[x + 1]));
+      to[x] = least != kInvalidDepth && most - least <= least * kStep >> 16 ? kSurface : 0;
+    }
+  }
+}
+
+void
+RedundantPoints::find (const ResolvedFrame &frame, double overlap, int threads)
+{
+  const std::size_t count = frame.images.size ();
+  std::size_t width = 0, height = 0;
+  count_ = 0;
+  for (std::size_t i = 0; i < count; i++) {
+    const auto &depth = frame.images[i].depth;
+    images_[i].winners = 0;
+    images_[i].winner.reset (depth.width, depth.height, kNobody);
+    images_[i].surface.reset (depth.width, depth.height, 0);
+    width = std::max (width, static_cast<std::size_t> (depth.width));
+    height = std::max (height, static_cast<std::size_t> (depth.height));
+  }
+  if (candidates_.size () < height)
+    candidates_.resize (height);
+  for (Row &row : rows_) {
+    const std::size_t size = width + 4 * kMostLanes;
+    if (row.on_surface.size () >= size)
+      continue;
+    for (auto *numbers : {&row.depth, &row.u, &row.v})
+      numbers->resize (size);
+    row.on_surface.resize (size); /* the last to grow: all have grown */
+  }
+  in_parallel (
+      count, threads, [&] (std::size_t i) { make_surface (frame.images[i], images_[i].surface); });
+  list (frame);
+  const bool avx2 = cpu_level () >= CpuLevel::kAvx2;
+  for (std::size_t i = 0; i < count; i++)
+    for (std::uint64_t rest = images_[i].winners; rest; rest &= rest - 1) {
+      const auto winner = static_cast<std::size_t> (std::countr_zero (rest));
+      avx2 ? Twins::run (CoverLoop<Wide> (*this, frame, i, winner, overlap))
+           : Twins::run (CoverLoop<Narrow> (*this, frame, i, winner, overlap));
+    }
+}
+
+void
+RedundantPoints::clear (const ResolvedFrame &frame)
+{
+  for (std::size_t i = 0; i < frame.images.size (); i++) {
+    const auto &depth = frame.images[i].depth;
+    for (int y = 0; y < depth.height && images_[i].winners; y++) {
+      const std::uint8_t *winner = images_[i].winner.row (y);
+      std::uint16_t *row = depth.row (y);
+      for (int x = 0; x < depth.width; x++)
+        row[x] = winner[x] == kGoes ? kInvalidDepth : row[x];
+    }
+  }
+}
+
+} // namespace rangecast

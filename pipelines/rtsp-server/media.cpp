@@ -1,0 +1,534 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "media.hpp"
+
+#include <gst/video/video.h>
+
+#include "join.hpp"
+#include "tcp-viewer.hpp"
+
+static const char kCodedType[] = "application/x-neighbour-code";
+static const char kLiveKey[] = "rangecast-live"; /* of a media: gives frame sets as they come */
+/* EOS waits so long for the last frame set's time, and then for it to be sent. */
+static constexpr gint64 kLongestEnd_us = 2 * G_USEC_PER_SEC;
+static constexpr GstClockTime kSending = 100 * GST_MSECOND;
+
+/* ---- the launch string ---- */
+
+/* test-launch of gst-rtsp-server wants parentheses, so people write them. */
+static std::string
+without_parentheses (const std::string &launch)
+{
+  if (launch.size () < 2 || launch.front () != '(' || launch.back () != ')')
+    return launch;
+  return launch.substr (1, launch.size () - 2);
+}
+
+static bool
+may_give (GstPad *pad, const char *media_type)
+{
+  GstCaps *caps = gst_pad_query_caps (pad, nullptr);
+  bool may = false;
+  for (guint i = 0; i < gst_caps_get_size (caps) && !may; i++)
+    may = gst_structure_has_name (gst_caps_get_structure (caps, i), media_type);
+  gst_caps_unref (caps);
+  return may;
+}
+
+static void
+set_error (GError **error, const std::string &text)
+{
+  g_set_error_literal (error, GST_PARSE_ERROR, GST_PARSE_ERROR_LINK, text.c_str ());
+}
+
+static bool
+add_payloader (GstBin *bin, GError **error)
+{
+  GstPad *end = gst_bin_find_unlinked_pad (bin, GST_PAD_SRC);
+  if (!end) {
+    set_error (error, "expected a payloader named pay0, or coded frame sets that lead nowhere yet");
+    return false;
+  }
+  bool added = false;
+  GstElement *payloader = nullptr;
+  if (!may_give (end, kCodedType)) {
+    gchar *name = gst_pad_get_name (end);
+    GstElement *owner = gst_pad_get_parent_element (end);
+    set_error (error, std::string ("expected coded frame sets at the end (neighbourcodeenc), or a "
+                                   "payloader named pay0; the end is pad ") +
+                          name + " of " + GST_OBJECT_NAME (owner));
+    gst_object_unref (owner);
+    g_free (name);
+  } else if (!(payloader = gst_element_factory_make ("rtpneighbourcodepay", "pay0"))) {
+    set_error (error, "there is no element rtpneighbourcodepay: expected GST_PLUGIN_PATH to lead "
+                      "to the plugins of gst-rangecast, as pipelines/env.sh does");
+  } else {
+    gst_bin_add (bin, payloader);
+    GstPad *sink = gst_element_get_static_pad (payloader, "sink");
+    added = gst_pad_link (end, sink) == GST_PAD_LINK_OK;
+    gst_object_unref (sink);
+    if (!added)
+      set_error (error, "the end of the launch string cannot be linked to rtpneighbourcodepay");
+  }
+  gst_object_unref (end);
+  return added;
+}
+
+GstElement *
+make_stream_bin (const std::string &launch, GError **error)
+{
+  GstElement *bin = gst_parse_bin_from_description_full (
+      without_parentheses (launch).c_str (), FALSE, nullptr, GST_PARSE_FLAG_FATAL_ERRORS, error);
+  if (!bin)
+    return nullptr;
+  if (GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0")) {
+    gst_object_unref (payloader);
+    return bin;
+  }
+  if (add_payloader (GST_BIN (bin), error))
+    return bin;
+  gst_object_unref (gst_object_ref_sink (bin));
+  return nullptr;
+}
+
+/* ---- the media ---- */
+
+struct Stage {
+  StreamCounts *counts;
+  StreamEnd on_end;
+};
+
+/* Who hears what a media says; it may say its last when it is gone already. */
+struct Listener {
+  Listener (GstRTSPMedia *media, const StreamEnd &on_end) : on_end_ (on_end)
+  {
+    g_weak_ref_init (&media_, media);
+  }
+  ~Listener () { g_weak_ref_clear (&media_); }
+  void tell (bool is_over, const std::string &why)
+  {
+    auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
+    if (!media)
+      return;
+    on_end_ (media, is_over, why);
+    g_object_unref (media);
+  }
+
+  /* Of a media that has its first frame set. */
+  bool is_live ()
+  {
+    auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
+    const bool live = media && g_object_get_data (G_OBJECT (media), kLiveKey);
+    g_clear_object (&media);
+    return live;
+  }
+
+private:
+  GWeakRef media_;
+  StreamEnd on_end_;
+};
+
+static void
+delete_listener_of_signal (gpointer listener, GClosure *)
+{
+  delete static_cast<Listener *> (listener);
+}
+
+static void
+delete_stage (gpointer stage, GClosure *)
+{
+  delete static_cast<Stage *> (stage);
+}
+
+static void
+on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
+{
+  auto &listener = *static_cast<Listener *> (user_data);
+  GError *error = nullptr;
+  gchar *details = nullptr;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
+    if (GST_IS_PIPELINE (message->src))
+      listener.tell (true, "");
+    return;
+  }
+  const bool is_error = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR;
+  if (is_error)
+    gst_message_parse_error (message, &error, &details);
+  else
+    gst_message_parse_warning (message, &error, nullptr);
+  const std::string text = std::string (GST_OBJECT_NAME (message->src)) + ": " + error->message;
+  if (is_error)
+    listener.tell (true, details ? text + "\n" + details : text);
+  else
+    g_printerr ("rtsp-server: warning: %s\n", text.c_str ());
+  g_free (details);
+  g_error_free (error);
+}
+
+static void
+note_packet (StreamCounts &counts, GstBuffer *packet)
+{
+  counts.bytes += gst_buffer_get_size (packet);
+  if (GST_BUFFER_FLAG_IS_SET (packet, GST_BUFFER_FLAG_MARKER))
+    counts.frame_sets++;
+}
+
+static GstPadProbeReturn
+on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+{
+  StreamCounts &counts = *static_cast<StreamCounts *> (user_data);
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) {
+    GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+    for (guint i = 0; i < gst_buffer_list_length (list); i++)
+      note_packet (counts, gst_buffer_list_get (list, i));
+  } else if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER) {
+    note_packet (counts, GST_PAD_PROBE_INFO_BUFFER (info));
+  } else if (gst_video_event_is_force_key_unit (GST_PAD_PROBE_INFO_EVENT (info))) {
+    counts.key_requests++;
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+/* The one pay0, or the first of several. */
+static GstPad *
+payload_pad (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
+  GstPad *pad = payloader ? gst_element_get_static_pad (payloader, "src") : nullptr;
+  gst_clear_object (&payloader);
+  gst_object_unref (bin);
+  return pad;
+}
+
+static const char kPreparedKey[] = "rangecast-prepared"; /* of a media: has its first frame set */
+
+static bool
+is_live (GstRTSPMedia *media)
+{
+  GstQuery *query = gst_query_new_latency ();
+  gboolean live = FALSE;
+  if (GstPad *pad = payload_pad (media)) {
+    if (gst_pad_query (pad, query))
+      gst_query_parse_latency (query, &live, nullptr, nullptr);
+    gst_object_unref (pad);
+  }
+  gst_query_unref (query);
+  return live;
+}
+
+static void
+on_prepared (GstRTSPMedia *media, gpointer)
+{
+  g_object_set_data (G_OBJECT (media), kPreparedKey, media);
+  g_object_set_data (G_OBJECT (media), kLiveKey, is_live (media) ? media : nullptr);
+  send_as_they_come (media);
+}
+
+/* Of which the library's switch says nothing. */
+static void
+free_udp_sinks (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GstIterator *sinks =
+        gst_bin_iterate_elements (GST_BIN (pipeline)); /* not those of the launch string */
+    const auto free_sink = [] (const GValue *sink, gpointer) {
+      auto element = GST_ELEMENT (g_value_get_object (sink));
+      GstElementFactory *factory = gst_element_get_factory (element);
+      if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
+        g_object_set (element, "sync", FALSE, nullptr);
+    };
+    while (gst_iterator_foreach (sinks, free_sink, nullptr) == GST_ITERATOR_RESYNC)
+      gst_iterator_resync (sinks);
+    gst_iterator_free (sinks);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+}
+
+void
+send_as_they_come (GstRTSPMedia *media)
+{
+  if (!g_object_get_data (G_OBJECT (media), kLiveKey))
+    return;
+  gst_rtsp_media_set_rate_control (media, FALSE);
+  free_udp_sinks (media);
+  for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++) {
+    GObject *session = gst_rtsp_stream_get_rtpsession (gst_rtsp_media_get_stream (media, i));
+    if (!session)
+      continue;
+    g_object_set (session, "disable-sr-timestamp", FALSE, nullptr); /* the library set it */
+    g_object_unref (session);
+  }
+}
+
+/* The library's class has none of its own. */
+static GstRTSPStatusCode
+adjust_play_mode (GstRTSPClient *, GstRTSPContext *context, GstRTSPTimeRange **, GstSeekFlags *,
+    gdouble *, GstClockTime *, gboolean *enable_rate_control)
+{
+  if (context->media && g_object_get_data (G_OBJECT (context->media), kLiveKey))
+    *enable_rate_control = FALSE;
+  return GST_RTSP_STS_OK;
+}
+
+void
+let_live_media_play ()
+{
+  auto klass = static_cast<GstRTSPClientClass *> (g_type_class_ref (GST_TYPE_RTSP_CLIENT));
+  if (!klass->adjust_play_mode)
+    klass->adjust_play_mode = adjust_play_mode;
+}
+
+void
+request_key_frame_set (GstRTSPMedia *media)
+{
+  if (GstPad *pad = payload_pad (media)) {
+    gst_pad_send_event (
+        pad, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
+    gst_object_unref (pad);
+  }
+}
+
+/* ---- the end of the stream ---- */
+
+struct EndWatch {
+  Listener listener;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* streaming thread */
+};
+
+static void
+delete_end_watch (gpointer watch)
+{
+  delete static_cast<EndWatch *> (watch);
+}
+
+/* Of the pad's element; NONE where there is none. */
+static GstClockTime
+clock_time_of (GstPad *pad, GstElement *element, GstClockTime pts)
+{
+  GstClockTime running_time = GST_CLOCK_TIME_NONE;
+  if (GstEvent *event = gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0)) {
+    const GstSegment *segment = nullptr;
+    gst_event_parse_segment (event, &segment);
+    running_time = gst_segment_to_running_time (segment, GST_FORMAT_TIME, pts);
+    gst_event_unref (event);
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (running_time))
+    return GST_CLOCK_TIME_NONE;
+  return gst_element_get_base_time (element) + running_time;
+}
+
+/* The RTP session says goodbye to the viewers as soon as it has EOS, when the last frame sets still
+ * wait in the sinks for their time; and players end there. So EOS waits for them. */
+static void
+wait_for_sinks (GstPad *pad, GstClockTime last_pts)
+{
+  GstElement *element = gst_pad_get_parent_element (pad);
+  GstClock *clock = element ? gst_element_get_clock (element) : nullptr;
+  if (clock && GST_CLOCK_TIME_IS_VALID (last_pts)) {
+    const GstClockTime due = clock_time_of (pad, element, last_pts);
+    const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
+    while (GST_CLOCK_TIME_IS_VALID (due) && gst_clock_get_time (clock) < due + kSending &&
+           !GST_PAD_IS_FLUSHING (pad) && g_get_monotonic_time () < until_us)
+      g_usleep (10000);
+  }
+  gst_clear_object (&clock);
+  gst_clear_object (&element);
+}
+
+/* Viewers are told of the end when the payloader has passed it; the sinks, and so the bus, come to
+ * it only when the last frame set's time is over. */
+static GstPadProbeReturn
+on_payload_end (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
+{
+  auto &watch = *static_cast<EndWatch *> (user_data);
+  const GstPadProbeType type = GST_PAD_PROBE_INFO_TYPE (info);
+  if (type & GST_PAD_PROBE_TYPE_BUFFER) {
+    watch.last_pts = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
+  } else if (type & GST_PAD_PROBE_TYPE_BUFFER_LIST) {
+    GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+    if (gst_buffer_list_length (list) > 0)
+      watch.last_pts = GST_BUFFER_PTS (gst_buffer_list_get (list, 0));
+  } else if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS) {
+    watch.listener.tell (false, "");
+    if (!watch.listener.is_live ())
+      wait_for_sinks (pad, watch.last_pts);
+  }
+  return GST_PAD_PROBE_OK;
+}
+
+/* ---- the factory ---- */
+
+G_BEGIN_DECLS
+struct LaunchFactory {
+  GstRTSPMediaFactory parent;
+  gint run;        /* atomic */
+  gint ends;       /* atomic: the server does */
+  GWeakRef latest; /* media */
+};
+struct LaunchFactoryClass {
+  GstRTSPMediaFactoryClass parent_class;
+};
+G_END_DECLS
+G_DEFINE_TYPE (LaunchFactory, launch_factory, GST_TYPE_RTSP_MEDIA_FACTORY)
+
+static GstElement *
+launch_factory_create_element (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
+{
+  gchar *launch = gst_rtsp_media_factory_get_launch (factory);
+  GError *error = nullptr;
+  GstElement *bin = make_stream_bin (launch, &error);
+  if (!bin)
+    g_printerr ("rtsp-server: launch string: %s\n", error->message);
+  g_clear_error (&error);
+  g_free (launch);
+  return bin;
+}
+
+/* Whatever port or query a viewer asks with, it gets the one run. */
+static gchar *
+launch_factory_gen_key (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
+{
+  return g_strdup_printf (
+      "%d", g_atomic_int_get (&reinterpret_cast<LaunchFactory *> (factory)->run));
+}
+
+void
+begin_new_run (GstRTSPMediaFactory *factory)
+{
+  g_atomic_int_inc (&reinterpret_cast<LaunchFactory *> (factory)->run);
+}
+
+static void
+launch_factory_init (LaunchFactory *factory)
+{
+  g_weak_ref_init (&factory->latest, nullptr);
+}
+
+static void
+launch_factory_finalize (GObject *object)
+{
+  g_weak_ref_clear (&reinterpret_cast<LaunchFactory *> (object)->latest);
+  G_OBJECT_CLASS (launch_factory_parent_class)->finalize (object);
+}
+
+static void
+launch_factory_class_init (LaunchFactoryClass *klass)
+{
+  G_OBJECT_CLASS (klass)->finalize = launch_factory_finalize;
+  GST_RTSP_MEDIA_FACTORY_CLASS (klass)->create_element = launch_factory_create_element;
+  GST_RTSP_MEDIA_FACTORY_CLASS (klass)->gen_key = launch_factory_gen_key;
+}
+
+/* Who waits for its first frame set waits no longer: the library takes an error so, and waits up to
+ * 20 seconds otherwise. */
+static void
+fail (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GError *error = g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server ends");
+    gst_element_post_message (
+        GST_ELEMENT (pipeline), gst_message_new_error (pipeline, error, nullptr));
+    g_error_free (error);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+}
+
+void
+end_waiting (GstRTSPMediaFactory *factory)
+{
+  auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
+  g_atomic_int_set (&launch_factory->ends, 1);
+  auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&launch_factory->latest));
+  if (!media)
+    return;
+  if (!g_object_get_data (G_OBJECT (media), kPreparedKey))
+    fail (media);
+  g_object_unref (media);
+}
+
+static void
+on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer user_data)
+{
+  auto stage = static_cast<Stage *> (user_data);
+  auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  prepare_tcp_queues (media);
+  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+    gst_bus_enable_sync_message_emission (bus);
+    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
+      g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
+          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
+    gst_object_unref (bus);
+    GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
+    if (payloader && gst_rtsp_media_n_streams (media) == 1)
+      JoinGate::install (media, GST_ELEMENT (pipeline), payloader);
+    gst_clear_object (&payloader);
+    gst_object_unref (pipeline);
+  }
+  gst_object_unref (bin);
+  if (GstPad *pad = payload_pad (media)) {
+    gst_pad_add_probe (pad,
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
+                         GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
+        on_payload, stage->counts, nullptr);
+    if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
+      gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, on_payload_end,
+          new EndWatch{{media, stage->on_end}}, delete_end_watch);
+    gst_object_unref (pad);
+  }
+  g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
+  g_weak_ref_set (&launch_factory->latest, media);
+  if (g_atomic_int_get (&launch_factory->ends))
+    fail (media);
+}
+
+static void
+set_multicast (GstRTSPMediaFactory *factory, const MulticastRange &range)
+{
+  GstRTSPAddressPool *pool = gst_rtsp_address_pool_new ();
+  gst_rtsp_address_pool_add_range (pool, range.first.c_str (), range.last.c_str (),
+      guint16 (range.first_port), guint16 (range.last_port), guint8 (range.ttl));
+  gst_rtsp_media_factory_set_address_pool (factory, pool);
+  gst_rtsp_media_factory_set_max_mcast_ttl (factory, guint (range.ttl));
+  g_object_unref (pool);
+}
+
+GstRTSPMediaFactory *
+make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end)
+{
+  auto factory = GST_RTSP_MEDIA_FACTORY (g_object_new (launch_factory_get_type (), nullptr));
+  gst_rtsp_media_factory_set_launch (factory, options.launch.c_str ());
+  gst_rtsp_media_factory_set_shared (factory, TRUE);
+  gst_rtsp_media_factory_set_suspend_mode (factory, GST_RTSP_SUSPEND_MODE_NONE);
+  /* AVPF: viewers ask for key frame sets and lost packets at once. With AVP beside it the SDP would
+   * have two streams, and players take both. */
+  const bool is_clear = options.tcp && !options.udp && options.multicast.first.empty ();
+  gst_rtsp_media_factory_set_profiles (factory, options.certificate_file.empty () || is_clear
+                                                    ? GST_RTSP_PROFILE_AVPF
+                                                    : GST_RTSP_PROFILE_SAVPF);
+  int protocols = GST_RTSP_LOWER_TRANS_TCP; /* for the holder in any case */
+  if (options.udp)
+    protocols |= GST_RTSP_LOWER_TRANS_UDP;
+  if (!options.multicast.first.empty ()) {
+    protocols |= GST_RTSP_LOWER_TRANS_UDP_MCAST;
+    set_multicast (factory, options.multicast);
+  }
+  gst_rtsp_media_factory_set_protocols (factory, GstRTSPLowerTrans (protocols));
+  if (options.retransmission_ms > 0) {
+    gst_rtsp_media_factory_set_do_retransmission (factory, TRUE);
+    gst_rtsp_media_factory_set_retransmission_time (
+        factory, guint64 (options.retransmission_ms) * GST_MSECOND);
+  }
+  /* One role for all who may watch: a role's name is that of a GstStructure, a user's need not be.
+   */
+  gst_rtsp_media_factory_add_role (factory, kViewerRole, "media.factory.access", G_TYPE_BOOLEAN,
+      TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
+  g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
+      new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
+  return factory;
+}

@@ -1,0 +1,256 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "measure.hpp"
+
+#include <gstrange/gstrange.h>
+
+#include <algorithm>
+#include <utility>
+
+/* ---- reading elements ---- */
+
+static guint64
+stat_of (GstElement *element, const char *field)
+{
+  GstStructure *stats = nullptr;
+  guint64 value = 0;
+  if (!g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats"))
+    return 0;
+  g_object_get (element, "stats", &stats, nullptr);
+  if (!stats)
+    return 0;
+  gst_structure_get_uint64 (stats, field, &value);
+  gst_structure_free (stats);
+  return value;
+}
+
+static void
+add_jitterbuffer (const GValue *item, gpointer user_data)
+{
+  auto stats = static_cast<StreamStats *> (user_data);
+  auto element = GST_ELEMENT (g_value_get_object (item));
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory || g_strcmp0 (GST_OBJECT_NAME (factory), "rtpjitterbuffer") != 0)
+    return;
+  const guint64 lost = stat_of (element, "num-lost");
+  stats->rtp_packets += stat_of (element, "num-pushed") + lost;
+  stats->rtp_lost += lost;
+}
+
+static void
+read_cylinder (GstBin *bin, StreamStats &stats)
+{
+  GstElement *cylinder = gst_bin_get_by_name (bin, "cylinder");
+  if (!cylinder)
+    return;
+  stats.cylinder_frames = stat_of (cylinder, "frames");
+  stats.points_in = stat_of (cylinder, "points-in");
+  stats.points_out = stat_of (cylinder, "points-out");
+  gst_object_unref (cylinder);
+}
+
+static void
+read_decoder (GstBin *bin, StreamStats &stats)
+{
+  GstElement *decoder = gst_bin_get_by_name (bin, "decoder");
+  if (!decoder)
+    return;
+  stats.coded_frames = stat_of (decoder, "frames");
+  stats.raw_bytes = stat_of (decoder, "raw-bytes");
+  stats.coded_bytes = stat_of (decoder, "coded-bytes");
+  GstPad *pad = gst_element_get_static_pad (decoder, "src");
+  if (GstCaps *caps = gst_pad_get_current_caps (pad)) {
+    int views = 0;
+    gst_structure_get_int (gst_caps_get_structure (caps, 0), "views", &views);
+    stats.views = static_cast<guint64> (views);
+    gst_caps_unref (caps);
+  }
+  gst_object_unref (pad);
+  gst_object_unref (decoder);
+}
+
+StreamStats
+RunMeasure::stats ()
+{
+  StreamStats stats;
+  auto bin = GST_BIN (pipeline_);
+  read_cylinder (bin, stats);
+  read_decoder (bin, stats);
+  GstIterator *elements = gst_bin_iterate_recurse (bin);
+  while (gst_iterator_foreach (elements, add_jitterbuffer, &stats) == GST_ITERATOR_RESYNC) {
+    stats.rtp_packets = stats.rtp_lost = 0;
+    gst_iterator_resync (elements);
+  }
+  gst_iterator_free (elements);
+  std::lock_guard guard (lock_);
+  stats.frames = latencies_ms_.count ();
+  return stats;
+}
+
+double
+RunMeasure::fps ()
+{
+  std::lock_guard guard (lock_);
+  const auto n = latencies_ms_.count ();
+  if (n < 2 || last_frame_ <= first_frame_)
+    return 0;
+  return double (n - 1) * GST_SECOND / double (last_frame_ - first_frame_);
+}
+
+double
+RunMeasure::latency_ms (double p)
+{
+  std::unique_lock guard (lock_);
+  const LatencySamples samples = latencies_ms_;
+  guard.unlock (); /* no streaming thread waits while it sorts */
+  return samples.percentile (p);
+}
+
+guint64
+RunMeasure::whole_of (guint64 frames)
+{
+  std::lock_guard guard (lock_);
+  return decoded_ ? frames * whole_ / decoded_ : 0;
+}
+
+/* ---- probes, on streaming threads ---- */
+
+/* Until all views see somebody (the hosts are still learning their backgrounds) nothing is drawn,
+ * recorded or counted. A view that has nobody in it is not waited for for ever. */
+GstPadProbeReturn
+RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
+{
+  auto self = static_cast<RunMeasure *> (user_data);
+  GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
+  constexpr gint64 kPatienceUs = 2 * G_USEC_PER_SEC;
+  gpointer state = nullptr;
+  gint seen = 0;
+  while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (buffer, &state))
+    seen += meta->width > 0 && meta->height > 0;
+  const bool whole = seen >= std::max (1, self->options_.views);
+  std::lock_guard guard (self->lock_);
+  if (seen > 0 && self->first_points_us_ == 0)
+    self->first_points_us_ = g_get_monotonic_time ();
+  const bool tired = seen > 0 && g_get_monotonic_time () - self->first_points_us_ > kPatienceUs;
+  self->seen_points_ |= whole || tired;
+  if (self->seen_points_) {
+    self->decoded_++;
+    self->whole_ += whole;
+    if (whole)
+      self->whole_captures_[self->whole_ % self->whole_captures_.size ()] =
+          gst_range_buffer_get_capture_time (buffer);
+  }
+  self->views_now_ = seen;
+  return self->seen_points_ ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
+}
+
+/* @param[out] frames  that have passed, with this one
+ * @return false if there are enough already */
+bool
+RunMeasure::note_rendered (GstClockTime capture, gint &frames)
+{
+  GstClock *clock = gst_element_get_clock (pipeline_);
+  const GstClockTime now = clock ? gst_clock_get_time (clock) : gst_util_get_timestamp ();
+  gst_clear_object (&clock);
+  std::lock_guard guard (lock_);
+  if (options_.frames > 0 && latencies_ms_.count () >= guint64 (options_.frames))
+    return false;
+  if (!GST_CLOCK_TIME_IS_VALID (first_frame_))
+    first_frame_ = now;
+  last_frame_ = now;
+  const double latency_ms =
+      GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0;
+  latencies_ms_.add (latency_ms);
+  frames = gint (std::min<guint64> (latencies_ms_.count (), G_MAXINT));
+  if (frame_log_)
+    std::fprintf (frame_log_, "%.6f,%.3f,%d\n", double (now) * 1e-9, latency_ms, views_now_);
+  return true;
+}
+
+void
+RunMeasure::keep_if_whole (GstPad *pad, GstBuffer *picture)
+{
+  const GstClockTime capture = gst_range_buffer_get_capture_time (picture);
+  std::lock_guard guard (lock_);
+  if (!options_.snapshot || !GST_CLOCK_TIME_IS_VALID (capture) ||
+      std::ranges::find (whole_captures_, capture) == whole_captures_.end ())
+    return;
+  g_clear_pointer (&whole_picture_, gst_sample_unref);
+  GstCaps *caps = gst_pad_get_current_caps (pad);
+  whole_picture_ = gst_sample_new (picture, caps, nullptr, nullptr);
+  gst_caps_unref (caps);
+}
+
+GstSample *
+RunMeasure::last_whole_picture ()
+{
+  std::lock_guard guard (lock_);
+  return whole_picture_ ? gst_sample_ref (whole_picture_) : nullptr;
+}
+
+GstPadProbeReturn
+RunMeasure::count_rendered (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
+{
+  auto self = static_cast<RunMeasure *> (user_data);
+  gint frames = 0;
+  if (!self->note_rendered (
+          gst_range_buffer_get_capture_time (GST_PAD_PROBE_INFO_BUFFER (info)), frames))
+    return GST_PAD_PROBE_DROP;
+  self->keep_if_whole (pad, GST_PAD_PROBE_INFO_BUFFER (info));
+  const gint wanted = self->options_.frames;
+  if (wanted > 0 && frames == wanted)
+    self->on_last_ ();
+  if (self->turned_) /* the next picture; the last one is the first view's again */
+    g_object_set (
+        self->turned_, "azimuth", 360.0 * std::min (frames + 1, wanted) / wanted, nullptr);
+  return GST_PAD_PROBE_OK;
+}
+
+void
+RunMeasure::add_probe (const char *element_name, GstPadProbeCallback probe)
+{
+  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline_), element_name);
+  if (!element)
+    return;
+  GstPad *pad = gst_element_get_static_pad (element, "src");
+  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, probe, this, nullptr);
+  gst_object_unref (pad);
+  gst_object_unref (element);
+}
+
+/* ---- life ---- */
+
+RunMeasure::RunMeasure (
+    GstElement *pipeline, const RunOptions &options, std::function<void ()> on_last)
+    : pipeline_ (pipeline), options_ (options), on_last_ (std::move (on_last))
+{
+}
+
+RunMeasure::~RunMeasure ()
+{
+  gst_clear_object (&turned_);
+  g_clear_pointer (&whole_picture_, gst_sample_unref);
+  if (frame_log_)
+    std::fclose (frame_log_);
+}
+
+bool
+RunMeasure::log_frames (const char *path)
+{
+  frame_log_ = std::fopen (path, "w");
+  if (!frame_log_) {
+    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
+    return false;
+  }
+  std::setvbuf (frame_log_, nullptr, _IOLBF, 0); /* whoever watches reads it as it grows */
+  std::fprintf (frame_log_, "clock_s,latency_ms,views\n");
+  return true;
+}
+
+void
+RunMeasure::start ()
+{
+  if (options_.turn && options_.frames > 0)
+    turned_ = gst_bin_get_by_name (GST_BIN (pipeline_), "view");
+  add_probe ("decoder", count_views);
+  add_probe ("rendered", count_rendered);
+}

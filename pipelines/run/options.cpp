@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "options.hpp"
+
+#include <gst/gst.h>
+
+#include <initializer_list>
+
+RunOptions::~RunOptions ()
+{
+  for (gchar *text :
+      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key, drop_empty})
+    g_free (text);
+  g_strfreev (launch);
+}
+
+bool
+RunOptions::parse (int *argc, char ***argv)
+{
+  const GOptionEntry entries[] = {
+      {"base-time", 0, 0, G_OPTION_ARG_INT64, &base_time,
+          "Base time of the pipeline: that running time 0 is at this clock time", "NS"},
+      {"frames", 0, 0, G_OPTION_ARG_INT, &frames,
+          "Stop after N frames at the element named rendered (default 0: run to the end)", "N"},
+      {"views", 0, 0, G_OPTION_ARG_INT, &views,
+          "Begin when N views have points, or 2 s after the first one has (default 1)", "N"},
+      {"turn", 0, 0, G_OPTION_ARG_NONE, &turn,
+          "Turn the striprender named view once round in the N frames", nullptr},
+      {"timeout", 0, 0, G_OPTION_ARG_INT, &timeout_s,
+          "Fail if it has not ended by then (default 0: never)", "SECONDS"},
+      {"progress", 0, 0, G_OPTION_ARG_NONE, &progress, "Print a line every 2 s", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_STRING, &stats,
+          "Send the elements' statistics there, for top.sh: udp://HOST:PORT or a file (default: "
+          "environment RANGECAST_STATS, else nowhere)",
+          "ADDRESS"},
+      {"trace-latency", 0, 0, G_OPTION_ARG_FILENAME, &trace,
+          "Write when each buffer passed each pad (the first 4 million)", "FILE"},
+      {"report", 0, 0, G_OPTION_ARG_FILENAME, &report, "Write the measurements", "JSON"},
+      {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &snapshot,
+          "Write the last picture of all views, or of the sink named snapshot", "PNG"},
+      {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &frame_log,
+          "Write a line for each frame: its time, latency and views with points", "CSV"},
+      {"memory-log", 0, 0, G_OPTION_ARG_FILENAME, &memory_log,
+          "Append a line every 5 s: time, KiB of the heap in use", "CSV"},
+      {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &threads_left,
+          "Write the names of threads that still run when the pipeline is gone", "FILE"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &srtp_key,
+          "Key of every srtpenc and srtpdec: a file of 60 hexadecimal digits", "FILE"},
+      {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME, &drop_empty,
+          "Remove this file at the end if nothing was written to it", "FILE"},
+      {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &launch, nullptr, nullptr}, {}};
+  GOptionContext *context =
+      g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  const bool parsed = g_option_context_parse (context, argc, argv, &error);
+  if (!parsed)
+    g_printerr ("rangecast-run: %s\n", error->message);
+  else if (!launch)
+    g_printerr ("rangecast-run: expected a launch string, see --help\n");
+  g_clear_error (&error);
+  g_option_context_free (context);
+  return parsed && launch;
+}

@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Runs a launch string as gst-launch-1.0 does, and measures it: frames, latency from capture to
+ * the element named "rendered", points, bytes, RTP packets, CPU time. Reads only what any
+ * application can read: buffers, their metas, and the elements' `stats` properties.
+ *
+ * Elements it looks for, by name (all may be missing): "rendered" (frames and latency),
+ * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "view" (a striprender), "snapshot"
+ * (a sink whose last sample becomes a PNG); every rtpjitterbuffer, whatever its name. */
+#include <glib-unix.h>
+#include <glib/gstdio.h>
+#include <gst/gst.h>
+
+#include <clocale>
+#include <memory>
+#include <string>
+
+#include "latency-trace.hpp"
+#include "report.hpp"
+#include "srtp-key.hpp"
+#include "stats-sender.hpp"
+
+struct Runner {
+  RunOptions options;
+  GstElement *pipeline = nullptr;
+  GMainLoop *loop = nullptr;
+  std::unique_ptr<RunMeasure> measure;
+  std::unique_ptr<StatsSender> stats;
+  std::unique_ptr<LatencyTrace> trace;
+  bool failed = false;
+  bool ending = false;
+};
+
+static gboolean
+send_eos (gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  if (!runner->ending)
+    gst_element_send_event (runner->pipeline, gst_event_new_eos ());
+  runner->ending = true;
+  return G_SOURCE_REMOVE;
+}
+
+static gboolean
+on_message (GstBus *, GstMessage *message, gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  GError *error = nullptr;
+  gchar *details = nullptr;
+  switch (GST_MESSAGE_TYPE (message)) {
+    case GST_MESSAGE_ERROR:
+      gst_message_parse_error (message, &error, &details);
+      g_printerr ("ERROR: %s: %s\n%s\n", GST_OBJECT_NAME (message->src), error->message,
+          details ? details : "");
+      g_free (details);
+      g_error_free (error);
+      runner->failed = true;
+      g_main_loop_quit (runner->loop);
+      break;
+    case GST_MESSAGE_WARNING:
+      gst_message_parse_warning (message, &error, nullptr);
+      g_printerr ("WARNING: %s: %s\n", GST_OBJECT_NAME (message->src), error->message);
+      g_error_free (error);
+      break;
+    case GST_MESSAGE_LATENCY:
+      gst_bin_recalculate_latency (GST_BIN (runner->pipeline));
+      break;
+    case GST_MESSAGE_CLOCK_LOST:
+      gst_element_set_state (runner->pipeline, GST_STATE_PAUSED);
+      gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
+      break;
+    case GST_MESSAGE_ELEMENT:
+      if (runner->stats)
+        runner->stats->take (message);
+      break;
+    case GST_MESSAGE_EOS:
+      g_main_loop_quit (runner->loop);
+      break;
+    default:
+      break;
+  }
+  return G_SOURCE_CONTINUE;
+}
+
+/* Where the pipeline does not start. Some elements fail without a message. */
+static void
+tell_failure (Runner &runner, GstBus *bus)
+{
+  runner.failed = true;
+  if (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
+    on_message (bus, message, &runner);
+    gst_message_unref (message);
+  } else {
+    g_printerr ("ERROR: the pipeline does not start, and no element says why; GST_DEBUG=2 may\n");
+  }
+}
+
+static gboolean
+on_timeout (gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  g_printerr ("ERROR: no end of stream after %d s\n", runner->options.timeout_s);
+  runner->failed = true;
+  g_main_loop_quit (runner->loop);
+  return G_SOURCE_REMOVE;
+}
+
+/* What happens by time and by signals while the pipeline runs. */
+static void
+add_sources (Runner &runner)
+{
+  g_unix_signal_add (SIGINT, send_eos, &runner);
+  g_unix_signal_add (SIGTERM, send_eos, &runner);
+  if (runner.options.timeout_s > 0)
+    g_timeout_add_seconds (guint (runner.options.timeout_s), on_timeout, &runner);
+  const auto progress = [] (gpointer data) -> gboolean {
+    print_progress (*static_cast<Runner *> (data)->measure);
+    return G_SOURCE_CONTINUE;
+  };
+  if (runner.options.progress)
+    g_timeout_add_seconds (2, progress, &runner);
+  const auto memory = [] (gpointer data) -> gboolean {
+    log_memory (static_cast<Runner *> (data)->options.memory_log);
+    return G_SOURCE_CONTINUE;
+  };
+  if (runner.options.memory_log)
+    g_timeout_add_seconds (5, memory, &runner);
+}
+
+static void
+remove_empty (const char *path)
+{
+  GStatBuf file;
+  if (g_stat (path, &file) == 0 && S_ISREG (file.st_mode) && file.st_size == 0)
+    g_remove (path);
+}
+
+/* After the loop: what was asked for, from a pipeline that still has it, and its end. */
+static void
+finish (Runner &runner)
+{
+  const RunOptions &options = runner.options;
+  if (!runner.failed && options.report)
+    runner.failed = !write_report (*runner.measure, options.report);
+  if (!runner.failed && options.snapshot)
+    runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
+  gst_element_set_state (runner.pipeline, GST_STATE_NULL);
+  if (options.drop_empty)
+    remove_empty (options.drop_empty);
+  if (runner.trace && !runner.trace->write (options.trace)) {
+    g_printerr ("rangecast-run: %s: cannot be written\n", options.trace);
+    runner.failed = true;
+  }
+}
+
+static void
+play (Runner &runner)
+{
+  runner.loop = g_main_loop_new (nullptr, FALSE);
+  GstBus *bus = gst_element_get_bus (runner.pipeline);
+  gst_bus_add_watch (bus, on_message, &runner);
+  add_sources (runner);
+  if (runner.options.base_time >= 0) {
+    gst_element_set_start_time (runner.pipeline, GST_CLOCK_TIME_NONE);
+    gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
+  }
+  runner.measure->start ();
+  if (runner.options.trace)
+    runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
+
+  if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
+    tell_failure (runner, bus);
+  else
+    g_main_loop_run (runner.loop);
+  finish (runner);
+  gst_bus_remove_watch (bus);
+  gst_object_unref (bus);
+  g_main_loop_unref (runner.loop);
+}
+
+/* @return false if there is something wrong with the address */
+static bool
+open_stats (Runner &runner)
+{
+  const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
+  if (!address || !*address)
+    return true;
+  const char *host = g_getenv ("RANGECAST_HOST");
+  std::string error;
+  runner.stats = StatsSender::open (address, host && *host ? host : g_get_host_name (), error);
+  if (!runner.stats)
+    g_printerr ("rangecast-run: statistics: %s\n", error.c_str ());
+  return runner.stats != nullptr;
+}
+
+/* @return transfer full; null if the launch string is none, which has been said */
+static GstElement *
+parse_pipeline (gchar **launch)
+{
+  GError *error = nullptr;
+  GstElement *parsed = gst_parse_launchv (const_cast<const gchar **> (launch), &error);
+  if (!parsed || error) {
+    g_printerr ("ERROR: %s\n", error ? error->message : "empty launch string");
+    g_clear_error (&error);
+    gst_clear_object (&parsed);
+    return nullptr;
+  }
+  if (GST_IS_PIPELINE (parsed))
+    return parsed;
+  GstElement *pipeline = gst_pipeline_new (nullptr);
+  gst_bin_add (GST_BIN (pipeline), parsed);
+  return pipeline;
+}
+
+/* Gives the pipeline up. @return false if it failed, which has been said */
+static bool
+run (Runner &runner)
+{
+  const RunOptions &options = runner.options;
+  runner.measure = std::make_unique<RunMeasure> (
+      runner.pipeline, options, [&runner] { g_idle_add (send_eos, &runner); });
+  if ((options.frame_log && !runner.measure->log_frames (options.frame_log)) ||
+      (options.srtp_key && !give_srtp_key (runner.pipeline, options.srtp_key)))
+    runner.failed = true;
+  else
+    play (runner);
+  runner.trace.reset ();
+  runner.measure.reset ();
+  gst_object_unref (runner.pipeline);
+  return !runner.failed;
+}
+
+int
+main (int argc, char **argv)
+{
+  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
+  Runner runner;
+  if (!runner.options.parse (&argc, &argv) || !open_stats (runner))
+    return 2;
+  runner.pipeline = parse_pipeline (runner.options.launch);
+  if (!runner.pipeline)
+    return 1;
+  bool good = run (runner);
+  if (runner.options.threads_left)
+    good = write_threads_left (runner.options.threads_left) && good;
+  gst_deinit (); /* tracers write now what they found */
+  return good ? 0 : 1;
+}

@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "report.hpp"
+
+#include <gst/video/video.h>
+#include <malloc.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+static double
+cpu_seconds ()
+{
+  rusage usage;
+  getrusage (RUSAGE_SELF, &usage);
+  return usage.ru_utime.tv_sec + usage.ru_stime.tv_sec +
+         1e-6 * (usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+static double
+per_frame (guint64 total, guint64 frames)
+{
+  return frames ? double (total) / double (frames) : 0;
+}
+
+void
+print_progress (RunMeasure &measure)
+{
+  const StreamStats stats = measure.stats ();
+  if (stats.frames == 0)
+    std::printf ("  waiting: cameras learn their background\n");
+  else
+    std::printf ("  frame set %5" G_GUINT64_FORMAT "  %5.1f /s  %7.0f points  %6.1f ms\n",
+        stats.frames, measure.fps (), per_frame (stats.points_out, stats.cylinder_frames),
+        measure.latency_ms (0.5));
+  std::fflush (stdout);
+}
+
+bool
+write_report (RunMeasure &measure, const char *path)
+{
+  const StreamStats s = measure.stats ();
+  FILE *file = std::fopen (path, "w");
+  if (!file) {
+    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
+    return false;
+  }
+  std::fprintf (file,
+      "{\n  \"frames\": %" G_GUINT64_FORMAT ",\n  \"whole_frame_sets\": %" G_GUINT64_FORMAT
+      ",\n  \"views\": %" G_GUINT64_FORMAT
+      ",\n  \"fps\": %.2f,\n  \"points_per_frame_set\": %.1f,\n"
+      "  \"points_after_cylinder\": %.1f,\n  \"raw_bytes_per_frame_set\": %.1f,\n"
+      "  \"coded_bytes_per_frame_set\": %.1f,\n"
+      "  \"latency_ms\": {\"p50\": %.2f, \"p99\": %.2f},\n"
+      "  \"rtp_packets\": %" G_GUINT64_FORMAT ",\n  \"rtp_lost\": %" G_GUINT64_FORMAT
+      ",\n  \"cpu_seconds\": %.3f\n}\n",
+      s.frames, measure.whole_of (s.frames), s.views, measure.fps (),
+      per_frame (s.points_in, s.cylinder_frames), per_frame (s.points_out, s.cylinder_frames),
+      per_frame (s.raw_bytes, s.coded_frames), per_frame (s.coded_bytes, s.coded_frames),
+      measure.latency_ms (0.5), measure.latency_ms (0.99), s.rtp_packets, s.rtp_lost,
+      cpu_seconds ());
+  const bool failed = std::ferror (file) != 0;
+  if (std::fclose (file) == 0 && !failed)
+    return true;
+  g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return false;
+}
+
+/* ---- the last picture ---- */
+
+/* One with all views, if there was one. @return transfer full; null if there is none, or it cannot
+ * be converted */
+static GstSample *
+last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GError **error)
+{
+  GstSample *sample = measure.last_whole_picture ();
+  GstElement *sink = sample ? nullptr : gst_bin_get_by_name (GST_BIN (pipeline), "snapshot");
+  if (sink) {
+    g_object_get (sink, "last-sample", &sample, nullptr);
+    gst_object_unref (sink);
+  }
+  if (!sample) {
+    g_printerr ("rangecast-run: no picture was rendered for %s\n", path);
+    return nullptr;
+  }
+  GstCaps *png = gst_caps_new_empty_simple ("image/png");
+  GstSample *converted = gst_video_convert_sample (sample, png, 10 * GST_SECOND, error);
+  gst_caps_unref (png);
+  gst_sample_unref (sample);
+  if (!converted)
+    g_printerr ("rangecast-run: %s: %s\n", path, (*error)->message);
+  return converted;
+}
+
+bool
+write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path)
+{
+  GError *error = nullptr;
+  GstSample *picture = last_picture (pipeline, measure, path, &error);
+  g_clear_error (&error);
+  if (!picture)
+    return false;
+  bool written = false;
+  GstMapInfo map;
+  if (gst_buffer_map (gst_sample_get_buffer (picture), &map, GST_MAP_READ)) {
+    written = g_file_set_contents (
+        path, reinterpret_cast<const gchar *> (map.data), gssize (map.size), &error);
+    gst_buffer_unmap (gst_sample_get_buffer (picture), &map);
+  }
+  gst_sample_unref (picture);
+  if (!written)
+    g_printerr ("rangecast-run: %s: %s\n", path, error ? error->message : "cannot be written");
+  g_clear_error (&error);
+  return written;
+}
+
+/* ---- what the process holds ---- */
+
+void
+log_memory (const char *path)
+{
+  const auto heap = mallinfo2 ();
+  std::ofstream (path, std::ios::app) << g_get_monotonic_time () / G_USEC_PER_SEC << ','
+                                      << (heap.uordblks + heap.hblkhd) / 1024 << '\n';
+}
+
+static std::vector<std::string>
+other_threads ()
+{
+  std::vector<std::string> names;
+  std::error_code error;
+  const std::string own = std::to_string (getpid ());
+  for (const auto &task : std::filesystem::directory_iterator ("/proc/self/task", error)) {
+    std::string name;
+    std::ifstream (task.path () / "comm") >> name;
+    if (task.path ().filename () != own)
+      names.push_back (name);
+  }
+  return names;
+}
+
+bool
+write_threads_left (const char *path)
+{
+  g_thread_pool_set_max_unused_threads (0); /* else some stay for later use */
+  std::vector<std::string> left = other_threads ();
+  for (int i = 0; !left.empty () && i < 20; i++) {
+    g_usleep (50000);
+    left = other_threads ();
+  }
+  std::ofstream file (path);
+  for (const std::string &name : left)
+    file << name << '\n';
+  if (!file.flush ())
+    g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return bool (file);
+}

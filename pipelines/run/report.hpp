@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include "measure.hpp"
+
+/* What rangecast-run writes. Each write_...() says what went wrong, if anything did, and gives
+ * false then. */
+
+/** Prints a line: frames, rate, points, latency. */
+void print_progress (RunMeasure &measure);
+/** Writes what was measured, JSON; pipelines/demo-report.py reads it. */
+bool write_report (RunMeasure &measure, const char *path);
+/** Writes the last picture that shows all views, or else the last one of the sink named "snapshot",
+ *  as a PNG. */
+bool write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path);
+/** Appends a line: seconds, KiB that the process holds of its heap, without what the allocator
+ *  keeps of what was given back. */
+void log_memory (const char *path);
+/** Writes the names of the process's threads but for the first; those that end by themselves get a
+ *  second for it. */
+bool write_threads_left (const char *path);

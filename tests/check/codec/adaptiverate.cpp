@@ -1,0 +1,382 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* neighbourcodeenc adaptive-bitrate: events from receivers in, bit and frame rates out. */
+#include "../coded-check.hpp"
+
+#include <functional>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static constexpr GstClockTime kInterval = GST_SECOND / 30;
+
+/* Transport-wide feedback of a link, as rtpsession sends it: a packet in 2 ms of queue more for
+ * each frame set where it is too narrow. */
+struct Receiver {
+  double queue_growth_s = 0; /* a frame set */
+  int lost_of_10 = 0;
+  double queue_s = 0;
+  guint sequence = 0;
+  int frame = 0;
+
+  GstEvent *report (gsize bytes)
+  {
+    G_GNUC_BEGIN_IGNORE_DEPRECATIONS
+    GValueArray *packets = g_value_array_new (0);
+    queue_s += queue_growth_s;
+    const int n = int (bytes / 1200) + 2;
+    for (int i = 0; i < n; i++) {
+      const bool lost = int (sequence % 10) < lost_of_10;
+      const guint64 sent = GST_SECOND + guint64 (frame) * kInterval + guint64 (i) * 1000;
+      GstStructure *packet = gst_structure_new ("RTPTWCCPacket", "seqnum", G_TYPE_UINT,
+          sequence++ & 0xffff, "local-ts", G_TYPE_UINT64, sent, "remote-ts", G_TYPE_UINT64,
+          lost ? GST_CLOCK_TIME_NONE : guint64 (double (sent) + 1e9 * queue_s + 5e9),
+          "payload-type", G_TYPE_UCHAR, 96, "size", G_TYPE_UINT, guint (bytes / gsize (n)), "lost",
+          G_TYPE_BOOLEAN, gboolean (lost), nullptr);
+      GValue value = G_VALUE_INIT;
+      g_value_init (&value, GST_TYPE_STRUCTURE);
+      g_value_take_boxed (&value, packet);
+      g_value_array_append (packets, &value);
+      g_value_unset (&value);
+    }
+    frame++;
+    GstStructure *all = gst_structure_new (
+        "RTPTWCCPackets", "packets", g_value_array_get_type (), packets, nullptr);
+    g_value_array_free (packets);
+    G_GNUC_END_IGNORE_DEPRECATIONS
+    return gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, all);
+  }
+};
+
+struct Session {
+  Rig rig = ring_rig (1);
+  GstHarness *h;
+  GstBus *bus = gst_bus_new ();
+  Receiver receiver;
+  int frame = 0;
+  std::vector<gsize> sizes;         /* of what came out */
+  std::vector<GstClockTime> times;  /* its PTS */
+  std::vector<GstBuffer *> buffers; /* itself, where `keeps` */
+  bool keeps = false;
+
+  explicit Session (const std::string &properties)
+      : h (harness_of ("neighbourcodeenc profile=packed " + properties))
+  {
+    gst_element_set_bus (h->element, bus);
+    gst_harness_set_src_caps (h, range_caps (rig));
+  }
+  ~Session ()
+  {
+    unref_all (buffers);
+    gst_element_set_bus (h->element, nullptr);
+    gst_object_unref (bus);
+    gst_harness_teardown (h);
+  }
+  void play (int n, bool reports = true)
+  {
+    for (const int end = frame + n; frame < end; frame++) {
+      fail_unless_equals_int (
+          gst_harness_push (h, make_frame_set (rig, GstClockTime (frame) * kInterval)),
+          GST_FLOW_OK);
+      gsize bytes = 0;
+      while (GstBuffer *buffer = gst_harness_try_pull (h)) {
+        bytes = gst_buffer_get_size (buffer);
+        sizes.push_back (bytes);
+        times.push_back (GST_BUFFER_PTS (buffer));
+        if (keeps)
+          buffers.push_back (buffer);
+        else
+          gst_buffer_unref (buffer);
+      }
+      if (reports && bytes > 0)
+        fail_unless (gst_harness_push_upstream_event (h, receiver.report (bytes)));
+      else
+        receiver.frame++;
+    }
+  }
+  guint64 estimate () const
+  {
+    guint64 bitrate = 0;
+    g_object_get (h->element, "estimated-bitrate", &bitrate, nullptr);
+    return bitrate;
+  }
+  guint64 stat (const char *name) const
+  {
+    GstStructure *stats = nullptr;
+    guint64 value = 0;
+    g_object_get (h->element, "stats", &stats, nullptr);
+    fail_unless (gst_structure_get_uint64 (stats, name, &value), "%s", name);
+    gst_structure_free (stats);
+    return value;
+  }
+  int messages () const
+  {
+    int n = 0;
+    while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ELEMENT)) {
+      const GstStructure *structure = gst_message_get_structure (message);
+      if (gst_structure_has_name (structure, "neighbourcodeenc-adaptive-bitrate")) {
+        n++;
+        for (const char *field :
+            {"one-of", "estimated-bitrate", "receiver-reports", "receiver-loss", "receiver-queue"})
+          fail_unless (gst_structure_has_field (structure, field), "%s", field);
+      }
+      gst_message_unref (message);
+    }
+    return n;
+  }
+};
+
+/* Bits/s of the default thresholds. */
+static double
+usual_rate ()
+{
+  Session session ("");
+  session.play (10);
+  return 8 * 30 * double (session.sizes.back ());
+}
+
+static GstEvent *
+receiver_report (double lost, guint ssrc = 1)
+{
+  return gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+      gst_structure_new ("RangecastReceiverReport", "ssrc", G_TYPE_UINT, ssrc, "fraction-lost",
+          G_TYPE_DOUBLE, lost, "packets", G_TYPE_UINT, 500u, nullptr));
+}
+
+GST_START_TEST (test_without_trouble_thresholds_are_as_configured)
+{
+  Session plain (""), adaptive ("adaptive-bitrate=true");
+  plain.play (30);
+  adaptive.play (30);
+  fail_unless (plain.sizes == adaptive.sizes);
+  fail_unless_equals_uint64 (adaptive.estimate (), 0);
+  fail_unless_equals_uint64 (adaptive.stat ("receiver-reports"), 30);
+  fail_unless_equals_int (adaptive.messages (), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it)
+{
+  Session session ("adaptive-bitrate=true");
+  session.play (15);
+  const double before = 30 * 8 * double (session.sizes.back ());
+  session.receiver.queue_growth_s = 0.004;
+  session.play (15);
+  const guint64 low = session.estimate ();
+  fail_unless (low > 0 && double (low) < 0.95 * before, "%" G_GUINT64_FORMAT " of %g", low, before);
+  fail_unless (session.sizes.back () < session.sizes.front ());
+  fail_unless (session.messages () > 0);
+  session.receiver.queue_growth_s = -session.receiver.queue_s / 10;
+  session.play (10);
+  session.receiver.queue_growth_s = 0;
+  /* Time between reports is that of the wall. */
+  for (int i = 0; i < 20 && session.estimate () <= low; i++) {
+    g_usleep (50000);
+    session.play (10);
+  }
+  fail_unless (session.estimate () > low);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_lost_packets_lower_the_rate)
+{
+  Session session ("adaptive-bitrate=true");
+  session.play (15);
+  session.receiver.lost_of_10 = 4;
+  session.play (40);
+  fail_unless (session.estimate () > 0);
+  fail_unless (session.sizes.back () < session.sizes.front ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_target_bitrate_is_the_most_and_min_bitrate_the_least)
+{
+  Session session ("adaptive-bitrate=true target-bitrate=2000000 min-bitrate=900000 "
+                   "min-framerate=30/1");
+  session.play (20);
+  fail_unless_equals_uint64 (session.estimate (), 2000000);
+  session.receiver.lost_of_10 = 9;
+  session.play (200);
+  fail_unless_equals_uint64 (session.estimate (), 900000);
+  g_object_set (session.h->element, "min-bitrate", 3000000u, nullptr);
+  session.play (2);
+  fail_unless_equals_uint64 (session.estimate (), 2000000);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_without_adaptive_bitrate_events_change_nothing)
+{
+  Session session ("target-bitrate=2000000"), other ("target-bitrate=2000000");
+  session.receiver.lost_of_10 = 9;
+  session.play (60);
+  other.play (60, false);
+  fail_unless (session.sizes == other.sizes);
+  fail_unless_equals_uint64 (session.stat ("receiver-reports"), 60);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_receiver_reports_lower_the_rate)
+{
+  Session session ("adaptive-bitrate=true");
+  session.play (10, false);
+  for (int i = 0; i < 2; i++)
+    fail_unless (gst_harness_push_upstream_event (session.h, receiver_report (0.3)));
+  session.play (10, false);
+  fail_unless (session.estimate () > 0);
+  fail_unless (double (session.estimate ()) < 0.7 * usual_rate ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_below_the_worst_thresholds_whole_frame_sets_are_left_out_evenly)
+{
+  Session session ("adaptive-bitrate=true min-bitrate=10000 min-framerate=1/1 target-bitrate=" +
+                   std::to_string (int (usual_rate () / 8)));
+  session.play (90);
+  session.times.clear ();
+  const gsize events = gst_harness_events_received (session.h);
+  const guint64 before = session.stat ("left-out");
+  session.play (90);
+  fail_unless (session.times.size () < 46, "%d frame sets", int (session.times.size ()));
+  const GstClockTime step = session.times[1] - session.times[0];
+  for (gsize i = 1; i < session.times.size (); i++)
+    fail_unless (session.times[i] - session.times[i - 1] == step);
+  fail_unless_equals_uint64 (session.stat ("left-out") - before, 90 - session.times.size ());
+  /* Each is a GAP downstream. */
+  fail_unless_equals_int (
+      gst_harness_events_received (session.h) - events, 90 - int (session.times.size ()));
+  GstEvent *last = nullptr;
+  while (GstEvent *event = gst_harness_try_pull_event (session.h)) {
+    if (GST_EVENT_TYPE (event) == GST_EVENT_GAP)
+      gst_event_replace (&last, event);
+    gst_event_unref (event);
+  }
+  fail_unless (last != nullptr);
+  GstClockTime time, duration;
+  gst_event_parse_gap (last, &time, &duration);
+  fail_unless (time > 88 * kInterval && time < 180 * kInterval);
+  gst_event_unref (last);
+  fail_unless (session.messages () > 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_min_framerate_is_kept)
+{
+  Session session ("adaptive-bitrate=true min-bitrate=1000 target-bitrate=1000 min-framerate=15/1");
+  session.play (60);
+  session.times.clear ();
+  session.play (60);
+  fail_unless_equals_int (session.times.size (), 30);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_what_refers_to_earlier_frame_sets_decodes_where_some_are_left_out)
+{
+  Session session ("adaptive-bitrate=true temporal=true min-bitrate=10000 min-framerate=1/1 "
+                   "target-bitrate=" +
+                   std::to_string (int (usual_rate () / 60)));
+  session.keeps = true;
+  session.play (90);
+  fail_unless (session.stat ("left-out") > 20);
+  GstHarness *decoder = harness_of ("neighbourcodedec");
+  gst_harness_set_src_caps (decoder, coded_caps (session.rig));
+  for (GstBuffer *buffer : session.buffers)
+    gst_buffer_unref (gst_harness_push_and_pull (decoder, gst_buffer_ref (buffer)));
+  GstStructure *stats = nullptr;
+  guint64 missing = 1, unknown = 1;
+  g_object_get (decoder->element, "stats", &stats, nullptr);
+  fail_unless (gst_structure_get (stats, "missing-pixels", G_TYPE_UINT64, &missing,
+      "unknown-pixels", G_TYPE_UINT64, &unknown, nullptr));
+  gst_structure_free (stats);
+  fail_unless_equals_uint64 (missing + unknown, 0);
+  gst_harness_teardown (decoder);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_key_frame_set_that_is_asked_for_comes_with_the_next_one_kept)
+{
+  Session session ("adaptive-bitrate=true temporal=true min-bitrate=1000 target-bitrate=1000 "
+                   "min-framerate=5/1");
+  session.play (60);
+  session.keeps = true;
+  session.play (1); /* somewhere between two that are kept */
+  gst_harness_push_upstream_event (session.h,
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+          gst_structure_new ("GstForceKeyUnit", "running-time", G_TYPE_UINT64, GST_CLOCK_TIME_NONE,
+              "all-headers", G_TYPE_BOOLEAN, TRUE, "count", G_TYPE_UINT, 1, nullptr)));
+  const gsize before = session.buffers.size ();
+  session.play (6, false);
+  fail_unless_equals_int (session.buffers.size () - before, 1);
+  fail_if (GST_BUFFER_FLAG_IS_SET (session.buffers[before], GST_BUFFER_FLAG_DELTA_UNIT));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_events_that_hold_nonsense_are_borne)
+{
+  Session session ("adaptive-bitrate=true");
+  session.play (5);
+  const char *const nonsense[] = {"RTPTWCCPackets", "RTPTWCCPackets, packets=(int)3",
+      "RTPTWCCPackets, packets=(string)x", "RangecastReceiverReport",
+      "RangecastReceiverReport, fraction-lost=(string)much",
+      "RangecastReceiverReport, fraction-lost=(double)-7, jitter=(guint64)18446744073709551615, "
+      "round-trip-time=(guint64)18446744073709551615, packets=(uint)4294967295",
+      "RangecastReceiverReport, fraction-lost=(double)1e300"};
+  for (const char *text : nonsense) {
+    GstStructure *structure = gst_structure_from_string (text, nullptr);
+    fail_unless (structure != nullptr, "%s", text);
+    gst_harness_push_upstream_event (
+        session.h, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+    session.play (2);
+  }
+  G_GNUC_BEGIN_IGNORE_DEPRECATIONS
+  GValueArray *packets = g_value_array_new (0);
+  GValue number = G_VALUE_INIT;
+  g_value_init (&number, G_TYPE_INT);
+  g_value_array_append (packets, &number);
+  GstStructure *structure =
+      gst_structure_new ("RTPTWCCPackets", "packets", g_value_array_get_type (), packets, nullptr);
+  g_value_array_free (packets);
+  G_GNUC_END_IGNORE_DEPRECATIONS
+  gst_harness_push_upstream_event (
+      session.h, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+  session.play (5);
+  fail_unless_equals_int (int (session.sizes.size ()), session.frame);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_ready_forgets_the_receivers)
+{
+  Session session ("adaptive-bitrate=true");
+  session.receiver.lost_of_10 = 5;
+  session.play (40);
+  fail_unless (session.estimate () > 0);
+  gst_element_set_state (session.h->element, GST_STATE_READY);
+  gst_harness_play (session.h);
+  gst_harness_set_src_caps (session.h, range_caps (session.rig));
+  session.play (2, false);
+  fail_unless_equals_uint64 (session.estimate (), 0);
+  fail_unless_equals_uint64 (session.stat ("receiver-reports"), 0);
+}
+GST_END_TEST;
+
+static Suite *
+adaptiverate_suite ()
+{
+  Suite *suite = suite_create ("adaptiverate");
+  TCase *tc = tcase_create ("general");
+  tcase_set_timeout (tc, 120);
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_without_trouble_thresholds_are_as_configured);
+  tcase_add_test (tc, test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it);
+  tcase_add_test (tc, test_lost_packets_lower_the_rate);
+  tcase_add_test (tc, test_target_bitrate_is_the_most_and_min_bitrate_the_least);
+  tcase_add_test (tc, test_without_adaptive_bitrate_events_change_nothing);
+  tcase_add_test (tc, test_receiver_reports_lower_the_rate);
+  tcase_add_test (tc, test_below_the_worst_thresholds_whole_frame_sets_are_left_out_evenly);
+  tcase_add_test (tc, test_min_framerate_is_kept);
+  tcase_add_test (tc, test_what_refers_to_earlier_frame_sets_decodes_where_some_are_left_out);
+  tcase_add_test (tc, test_key_frame_set_that_is_asked_for_comes_with_the_next_one_kept);
+  tcase_add_test (tc, test_events_that_hold_nonsense_are_borne);
+  tcase_add_test (tc, test_ready_forgets_the_receivers);
+  return suite;
+}
+
+GST_CHECK_MAIN (adaptiverate);

@@ -1,0 +1,546 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <sstream> /* before check.h, whose macro `fail` it does not survive */
+
+#include "../failing-memory.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <map>
+#include <random>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#ifdef RANGECAST_HAVE_ASSIMP
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#endif
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+struct Ply {
+  std::size_t points = 0;
+  std::vector<float> xyz, normals;
+  std::vector<guint8> rgb, view_id;
+};
+
+static Ply
+parse_ply (GstBuffer *buffer, bool with_view_id, bool with_normals = false)
+{
+  GstMapInfo map;
+  fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
+  const std::string_view text (reinterpret_cast<const char *> (map.data), map.size);
+  const auto end = text.find ("end_header\n");
+  fail_unless (end != text.npos);
+  fail_unless (text.starts_with ("ply\nformat binary_little_endian 1.0\n"));
+  const auto element = text.find ("element vertex ");
+  Ply ply;
+  ply.points = std::strtoul (text.data () + element + 15, nullptr, 10);
+  const guint8 *at = map.data + end + 11;
+  const std::size_t stride = (with_normals ? 27 : 15) + (with_view_id ? 1 : 0);
+  const std::size_t colour = with_normals ? 24 : 12;
+  fail_unless_equals_int (map.size - (end + 11), ply.points * stride);
+  for (std::size_t i = 0; i < ply.points; i++, at += stride) {
+    float xyz[3];
+    std::memcpy (xyz, at, sizeof xyz);
+    ply.xyz.insert (ply.xyz.end (), xyz, xyz + 3);
+    if (with_normals) {
+      std::memcpy (xyz, at + 12, sizeof xyz);
+      ply.normals.insert (ply.normals.end (), xyz, xyz + 3);
+    }
+    ply.rgb.insert (ply.rgb.end (), at + colour, at + colour + 3);
+    if (with_view_id)
+      ply.view_id.push_back (at[colour + 3]);
+  }
+  gst_buffer_unmap (buffer, &map);
+  return ply;
+}
+
+static GstHarness *
+ply_harness (const Rig &rig)
+{
+  GstHarness *h = gst_harness_new ("plyenc");
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  return h;
+}
+
+GST_START_TEST (test_point_is_where_the_camera_saw_it)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *input = make_frame_set (rig, 7);
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READWRITE);
+    for (const auto &view : frame.views ())
+      for (int y = 0; y < 240; y++)
+        for (int x = 0; x < 320; x++)
+          view.depth.at (x, y) = 0;
+    frame.views ()[1].depth.at (319, 239) = 8000;
+  }
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "view-id", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  const Ply ply = parse_ply (output, true);
+  fail_unless_equals_int (ply.points, 1);
+  /* View 1 stands behind (-z) and looks along +z; its x axis is the world's -x. */
+  fail_unless (std::abs (ply.xyz[0] - -159.5 / 320 * 0.8) < 1e-6);
+  fail_unless (std::abs (ply.xyz[1] - -119.5 / 320 * 0.8) < 1e-6);
+  fail_unless (std::abs (ply.xyz[2] - 0.0) < 1e-6);
+  fail_unless_equals_int (ply.view_id[0], 1);
+  fail_unless_equals_int (ply.rgb[0], 319 % 256);
+  fail_unless_equals_int (ply.rgb[1], 239);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 7);
+  fail_unless_equals_int (gst_buffer_n_range_metas (output), 0);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_only_valid_pixels_of_the_roi_are_points)
+{
+  const Rig rig = ring_rig (3);
+  GstBuffer *input = make_frame_set (rig, 0, {100, 50, 37, 41});
+  std::size_t valid = 0;
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+    for (const auto &view : frame.views ())
+      for (int y = 0; y < 41; y++)
+        for (int x = 0; x < 37; x++)
+          valid += view.depth.at (x, y) != 0;
+  }
+  GstHarness *h = ply_harness (rig);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  fail_unless (valid > 1000);
+  fail_unless_equals_int (parse_ply (output, false).points, valid);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_empty_frame_set_is_a_file_without_points)
+{
+  const Rig rig = ring_rig (1);
+  GstBuffer *input = gst_range_buffer_new (1, 8, 8);
+  gst_range_buffer_add_view (input, 0, 0, 0, 0, 0, 0);
+  GstHarness *h = ply_harness (rig);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  fail_unless_equals_int (parse_ply (output, false).points, 0);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
+{
+  GstHarness *h = ply_harness (ring_rig (1));
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (2))), GST_FLOW_ERROR);
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("no view 1") != std::string::npos);
+  fail_if (gst_bus_have_pending (bus) && gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) != nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_works_again_after_null)
+{
+  GstElement *pipeline = gst_parse_launch ("appsrc name=a ! plyenc ! fakesink", nullptr);
+  for (int i = 0; i < 2; i++) {
+    fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+    fail_unless_equals_int (
+        gst_element_set_state (pipeline, GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
+  }
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+/* ---- normals ---- */
+
+/* A frame set of one view, its depths in units of 0.1 mm from column and row. */
+template <typename DepthAt>
+static GstBuffer *
+make_depths (const Rig &rig, DepthAt depth_at)
+{
+  GstBuffer *buffer = make_frame_set (rig);
+  gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+  for (const auto &image : frame.views ())
+    for (int y = 0; y < image.depth.height; y++)
+      for (int x = 0; x < image.depth.width; x++)
+        image.depth.at (x, y) = static_cast<std::uint16_t> (depth_at (x, y));
+  return buffer;
+}
+
+static Ply
+normals_of (const Rig &rig, GstBuffer *input)
+{
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "normals", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  const Ply ply = parse_ply (output, false, true);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return ply;
+}
+
+/* The cosine between a point's normal and a direction of length 1. */
+static double
+along (const Ply &ply, std::size_t i, Vec3 direction)
+{
+  return dot ({ply.normals[3 * i], ply.normals[3 * i + 1], ply.normals[3 * i + 2]}, direction);
+}
+
+/* View 1 of three, so that the world is not the camera's frame; the plane is seen at 60 degrees. */
+GST_START_TEST (test_normals_of_a_slanted_plane_are_the_planes)
+{
+  Rig rig = ring_rig (3);
+  rig.views = {rig.views[1]};
+  const View &view = rig.views[0];
+  const Vec3 normal = {std::sin (M_PI / 3) * 0.6, std::sin (M_PI / 3) * 0.8, -0.5};
+  GstBuffer *input = make_depths (rig, [&] (int x, int y) {
+    const double z = 0.5 * 0.8 / -dot (normal, view.intrinsics.unproject (x, y, 1));
+    return z > 0.3 && z < 2 ? std::round (z / view.depth_unit_m) : 0;
+  });
+  const Ply ply = normals_of (rig, input);
+  fail_unless (ply.points > 30000);
+  const Vec3 in_world = view.world_from_view.rotation * normal;
+  double worst = 1;
+  for (std::size_t i = 0; i < ply.points; i++)
+    worst = std::min (worst, along (ply, i, in_world));
+  fail_unless (worst > 0.999, "%f", worst);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normals_do_not_mix_two_surfaces)
+{
+  const Rig rig = ring_rig (1);
+  const Ply ply = normals_of (
+      rig, make_depths (rig, [] (int x, int y) { return (x / 20 + y / 20) % 2 ? 6000 : 8000; }));
+  fail_unless_equals_int (ply.points, 320 * 240);
+  double worst = 1;
+  for (std::size_t i = 0; i < ply.points; i++)
+    worst = std::min (worst, along (ply, i, {0, 0, 1}));
+  fail_unless (worst > 0.99999, "%f", worst);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normal_of_a_lone_point_or_line_is_towards_the_camera)
+{
+  const Rig rig = ring_rig (1);
+  const Ply ply = normals_of (rig, make_depths (rig, [] (int x, int y) {
+    return (x == 10 && y == 20) || (y == 100 && x >= 50 && x < 60) ? 8000 : 0;
+  }));
+  fail_unless_equals_int (ply.points, 11);
+  for (std::size_t i = 0; i < ply.points; i++) {
+    const Vec3 to_camera =
+        Vec3{0, 0, 0.8} - Vec3{ply.xyz[3 * i], ply.xyz[3 * i + 1], ply.xyz[3 * i + 2]};
+    fail_unless (along (ply, i, 1 / norm (to_camera) * to_camera) > 0.99999);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_normals_of_noise_have_length_1_and_face_the_camera)
+{
+  const Rig rig = ring_rig (1);
+  std::mt19937 random (1);
+  for (const int limit : {65535, 3}) {
+    const Ply ply =
+        normals_of (rig, make_depths (rig, [&] (int, int) { return random () % (limit + 1); }));
+    fail_unless (ply.points > 50000);
+    double length_error = 0, backwards = 0;
+    bool has_nan = false;
+    for (std::size_t i = 0; i < ply.points; i++) {
+      const Vec3 n = {ply.normals[3 * i], ply.normals[3 * i + 1], ply.normals[3 * i + 2]};
+      const Vec3 point = {ply.xyz[3 * i], ply.xyz[3 * i + 1], ply.xyz[3 * i + 2]};
+      has_nan |= std::isnan (norm (n));
+      length_error = std::max (length_error, std::abs (norm (n) - 1));
+      backwards = std::min (backwards, dot (n, Vec3{0, 0, 0.8} - point));
+    }
+    fail_if (has_nan);
+    fail_unless (length_error < 1e-5, "%g", length_error);
+    fail_unless (backwards > -1e-6, "%g", backwards);
+  }
+}
+GST_END_TEST;
+
+/* The file of an image cut to a ROI, all of which is invalid but 5 x 5 pixels round (110, 60). */
+static Ply
+cut_to (const Rig &rig, const Roi &roi)
+{
+  GstBuffer *input = make_depths (rig, [] (int x, int y) {
+    return std::abs (x - 110) <= 2 && std::abs (y - 60) <= 2 ? 7000 + 10 * x + 3 * y : 0;
+  });
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READWRITE);
+    frame.crop (0, roi);
+  }
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "normals", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  Ply ply = parse_ply (output, false, true);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return ply;
+}
+
+GST_START_TEST (test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_image)
+{
+  Rig rig = ring_rig (3);
+  rig.views = {rig.views[1]};
+  const Ply whole = cut_to (rig, {0, 0, 320, 240});
+  fail_unless_equals_int (whole.points, 25);
+  for (const Roi &roi : {Roi{100, 50, 37, 41}, Roi{108, 58, 5, 5}, Roi{3, 57, 300, 9}}) {
+    const Ply part = cut_to (rig, roi);
+    fail_unless (part.xyz == whole.xyz);
+    fail_unless (part.normals == whole.normals);
+    fail_unless (part.rgb == whole.rgb);
+  }
+}
+GST_END_TEST;
+
+/* ---- formats ---- */
+
+/* A file as a reader of PCD finds it: by its header, of which it knows nothing before
+ * ("The PCD (Point Cloud Data) file format", pointclouds.org). */
+class Pcd {
+public:
+  explicit Pcd (GstBuffer *buffer)
+  {
+    GstMapInfo map;
+    fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
+    bytes_.assign (reinterpret_cast<const char *> (map.data), map.size);
+    gst_buffer_unmap (buffer, &map);
+    std::size_t at = 0;
+    while (!words_.contains ("DATA"))
+      at = take_line (at);
+    data_ = at;
+    find_fields ();
+    fail_unless_equals_int (bytes_.size () - data_, points () * stride_);
+  }
+
+  /** What a line of the header says after its name. */
+  [[nodiscard]] const std::vector<std::string> &words (const char *name) const
+  {
+    const auto found = words_.find (name);
+    fail_unless (found != words_.end (), "no %s in the header", name);
+    return found->second;
+  }
+  [[nodiscard]] std::size_t points () const { return std::stoul (words ("POINTS").at (0)); }
+  /** Bytes of one point's field. */
+  template <typename T> [[nodiscard]] T value (std::size_t point, const std::string &field) const
+  {
+    const auto found = fields_.find (field);
+    fail_unless (found != fields_.end (), "no field %s", field.c_str ());
+    fail_unless_equals_int (found->second.size, sizeof (T));
+    fail_unless (found->second.type == (std::is_floating_point_v<T> ? "F" : "U"));
+    T value;
+    std::memcpy (
+        &value, bytes_.data () + data_ + point * stride_ + found->second.offset, sizeof value);
+    return value;
+  }
+  /** Red, green, blue: of a float whose bits are 0x00rrggbb, as PCL packs them. */
+  [[nodiscard]] std::array<guint8, 3> colour (std::size_t point) const
+  {
+    const auto bits = std::bit_cast<guint32> (value<float> (point, "rgb"));
+    fail_unless_equals_int (bits >> 24, 0);
+    return {guint8 (bits >> 16), guint8 (bits >> 8), guint8 (bits)};
+  }
+
+private:
+  struct Field {
+    std::size_t offset, size;
+    std::string type;
+  };
+
+  std::size_t take_line (std::size_t at)
+  {
+    const std::size_t end = bytes_.find ('\n', at);
+    fail_unless (end != bytes_.npos, "the header has no end");
+    std::istringstream line (bytes_.substr (at, end - at));
+    std::string name, word;
+    line >> name;
+    if (!name.starts_with ('#')) {
+      fail_if (words_.contains (name), "two lines %s", name.c_str ());
+      auto &words = words_[name];
+      while (line >> word)
+        words.push_back (word);
+    }
+    return end + 1;
+  }
+
+  void find_fields ()
+  {
+    const auto &names = words ("FIELDS");
+    for (const char *name : {"SIZE", "TYPE", "COUNT"})
+      fail_unless_equals_int (words (name).size (), names.size ());
+    for (std::size_t i = 0; i < names.size (); i++) {
+      const std::size_t size = std::stoul (words ("SIZE")[i]);
+      fail_unless_equals_string (words ("COUNT")[i].c_str (), "1");
+      fields_[names[i]] = {stride_, size, words ("TYPE")[i]};
+      stride_ += size;
+    }
+  }
+
+  std::string bytes_;
+  std::map<std::string, std::vector<std::string>> words_;
+  std::map<std::string, Field> fields_;
+  std::size_t data_ = 0, stride_ = 0;
+};
+
+/* The same frame set as PLY or PCD, with all that a file can have. */
+static GstBuffer *
+whole_file (const Rig &rig, const char *format)
+{
+  const std::string launch = std::string ("plyenc normals=true view-id=true format=") + format;
+  GstHarness *h = gst_harness_new_parse (launch.c_str ());
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 5, 40, 30}));
+  gst_harness_teardown (h);
+  return output;
+}
+
+GST_START_TEST (test_pcd_read_by_its_header_has_the_points_of_the_ply)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *ply_file = whole_file (rig, "ply"), *pcd_file = whole_file (rig, "pcd");
+  const Ply ply = parse_ply (ply_file, true, true);
+  const Pcd pcd (pcd_file);
+  fail_unless (ply.points > 500);
+  fail_unless_equals_int (pcd.points (), ply.points);
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < ply.points; i++) {
+    const char *const place[] = {"x", "y", "z"}, *const normal[] = {
+                                                     "normal_x", "normal_y", "normal_z"};
+    const auto rgb = pcd.colour (i);
+    for (std::size_t k = 0; k < 3; k++)
+      wrong += pcd.value<float> (i, place[k]) != ply.xyz[3 * i + k] ||
+               pcd.value<float> (i, normal[k]) != ply.normals[3 * i + k] ||
+               rgb[k] != ply.rgb[3 * i + k];
+    wrong += pcd.value<guint8> (i, "view_id") != ply.view_id[i];
+  }
+  fail_unless_equals_int (wrong, 0);
+  gst_buffer_unref (ply_file);
+  gst_buffer_unref (pcd_file);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pcd_header_says_what_readers_ask_for)
+{
+  const Rig rig = ring_rig (2);
+  GstBuffer *file = whole_file (rig, "pcd");
+  const Pcd pcd (file);
+  using Words = std::vector<std::string>;
+  fail_unless (pcd.words ("VERSION") == Words{"0.7"});
+  fail_unless (pcd.words ("WIDTH") == pcd.words ("POINTS"));
+  fail_unless (pcd.words ("HEIGHT") == Words{"1"}); /* a cloud, not a picture */
+  fail_unless ((pcd.words ("VIEWPOINT") == Words{"0", "0", "0", "1", "0", "0", "0"}));
+  fail_unless (pcd.words ("DATA") == Words{"binary"});
+  gst_buffer_unref (file);
+}
+GST_END_TEST;
+
+/* Whether the next file, and what the caps say of it, are PCD. */
+static void
+expect_format (GstHarness *h, const Rig &rig, bool pcd)
+{
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+  fail_unless_equals_int (gst_buffer_memcmp (output, 0, "ply\n", 4) != 0, pcd);
+  gst_buffer_unref (output);
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  fail_unless (gst_structure_has_name (
+      gst_caps_get_structure (caps, 0), pcd ? "application/x-pcd" : "application/x-ply"));
+  gst_caps_unref (caps);
+}
+
+GST_START_TEST (test_format_set_while_playing_waits_for_ready)
+{
+  const Rig rig = ring_rig (1, 32, 24);
+  GstElement *element =
+      GST_ELEMENT (gst_object_ref_sink (gst_element_factory_make ("plyenc", nullptr)));
+  GParamSpec *spec = g_object_class_find_property (G_OBJECT_GET_CLASS (element), "format");
+  fail_unless (spec->flags & GST_PARAM_MUTABLE_READY);
+  for (const bool pcd : {false, true}) {
+    GstHarness *h = gst_harness_new_with_element (element, "sink", "src");
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+    expect_format (h, rig, pcd);
+    gst_util_set_object_arg (G_OBJECT (element), "format", pcd ? "ply" : "pcd");
+    expect_format (h, rig, pcd);
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 15, 1)));
+    expect_format (h, rig, pcd);
+    gst_harness_teardown (h); /* to NULL */
+  }
+  gst_object_unref (element);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
+{
+  if (!memory_can_end ())
+    RANGECAST_SKIP ("operator new is somebody else's");
+  fail_unless (run_out_of_memory ("plyenc", ring_rig (2, 32, 24)) > 2);
+  fail_unless (run_out_of_memory ("plyenc format=pcd normals=true", ring_rig (2, 32, 24)) > 2);
+}
+GST_END_TEST;
+
+#ifdef RANGECAST_HAVE_ASSIMP
+GST_START_TEST (test_assimp_reads_points_colours_and_normals)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = ply_harness (rig);
+  g_object_set (h->element, "normals", TRUE, "view-id", TRUE, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+  const Ply ply = parse_ply (output, true, true);
+  GstMapInfo map;
+  fail_unless (gst_buffer_map (output, &map, GST_MAP_READ));
+  Assimp::Importer importer;
+  const aiScene *scene = importer.ReadFileFromMemory (map.data, map.size, 0, "ply");
+  gst_buffer_unmap (output, &map);
+  fail_unless (scene && scene->mNumMeshes == 1, "%s", importer.GetErrorString ());
+  const aiMesh &mesh = *scene->mMeshes[0];
+  fail_unless_equals_int (mesh.mNumVertices, ply.points);
+  fail_unless (mesh.HasNormals () && mesh.HasVertexColors (0));
+  unsigned wrong = 0;
+  for (unsigned i = 0; i < mesh.mNumVertices; i++)
+    for (unsigned k = 0; k < 3; k++)
+      wrong += mesh.mVertices[i][k] != ply.xyz[3 * i + k] ||
+               mesh.mNormals[i][k] != ply.normals[3 * i + k] ||
+               std::abs (mesh.mColors[0][i][k] * 255 - ply.rgb[3 * i + k]) > 0.01;
+  fail_unless_equals_int (wrong, 0);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+#endif
+
+static Suite *
+plyenc_suite ()
+{
+  Suite *suite = suite_create ("plyenc");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_point_is_where_the_camera_saw_it);
+  tcase_add_test (tc, test_only_valid_pixels_of_the_roi_are_points);
+  tcase_add_test (tc, test_empty_frame_set_is_a_file_without_points);
+  tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
+  tcase_add_test (tc, test_works_again_after_null);
+  tcase_add_test (tc, test_normals_of_a_slanted_plane_are_the_planes);
+  tcase_add_test (tc, test_normals_do_not_mix_two_surfaces);
+  tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
+  tcase_add_test (tc, test_normals_of_noise_have_length_1_and_face_the_camera);
+  tcase_add_test (tc, test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_image);
+  tcase_add_test (tc, test_pcd_read_by_its_header_has_the_points_of_the_ply);
+  tcase_add_test (tc, test_pcd_header_says_what_readers_ask_for);
+  tcase_add_test (tc, test_format_set_while_playing_waits_for_ready);
+  tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
+#ifdef RANGECAST_HAVE_ASSIMP
+  tcase_add_test (tc, test_assimp_reads_points_colours_and_normals);
+#endif
+  return suite;
+}
+
+GST_CHECK_MAIN (plyenc);

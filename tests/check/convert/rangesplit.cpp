@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* before check.h, whose fail() is a macro */
+#include <atomic>
+#include <thread>
+
+#include "../rangecast-check.hpp"
+
+#include <gst/video/video.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static GstHarness *
+split_harness (const Rig &rig, const char *src_pad)
+{
+  GstHarness *h = gst_harness_new_with_padnames ("rangesplit", "sink", src_pad);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  return h;
+}
+
+static guint16
+depth_at (GstBuffer *buffer, GstCaps *caps, int x, int y)
+{
+  GstVideoInfo info;
+  GstVideoFrame frame;
+  fail_unless (gst_video_info_from_caps (&info, caps));
+  fail_unless (gst_video_frame_map (&frame, &info, buffer, GST_MAP_READ));
+  auto row = static_cast<const guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0)) +
+             y * GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0);
+  const guint16 depth = GST_READ_UINT16_LE (row + 2 * x);
+  gst_video_frame_unmap (&frame);
+  return depth;
+}
+
+GST_START_TEST (test_depth_has_the_full_size_with_the_roi_in_its_place)
+{
+  const Rig rig = ring_rig (2, 322, 241); /* rows of GRAY16 are padded to 4 bytes */
+  GstBuffer *input = make_frame_set (rig, 123, {100, 60, 51, 43});
+  guint16 middle;
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+    middle = frame.views ()[1].depth.at (25, 21);
+  }
+  GstHarness *h = split_harness (rig, "depth_1");
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  fail_unless (middle > 0);
+  fail_unless_equals_int (depth_at (output, caps, 125, 81), middle);
+  fail_unless_equals_int (depth_at (output, caps, 99, 81), 0);
+  fail_unless_equals_int (depth_at (output, caps, 125, 59), 0);
+  fail_unless_equals_int (depth_at (output, caps, 321, 240), 0);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 123);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 123);
+  gst_caps_unref (caps);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static guint8
+red_at_edge (gboolean mask)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "colour");
+  g_object_set (h->element, "mask", mask, nullptr);
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+  guint8 rgbx[4];
+  gst_buffer_extract (output, 200 * 4, rgbx, 4); /* row 0 lies outside the bump: no depth */
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return rgbx[0];
+}
+
+GST_START_TEST (test_colour_without_depth_is_black_unless_unmasked)
+{
+  fail_unless_equals_int (red_at_edge (TRUE), 0);
+  fail_unless_equals_int (red_at_edge (FALSE), 200);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_missing_in_a_frame_set_is_an_empty_picture)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = split_harness (rig, "depth_1");
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (ring_rig (1)));
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  fail_unless_equals_int (depth_at (output, caps, 160, 120), 0);
+  gst_caps_unref (caps);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = split_harness (rig, "depth_5");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("view 5") != std::string::npos);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_caps_reach_the_video_pads)
+{
+  GstHarness *h = split_harness (ring_rig (1), "depth");
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (ring_rig (1))));
+  const Rig larger = ring_rig (1, 640, 480);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (larger, 30, 1)));
+  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (larger));
+  fail_unless_equals_int (gst_buffer_get_size (output), 640 * 480 * 2);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_flush_and_eos_reach_the_video_pads)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "depth");
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_start ()));
+  fail_unless (gst_harness_push_event (h, gst_event_new_flush_stop (TRUE)));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  fail_unless (gst_harness_push_event (h, gst_event_new_segment (&segment)));
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  bool eos = false;
+  while (GstEvent *event = gst_harness_try_pull_event (h)) {
+    eos |= GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+    gst_event_unref (event);
+  }
+  fail_unless (eos);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_unlinked_pad_does_not_stop_the_others)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "depth");
+  GstPad *unlinked = gst_element_request_pad_simple (h->element, "colour");
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  gst_element_release_request_pad (h->element, unlinked);
+  gst_object_unref (unlinked);
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+struct Pusher {
+  GstHarness *h;
+  const Rig &rig;
+  std::atomic<bool> ends = false;
+  GstFlowReturn flow = GST_FLOW_OK;
+
+  void push ()
+  {
+    for (GstClockTime t = 0; !ends && flow == GST_FLOW_OK; t += 33 * GST_MSECOND)
+      flow = gst_harness_push (h, make_frame_set (rig, t));
+  }
+};
+
+GST_START_TEST (test_pads_that_come_and_go_leave_the_others_running)
+{
+  const Rig rig = ring_rig (2, 16, 16);
+  GstHarness *h = split_harness (rig, "depth_0");
+  gst_harness_set_drop_buffers (h, TRUE);
+  Pusher pusher = {h, rig};
+  std::thread thread (&Pusher::push, &pusher);
+  for (int i = 0; i < 300; i++) {
+    GstElement *sink = gst_element_factory_make ("fakesink", nullptr);
+    g_object_set (sink, "async", FALSE, nullptr);
+    gst_element_set_state (sink, GST_STATE_PLAYING);
+    GstPad *pad = gst_element_request_pad_simple (h->element, "colour_1"),
+           *peer = gst_element_get_static_pad (sink, "sink");
+    fail_unless_equals_int (gst_pad_link (pad, peer), GST_PAD_LINK_OK);
+    g_usleep (500);
+    gst_element_release_request_pad (
+        h->element, pad); /* in the middle of a push, as often as not */
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+    gst_element_set_state (sink, GST_STATE_NULL);
+    gst_object_unref (sink);
+  }
+  pusher.ends = true;
+  thread.join ();
+  fail_unless_equals_int (pusher.flow, GST_FLOW_OK);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_frame_set_without_capture_time_gives_a_picture_without)
+{
+  const Rig rig = ring_rig (1, 16, 16);
+  GstHarness *h = split_harness (rig, "depth");
+  GstBuffer *input = make_frame_set (rig, 0);
+  gst_range_buffer_set_capture_time (input, GST_CLOCK_TIME_NONE);
+  gpointer state = nullptr;
+  while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (input, &state))
+    meta->capture_time = GST_CLOCK_TIME_NONE;
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  fail_unless (!gst_buffer_get_reference_timestamp_meta (output, nullptr));
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_plays_twice)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "depth");
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  gst_element_set_state (h->element, GST_STATE_NULL);
+  gst_harness_play (h);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static Suite *
+rangesplit_suite ()
+{
+  Suite *suite = suite_create ("rangesplit");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_depth_has_the_full_size_with_the_roi_in_its_place);
+  tcase_add_test (tc, test_colour_without_depth_is_black_unless_unmasked);
+  tcase_add_test (tc, test_view_missing_in_a_frame_set_is_an_empty_picture);
+  tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
+  tcase_add_test (tc, test_new_caps_reach_the_video_pads);
+  tcase_add_test (tc, test_flush_and_eos_reach_the_video_pads);
+  tcase_add_test (tc, test_unlinked_pad_does_not_stop_the_others);
+  tcase_add_test (tc, test_pads_that_come_and_go_leave_the_others_running);
+  tcase_add_test (tc, test_frame_set_without_capture_time_gives_a_picture_without);
+  tcase_add_test (tc, test_plays_twice);
+  return suite;
+}
+
+GST_CHECK_MAIN (rangesplit);

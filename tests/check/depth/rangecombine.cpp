@@ -1,0 +1,534 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <thread> /* before GStreamer's check header, whose macros hide names of it */
+
+#include "../rangecast-check.hpp"
+
+#include <glib/gstdio.h>
+#include <gst/video/video.h>
+#include <unistd.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+struct Combine {
+  GstHarness *colour, *depth;
+  GstBus *bus = gst_bus_new ();
+
+  explicit Combine (const char *colour_caps = "video/x-raw,format=RGB,width=5,height=3,"
+                                              "framerate=10/1",
+      const char *depth_caps = "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
+      const char *properties = "")
+  {
+    GstElement *element =
+        gst_parse_launch ((std::string ("rangecombine ") + properties).c_str (), nullptr);
+    colour = gst_harness_new_with_element (element, "colour", "src");
+    depth = gst_harness_new_with_element (element, "depth", nullptr);
+    gst_element_set_bus (element, bus);
+    gst_object_unref (element);
+    gst_harness_set_src_caps_str (colour, colour_caps);
+    gst_harness_set_src_caps_str (depth, depth_caps);
+  }
+  ~Combine ()
+  {
+    gst_element_set_bus (colour->element, nullptr);
+    gst_object_unref (bus);
+    gst_harness_teardown (depth);
+    gst_harness_teardown (colour);
+  }
+  void push_colour (GstClockTime pts, guint8 value)
+  {
+    GstBuffer *buffer = gst_buffer_new_allocate (nullptr, 16 * 3, nullptr); /* rows of 15 + 1 */
+    gst_buffer_memset (buffer, 0, value, 16 * 3);
+    GST_BUFFER_PTS (buffer) = pts;
+    gst_harness_push (colour, buffer);
+  }
+  void push_depth (GstClockTime pts, guint16 millimetres)
+  {
+    guint16 rows[3][6]; /* rows of 10 + 2 bytes */
+    for (auto &row : rows)
+      for (guint16 &d : row)
+        d = GUINT16_TO_LE (millimetres);
+    rows[2][4] = 0;
+    GstBuffer *buffer = gst_buffer_new_memdup (rows, sizeof rows);
+    GST_BUFFER_PTS (buffer) = pts;
+    gst_harness_push (depth, buffer);
+  }
+};
+
+GST_START_TEST (test_millimetres_become_depth_units_and_colour_stays)
+{
+  Combine c;
+  c.push_colour (0, 77);
+  c.push_depth (0, 1234);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ().size (), 1);
+    const RangeImage &image = frame.views ()[0];
+    fail_unless (image.roi == (Roi{0, 0, 5, 3}));
+    fail_unless_equals_int (image.depth.at (3, 2), 12340);
+    fail_unless_equals_int (image.depth.at (4, 2), 0);
+    fail_unless_equals_int (image.colour.at (4, 2).r, 77);
+    fail_unless_equals_int (image.colour.at (0, 0).b, 77);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
+      "near=0.7 far=2.3"); /* neither is a whole number of depth units in binary */
+  for (guint16 millimetres : {699, 700, 2300, 2301}) {
+    c.push_colour (GST_SECOND * millimetres, 0);
+    c.push_depth (GST_SECOND * millimetres, millimetres);
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      const bool valid = millimetres >= 700 && millimetres <= 2300;
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), valid ? 10 * millimetres : 0);
+    }
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pairs_by_pts_and_drops_what_has_no_partner)
+{
+  Combine c;
+  c.push_depth (100 * GST_MSECOND, 1000);
+  c.push_colour (0, 1);                 /* older than any depth: dropped */
+  c.push_colour (130 * GST_MSECOND, 2); /* within half a frame of 100 ms */
+  c.push_depth (200 * GST_MSECOND, 1001);
+  c.push_depth (300 * GST_MSECOND, 1002);
+  c.push_colour (300 * GST_MSECOND, 3);
+  for (int expected : {1000, 1002}) {
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * expected);
+      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, expected == 1000 ? 2 : 3);
+    }
+    gst_buffer_unref (output);
+  }
+  GstStructure *stats;
+  guint64 dropped_colour = 0, dropped_depth = 0;
+  g_object_get (c.colour->element, "stats", &stats, nullptr);
+  gst_structure_get (stats, "dropped-colour", G_TYPE_UINT64, &dropped_colour, "dropped-depth",
+      G_TYPE_UINT64, &dropped_depth, nullptr);
+  fail_unless_equals_uint64 (dropped_colour, 1);
+  fail_unless_equals_uint64 (dropped_depth, 1);
+  gst_structure_free (stats);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_gap_costs_its_frame_and_nothing_else)
+{
+  Combine c;
+  gst_harness_push_event (c.depth, gst_event_new_gap (0, GST_SECOND / 10));
+  c.push_colour (0, 1);
+  c.push_colour (GST_SECOND, 2);
+  c.push_depth (GST_SECOND, 1000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+/* The next GAP that comes out, which must be behind a segment, and no later than any frame. */
+static void
+expect_gap (Combine &c, GstClockTime begin, GstClockTime length)
+{
+  for (bool segment = false;;) {
+    GstEvent *event = gst_harness_try_pull_event (c.colour);
+    for (int i = 0; !event && i < 500; i++) { /* the element has a thread of its own */
+      g_usleep (10000);
+      event = gst_harness_try_pull_event (c.colour);
+    }
+    fail_unless (event != nullptr, "no GAP");
+    const GstEventType type = GST_EVENT_TYPE (event);
+    GstClockTime time = 0, duration = 0;
+    if (type == GST_EVENT_GAP)
+      gst_event_parse_gap (event, &time, &duration);
+    gst_event_unref (event);
+    segment |= type == GST_EVENT_SEGMENT;
+    if (type != GST_EVENT_GAP)
+      continue;
+    fail_unless (segment, "a GAP before the segment");
+    fail_unless_equals_uint64 (time, begin);
+    fail_unless_equals_uint64 (duration, length);
+    return;
+  }
+}
+
+GST_START_TEST (test_gap_on_one_pad_is_a_gap_of_what_it_took_with_it)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  gst_harness_push_event (c.depth, gst_event_new_gap (0, GST_SECOND / 10));
+  expect_gap (c, 0, GST_SECOND / 10);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_gap_on_both_pads_is_a_gap_up_to_the_next_pair)
+{
+  Combine c;
+  for (GstHarness *h : {c.colour, c.depth})
+    gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND));
+  expect_gap (c, 0, GST_SECOND);
+  c.push_colour (GST_SECOND, 2);
+  c.push_depth (GST_SECOND, 1000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_gap_after_a_flush_follows_a_segment)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 1000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  const guint32 seek = gst_util_seqnum_next (); /* the same for both: one flush of the element */
+  for (const bool start : {true, false})
+    for (GstHarness *h : {c.colour, c.depth}) {
+      GstEvent *event = start ? gst_event_new_flush_start () : gst_event_new_flush_stop (TRUE);
+      gst_event_set_seqnum (event, seek);
+      gst_harness_push_event (h, event);
+    }
+  while (GstEvent *event = gst_harness_try_pull_event (c.colour))
+    gst_event_unref (event);
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  for (GstHarness *h : {c.colour, c.depth}) {
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+    gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND / 10));
+  }
+  expect_gap (c, 0, GST_SECOND / 10);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capture_time_comes_from_the_colour_camera)
+{
+  Combine c;
+  GstBuffer *colour = gst_buffer_new_allocate (nullptr, 48, nullptr);
+  gst_buffer_memset (colour, 0, 9, 48);
+  GST_BUFFER_PTS (colour) = GST_SECOND;
+  gst_range_buffer_set_capture_time (colour, 123456789);
+  gst_harness_push (c.colour, colour);
+  c.push_depth (GST_SECOND, 1000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 123456789);
+  fail_unless_equals_uint64 (gst_buffer_get_range_meta (output, 0)->capture_time, 123456789);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
+  fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), GST_SECOND / 10);
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pictures_of_different_size_are_one_error)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=6,height=3,framerate=10/1");
+  c.push_colour (0, 1);
+  c.push_depth (0, 1);
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("pad depth is 6x3") != std::string::npos, text.c_str ());
+  fail_unless (text.find ("expected") != std::string::npos, text.c_str ());
+}
+GST_END_TEST;
+
+/* A buffer of one value, of the size that the caps give. */
+static GstBuffer *
+flat (guint width, guint height, guint bytes, guint16 value, GstClockTime pts)
+{
+  GstBuffer *buffer =
+      gst_buffer_new_allocate (nullptr, GST_ROUND_UP_4 (width * bytes) * height, nullptr);
+  GstMapInfo map;
+  gst_buffer_map (buffer, &map, GST_MAP_WRITE);
+  for (gsize i = 0; i < map.size; i++) /* little-endian depth; colour all alike */
+    map.data[i] = static_cast<guint8> (bytes == 2 && i % 2 ? value >> 8 : value & 255);
+  gst_buffer_unmap (buffer, &map);
+  GST_BUFFER_PTS (buffer) = pts;
+  return buffer;
+}
+
+GST_START_TEST (test_colour_of_more_pixels_comes_out_at_either_size)
+{
+  const struct {
+    const char *properties;
+    int width, height;
+  } cases[] = {{"near=0.5", 8, 6}, {"near=0.5 into=depth", 8, 6}, {"near=0.5 into=colour", 16, 12}};
+  for (const auto &it : cases) {
+    Combine c ("video/x-raw,format=RGB,width=16,height=12,framerate=10/1",
+        "video/x-raw,format=GRAY16_LE,width=8,height=6,framerate=10/1", it.properties);
+    gst_harness_push (c.colour, flat (16, 12, 3, 77, 0));
+    gst_harness_push (c.depth, flat (8, 6, 2, 1500, 0));
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      const RangeImage &image = frame.views ()[0];
+      fail_unless (image.roi == (Roi{0, 0, it.width, it.height}));
+      for (int y = 0; y < it.height; y++)
+        for (int x = 0; x < it.width; x++) {
+          fail_unless_equals_int (image.depth.at (x, y), 15000);
+          fail_unless_equals_int (image.colour.at (x, y).g, 77);
+        }
+    }
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
+static std::string
+rig_of_two (const char *name)
+{
+  Rig rig;
+  for (int id : {2, 7}) {
+    View view = ring_rig (1, id == 2 ? 32 : 64, id == 2 ? 24 : 48).views[0];
+    view.id = id;
+    view.world_from_view.translation.x = id == 2 ? 0 : 0.05;
+    view.far_m = 3;
+    rig.views.push_back (view);
+  }
+  const std::string path =
+      std::string (g_get_tmp_dir ()) + "/" + name + std::to_string (getpid ()) + ".yaml";
+  fail_unless (save_rig (path, rig).ok ());
+  return path;
+}
+
+GST_START_TEST (test_colour_camera_of_the_rig_is_registered_into_either_view)
+{
+  const std::string path = rig_of_two ("rangecombine-two-");
+  for (const bool into_colour : {false, true}) {
+    const std::string properties =
+        "rig=" + path + " view-id=2 colour-view-id=7 into=" + (into_colour ? "colour" : "depth");
+    /* Pictures of twice the rig's size: the calibration is scaled. */
+    Combine c ("video/x-raw,format=RGB,width=128,height=96,framerate=10/1",
+        "video/x-raw,format=GRAY16_LE,width=64,height=48,framerate=10/1", properties.c_str ());
+    gst_harness_push (c.colour, flat (128, 96, 3, 77, 0));
+    gst_harness_push (c.depth, flat (64, 48, 2, 1000, 0));
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      const RangeImage &image = frame.views ()[0];
+      fail_unless_equals_int (image.view_id, into_colour ? 7 : 2);
+      fail_unless_equals_int (image.roi.width, into_colour ? 128 : 64);
+      const int last = image.roi.width - 1, row = image.roi.height / 2;
+      fail_unless_equals_int (image.depth.at (last / 2, row), 10000);
+      /* The colour camera stands 5 cm to the right: at 1 m that is 5 % of the picture's width. */
+      const int strip = image.roi.width / 25;
+      fail_unless ((image.depth.at (0, row) == 0) == !into_colour);
+      fail_unless ((image.depth.at (strip / 2, row) == 0) == !into_colour);
+      fail_unless ((image.depth.at (last, row) == 0) == into_colour);
+    }
+    gst_buffer_unref (output);
+  }
+  g_unlink (path.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_calibration_of_another_shape_is_one_error_that_names_the_rig)
+{
+  const std::string path = rig_of_two ("rangecombine-shape-");
+  Combine c ("video/x-raw,format=RGB,width=64,height=48,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=64,height=36,framerate=10/1",
+      ("rig=" + path + " view-id=2 colour-view-id=7").c_str ());
+  gst_harness_push (c.colour, flat (64, 48, 3, 77, 0));
+  gst_harness_push (c.depth, flat (64, 36, 2, 1000, 0));
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find (path) != std::string::npos, text.c_str ());
+  fail_unless (text.find ("64x36") != std::string::npos, text.c_str ());
+  g_unlink (path.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_colour_camera_without_a_rig_is_one_error)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "colour-view-id=1");
+  c.push_colour (0, 1);
+  c.push_depth (0, 1);
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("colour-view-id") != std::string::npos, text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pairs_stay_right_where_both_streams_have_holes_and_gaps)
+{
+  Combine c;
+  const auto has_colour = [] (guint i) { return i % 3 != 1; };
+  const auto has_depth = [] (guint i) { return i % 5 != 2; };
+  constexpr guint kFrames = 40;
+  /* Each camera in its own thread, as in life: a full pad makes its camera wait for the other. */
+  std::thread depth_camera ([&] {
+    for (guint i = 0; i < kFrames; i++) {
+      const GstClockTime pts = i * GST_SECOND / 10;
+      if (has_depth (i))
+        c.push_depth (pts, static_cast<guint16> (1000 + i));
+      else if (i % 2)
+        gst_harness_push_event (c.depth, gst_event_new_gap (pts, GST_SECOND / 10));
+    }
+    gst_harness_push_event (c.depth, gst_event_new_eos ());
+  });
+  for (guint i = 0; i < kFrames; i++) {
+    const GstClockTime pts = i * GST_SECOND / 10;
+    if (has_colour (i))
+      c.push_colour (pts, static_cast<guint8> (i));
+    else if (i % 2)
+      gst_harness_push_event (c.colour, gst_event_new_gap (pts, GST_SECOND / 10));
+  }
+  gst_harness_push_event (c.colour, gst_event_new_eos ());
+  depth_camera.join ();
+  for (guint i = 0; i < kFrames; i++) {
+    if (!has_colour (i) || !has_depth (i))
+      continue;
+    GstBuffer *output = gst_harness_pull (c.colour);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), i * GST_SECOND / 10);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
+      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
+    }
+    gst_buffer_unref (output);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_streams_of_different_rates_give_the_slower_one_with_the_nearest_partner)
+{
+  for (const bool colour_is_fast : {true, false}) {
+    const char *const fast = ",framerate=30/1", *const slow = ",framerate=10/1";
+    const std::string colour = "video/x-raw,format=RGB,width=5,height=3";
+    const std::string depth = "video/x-raw,format=GRAY16_LE,width=5,height=3";
+    Combine c ((colour + (colour_is_fast ? fast : slow)).c_str (),
+        (depth + (colour_is_fast ? slow : fast)).c_str ());
+    const GstClockTime late = 10 * GST_MSECOND; /* by which the slow one is beside the fast one */
+    for (guint i = 0; i < 12; i++) {
+      const GstClockTime pts = gst_util_uint64_scale (i, GST_SECOND, 30);
+      if (i % 3 == 0 && colour_is_fast)
+        c.push_depth (pts + late, static_cast<guint16> (1000 + i));
+      else if (i % 3 == 0)
+        c.push_colour (pts + late, static_cast<guint8> (i));
+      if (colour_is_fast)
+        c.push_colour (pts, static_cast<guint8> (i));
+      else
+        c.push_depth (pts, static_cast<guint16> (1000 + i));
+    }
+    for (guint i = 0; i < 12; i += 3) {
+      GstBuffer *output = gst_harness_pull (c.colour);
+      fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), GST_SECOND / 10);
+      {
+        gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+        fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
+        fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
+      }
+      gst_buffer_unref (output);
+    }
+    GstCaps *caps = gst_pad_get_current_caps (GST_PAD_PEER (c.colour->sinkpad));
+    gint n = 0, d = 0;
+    gst_structure_get_fraction (gst_caps_get_structure (caps, 0), "framerate", &n, &d);
+    fail_unless_equals_int (n, 10);
+    gst_caps_unref (caps);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_missing_rig_is_one_error_that_names_it)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "rig=/nowhere/rig.yaml");
+  c.push_colour (0, 1);
+  c.push_depth (0, 1);
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
+  fail_unless (text.find ("/nowhere/rig.yaml") != std::string::npos, text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_end_of_one_pad_ends_the_stream)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 1000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  fail_unless (gst_harness_push_event (c.depth, gst_event_new_eos ()));
+  c.push_colour (GST_SECOND, 1);
+  bool eos = false;
+  while (!eos) {
+    GstEvent *event = gst_harness_pull_event (c.colour);
+    fail_unless (event != nullptr);
+    eos = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+    gst_event_unref (event);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_size_in_the_stream_is_taken)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 1000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  gst_harness_set_src_caps_str (
+      c.colour, "video/x-raw,format=GRAY8,width=4,height=2,framerate=10/1");
+  gst_harness_set_src_caps_str (
+      c.depth, "video/x-raw,format=GRAY16_LE,width=4,height=2,framerate=10/1");
+  GstBuffer *colour = gst_buffer_new_memdup ("abcdefgh", 8);
+  GstBuffer *depth = gst_buffer_new_allocate (nullptr, 16, nullptr);
+  gst_buffer_memset (depth, 0, 4, 16);
+  GST_BUFFER_PTS (colour) = GST_BUFFER_PTS (depth) = GST_SECOND;
+  gst_harness_push (c.colour, colour);
+  gst_harness_push (c.depth, depth);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless (frame.views ()[0].roi == (Roi{0, 0, 4, 2}));
+    fail_unless_equals_int (frame.views ()[0].depth.at (3, 1), 10280);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_changes_states_twice)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("videotestsrc num-buffers=3 ! video/x-raw,format=GRAY16_LE ! c.depth "
+                        "videotestsrc num-buffers=3 ! c.colour rangecombine name=c ! fakesink",
+          nullptr);
+  for (int i = 0; i < 2; i++)
+    play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+static Suite *
+rangecombine_suite ()
+{
+  Suite *suite = suite_create ("rangecombine");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
+  tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
+  tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
+  tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
+  tcase_add_test (tc, test_gap_on_one_pad_is_a_gap_of_what_it_took_with_it);
+  tcase_add_test (tc, test_gap_on_both_pads_is_a_gap_up_to_the_next_pair);
+  tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
+  tcase_add_test (tc, test_capture_time_comes_from_the_colour_camera);
+  tcase_add_test (tc, test_pictures_of_different_size_are_one_error);
+  tcase_add_test (tc, test_colour_of_more_pixels_comes_out_at_either_size);
+  tcase_add_test (tc, test_colour_camera_of_the_rig_is_registered_into_either_view);
+  tcase_add_test (tc, test_calibration_of_another_shape_is_one_error_that_names_the_rig);
+  tcase_add_test (tc, test_colour_camera_without_a_rig_is_one_error);
+  tcase_add_test (tc, test_pairs_stay_right_where_both_streams_have_holes_and_gaps);
+  tcase_add_test (tc, test_streams_of_different_rates_give_the_slower_one_with_the_nearest_partner);
+  tcase_add_test (tc, test_missing_rig_is_one_error_that_names_it);
+  tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
+  tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
+  tcase_add_test (tc, test_changes_states_twice);
+  return suite;
+}
+
+GST_CHECK_MAIN (rangecombine);

@@ -1,0 +1,376 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Payloader and depayloader together. */
+#include "../rangecast-check.hpp"
+
+#include <gst/rtp/rtp.h>
+
+#include <algorithm>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <vector>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static constexpr const char *kPlainRtpCaps =
+    "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+
+/* The packets of some access units of a rig, with the payloader's caps. */
+struct Sent {
+  std::vector<GstBuffer *> packets;
+  std::vector<GstBuffer *> access_units;
+  GstCaps *caps = nullptr;
+
+  explicit Sent (
+      const Rig &rig, int frames = 3, const char *launch = "rtpneighbourcodepay mtu=1400")
+  {
+    GstHarness *encoder = gst_harness_new ("neighbourcodeenc");
+    gst_harness_set_src_caps (
+        encoder, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
+    GstHarness *h = gst_harness_new_parse (launch);
+    gst_harness_set_src_caps (
+        h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 25, 1), "access-unit"));
+    for (int i = 0; i < frames; i++) {
+      GstBuffer *coded =
+          gst_harness_push_and_pull (encoder, make_frame_set (rig, i * GST_SECOND / 25));
+      access_units.push_back (gst_buffer_ref (coded));
+      fail_unless_equals_int (gst_harness_push (h, coded), GST_FLOW_OK);
+    }
+    while (GstBuffer *packet = gst_harness_try_pull (h))
+      packets.push_back (packet);
+    caps = gst_pad_get_current_caps (h->sinkpad);
+    gst_harness_teardown (h);
+    gst_harness_teardown (encoder);
+  }
+  ~Sent ()
+  {
+    for (GstBuffer *buffer : packets)
+      gst_buffer_unref (buffer);
+    for (GstBuffer *buffer : access_units)
+      gst_buffer_unref (buffer);
+    gst_caps_unref (caps);
+  }
+};
+
+static std::vector<guint8>
+bytes_of (GstBuffer *buffer)
+{
+  std::vector<guint8> bytes (gst_buffer_get_size (buffer));
+  gst_buffer_extract (buffer, 0, bytes.data (), bytes.size ());
+  return bytes;
+}
+
+static std::vector<guint8>
+payload_of (GstBuffer *packet)
+{
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  fail_unless (gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp));
+  auto from = static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp));
+  std::vector<guint8> bytes (from, from + gst_rtp_buffer_get_payload_len (&rtp));
+  gst_rtp_buffer_unmap (&rtp);
+  return bytes;
+}
+
+static GstHarness *
+receiver (GstCaps *caps)
+{
+  GstHarness *h = gst_harness_new ("rtpneighbourcodedepay");
+  gst_harness_set_src_caps (h, caps);
+  return h;
+}
+
+static guint64
+stat (GstHarness *h, const char *field)
+{
+  GstStructure *stats;
+  guint64 value = G_MAXUINT64;
+  g_object_get (h->element, "unit-stats", &stats, nullptr);
+  gst_structure_get_uint64 (stats, field, &value);
+  gst_structure_free (stats);
+  return value;
+}
+
+GST_START_TEST (test_access_units_come_back_byte_for_byte)
+{
+  const Sent sent (ring_rig (3));
+  GstHarness *h = receiver (gst_caps_ref (sent.caps));
+  for (GstBuffer *packet : sent.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  for (std::size_t i = 0; i < sent.access_units.size (); i++) {
+    GstBuffer *received = gst_harness_pull (h);
+    fail_unless (bytes_of (received) == bytes_of (sent.access_units[i]));
+    fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (received), i * GST_SECOND / 25);
+    gst_buffer_unref (received);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_every_packet_fits_the_mtu_and_holds_whole_units)
+{
+  const Sent sent (ring_rig (2));
+  fail_unless (sent.packets.size () > 20);
+  for (GstBuffer *packet : sent.packets) {
+    fail_unless (gst_buffer_get_size (packet) <= 1400);
+    const auto payload = payload_of (packet);
+    UnitReader reader (payload);
+    UnitHeader header;
+    int units = 0;
+    while (reader.next (header))
+      units++;
+    fail_unless (reader.status ().ok () && units > 0);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_marker_is_on_the_last_packet_of_each_access_unit)
+{
+  const Sent sent (ring_rig (1), 4);
+  int markers = 0;
+  for (std::size_t i = 0; i < sent.packets.size (); i++) {
+    GstRTPBuffer rtp = GST_RTP_BUFFER_INIT, next = GST_RTP_BUFFER_INIT;
+    gst_rtp_buffer_map (sent.packets[i], GST_MAP_READ, &rtp);
+    const bool marker = gst_rtp_buffer_get_marker (&rtp);
+    markers += marker;
+    if (i + 1 < sent.packets.size ()) {
+      gst_rtp_buffer_map (sent.packets[i + 1], GST_MAP_READ, &next);
+      fail_unless_equals_int (
+          marker, gst_rtp_buffer_get_timestamp (&rtp) != gst_rtp_buffer_get_timestamp (&next));
+      gst_rtp_buffer_unmap (&next);
+    }
+    gst_rtp_buffer_unmap (&rtp);
+  }
+  fail_unless_equals_int (markers, 4);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_any_one_lost_packet_costs_only_its_own_units)
+{
+  const Sent sent (ring_rig (1), 3);
+  for (std::size_t lost = 0; lost < sent.packets.size (); lost++) {
+    GstHarness *h = receiver (gst_caps_ref (sent.caps));
+    gsize expected = 0, received = 0;
+    for (GstBuffer *unit : sent.access_units)
+      expected += gst_buffer_get_size (unit);
+    for (std::size_t i = 0; i < sent.packets.size (); i++)
+      if (i != lost)
+        gst_harness_push (h, gst_buffer_ref (sent.packets[i]));
+    gst_harness_push_event (h, gst_event_new_eos ());
+    while (GstBuffer *buffer = gst_harness_try_pull (h)) {
+      received += gst_buffer_get_size (buffer);
+      gst_buffer_unref (buffer);
+    }
+    const auto payload = payload_of (sent.packets[lost]);
+    UnitReader reader (payload);
+    UnitHeader header;
+    gsize slices = 0;
+    while (const auto unit = reader.next (header))
+      slices += header.type == guint8 (UnitType::kSlice) ? unit->size () : 0;
+    fail_unless_equals_int (received, expected - slices);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_of_64_views_comes_in_band)
+{
+  Rig rig = ring_rig (64, 16, 12);
+  const Sent sent (rig, 1);
+  GstHarness *h = receiver (gst_caps_from_string (kPlainRtpCaps));
+  for (GstBuffer *packet : sent.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  GstBuffer *received = gst_harness_pull (h);
+  fail_unless (bytes_of (received) == bytes_of (sent.access_units[0]));
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  gstrange::RangeInfo info;
+  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless (encode_rig (info.rig) == encode_rig (rig));
+  fail_unless_equals_int (info.fps_n, 25);
+  gst_caps_unref (caps);
+  gst_buffer_unref (received);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_of_the_caps_suffices)
+{
+  const Sent sent (ring_rig (2), 2, "rtpneighbourcodepay mtu=1400 config-interval=0");
+  GstHarness *h = receiver (gst_caps_ref (sent.caps));
+  for (GstBuffer *packet : sent.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  gst_buffer_unref (gst_harness_pull (h));
+  gst_buffer_unref (gst_harness_pull (h));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_nothing_comes_out_before_the_rig_is_known)
+{
+  const Sent sent (ring_rig (2), 2, "rtpneighbourcodepay mtu=1400 config-interval=0");
+  GstHarness *h = receiver (gst_caps_from_string (kPlainRtpCaps));
+  for (GstBuffer *packet : sent.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  fail_unless_equals_int (gst_harness_buffers_received (h), 0);
+  fail_unless_equals_uint64 (stat (h, "without-rig"), 2);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slices_of_views_that_the_rig_has_not_are_damaged_units)
+{
+  const Sent three (ring_rig (3), 2, "rtpneighbourcodepay mtu=1400 config-interval=0");
+  const Sent two (ring_rig (2), 1);
+  GstHarness *h = receiver (gst_caps_ref (two.caps));
+  for (GstBuffer *packet : three.packets)
+    gst_harness_push (h, gst_buffer_ref (packet));
+  for (int i = 0; i < 2; i++) {
+    GstBuffer *received = gst_harness_pull (h);
+    const std::vector<guint8> bytes = bytes_of (received);
+    UnitReader reader (bytes);
+    UnitHeader header;
+    unsigned views = 0;
+    while (const auto unit = reader.next (header))
+      views |= 1u << (*unit)[4];
+    fail_unless_equals_int (views, 0b011);
+    gst_buffer_unref (received);
+  }
+  fail_unless (stat (h, "bad-units") > 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damaged_packets_are_counted_and_never_fatal)
+{
+  const Sent sent (ring_rig (2), 3);
+  GstHarness *h = receiver (gst_caps_ref (sent.caps));
+  GRand *random = g_rand_new_with_seed (7);
+  for (int round = 0; round < 20; round++)
+    for (GstBuffer *packet : sent.packets) {
+      GstBuffer *bad = gst_buffer_copy_deep (packet);
+      GstMapInfo map;
+      gst_buffer_map (bad, &map, GST_MAP_READWRITE);
+      for (int i = 0; i < 8; i++)
+        map.data[g_rand_int_range (random, 12, gint32 (map.size))] ^=
+            1 << g_rand_int_range (random, 0, 8);
+      gst_buffer_unmap (bad, &map);
+      gst_buffer_set_size (bad, g_rand_int_range (random, 13, gint32 (map.size) + 1));
+      fail_unless_equals_int (gst_harness_push (h, bad), GST_FLOW_OK);
+    }
+  g_rand_free (random);
+  fail_unless (stat (h, "bad-units") > 50);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set)
+{
+  GstHarness *h =
+      gst_harness_new_parse ("neighbourcodeenc max-slice-size=4000 ! rtpneighbourcodepay mtu=1400");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  const Rig rig = ring_rig (1);
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
+  fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
+  fail_unless (
+      next_message_text (bus, GST_MESSAGE_ERROR).find ("max-slice-size") != std::string::npos);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_bad_rig_in_the_caps_is_one_error)
+{
+  GstHarness *h = gst_harness_new ("rtpneighbourcodedepay");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  GstCaps *caps = gst_caps_from_string (kPlainRtpCaps);
+  gst_caps_set_simple (caps, "rig", G_TYPE_STRING, "AAAA", nullptr);
+  gst_harness_set_src_caps (h, caps);
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("rig") != std::string::npos);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_works_again_after_null)
+{
+  const Sent sent (ring_rig (1), 2);
+  GstHarness *h = receiver (gst_caps_from_string (kPlainRtpCaps));
+  for (int round = 0; round < 2; round++) {
+    for (GstBuffer *packet : sent.packets)
+      gst_harness_push (h, gst_buffer_copy (packet));
+    gst_buffer_unref (gst_harness_pull (h));
+    gst_buffer_unref (gst_harness_pull (h));
+    gst_element_set_state (h->element, GST_STATE_NULL);
+    gst_harness_play (h);
+    gst_harness_set_src_caps_str (h, kPlainRtpCaps);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Whether a packet holds slices. */
+static bool
+has_slices (GstBuffer *packet)
+{
+  const auto payload = payload_of (packet);
+  UnitReader reader (payload);
+  UnitHeader header;
+  bool any = false;
+  while (reader.next (header))
+    any = any || header.type == guint8 (UnitType::kSlice);
+  return any;
+}
+
+/* Large views, of which parts are lost, and small ones, each in a packet of its own. */
+GST_START_TEST (test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are)
+{
+  for (const int width : {160, 24}) {
+    const Sent sent (ring_rig (2, width, width * 3 / 4), 3);
+    if (width == 24) /* the rig's in front of the first, and one for each view */
+      fail_unless_equals_int (int (sent.packets.size ()), 1 + 3 * 2);
+    for (std::size_t lost = 0; lost < sent.packets.size (); lost++) {
+      GstHarness *h = receiver (gst_caps_ref (sent.caps));
+      for (std::size_t i = 0; i < sent.packets.size (); i++)
+        if (i != lost)
+          gst_harness_push (h, gst_buffer_ref (sent.packets[i]));
+      gst_harness_push_event (h, gst_event_new_eos ());
+      int buffers = 0;
+      for (; GstBuffer *buffer = gst_harness_try_pull (h); buffers++) {
+        const bool lacks = GST_BUFFER_PTS (buffer) == GST_BUFFER_PTS (sent.packets[lost]) &&
+                           has_slices (sent.packets[lost]);
+        fail_unless (lacks == GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT),
+            "width %d: buffer %d without packet %zu", width, buffers, lost);
+        gst_buffer_unref (buffer);
+      }
+      fail_unless_equals_int (buffers, 3);
+      gst_harness_teardown (h);
+    }
+  }
+}
+GST_END_TEST;
+
+static Suite *
+rtpneighbourcodedepay_suite ()
+{
+  Suite *suite = suite_create ("rtpneighbourcodedepay");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_access_units_come_back_byte_for_byte);
+  tcase_add_test (tc, test_every_packet_fits_the_mtu_and_holds_whole_units);
+  tcase_add_test (tc, test_marker_is_on_the_last_packet_of_each_access_unit);
+  tcase_add_test (tc, test_any_one_lost_packet_costs_only_its_own_units);
+  tcase_add_test (tc, test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are);
+  tcase_add_test (tc, test_rig_of_64_views_comes_in_band);
+  tcase_add_test (tc, test_rig_of_the_caps_suffices);
+  tcase_add_test (tc, test_nothing_comes_out_before_the_rig_is_known);
+  tcase_add_test (tc, test_slices_of_views_that_the_rig_has_not_are_damaged_units);
+  tcase_add_test (tc, test_damaged_packets_are_counted_and_never_fatal);
+  tcase_add_test (tc, test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set);
+  tcase_add_test (tc, test_bad_rig_in_the_caps_is_one_error);
+  tcase_add_test (tc, test_works_again_after_null);
+  return suite;
+}
+
+GST_CHECK_MAIN (rtpneighbourcodedepay);

@@ -1,0 +1,455 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "../coded-check.hpp"
+
+#include <gst/rtp/rtp.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static GstHarness *
+payloader (const Rig &rig, const char *properties = "", const char *alignment = "access-unit")
+{
+  GstHarness *h = harness_of (std::string ("rtpneighbourcodepay ") + properties);
+  gst_harness_set_src_caps (h, coded_caps (rig, alignment));
+  return h;
+}
+
+/* A packet, read. */
+struct Packet {
+  gsize size = 0;
+  bool marker = false;
+  guint32 timestamp = 0;
+  std::vector<std::vector<guint8>> units;
+
+  explicit Packet (GstBuffer *buffer) : size (gst_buffer_get_size (buffer))
+  {
+    GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+    fail_unless (gst_rtp_buffer_map (buffer, GST_MAP_READ, &rtp));
+    marker = gst_rtp_buffer_get_marker (&rtp);
+    timestamp = gst_rtp_buffer_get_timestamp (&rtp);
+    auto from = static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp));
+    units = units_of ({from, gst_rtp_buffer_get_payload_len (&rtp)});
+    gst_rtp_buffer_unmap (&rtp);
+  }
+  int count (UnitType type) const
+  {
+    int n = 0;
+    for (const auto &unit : units)
+      n += (unit[0] & 15) == int (type);
+    return n;
+  }
+};
+
+static std::vector<Packet>
+pull_packets (GstHarness *h)
+{
+  std::vector<Packet> packets;
+  auto buffers = pull_all (h);
+  for (GstBuffer *buffer : buffers)
+    packets.emplace_back (buffer);
+  unref_all (buffers);
+  return packets;
+}
+
+static int
+count (const std::vector<Packet> &packets, UnitType type)
+{
+  int n = 0;
+  for (const Packet &packet : packets)
+    n += packet.count (type);
+  return n;
+}
+
+static GstBuffer *
+access_unit (const Rig &rig, GstClockTime time = 0, const char *properties = "")
+{
+  return buffer_of (encoded_units (rig, make_frame_set (rig, time), properties), time);
+}
+
+GST_START_TEST (test_no_packet_is_longer_than_the_mtu)
+{
+  const Rig rig = ring_rig (2);
+  for (const int mtu : {600, 1000, 1400, 9000}) {
+    GstHarness *h = payloader (rig, ("mtu=" + std::to_string (mtu)).c_str ());
+    const std::string limit = "max-slice-size=" + std::to_string (std::min (mtu - 12, 1200));
+    gst_harness_push (h, access_unit (rig, 0, limit.c_str ()));
+    gsize longest = 0;
+    for (const Packet &packet : pull_packets (h))
+      longest = std::max (longest, packet.size);
+    fail_unless (longest <= gsize (mtu));
+    fail_unless (longest > gsize (mtu) * 2 / 3);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* Caps of a peer that wants transport-wide sequence numbers and the time of sending. */
+static constexpr const char *kWithExtensions =
+    "application/x-rtp, "
+    "extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01, "
+    "extmap-3=(string)urn:ietf:params:rtp-hdrext:ntp-64";
+
+GST_START_TEST (test_no_packet_is_longer_than_the_mtu_with_header_extensions)
+{
+  const Rig rig = ring_rig (2);
+  for (const guint mtu : {1240u, 1400u}) {
+    GstHarness *h = gst_harness_new ("rtpneighbourcodepay");
+    gst_harness_set_sink_caps_str (h, kWithExtensions);
+    g_object_set (h->element, "mtu", mtu, nullptr);
+    gst_harness_set_src_caps (h, coded_caps (rig));
+    gst_harness_push (h, access_unit (rig, 0, "max-slice-size=300"));
+    gsize longest = 0;
+    auto packets = pull_all (h);
+    fail_unless (packets.size () > 3);
+    for (GstBuffer *packet : packets) {
+      GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+      gpointer data = nullptr;
+      guint size = 0;
+      fail_unless (gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp));
+      fail_unless (gst_rtp_buffer_get_extension_onebyte_header (&rtp, 1, 0, &data, &size));
+      fail_unless_equals_int (size, 2);
+      gst_rtp_buffer_unmap (&rtp);
+      longest = std::max (longest, gst_buffer_get_size (packet));
+    }
+    unref_all (packets);
+    fail_unless (longest <= mtu, "%d bytes, mtu %d", int (longest), int (mtu));
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_every_packet_decodes_alone)
+{
+  const Rig rig = ring_rig (3);
+  GstHarness *h = payloader (rig, "mtu=1400");
+  gst_harness_push (h, access_unit (rig));
+  AccessUnitDecoder decoder;
+  fail_unless (decoder.set_rig (rig).ok ());
+  DecoderResult all;
+  GstBuffer *canvas = make_frame_set (rig);
+  {
+    gstrange::RangeFrameMap frame (canvas, GST_MAP_READWRITE);
+    for (const Packet &packet : pull_packets (h)) {
+      std::vector<guint8> bytes;
+      for (const auto &unit : packet.units)
+        bytes.insert (bytes.end (), unit.begin (), unit.end ());
+      decoder.plan (bytes, all);
+      std::vector<RangeImage> images;
+      for (const auto &view : decoder.views ())
+        images.push_back (frame.views ()[std::size_t (view.view_id)]);
+      fail_unless (decoder.decode (images, 1, all).ok ());
+    }
+  }
+  gst_buffer_unref (canvas);
+  fail_unless_equals_uint64 (all.slices, encoded_units (rig, make_frame_set (rig), "").size ());
+  fail_unless_equals_uint64 (all.bad_slices, 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_mtu_may_change_while_playing)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig, "mtu=1400");
+  for (const guint mtu : {9000u, 1400u, 3000u}) {
+    g_object_set (h->element, "mtu", mtu, nullptr);
+    gst_harness_push (h, access_unit (rig));
+    for (const Packet &packet : pull_packets (h))
+      fail_unless (packet.size <= mtu);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slice_or_rig_longer_than_the_mtu_is_one_error)
+{
+  const Rig rig = ring_rig (1);
+  for (const char *properties : {"mtu=1000", "mtu=60", "mtu=1000 config-interval=0"}) {
+    GstHarness *h = payloader (rig, properties);
+    {
+      ErrorCounter errors (h);
+      fail_unless_equals_int (gst_harness_push (h, access_unit (rig)), GST_FLOW_ERROR);
+      fail_unless_equals_int (errors.take (), 1);
+    }
+    fail_unless_equals_int (gst_harness_buffers_received (h), 0);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* What the payloader says of an access unit that it refuses. */
+static std::string
+refusal (const Rig &rig, const char *properties, GstBuffer *buffer)
+{
+  GstHarness *h = payloader (rig, properties);
+  std::string text;
+  {
+    ErrorCounter errors (h);
+    fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_ERROR);
+    text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
+  }
+  gst_harness_teardown (h);
+  return text;
+}
+
+static bool
+says (const std::string &text, const std::string &part)
+{
+  return text.find (part) != std::string::npos;
+}
+
+GST_START_TEST (test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit)
+{
+  const Rig rig = ring_rig (1);
+  const auto slices = encoded_units (rig, make_frame_set (rig), "max-slice-size=1200");
+  gsize first_long = 0;
+  for (const auto &slice : slices)
+    if (first_long == 0 && slice.size () > 1000 - 12)
+      first_long = slice.size ();
+  const std::string text = refusal (rig, "mtu=1000", buffer_of (slices));
+  fail_unless (says (text, "A slice of " + std::to_string (first_long)), "%s", text.c_str ());
+  fail_unless (says (text, "max-slice-size=988"), "%s", text.c_str ());
+  fail_unless (says (text, "mtu=" + std::to_string (first_long + 12)), "%s", text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set)
+{
+  const Rig rig = ring_rig (1);
+  const std::string text = refusal (rig, "mtu=200 config-interval=0", access_unit (rig));
+  fail_unless (says (text, "A slice of "), "%s", text.c_str ());
+  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_error_for_a_long_rig_view_names_mtu_and_config_interval)
+{
+  const Rig rig = ring_rig (1);
+  std::vector<guint8> rig_units;
+  write_rig_units ({rig, 30, 1}, rig_units); /* one: the rig has one view */
+  const std::string text = refusal (rig, "mtu=60", access_unit (rig));
+  fail_unless (
+      says (text, "A rig view of " + std::to_string (rig_units.size ())), "%s", text.c_str ());
+  fail_unless (says (text, "mtu=" + std::to_string (rig_units.size () + 12)), "%s", text.c_str ());
+  fail_unless (says (text, "config-interval=0"), "%s", text.c_str ());
+  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_caps_without_a_rig_are_an_error)
+{
+  GstHarness *h = gst_harness_new ("rtpneighbourcodepay");
+  {
+    ErrorCounter errors (h);
+    gst_harness_set_src_caps_str (h, "application/x-neighbour-code,version=1,alignment=access-unit,"
+                                     "width=320,height=240,framerate=30/1,views=1");
+    fail_unless (errors.take () > 0); /* again with each event: GStreamer repeats refused caps */
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_states_change_twice)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig, "config-interval=3600");
+  for (int round = 0; round < 2; round++) {
+    gst_harness_push (h, access_unit (rig));
+    fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), 1);
+    for (const GstState state : {GST_STATE_READY, GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
+      fail_unless (gst_element_set_state (h->element, state) == GST_STATE_CHANGE_SUCCESS);
+    gst_harness_play (h);
+    gst_harness_set_src_caps (h, coded_caps (rig));
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_eos_and_gap_go_by)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig);
+  gst_harness_push (h, access_unit (rig));
+  fail_unless (gst_harness_push_event (h, gst_event_new_gap (GST_SECOND, GST_SECOND)));
+  gst_harness_push (h, access_unit (rig, 2 * GST_SECOND));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  fail_unless (pulls_event (h, GST_EVENT_EOS));
+  int markers = 0;
+  for (const Packet &packet : pull_packets (h))
+    markers += packet.marker;
+  fail_unless_equals_int (markers, 2);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_goes_on_after_a_flush)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig);
+  gst_harness_push (h, access_unit (rig));
+  const auto before = pull_packets (h);
+  flush (h);
+  gst_harness_push (h, access_unit (rig));
+  fail_unless_equals_int (
+      count (pull_packets (h), UnitType::kSlice), count (before, UnitType::kSlice));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_new_rig_is_sent_at_once)
+{
+  const Rig one = ring_rig (1, 64, 48), two = ring_rig (2, 128, 96);
+  GstHarness *h = payloader (one, "config-interval=3600");
+  for (const Rig *rig : {&one, &two, &one}) {
+    gst_harness_set_src_caps (h, coded_caps (*rig));
+    gst_harness_push (h, access_unit (*rig));
+    gst_harness_push (h, access_unit (*rig, 1));
+    fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), int (rig->views.size ()));
+    GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+    const gchar *width = gst_structure_get_string (gst_caps_get_structure (caps, 0), "width");
+    fail_unless (std::to_string (rig->views[0].width) == width);
+    gst_caps_unref (caps);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_config_interval_may_change_while_playing)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig, "config-interval=0");
+  int rigs[3] = {};
+  for (int phase = 0; phase < 3; phase++) {
+    g_object_set (h->element, "config-interval", phase == 0 ? 0 : phase == 1 ? -1 : 1, nullptr);
+    for (int i = 0; i < 10; i++)
+      gst_harness_push (h, access_unit (rig, (phase * 10 + i) * GST_SECOND / 4));
+    rigs[phase] = count (pull_packets (h), UnitType::kRigView);
+  }
+  fail_unless_equals_int (rigs[0], 0);
+  fail_unless_equals_int (rigs[1], 10);
+  fail_unless (rigs[2] == 2 || rigs[2] == 3);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_latency_is_that_of_upstream)
+{
+  GstHarness *h = payloader (ring_rig (1));
+  gst_harness_set_upstream_latency (h, 40 * GST_MSECOND);
+  fail_unless_equals_uint64 (gst_harness_query_latency (h), 40 * GST_MSECOND);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_empty_rois_are_one_packet_with_a_marker)
+{
+  const Rig rig = ring_rig (3);
+  GstBuffer *frame_set = make_frame_set (rig);
+  {
+    gstrange::RangeFrameMap frame (frame_set, GST_MAP_READWRITE);
+    for (std::size_t i = 0; i < 3; i++)
+      frame.crop (i, {});
+  }
+  GstHarness *h = payloader (rig, "config-interval=0");
+  gst_harness_push (h, buffer_of (encoded_units (rig, frame_set)));
+  const auto packets = pull_packets (h);
+  fail_unless_equals_int (packets.size (), 1);
+  fail_unless (packets[0].marker);
+  fail_unless_equals_int (packets[0].count (UnitType::kSlice), 3);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damaged_and_empty_access_units_are_no_error)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = payloader (rig, "config-interval=0");
+  gst_harness_push (h, access_unit (rig));
+  const int all = count (pull_packets (h), UnitType::kSlice);
+  GstBuffer *cut = access_unit (rig);
+  gst_buffer_set_size (cut, gssize (gst_buffer_get_size (cut)) - 5);
+  fail_unless_equals_int (gst_harness_push (h, cut), GST_FLOW_OK);
+  fail_unless_equals_int (count (pull_packets (h), UnitType::kSlice), all - 1);
+  fail_unless_equals_int (gst_harness_push (h, gst_buffer_new ()), GST_FLOW_OK);
+  fail_unless_equals_int (pull_packets (h).size (), 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static void
+push_slices (GstHarness *h, const std::vector<std::vector<guint8>> &units, GstClockTime time,
+    bool with_marker)
+{
+  for (std::size_t i = 0; i < units.size (); i++) {
+    GstBuffer *slice = buffer_of ({units[i]}, time);
+    if (with_marker && i + 1 == units.size ())
+      GST_BUFFER_FLAG_SET (slice, GST_BUFFER_FLAG_MARKER);
+    fail_unless_equals_int (gst_harness_push (h, slice), GST_FLOW_OK);
+  }
+}
+
+GST_START_TEST (test_slices_leave_as_they_come_and_the_last_has_the_marker)
+{
+  const Rig rig = ring_rig (2);
+  const auto units = encoded_units (rig, make_frame_set (rig), "");
+  GstHarness *h = payloader (rig, "config-interval=-1", "slice");
+  for (int frame = 0; frame < 2; frame++) {
+    push_slices (h, units, frame * GST_SECOND / 30, true);
+    const auto packets = pull_packets (h);
+    fail_unless (packets.size () >= units.size ());
+    fail_unless_equals_int (count (packets, UnitType::kSlice), int (units.size ()));
+    fail_unless_equals_int (count (packets, UnitType::kRigView), 2);
+    for (std::size_t i = 0; i < packets.size (); i++) {
+      fail_unless_equals_int (packets[i].marker, i + 1 == packets.size ());
+      fail_unless_equals_int (packets[i].timestamp, packets[0].timestamp);
+    }
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slices_without_a_marker_have_a_timestamp_for_each_frame_set)
+{
+  const Rig rig = ring_rig (1);
+  const auto units = encoded_units (rig, make_frame_set (rig), "");
+  GstHarness *h = payloader (rig, "config-interval=-1", "slice");
+  push_slices (h, units, 0, false);
+  push_slices (h, units, GST_SECOND, false);
+  const auto packets = pull_packets (h);
+  fail_unless_equals_int (count (packets, UnitType::kRigView), 2);
+  fail_unless_equals_int (packets.back ().timestamp - packets.front ().timestamp, 90000);
+  for (const Packet &packet : packets)
+    fail_if (packet.marker);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static Suite *
+rtpneighbourcodepay_suite ()
+{
+  Suite *suite = suite_create ("rtpneighbourcodepay");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu);
+  tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu_with_header_extensions);
+  tcase_add_test (tc, test_every_packet_decodes_alone);
+  tcase_add_test (tc, test_mtu_may_change_while_playing);
+  tcase_add_test (tc, test_slice_or_rig_longer_than_the_mtu_is_one_error);
+  tcase_add_test (tc, test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit);
+  tcase_add_test (tc, test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set);
+  tcase_add_test (tc, test_error_for_a_long_rig_view_names_mtu_and_config_interval);
+  tcase_add_test (tc, test_caps_without_a_rig_are_an_error);
+  tcase_add_test (tc, test_states_change_twice);
+  tcase_add_test (tc, test_eos_and_gap_go_by);
+  tcase_add_test (tc, test_goes_on_after_a_flush);
+  tcase_add_test (tc, test_new_rig_is_sent_at_once);
+  tcase_add_test (tc, test_config_interval_may_change_while_playing);
+  tcase_add_test (tc, test_latency_is_that_of_upstream);
+  tcase_add_test (tc, test_empty_rois_are_one_packet_with_a_marker);
+  tcase_add_test (tc, test_damaged_and_empty_access_units_are_no_error);
+  tcase_add_test (tc, test_slices_leave_as_they_come_and_the_last_has_the_marker);
+  tcase_add_test (tc, test_slices_without_a_marker_have_a_timestamp_for_each_frame_set);
+  return suite;
+}
+
+GST_CHECK_MAIN (rtpneighbourcodepay);

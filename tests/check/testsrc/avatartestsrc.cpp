@@ -1,0 +1,630 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <rangecast/scene/scene.hpp> // before check's macro fail(), which <memory> does not survive
+
+#include "../rangecast-check.hpp"
+
+#include <glib/gstdio.h>
+#include <gst/video/gstvideopool.h>
+#include <gst/video/video.h>
+
+#include <cstring>
+#include <gstrange/gstrangebufferpool.h>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+static GstHarness *
+source_harness (const char *pad, const char *caps)
+{
+  GstHarness *h = gst_harness_new_with_padnames ("avatartestsrc", nullptr, pad);
+  gst_harness_set_sink_caps_str (h, caps);
+  return h;
+}
+
+GST_START_TEST (test_frames_follow_the_frame_rate_and_carry_capture_time)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGB,width=64,height=48,framerate=10/1");
+  g_object_set (h->element, "num-buffers", 3, nullptr);
+  gst_harness_play (h);
+  for (guint64 i = 0; i < 3; i++) {
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless (buffer != nullptr);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), i * 100 * GST_MSECOND);
+    fail_unless_equals_uint64 (GST_BUFFER_DURATION (buffer), 100 * GST_MSECOND);
+    fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (buffer), GST_BUFFER_PTS (buffer));
+    gst_buffer_unref (buffer);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_all_views_come_in_one_frame_set)
+{
+  GstHarness *h = source_harness ("src", "video/x-range,width=64,height=48");
+  g_object_set (h->element, "num-buffers", 1, "views", 3, nullptr);
+  gst_harness_play (h);
+  GstBuffer *buffer = gst_harness_pull (h);
+  fail_unless_equals_int (gst_buffer_n_range_metas (buffer), 3);
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  gstrange::RangeInfo info;
+  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_equals_int (info.views (), 3);
+  fail_unless_equals_int (info.width, 64);
+  gst_caps_unref (caps);
+  gst_buffer_unref (buffer);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_person_only_crops_and_empty_frames_have_nobody)
+{
+  GstHarness *h = source_harness ("src", "video/x-range,width=160,height=120");
+  g_object_set (h->element, "num-buffers", 2, "view-id", 2, "range-person-only", TRUE,
+      "empty-frames", 1, nullptr);
+  gst_harness_play (h);
+  GstBuffer *empty = gst_harness_pull (h), *person = gst_harness_pull (h);
+  fail_unless_equals_int (gst_buffer_get_range_meta (empty, 2)->width, 0);
+  const GstRangeMeta *meta = gst_buffer_get_range_meta (person, 2);
+  fail_unless (meta->width > 40 && meta->width < 140);
+  gst_buffer_unref (empty);
+  gst_buffer_unref (person);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* Runs a launch line to its end. */
+static std::string
+run (const char *line)
+{
+  GstElement *pipeline = gst_parse_launch (line, nullptr);
+  fail_unless (pipeline != nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstMessage *message = gst_bus_timed_pop_filtered (
+      bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  fail_unless (message != nullptr);
+  std::string text;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
+    GError *error = nullptr;
+    gst_message_parse_error (message, &error, nullptr);
+    text = error->message;
+    g_error_free (error);
+  }
+  gst_message_unref (message);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+  return text;
+}
+
+GST_START_TEST (test_bad_view_and_model_are_named)
+{
+  fail_unless (run ("avatartestsrc view-id=9 ! fakesink").find ("view-id") != std::string::npos);
+  fail_unless (run ("avatartestsrc location=/no/head.glb ! fakesink").find ("/no/head.glb") !=
+               std::string::npos);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_left_and_right_end_together_in_their_own_formats)
+{
+  fail_unless (run ("avatartestsrc name=s num-buffers=4 "
+                    "s.left ! video/x-raw,format=GRAY8,width=50,height=40 ! queue ! fakesink "
+                    "s.right ! video/x-raw,format=BGRx ! queue ! fakesink "
+                    "s.src ! queue ! fakesink")
+                   .empty ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_sizes_that_do_not_agree_are_an_error)
+{
+  fail_if (run ("avatartestsrc name=s s.left ! video/x-raw,width=50 ! queue ! fakesink "
+                "s.right ! video/x-raw,width=60 ! queue ! fakesink")
+               .empty ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_state_changes_can_be_repeated)
+{
+  for (const char *line : {"avatartestsrc ! video/x-range,width=64,height=48 ! fakesink sync=true",
+           "avatartestsrc is-live=true ! video/x-range,width=64,height=48 ! fakesink sync=true"}) {
+    GstElement *pipeline = gst_parse_launch (line, nullptr);
+    for (int i = 0; i < 2; i++)
+      for (GstState state : {GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED, GST_STATE_READY,
+               GST_STATE_PLAYING, GST_STATE_NULL}) {
+        fail_if (gst_element_set_state (pipeline, state) == GST_STATE_CHANGE_FAILURE);
+        fail_if (gst_element_get_state (pipeline, nullptr, nullptr, 10 * GST_SECOND) ==
+                 GST_STATE_CHANGE_FAILURE);
+      }
+    gst_object_unref (pipeline);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_live_frames_lie_on_multiples_of_the_frame_period)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48,framerate=20/1");
+  g_object_set (h->element, "is-live", TRUE, "num-buffers", 2, nullptr);
+  gst_harness_use_systemclock (h);
+  gst_harness_play (h);
+  for (int i = 0; i < 2; i++) {
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless (buffer != nullptr);
+    fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (buffer) % (50 * GST_MSECOND), 0);
+    gst_buffer_unref (buffer);
+  }
+  fail_unless_equals_uint64 (gst_harness_query_latency (h), 50 * GST_MSECOND);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rig_is_exported_with_the_size_of_the_caps)
+{
+  gchar *path = g_build_filename (g_get_tmp_dir (), "rangecast-avatar-rig.yaml", nullptr);
+  gchar *line = g_strdup_printf (
+      "avatartestsrc num-buffers=1 rig-export=%s ! video/x-range,width=64,height=48 ! fakesink",
+      path);
+  fail_unless (run (line).empty ());
+  Rig rig;
+  fail_unless (load_rig (path, rig).ok ());
+  fail_unless_equals_int (static_cast<int> (rig.views.size ()), 4);
+  fail_unless_equals_int (rig.views[0].width, 64);
+  fail_unless (rig.views[0].right.has_value ());
+  g_remove (path);
+  g_free (line);
+  g_free (path);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_caps_change_mid_stream_changes_the_size)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48,framerate=20/1");
+  gst_harness_play (h);
+  gst_buffer_unref (gst_harness_pull (h));
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx,width=32,height=24,framerate=20/1");
+  gsize size = 0;
+  GstClockTime last = 0;
+  for (int i = 0; i < 1000 && size != 32 * 24 * 4; i++) {
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless (buffer && (i == 0 || GST_BUFFER_PTS (buffer) > last));
+    size = gst_buffer_get_size (buffer);
+    last = GST_BUFFER_PTS (buffer);
+    gst_buffer_unref (buffer);
+  }
+  fail_unless_equals_int (static_cast<int> (size), 32 * 24 * 4);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* ---- the same picture everywhere ---- */
+
+/* The n-th picture (from 0) of a source with that frame rate and seed. */
+static GstBuffer *
+nth_picture (int n, int frames_per_second, guint seed)
+{
+  gchar *caps = g_strdup_printf (
+      "video/x-raw,format=RGBx,width=64,height=48,framerate=%d/1", frames_per_second);
+  GstHarness *h = source_harness ("left", caps);
+  g_free (caps);
+  g_object_set (h->element, "num-buffers", n + 1, "seed", seed, nullptr);
+  gst_harness_play (h);
+  GstBuffer *buffer = gst_harness_pull (h);
+  for (int i = 0; i < n; i++) {
+    gst_buffer_unref (buffer);
+    buffer = gst_harness_pull (h);
+  }
+  gst_harness_teardown (h);
+  return buffer;
+}
+
+static std::string
+bytes_of (GstBuffer *buffer)
+{
+  std::string bytes (gst_buffer_get_size (buffer), 0);
+  gst_buffer_extract (buffer, 0, bytes.data (), bytes.size ());
+  return bytes;
+}
+
+static std::string
+take_bytes (GstBuffer *buffer)
+{
+  std::string bytes = bytes_of (buffer);
+  gst_buffer_unref (buffer);
+  return bytes;
+}
+
+GST_START_TEST (test_same_seed_and_capture_time_give_the_same_picture)
+{
+  const std::string picture = take_bytes (nth_picture (4, 10, 7));
+  fail_unless (take_bytes (nth_picture (2, 5, 7)) == picture, "0.4 s, whatever came before");
+  fail_if (take_bytes (nth_picture (2, 5, 8)) == picture, "another seed");
+  fail_if (take_bytes (nth_picture (1, 5, 7)) == picture, "another time");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_loop_goes_forwards_and_backwards_through_the_first_pictures)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48,framerate=10/1");
+  g_object_set (
+      h->element, "num-buffers", 9, "seed", 7, "loop-frames", 3, "empty-frames", 2, nullptr);
+  gst_harness_play (h);
+  std::string shown[9], drawn[3];
+  for (std::string &picture : shown)
+    picture = take_bytes (gst_harness_pull (h));
+  gst_harness_teardown (h);
+  for (int i = 0; i < 3; i++)
+    drawn[i] = take_bytes (nth_picture (i, 10, 7));
+  fail_if (shown[0] == shown[1] || shown[0] == drawn[0], "the empty room is not looped");
+  const int expected[] = {0, 1, 2, 1, 0, 1, 2, 1, 0};
+  for (int i = 2; i < 9; i++)
+    fail_unless (shown[i] == drawn[expected[i]], "picture %d is none of frame %d", i, expected[i]);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_loop_is_drawn_anew_for_another_size_and_rate)
+{
+  GstHarness *h =
+      source_harness ("left", "video/x-raw,format=RGBx,width=32,height=24,framerate=5/1");
+  g_object_set (h->element, "loop-frames", 2, "seed", 7, nullptr);
+  gst_harness_play (h);
+  gst_buffer_unref (gst_harness_pull (h));
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx,width=64,height=48,framerate=10/1");
+  const std::string first = take_bytes (nth_picture (0, 10, 7)),
+                    second = take_bytes (nth_picture (1, 10, 7));
+  std::string picture;
+  while (picture.size () != first.size ()) /* old ones wait */
+    picture = take_bytes (gst_harness_pull (h));
+  const std::string next = take_bytes (gst_harness_pull (h));
+  fail_unless ((picture == first && next == second) || (picture == second && next == first));
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_loop_that_needs_too_much_memory_is_an_error_that_names_it)
+{
+  fail_unless (run ("avatartestsrc name=s loop-frames=5000000 s.left ! "
+                    "video/x-raw,width=64,height=48 ! fakesink")
+                   .find ("loop-frames 5000000") != std::string::npos);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_camera_pad_gives_its_own_cameras_picture)
+{
+  SceneSettings settings;
+  settings.width = 64;
+  settings.height = 48;
+  std::unique_ptr<Scene> scene;
+  fail_unless (Scene::create (settings, scene).ok ());
+  const char *pads[] = {"left", "right", "third"};
+  for (int i = 0; i < 3; i++) {
+    GstHarness *h = source_harness (pads[i], "video/x-raw,format=RGBx,width=64,height=48");
+    g_object_set (h->element, "num-buffers", 1, nullptr);
+    gst_harness_play (h);
+    std::string expected (64 * 48 * 4, 0);
+    const ImageView<Rgbx> view{reinterpret_cast<Rgbx *> (expected.data ()), 64, 48, 64 * 4};
+    fail_unless (scene->render (0, static_cast<SceneCamera> (i), 0, false, view, {}, {}).ok ());
+    fail_unless (take_bytes (gst_harness_pull (h)) == expected, "%s", pads[i]);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* ---- downstream's memory ---- */
+
+static GstPadProbeReturn
+offer_pool (GstPad *, GstPadProbeInfo *info, gpointer pool)
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) != GST_QUERY_ALLOCATION)
+    return GST_PAD_PROBE_OK;
+  gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
+  gst_query_add_allocation_pool (query, GST_BUFFER_POOL (pool), 0, 0, 0);
+  return GST_PAD_PROBE_HANDLED;
+}
+
+static GstHarness *
+harness_with_pool (const char *pad, const char *caps, GstBufferPool *pool)
+{
+  GstHarness *h = source_harness (pad, caps);
+  g_object_set (h->element, "num-buffers", 1, nullptr);
+  gst_pad_add_probe (h->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM, offer_pool, pool, nullptr);
+  gst_harness_play (h);
+  return h;
+}
+
+/* A pool of pictures with room beside and above them. */
+static GstBufferPool *
+make_padded_pool (const char *caps_text)
+{
+  GstBufferPool *pool = gst_video_buffer_pool_new ();
+  GstCaps *caps = gst_caps_from_string (caps_text);
+  GstVideoInfo video;
+  fail_unless (gst_video_info_from_caps (&video, caps));
+  GstVideoAlignment padding;
+  gst_video_alignment_reset (&padding);
+  padding.padding_left = 16;
+  padding.padding_right = 32;
+  padding.padding_top = 2;
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  gst_buffer_pool_config_set_params (config, caps, GST_VIDEO_INFO_SIZE (&video), 0, 0);
+  gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_ALIGNMENT);
+  gst_buffer_pool_config_set_video_alignment (config, &padding);
+  fail_unless (gst_buffer_pool_set_config (pool, config));
+  gst_caps_unref (caps);
+  return pool;
+}
+
+GST_START_TEST (test_padded_strides_of_downstreams_pool_are_kept_to)
+{
+  for (const char *format : {"RGBx", "RGB", "GRAY8"}) {
+    const std::string caps =
+        "video/x-raw,framerate=(fraction)30/1,width=50,height=40,format=" + std::string (format);
+    GstBufferPool *pool = make_padded_pool (caps.c_str ());
+    GstHarness *padded = harness_with_pool ("left", caps.c_str (), pool);
+    GstHarness *plain = source_harness ("left", caps.c_str ());
+    gst_harness_play (plain);
+    GstBuffer *a = gst_harness_pull (padded), *b = gst_harness_pull (plain);
+    fail_unless (a->pool == pool);
+    GstVideoInfo video;
+    GstCaps *fixed = gst_caps_from_string (caps.c_str ());
+    gst_video_info_from_caps (&video, fixed);
+    GstVideoFrame x, y;
+    fail_unless (gst_video_frame_map (&x, &video, a, GST_MAP_READ));
+    fail_unless (gst_video_frame_map (&y, &video, b, GST_MAP_READ));
+    fail_unless (GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0) > GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0));
+    const auto bytes = static_cast<std::size_t> (50 * GST_VIDEO_FRAME_COMP_PSTRIDE (&x, 0));
+    for (int row = 0; row < 40; row++)
+      fail_unless (std::memcmp (static_cast<guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&x, 0)) +
+                                    row * GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0),
+                       static_cast<guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&y, 0)) +
+                           row * GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0),
+                       bytes) == 0,
+          "%s row %d", format, row);
+    gst_video_frame_unmap (&x);
+    gst_video_frame_unmap (&y);
+    gst_caps_unref (fixed);
+    gst_buffer_unref (a);
+    gst_buffer_unref (b);
+    gst_harness_teardown (padded);
+    gst_harness_teardown (plain);
+    gst_object_unref (pool);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_range_pool_of_downstream_is_used_and_others_are_not)
+{
+  const char *caps = "video/x-range,width=64,height=48";
+  GstBufferPool *range = gst_range_buffer_pool_new (), *video = gst_video_buffer_pool_new ();
+  for (GstBufferPool *pool : {range, video}) {
+    GstHarness *h = harness_with_pool ("src", caps, pool);
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless_equals_int (buffer->pool == pool, pool == range);
+    fail_unless_equals_int (gst_buffer_n_range_metas (buffer), 4);
+    gst_buffer_unref (buffer);
+    gst_harness_teardown (h);
+    gst_object_unref (pool);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_downstreams_alignment_is_kept_to)
+{
+  for (const char *pad : {"src", "left"}) {
+    GstHarness *h = gst_harness_new_with_padnames ("avatartestsrc", nullptr, pad);
+    GstAllocationParams params;
+    gst_allocation_params_init (&params);
+    params.align = 4095;
+    gst_harness_set_propose_allocator (h, nullptr, &params);
+    g_object_set (h->element, "num-buffers", 1, nullptr);
+    gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx; video/x-range");
+    gst_harness_play (h);
+    GstBuffer *buffer = gst_harness_pull (h);
+    GstMemory *memory = gst_buffer_peek_memory (buffer, 0);
+    GstMapInfo map;
+    fail_unless (gst_memory_map (memory, &map, GST_MAP_READ));
+    fail_unless_equals_int (GPOINTER_TO_SIZE (map.data) % 4096, 0);
+    gst_memory_unmap (memory, &map);
+    gst_buffer_unref (buffer);
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+/* A pool that takes no settings at all. */
+typedef struct {
+  GstVideoBufferPool parent;
+} StubbornPool;
+typedef struct {
+  GstVideoBufferPoolClass parent;
+} StubbornPoolClass;
+static GType stubborn_pool_get_type ();
+G_DEFINE_TYPE (StubbornPool, stubborn_pool, GST_TYPE_VIDEO_BUFFER_POOL)
+
+static gboolean
+refuse_config (GstBufferPool *, GstStructure *)
+{
+  return FALSE;
+}
+
+static void
+stubborn_pool_init (StubbornPool *)
+{
+}
+
+static void
+stubborn_pool_class_init (StubbornPoolClass *klass)
+{
+  GST_BUFFER_POOL_CLASS (klass)->set_config = refuse_config;
+}
+
+GST_START_TEST (test_downstreams_pool_that_refuses_is_replaced)
+{
+  auto pool = GST_BUFFER_POOL (g_object_new (stubborn_pool_get_type (), nullptr));
+  gst_object_ref_sink (pool);
+  GstHarness *h = harness_with_pool ("left", "video/x-raw,format=RGBx", pool);
+  GstBuffer *buffer = gst_harness_pull (h);
+  fail_unless (buffer && buffer->pool && buffer->pool != pool);
+  gst_buffer_unref (buffer);
+  gst_harness_teardown (h);
+  gst_object_unref (pool);
+}
+GST_END_TEST;
+
+/* ---- other ways to go wrong ---- */
+
+GST_START_TEST (test_file_that_is_no_model_is_one_error_that_names_it)
+{
+  gchar *path = g_build_filename (g_get_tmp_dir (), "rangecast-no-model.glb", nullptr);
+  fail_unless (g_file_set_contents (path, "no model", -1, nullptr));
+  gchar *line = g_strdup_printf ("avatartestsrc location=%s name=s ! fakesink async=false "
+                                 "s.left ! fakesink async=false",
+      path);
+  GstElement *pipeline = gst_parse_launch (line, nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find (path) != std::string::npos);
+  gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr, "a second error");
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+  g_remove (path);
+  g_free (line);
+  g_free (path);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_dress_is_set_by_the_names_of_its_pieces)
+{
+  GstElement *source = gst_element_factory_make ("avatartestsrc", nullptr);
+  guint pieces = 99;
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, 0);
+  gst_util_set_object_arg (G_OBJECT (source), "dress", "hair+hand");
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, kDressHair | kDressHand);
+  gst_util_set_object_arg (G_OBJECT (source), "dress", "all");
+  g_object_get (source, "dress", &pieces, nullptr);
+  fail_unless_equals_int (pieces, kDressAll);
+  gst_object_unref (source);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_dressed_figure_is_another_picture)
+{
+  std::string pictures[2];
+  for (guint dressed : {0, 1}) {
+    GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
+    g_object_set (h->element, "num-buffers", 1, "dress", dressed ? kDressAll : 0u, nullptr);
+    gst_harness_play (h);
+    pictures[dressed] = take_bytes (gst_harness_pull (h));
+    gst_harness_teardown (h);
+  }
+  fail_if (pictures[0] == pictures[1]);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_model_top_that_is_no_length_is_named)
+{
+  fail_unless (
+      run ("avatartestsrc model-top=0.05 ! fakesink").find ("model-top") != std::string::npos);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_capsfilters_change_changes_all_pads_at_one_frame)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc name=s num-buffers=400 s.left ! capsfilter name=f "
+                        "caps=video/x-raw,format=RGBx,width=64,height=48 ! queue "
+                        "max-size-buffers=2 ! appsink name=a max-buffers=1 sync=false "
+                        "s.right ! video/x-raw,format=RGBx ! queue ! appsink name=b sync=false",
+          nullptr);
+  fail_unless (pipeline != nullptr);
+  GstElement *filter = gst_bin_get_by_name (GST_BIN (pipeline), "f");
+  GstElement *sinks[] = {
+      gst_bin_get_by_name (GST_BIN (pipeline), "a"), gst_bin_get_by_name (GST_BIN (pipeline), "b")};
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstClockTime changed[2] = {GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE};
+  for (int i = 0; i < 400 && (i < 3 || changed[0] == GST_CLOCK_TIME_NONE); i++) {
+    if (i == 2) {
+      GstCaps *caps = gst_caps_from_string ("video/x-raw,format=RGBx,width=32,height=24");
+      g_object_set (filter, "caps", caps, nullptr);
+      gst_caps_unref (caps);
+    }
+    for (int k = 0; k < 2; k++) {
+      GstSample *sample = nullptr;
+      g_signal_emit_by_name (sinks[k], "pull-sample", &sample);
+      fail_unless (sample != nullptr, "ended without the new size");
+      GstBuffer *buffer = gst_sample_get_buffer (sample);
+      if (gst_buffer_get_size (buffer) == 32 * 24 * 4)
+        changed[k] = MIN (changed[k], GST_BUFFER_PTS (buffer));
+      gst_sample_unref (sample);
+    }
+  }
+  fail_unless (changed[0] != GST_CLOCK_TIME_NONE);
+  fail_unless_equals_uint64 (changed[0], changed[1]);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  for (GstElement *element : {filter, sinks[0], sinks[1], pipeline})
+    gst_object_unref (element);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_second_run_begins_as_the_first)
+{
+  GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
+  std::string first;
+  for (int run = 0; run < 2; run++) {
+    gst_harness_play (h);
+    GstBuffer *buffer = gst_harness_pull (h);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), 0);
+    if (run == 1)
+      fail_unless (bytes_of (buffer) == first);
+    first = take_bytes (buffer);
+    gst_element_set_state (h->element, GST_STATE_NULL);
+    while (GstBuffer *rest = gst_harness_try_pull (h))
+      gst_buffer_unref (rest);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+static Suite *
+avatartestsrc_suite ()
+{
+  Suite *suite = suite_create ("avatartestsrc");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_frames_follow_the_frame_rate_and_carry_capture_time);
+  tcase_add_test (tc, test_all_views_come_in_one_frame_set);
+  tcase_add_test (tc, test_person_only_crops_and_empty_frames_have_nobody);
+  tcase_add_test (tc, test_bad_view_and_model_are_named);
+  tcase_add_test (tc, test_left_and_right_end_together_in_their_own_formats);
+  tcase_add_test (tc, test_sizes_that_do_not_agree_are_an_error);
+  tcase_add_test (tc, test_state_changes_can_be_repeated);
+  tcase_add_test (tc, test_live_frames_lie_on_multiples_of_the_frame_period);
+  tcase_add_test (tc, test_rig_is_exported_with_the_size_of_the_caps);
+  tcase_add_test (tc, test_caps_change_mid_stream_changes_the_size);
+  tcase_add_test (tc, test_same_seed_and_capture_time_give_the_same_picture);
+  tcase_add_test (tc, test_loop_goes_forwards_and_backwards_through_the_first_pictures);
+  tcase_add_test (tc, test_loop_is_drawn_anew_for_another_size_and_rate);
+  tcase_add_test (tc, test_loop_that_needs_too_much_memory_is_an_error_that_names_it);
+  tcase_add_test (tc, test_each_camera_pad_gives_its_own_cameras_picture);
+  tcase_add_test (tc, test_padded_strides_of_downstreams_pool_are_kept_to);
+  tcase_add_test (tc, test_range_pool_of_downstream_is_used_and_others_are_not);
+  tcase_add_test (tc, test_downstreams_alignment_is_kept_to);
+  tcase_add_test (tc, test_downstreams_pool_that_refuses_is_replaced);
+  tcase_add_test (tc, test_file_that_is_no_model_is_one_error_that_names_it);
+  tcase_add_test (tc, test_dress_is_set_by_the_names_of_its_pieces);
+  tcase_add_test (tc, test_dressed_figure_is_another_picture);
+  tcase_add_test (tc, test_model_top_that_is_no_length_is_named);
+  tcase_add_test (tc, test_capsfilters_change_changes_all_pads_at_one_frame);
+  tcase_add_test (tc, test_second_run_begins_as_the_first);
+  return suite;
+}
+
+GST_CHECK_MAIN (avatartestsrc);

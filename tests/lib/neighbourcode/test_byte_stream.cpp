@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Access units in byte streams, sound, damaged and hostile; and in files, by time. */
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+using namespace rangecast;
+
+namespace {
+
+constexpr std::uint64_t kFrame_ns = 40'000'000;
+
+void
+append_unit (std::vector<std::uint8_t> &to, std::uint8_t type, std::size_t size)
+{
+  const std::size_t begin = to.size ();
+  to.resize (begin + size, 0xab);
+  to[begin] = std::uint8_t (0x10 | type);
+  to[begin + 1] = 0;
+  to[begin + 2] = std::uint8_t (size & 255);
+  to[begin + 3] = std::uint8_t (size >> 8);
+}
+
+/* An access unit of a rig view, if wanted, and two slices of which only the sizes are sound. */
+std::vector<std::uint8_t>
+make_access_unit (std::uint64_t pts_ns, bool key = true, bool rig = false, std::size_t size = 300)
+{
+  std::vector<std::uint8_t> units;
+  if (rig)
+    append_unit (units, 2, 60);
+  append_unit (units, 1, size);
+  append_unit (units, 1, size);
+  std::vector<std::uint8_t> bytes (kStreamPrefixSize);
+  std::copy (kStartCode.begin (), kStartCode.end (), bytes.begin ());
+  write_access_unit_header ({std::uint32_t (units.size ()), pts_ns, 0, key}, &bytes[4]);
+  bytes.insert (bytes.end (), units.begin (), units.end ());
+  return bytes;
+}
+
+void
+append (std::vector<std::uint8_t> &to, const std::vector<std::uint8_t> &bytes)
+{
+  to.insert (to.end (), bytes.begin (), bytes.end ());
+}
+
+/* A file of 25 access units a second, a rig and a key one each second, in memory. */
+struct File {
+  std::vector<std::uint8_t> bytes;
+  std::vector<std::uint64_t> offsets;
+  std::size_t bytes_read = 0;
+
+  explicit File (int frames, std::uint64_t first_pts_ns = 7'000'000'000)
+  {
+    for (int i = 0; i < frames; i++) {
+      offsets.push_back (bytes.size ());
+      const bool second = i % 25 == 0;
+      append (bytes,
+          make_access_unit (first_pts_ns + i * kFrame_ns, second, second, 300 + i * 37 % 900));
+    }
+  }
+  StreamFile open ()
+  {
+    return {[this] (std::uint64_t offset, std::size_t size, std::vector<std::uint8_t> &to) {
+              const std::size_t begin = std::min<std::uint64_t> (offset, bytes.size ());
+              const std::size_t end = std::min (begin + size, bytes.size ());
+              to.assign (
+                  bytes.begin () + std::ptrdiff_t (begin), bytes.begin () + std::ptrdiff_t (end));
+              bytes_read += to.size ();
+            },
+        bytes.size ()};
+  }
+};
+
+} // namespace
+
+TEST (ByteStream, WholeAccessUnitNeedsNoByteOfTheNext)
+{
+  const auto bytes = make_access_unit (5);
+  const StreamPart part = next_part (bytes, false);
+  EXPECT_EQ (part.length, bytes.size ());
+  EXPECT_EQ (part.header.pts_ns, 5u);
+}
+
+TEST (ByteStream, PartOfAnAccessUnitAsksForMoreButNeverForMoreThanItSays)
+{
+  const auto bytes = make_access_unit (5);
+  for (std::size_t size = 0; size < bytes.size (); size++) {
+    const std::vector<std::uint8_t> cut (bytes.begin (), bytes.begin () + std::ptrdiff_t (size));
+    const StreamPart part = next_part (cut, false);
+    EXPECT_GT (part.wanted, size);
+    EXPECT_LE (part.wanted, bytes.size ());
+  }
+}
+
+TEST (ByteStream, SizeThatLiesEndsAtTheNextStartCode)
+{
+  const auto sound = make_access_unit (5);
+  for (std::uint32_t lie : {30u, 100000u, 32u << 20}) {
+    auto bytes = sound;
+    write_access_unit_header ({lie, 5, 0, true}, &bytes[4]);
+    append (bytes, sound);
+    const StreamPart part = next_part (bytes, false);
+    EXPECT_EQ (part.length, lie < sound.size () ? kStreamPrefixSize : sound.size ());
+  }
+}
+
+TEST (ByteStream, LostBytesEndAtTheNextStartCode)
+{
+  auto bytes = make_access_unit (5);
+  const std::size_t size = bytes.size () - 50;
+  bytes.resize (size);
+  append (bytes, make_access_unit (6));
+  append (bytes, make_access_unit (7));
+  EXPECT_EQ (next_part (bytes, false).length, size);
+}
+
+TEST (ByteStream, AnyBytesAreUsedUpOrAskForMore)
+{
+  std::mt19937 random (1);
+  const auto sound = make_access_unit (5, true, true);
+  for (int run = 0; run < 20000; run++) {
+    std::vector<std::uint8_t> bytes = sound;
+    append (bytes, sound);
+    for (int i = random () % 6; i > 0; i--)
+      bytes[random () % bytes.size ()] = std::uint8_t (random ());
+    const std::size_t begin = random () % 40 * (run % 2);
+    /* exactly its size, so that one byte too far is seen */
+    const std::vector<std::uint8_t> cut (bytes.begin () + std::ptrdiff_t (begin),
+        bytes.end () - std::ptrdiff_t (random () % sound.size ()));
+    for (const bool at_end : {false, true}) {
+      const StreamPart part = next_part (cut, at_end);
+      EXPECT_EQ ((part.rubbish > 0) + (part.length > 0) + (part.wanted > 0), 1);
+      EXPECT_LE (part.rubbish, cut.size ());
+      EXPECT_LE (part.length, cut.size ());
+      EXPECT_TRUE (part.wanted == 0 || (part.wanted > cut.size () && !at_end));
+    }
+  }
+}
+
+TEST (StreamFile, EveryTimeFindsItsKeyAccessUnitsAndRig)
+{
+  File file (500);
+  StreamFile opened = file.open ();
+  for (std::size_t i = 0; i < 500; i += 7) {
+    const auto target = opened.locate (7'000'000'000 + i * kFrame_ns + 1);
+    ASSERT_TRUE (target.before && target.rig);
+    EXPECT_EQ (target.before->offset, file.offsets[i / 25 * 25]);
+    EXPECT_EQ (target.rig->offset, target.before->offset);
+    ASSERT_EQ (target.after.has_value (), i < 475);
+    if (target.after) {
+      EXPECT_EQ (target.after->offset, file.offsets[i / 25 * 25 + 25]);
+    }
+  }
+}
+
+TEST (StreamFile, TimeBeforeTheFirstFindsTheFirst)
+{
+  File file (100);
+  const auto target = file.open ().locate (1);
+  EXPECT_FALSE (target.before);
+  ASSERT_TRUE (target.after);
+  EXPECT_EQ (target.after->offset, 0u);
+}
+
+TEST (StreamFile, LongFileIsNotReadAsAWhole)
+{
+  File file (20000);
+  const auto target = file.open ().locate (7'000'000'000 + 12345 * kFrame_ns);
+  ASSERT_TRUE (target.before);
+  EXPECT_EQ (target.before->offset, file.offsets[12325]);
+  EXPECT_LT (file.bytes_read, file.bytes.size () / 10);
+}
+
+TEST (StreamFile, LastAccessUnitIsFoundBehindRubbish)
+{
+  File file (50);
+  file.bytes.resize (file.bytes.size () + 200000, 0x52);
+  const auto last = file.open ().last ();
+  ASSERT_TRUE (last);
+  EXPECT_EQ (last->offset, file.offsets[49]);
+}
+
+TEST (StreamFile, StreamsWithoutTimesOrAccessUnitsFindNothing)
+{
+  File empty (0), untimed (0);
+  for (int i = 0; i < 2000; i++)
+    append (untimed.bytes, make_access_unit (kNoTime));
+  EXPECT_FALSE (empty.open ().last ());
+  EXPECT_FALSE (empty.open ().locate (5).before);
+  const auto target = untimed.open ().locate (5'000'000'000);
+  EXPECT_FALSE (target.before || target.after);
+  File rubbish (0);
+  rubbish.bytes.assign (1000000, 0);
+  EXPECT_FALSE (rubbish.open ().last ());
+  EXPECT_FALSE (rubbish.open ().locate (5).before);
+}
+
+TEST (StreamFile, AnyDamageEnds)
+{
+  std::mt19937 random (2);
+  for (int run = 0; run < 50; run++) {
+    File file (600);
+    for (int i = 0; i < 3000; i++)
+      file.bytes[random () % file.bytes.size ()] ^= std::uint8_t (1 << random () % 8);
+    StreamFile opened = file.open ();
+    (void)opened.last ();
+    (void)opened.locate (random () * 10ull);
+    (void)opened.locate (UINT64_MAX - 1);
+  }
+}

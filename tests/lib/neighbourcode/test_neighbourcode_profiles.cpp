@@ -1,0 +1,400 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Profiles packed and entropy: what they promise, and what damage may do to them. */
+#include "neighbourcode-support.hpp"
+
+#include <cstring>
+#include <memory>
+#include <rangecast/neighbourcode/compact/isa.hpp>
+#include <rangecast/neighbourcode/compact/packed_code.hpp>
+
+using namespace rangecast;
+using namespace rangecast::testing;
+
+namespace {
+
+const Rig &
+rig ()
+{
+  static const Rig rig = ring_rig (2);
+  return rig;
+}
+
+void
+expect_same (Picture &a, Picture &b)
+{
+  ASSERT_EQ (a.roi, b.roi);
+  for (int y = 0; y < a.roi.height; y++)
+    for (int x = 0; x < a.roi.width; x++) {
+      ASSERT_EQ (a.depth.view ().at (x, y), b.depth.view ().at (x, y)) << x << " " << y;
+      const Rgbx p = a.colour.view ().at (x, y), q = b.colour.view ().at (x, y);
+      if (a.depth.view ().at (x, y)) {
+        ASSERT_TRUE (p.r == q.r && p.g == q.g && p.b == q.b) << x << " " << y;
+      }
+    }
+}
+
+struct Profiles : ::testing::TestWithParam<Profile> {
+  AccessUnitDecoder decoder;
+  void SetUp () override { ASSERT_TRUE (decoder.set_rig (rig ()).ok ()); }
+
+  static EncoderSettings settings (int depth_bits, int colour_bits, int depth_threshold,
+      int colour_threshold, int max_slice_size = 1200)
+  {
+    return {
+        depth_bits, colour_bits, depth_threshold, colour_threshold, max_slice_size, GetParam ()};
+  }
+  static EncoderSettings lossless (int max_slice_size = 1200)
+  {
+    return settings (16, 8, 0, 0, max_slice_size);
+  }
+  static std::vector<std::uint8_t> small_stream ()
+  {
+    std::vector<Picture> pictures;
+    pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
+    pictures.emplace_back (1, Roi{0, 0, 16, 12}, 2, 6);
+    return encode (rig (), pictures, settings (10, 6, 2, 2, 256));
+  }
+};
+
+std::string
+name_of (const ::testing::TestParamInfo<Profile> &info)
+{
+  return info.param == Profile::kPacked ? "packed" : "entropy";
+}
+
+} // namespace
+
+INSTANTIATE_TEST_SUITE_P (
+    Both, Profiles, ::testing::Values (Profile::kPacked, Profile::kEntropy), name_of);
+
+TEST_P (Profiles, threshold_0_is_lossless)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{10, 20, 151, 133}, 1, 20);
+  pictures.emplace_back (1, Roi{0, 0, 320, 240}, 2, 1);
+  Decoded decoded = decode_exact (decoder, encode (rig (), pictures, lossless ()));
+  ASSERT_EQ (decoded.pictures.size (), 2u);
+  EXPECT_EQ (decoded.result.bad_slices, 0u);
+  EXPECT_EQ (decoded.result.missing_pixels, 0u);
+  expect_same (pictures[0], decoded.pictures[0]);
+  expect_same (pictures[1], decoded.pictures[1]);
+}
+
+TEST_P (Profiles, noise_without_any_pattern_is_lossless_too)
+{
+  std::mt19937 random (7);
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{0, 0, 97, 61});
+  for (int y = 0; y < 61; y++)
+    for (int x = 0; x < 97; x++) {
+      pictures[0].depth.view ().at (x, y) =
+          random () % 3 ? static_cast<std::uint16_t> (3000 + random () % 12001) : 0;
+      const auto any = [&] { return static_cast<std::uint8_t> (random ()); };
+      pictures[0].colour.view ().at (x, y) = {any (), any (), any (), 0};
+    }
+  for (int limit : {256, 1200, 65535}) {
+    Decoded decoded = decode_exact (decoder, encode (rig (), pictures, lossless (limit)));
+    EXPECT_EQ (decoded.result.bad_slices, 0u);
+    expect_same (pictures[0], decoded.pictures[0]);
+  }
+}
+
+TEST_P (Profiles, differences_stay_within_thresholds_and_quantisation)
+{
+  for (int colour_bits : {4, 6, 8})
+    for (int threshold : {1, 2, 3, 5, 10, 40, 255})
+      for (NeighbourChoice choice : {NeighbourChoice::kFirst, NeighbourChoice::kBest}) {
+        EncoderSettings s = settings (10, colour_bits, threshold, threshold);
+        s.choice = choice;
+        std::vector<Picture> pictures;
+        pictures.emplace_back (0, Roi{0, 0, 160, 120}, 3, 25);
+        Decoded decoded = decode_exact (decoder, encode (rig (), pictures, s));
+        DepthQuantiser depth;
+        ASSERT_TRUE (depth.set (rig ().views[0], 10).ok ());
+        const double most_depth = (threshold + 0.5) * depth.step () + 1;
+        const double most_colour = (threshold + 0.5) * 255 / ((1 << colour_bits) - 1) + 1;
+        for (int y = 0; y < 120; y++)
+          for (int x = 0; x < 160; x++) {
+            const int a = pictures[0].depth.view ().at (x, y),
+                      b = decoded.pictures[0].depth.view ().at (x, y);
+            ASSERT_EQ (a == 0, b == 0);
+            ASSERT_LE (std::abs (a - b), most_depth);
+            const Rgbx p = pictures[0].colour.view ().at (x, y),
+                       q = decoded.pictures[0].colour.view ().at (x, y);
+            if (a) {
+              ASSERT_LE (std::abs (p.r - q.r), most_colour) << threshold;
+              ASSERT_LE (std::abs (p.g - q.g), most_colour) << threshold;
+              ASSERT_LE (std::abs (p.b - q.b), most_colour) << threshold;
+            }
+          }
+      }
+}
+
+TEST_P (Profiles, smaller_than_plain_and_best_is_smaller_than_first_of_the_same_error)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{0, 0, 320, 240}, 3, 2);
+  EncoderSettings s = {};
+  const std::size_t plain = encode (rig (), pictures, s).size ();
+  s.profile = GetParam ();
+  s.colour_threshold = 8;
+  const auto first = encode (rig (), pictures, s);
+  s.choice = NeighbourChoice::kBest;
+  s.colour_threshold = 9;
+  const auto best = encode (rig (), pictures, s);
+  EXPECT_LT (first.size (), plain / 2);
+  EXPECT_LT (best.size (), first.size ());
+  const auto error = [&] (std::span<const std::uint8_t> bytes) {
+    Decoded decoded = decode_exact (decoder, bytes);
+    double sum = 0;
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++)
+        if (pictures[0].depth.view ().at (x, y))
+          sum += std::pow (pictures[0].colour.view ().at (x, y).g -
+                               decoded.pictures[0].colour.view ().at (x, y).g,
+              2);
+    return sum;
+  };
+  EXPECT_LT (error (best), 1.05 * error (first));
+}
+
+TEST_P (Profiles, no_slice_exceeds_its_maximum)
+{
+  for (int limit : {256, 300, 1200, 65535}) {
+    std::vector<Picture> pictures;
+    pictures.emplace_back (0, Roi{3, 5, 317, 200}, 4, 50);
+    const auto bytes = encode (rig (), pictures, lossless (limit));
+    for (const auto &unit : units_of (bytes))
+      EXPECT_LE (unit.size (), static_cast<std::size_t> (limit));
+    Decoded decoded = decode_exact (decoder, bytes);
+    EXPECT_EQ (decoded.result.missing_pixels, 0u);
+    expect_same (pictures[0], decoded.pictures[0]);
+  }
+}
+
+TEST_P (Profiles, slice_survives_loss_of_all_others)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{0, 0, 320, 240}, 4, 5);
+  const auto units = units_of (encode (rig (), pictures, lossless ()));
+  ASSERT_GT (units.size (), 10u);
+  for (const auto &unit : units) {
+    SliceHeader header;
+    ASSERT_TRUE (read_slice_header (unit, header).ok ());
+    EXPECT_EQ (header.profile, GetParam ());
+    Decoded decoded = decode_exact (decoder, unit);
+    ASSERT_EQ (decoded.result.slices, 1u);
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const bool inside = y >= header.first_row && y < header.first_row + header.rows &&
+                            x >= header.first_column && x < header.first_column + header.columns;
+        ASSERT_EQ (decoded.pictures[0].depth.view ().at (x, y),
+            inside ? pictures[0].depth.view ().at (x, y) : 0);
+      }
+  }
+}
+
+TEST_P (Profiles, encoding_the_same_twice_gives_the_same_bytes)
+{
+  AccessUnitEncoder encoder;
+  ASSERT_TRUE (encoder.configure (rig (), settings (12, 8, 8, 10)).ok ());
+  Picture picture (0, {0, 0, 320, 240}), other (0, {0, 0, 320, 240}, 5, 30);
+  std::vector<std::vector<std::uint8_t>> bytes;
+  for (Picture *p : {&picture, &other, &picture}) {
+    const RangeImage image = p->image ();
+    EncoderResult result;
+    ASSERT_TRUE (encoder.encode ({&image, 1}, 1, 1, result).ok ());
+    bytes.push_back (encoder.bytes ());
+  }
+  EXPECT_EQ (bytes[0], bytes[2]);
+}
+
+TEST_P (Profiles, empty_roi_is_one_small_slice_and_an_empty_picture_is_small)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{});
+  const auto bytes = encode (rig (), pictures, settings (12, 8, 8, 10));
+  EXPECT_EQ (bytes.size (), kSliceHeaderSize);
+  EXPECT_EQ (decode_exact (decoder, bytes).result.slices, 1u);
+  pictures.clear ();
+  pictures.emplace_back (0, Roi{0, 0, 320, 240});
+  for (int y = 0; y < 240; y++)
+    std::fill_n (pictures[0].depth.view ().row (y), 320, kInvalidDepth);
+  const auto nothing = encode (rig (), pictures, settings (12, 8, 8, 10));
+  EXPECT_LT (nothing.size (), 400u);
+  EXPECT_EQ (decode_exact (decoder, nothing).result.points, 0u);
+}
+
+TEST_P (Profiles, encoder_and_decoder_count_the_same)
+{
+  std::vector<Picture> pictures;
+  pictures.emplace_back (0, Roi{0, 0, 200, 150});
+  EncoderResult coded;
+  const auto bytes = encode (rig (), pictures, settings (12, 8, 8, 10), &coded);
+  const Decoded decoded = decode_exact (decoder, bytes);
+  EXPECT_EQ (decoded.result.points, coded.points);
+  EXPECT_EQ (decoded.result.slices, coded.slices);
+  EXPECT_EQ (decoded.result.raw_bits, coded.raw_bits);
+}
+
+TEST_P (Profiles, every_truncated_prefix_costs_only_its_last_slice)
+{
+  expect_prefixes_cost_only_their_last_slice (decoder, small_stream ());
+}
+
+TEST_P (Profiles, slices_that_say_they_are_shorter_stay_in_their_bytes)
+{
+  for (const auto &unit : units_of (small_stream ()))
+    for (std::size_t size = 0; size < unit.size (); size++) {
+      auto less = std::vector<std::uint8_t> (unit.begin (), unit.begin () + std::ptrdiff_t (size));
+      if (size >= 4) {
+        less[2] = static_cast<std::uint8_t> (size);
+        less[3] = static_cast<std::uint8_t> (size >> 8);
+      }
+      const Decoded decoded = decode_exact (decoder, less);
+      EXPECT_LE (decoded.result.slices, 1u);
+    }
+}
+
+TEST_P (Profiles, no_bit_flip_crashes_and_other_slices_stay)
+{
+  const auto good = small_stream ();
+  const auto n = units_of (good).size ();
+  for (std::size_t bit = 0; bit < good.size () * 8; bit++) {
+    auto bad = good;
+    bad[bit / 8] ^= 1 << bit % 8;
+    const Decoded decoded = decode_exact (decoder, bad);
+    EXPECT_LE (decoded.result.slices, n + 1);
+  }
+}
+
+TEST_P (Profiles, noise_under_a_good_header_stays_in_its_rows_and_columns)
+{
+  const auto units = units_of (small_stream ());
+  std::mt19937 random (2);
+  for (int i = 0; i < 20000; i++) {
+    auto unit = units[1];
+    SliceHeader header;
+    ASSERT_TRUE (read_slice_header (unit, header).ok ());
+    const std::size_t begin = kSliceHeaderSize + (i % 2 ? 6 : 0); /* steps and orders too, or not */
+    for (std::size_t k = begin; k < unit.size (); k++)
+      unit[k] = static_cast<std::uint8_t> (random ());
+    Picture canvas (header.view_id, header.roi);
+    for (int y = 0; y < header.roi.height; y++)
+      std::fill_n (canvas.depth.view ().row (y), header.roi.width, std::uint16_t{0xabcd});
+    DecoderResult result;
+    const auto copy = std::make_unique<std::uint8_t[]> (unit.size ());
+    std::memcpy (copy.get (), unit.data (), unit.size ());
+    decoder.plan ({copy.get (), unit.size ()}, result);
+    ASSERT_EQ (decoder.views ().size (), 1u);
+    const RangeImage image = canvas.image ();
+    (void)decoder.decode ({&image, 1}, 1, result).ok ();
+    for (int y = 0; y < header.roi.height; y++)
+      for (int x = 0; x < header.roi.width; x++)
+        if (y < header.first_row || y >= header.first_row + header.rows ||
+            x < header.first_column || x >= header.first_column + header.columns) {
+          ASSERT_EQ (canvas.depth.view ().at (x, y), kInvalidDepth);
+        }
+  }
+}
+
+TEST_P (Profiles, trailing_bytes_and_steps_of_0_are_damage)
+{
+  const auto good = units_of (small_stream ())[0];
+  for (std::uint8_t byte : {0, 1}) {
+    auto unit = good;
+    unit.insert (unit.end (), 5, byte); /* of fewer, a range coder may be in the midst of reading */
+    unit[2] = static_cast<std::uint8_t> (unit[2] + 5);
+    EXPECT_EQ (decode_exact (decoder, unit).result.bad_slices, 1u) << int (byte);
+  }
+  for (std::size_t at : {kSliceHeaderSize, kSliceHeaderSize + 2, kSliceHeaderSize + 3}) {
+    auto unit = good;
+    unit[at] = 0;
+    if (at == kSliceHeaderSize)
+      unit[at + 1] = 0;
+    EXPECT_EQ (decode_exact (decoder, unit).result.bad_slices, 1u) << at;
+  }
+}
+
+TEST_P (Profiles, huge_steps_and_residuals_stay_in_range)
+{
+  std::mt19937 random (3);
+  auto unit = units_of (small_stream ())[0];
+  for (int i = 0; i < 2000; i++) {
+    for (std::size_t k = kSliceHeaderSize; k < unit.size (); k++)
+      unit[k] = static_cast<std::uint8_t> (k < kSliceHeaderSize + 4 ? 0xff : random ());
+    EXPECT_LE (decode_exact (decoder, unit).result.slices, 1u);
+  }
+}
+
+TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
+{
+  if (!has_x86_64_v3 ())
+    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  std::mt19937 random (7);
+  for (int i = 0; i < 40; i++) {
+    const auto below = [&] (unsigned n) { return static_cast<int> (random () % n); };
+    std::vector<Picture> pictures;
+    const Roi roi = {below (20), below (20), 1 + below (290), 1 + below (200)};
+    pictures.emplace_back (0, roi, random (), below (60));
+    EncoderSettings s =
+        settings (6 + below (11), 4 + below (5), below (3) ? below (300) : below (65536),
+            below (3) ? below (20) : below (256), 256 + below (2000));
+    s.choice = i % 4 ? NeighbourChoice::kFirst : NeighbourChoice::kBest;
+    const auto bytes = encode (rig (), pictures, s);
+    Decoded here = decode_exact (decoder, bytes);
+    limit_cpu (CpuLevel::kScalar);
+    AccessUnitDecoder other;
+    ASSERT_TRUE (other.set_rig (rig ()).ok ());
+    const auto other_bytes = encode (rig (), pictures, s);
+    Decoded there = decode_exact (other, bytes);
+    limit_cpu (CpuLevel::kAvx2);
+    ASSERT_EQ (bytes, other_bytes) << i;
+    ASSERT_EQ (here.result.bad_slices + there.result.bad_slices, 0u) << i;
+    expect_same (here.pictures[0], there.pictures[0]);
+  }
+}
+
+TEST_P (Profiles, code_for_every_cpu_and_for_this_one_agree_on_damage)
+{
+  if (!has_x86_64_v3 ())
+    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  std::mt19937 random (8);
+  const auto stream = small_stream ();
+  for (int i = 0; i < 2000; i++) {
+    auto bad = stream;
+    for (int k = 0; k < 3; k++)
+      bad[random () % bad.size ()] = static_cast<std::uint8_t> (random ());
+    const Decoded here = decode_exact (decoder, bad);
+    limit_cpu (CpuLevel::kScalar);
+    AccessUnitDecoder other;
+    ASSERT_TRUE (other.set_rig (rig ()).ok ());
+    const Decoded there = decode_exact (other, bad);
+    limit_cpu (CpuLevel::kAvx2);
+    ASSERT_EQ (here.result.slices, there.result.slices) << i;
+    ASSERT_EQ (here.result.bad_slices, there.result.bad_slices) << i;
+    ASSERT_EQ (here.result.points, there.result.points) << i;
+  }
+}
+
+TEST (PackedTables, every_context_has_a_complete_prefix_code)
+{
+  const auto kraft = [] (std::span<const std::uint8_t> lengths) {
+    int sum = 0;
+    for (std::uint8_t length : lengths)
+      sum += length > 0 ? 1 << (16 - length) : 0;
+    return sum;
+  };
+  for (const auto &lengths : kChoiceLengths)
+    EXPECT_EQ (kraft (lengths), 1 << 16);
+  for (const auto &lengths : kPatternLengths)
+    EXPECT_EQ (kraft (lengths), 1 << 16);
+}
+
+TEST (EntropyModel, no_decision_is_certain_to_begin_with)
+{
+  for (const Probability p : kInitialModel) {
+    EXPECT_GE (p, 64);
+    EXPECT_LE (p, 65536 - 64);
+  }
+}

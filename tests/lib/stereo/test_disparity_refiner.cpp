@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What refining makes of disparities whose truth is known. */
+#include "../test-support.hpp"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <rangecast/stereo/disparity_refiner.hpp>
+
+using namespace rangecast;
+
+namespace {
+
+constexpr int kWidth = 160, kHeight = 96, kRightX = 32;
+
+/* A slanted surface with texture, seen by two cameras, and what a matcher may say of it. */
+struct Pair {
+  cv::Mat left = cv::Mat (kHeight, kWidth, CV_8U),
+          right = cv::Mat (kHeight, kWidth + kRightX, CV_8U),
+          colour = cv::Mat (kHeight, kWidth, CV_8UC4, cv::Scalar (120, 100, 90, 0)),
+          disparity = cv::Mat (kHeight, kWidth, CV_16S);
+
+  static double truth (int x, int y) { return 12.3 + 0.03 * x - 0.02 * y; }
+
+  explicit Pair (double brighter = 0)
+  {
+    cv::RNG random (5);
+    cv::Mat texture (kHeight, 3 * kWidth, CV_32F);
+    random.fill (texture, cv::RNG::NORMAL, 0, 60);
+    cv::GaussianBlur (texture, texture, {}, 1.5);
+    for (int y = 0; y < kHeight; y++) {
+      const auto row = texture.ptr<float> (y);
+      const auto grey_at = [&] (double x) {
+        const int a = int (std::floor (x));
+        return 128 + row[a] + (x - a) * (row[a + 1] - row[a]);
+      };
+      for (int x = 0; x < kWidth + kRightX; x++)
+        right.at<std::uint8_t> (y, x) = cv::saturate_cast<std::uint8_t> (grey_at (x + 40));
+      for (int x = 0; x < kWidth; x++) {
+        left.at<std::uint8_t> (y, x) =
+            cv::saturate_cast<std::uint8_t> (brighter + grey_at (x + kRightX - truth (x, y) + 40));
+        const double d = truth (x, y) + random.uniform (-0.4, 0.4);
+        disparity.at<std::int16_t> (y, x) = std::int16_t (std::lround (16 * d));
+      }
+    }
+  }
+  void refine (int turns, const std::vector<cv::Rect> &parts, int threads = 2)
+  {
+    Pieces pieces;
+    pieces.set (parts, threads);
+    DisparityRefiner refiner;
+    refiner.apply ({left, right, colour, kRightX, 16, turns}, pieces, disparity);
+  }
+  void refine (int turns, int threads = 2) { refine (turns, {{0, 0, kWidth, kHeight}}, threads); }
+  /* Root of the mean square, pixels, away from the picture's edge. */
+  [[nodiscard]] double error () const
+  {
+    double sum = 0;
+    int n = 0;
+    for (int y = 8; y < kHeight - 8; y++)
+      for (int x = 8; x < kWidth - 8; x++, n++)
+        sum += std::pow (disparity.at<std::int16_t> (y, x) / 16.0 - truth (x, y), 2);
+    return std::sqrt (sum / n);
+  }
+};
+
+} // namespace
+
+TEST (DisparityRefiner, noise_becomes_a_quarter_on_a_slanted_surface)
+{
+  Pair pair;
+  const double before = pair.error ();
+  pair.refine (3);
+  EXPECT_GT (before, 0.2);
+  EXPECT_LT (pair.error (), before / 4);
+}
+
+TEST (DisparityRefiner, pictures_say_more_than_planes_do)
+{
+  Pair pair;
+  pair.disparity += 8; /* half a pixel too near, which no plane can know */
+  pair.refine (3);
+  EXPECT_LT (pair.error (), 0.1);
+}
+
+TEST (DisparityRefiner, cameras_of_different_brightness_do_no_harm)
+{
+  Pair pair (10);
+  pair.refine (3);
+  EXPECT_LT (pair.error (), 0.08);
+}
+
+TEST (DisparityRefiner, no_turns_change_nothing)
+{
+  Pair pair;
+  const cv::Mat before = pair.disparity.clone ();
+  pair.refine (0);
+  EXPECT_EQ (cv::norm (before, pair.disparity, cv::NORM_INF), 0);
+}
+
+TEST (DisparityRefiner, threads_and_pieces_change_nothing)
+{
+  Pair one, many;
+  one.refine (2, 1);
+  many.refine (2, 7);
+  EXPECT_EQ (cv::norm (one.disparity, many.disparity, cv::NORM_INF), 0);
+}
+
+TEST (DisparityRefiner, what_has_no_disparity_or_is_too_far_stays_as_it_is)
+{
+  Pair pair;
+  pair.disparity (cv::Rect (40, 30, 20, 20)).setTo (0);
+  pair.disparity (cv::Rect (80, 30, 20, 20)).setTo (15);
+  pair.refine (3);
+  EXPECT_EQ (cv::countNonZero (pair.disparity (cv::Rect (40, 30, 20, 20))), 0);
+  EXPECT_EQ (cv::countNonZero (pair.disparity (cv::Rect (80, 30, 20, 20)) != 15), 0);
+}
+
+TEST (DisparityRefiner, step_between_two_surfaces_stays_a_step)
+{
+  Pair pair;
+  cv::Mat near = pair.disparity (cv::Rect (80, 0, kWidth - 80, kHeight));
+  near += 16 * 10;
+  pair.right.setTo (128); /* nothing to see: planes alone */
+  pair.left.setTo (128);
+  pair.refine (3);
+  for (int y = 8; y < kHeight - 8; y++) {
+    EXPECT_NEAR (pair.disparity.at<std::int16_t> (y, 79) / 16.0, Pair::truth (79, y), 0.5);
+    EXPECT_NEAR (pair.disparity.at<std::int16_t> (y, 80) / 16.0, Pair::truth (80, y) + 10, 0.5);
+  }
+}
+
+/* Of columns x to x + n, pixels, against the slanted surface. */
+static double
+mean_offset (const Pair &pair, int x, int n)
+{
+  double sum = 0;
+  for (int y = 8; y < kHeight - 8; y++)
+    for (int u = x; u < x + n; u++)
+      sum += pair.disparity.at<std::int16_t> (y, u) / 16.0 - Pair::truth (u, y);
+  return sum / (n * (kHeight - 16));
+}
+
+TEST (DisparityRefiner, step_of_less_than_a_pixel_stays_where_colour_shows_it)
+{
+  Pair pair, plain;
+  for (Pair *p : {&pair, &plain}) {
+    cv::Mat near = p->disparity.colRange (80, kWidth);
+    near += 13;           /* 0.8 pixels: less than the noise of neighbours */
+    p->right.setTo (128); /* nothing to see: planes alone */
+    p->left.setTo (128);
+  }
+  pair.colour.colRange (80, kWidth).setTo (cv::Scalar (40, 40, 40, 0));
+  pair.refine (3);
+  plain.refine (3);
+  EXPECT_NEAR (mean_offset (pair, 78, 2), 0, 0.1);
+  EXPECT_NEAR (mean_offset (pair, 80, 2), 0.8125, 0.1);
+  EXPECT_GT (mean_offset (plain, 78, 2), 0.15); /* one colour: one surface */
+}
+
+TEST (DisparityRefiner, nothing_outside_of_the_parts_is_touched)
+{
+  Pair pair;
+  const cv::Rect part (30, 20, 50, 40);
+  cv::Mat outside (pair.disparity.size (), CV_8U, cv::Scalar (255));
+  outside (part).setTo (0);
+  pair.disparity.setTo (0, outside);
+  pair.refine (3, {part});
+  EXPECT_EQ (cv::countNonZero (pair.disparity), part.area ());
+}
+
+TEST (DisparityRefiner, disparities_beyond_the_right_picture_do_not_crash)
+{
+  Pair pair;
+  pair.disparity.setTo (30000);
+  pair.disparity.colRange (0, 50).setTo (-3000);
+  pair.refine (3);
+  SUCCEED ();
+}

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The documentation's links, and every mention of it in the tree, lead to something that exists; README's launch lines run.
+
+check_docs () { python3 "$source_dir/tests/pipelines/check-docs.py" "$1" 2>&1; }
+
+test_links_and_named_pages_exist () {
+  local faults
+  faults=$(check_docs "$source_dir") || fail "$faults"
+}
+
+# As they stand in README.md, but for a window, which a picture in memory replaces, and an end.
+test_launch_lines_of_the_readme_run () {
+  local line
+  need_gl
+  gst-launch-1.0 -q videotestsrc num-buffers=1 ! video/x-raw,width=64,height=48 ! jpegenc ! filesink location=colour.jpg
+  gst-launch-1.0 -q videotestsrc num-buffers=1 ! video/x-raw,format=GRAY16_BE,width=64,height=48 ! pngenc ! filesink location=depth.png
+  awk '/^```/ { inside = !inside; next } inside' "$source_dir/README.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep '^gst-launch-1.0 ' >lines
+  [ "$(wc -l <lines)" = 3 ] || fail "expected three launch lines: $(cat lines)"
+  sed -i -e 's/is-live=true/num-buffers=5/; s/ glimagesink$/ fakesink/' lines
+  while read -r line; do
+    timeout 60 bash -c "$line" >launch.log 2>&1 || fail "$line: $(tail -n 5 launch.log)"
+    ! grep -q '^WARNING' launch.log || fail "$line: $(cat launch.log)"
+  done <lines
+  expect_file depth.webm 1000
+  expect_file cloud.ply 1000
+}
+
+test_each_page_is_in_the_index () {
+  local page missing=
+  for page in "$source_dir"/docs/guide/*.md "$source_dir"/docs/formats/*.md "$source_dir"/docs/engineering/*.md; do
+    page=${page#"$source_dir"/docs/}
+    grep -qF "($page)" "$source_dir/docs/README.md" || missing+=" $page"
+  done
+  [ -z "$missing" ] || fail "docs/README.md does not link:$missing"
+}
+
+test_a_broken_reference_is_found () {
+  local docs=docs # so that these are no paths of this tree
+  mkdir -p tree/$docs/guide tree/gst
+  printf '# One page\n\n[self](#one-page) [other](guide/other.md#a-heading) `gst/there.cpp`\n' >tree/$docs/page.md
+  printf '## A heading\n\n```\n[no link](nowhere.md)\n```\n' >tree/$docs/guide/other.md
+  echo "/* see $docs/page.md and $docs/guide/ and $docs/guide/*.md */" >tree/gst/there.cpp
+  [ "$(check_docs tree)" = "" ] || fail "$(check_docs tree)"
+  expect_fault () { # text
+    [[ "$(check_docs tree)" == *"$1"* ]] || fail "expected '$1': $(check_docs tree)"
+  }
+  echo '[gone](gone.md)' >tree/$docs/guide/link.md
+  expect_fault "$docs/guide/link.md: link to gone.md: no such file"
+  echo '[gone](../page.md#two-pages)' >tree/$docs/guide/link.md
+  expect_fault "$docs/guide/link.md: link to ../page.md#two-pages: no such heading"
+  echo 'as in `gst/gone.cpp`' >tree/$docs/guide/link.md
+  expect_fault "$docs/guide/link.md: names \`gst/gone.cpp\`: no such file"
+  rm tree/$docs/guide/link.md
+  echo "/* see $docs/gone.md */" >tree/gst/there.cpp
+  expect_fault "gst/there.cpp: names $docs/gone.md: no such file"
+}
