@@ -3,10 +3,10 @@
  * SECTION:element-rigcalibrate
  * @title: rigcalibrate
  *
- * Calibrates any number of cameras from pictures of a chessboard or ChArUco board: each camera,
- * each stereo pair, and where all of them stand. Picks the frames itself, says by element messages
- * which camera saw the board and what is still missing, and writes the rig file that all elements
- * read, at EOS or on the action signal #GstRigCalibrate::calibrate.
+ * Calibrates any number of cameras, stereo pairs and their poses from images of a chessboard or
+ * ChArUco board. Selects frames automatically, reports in element messages which camera saw the
+ * board and what is still missing, and writes the rig file at EOS or on the action signal
+ * #GstRigCalibrate::calibrate.
  *
  * ## Example launch line
  * |[

@@ -3,7 +3,7 @@
  * SECTION:element-plyenc
  * @title: plyenc
  *
- * Writes each frame set as a point cloud: one binary PLY (or PCD) file a buffer, in world
+ * Encodes each frame set as a point cloud: one binary PLY or PCD file per buffer, in world
  * coordinates and metres, for multifilesink.
  *
  * ## Example launch line

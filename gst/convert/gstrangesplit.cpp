@@ -3,9 +3,9 @@
  * SECTION:element-rangesplit
  * @title: rangesplit
  *
- * Gives depth and colour of single views as ordinary video, at the full size of the view, to look
- * at or to hand on. Request pads: `depth` and `colour` of the view that #GstRangeSplit:view-id
- * names, `depth_%u` and `colour_%u` of the view with that id.
+ * Converts single views to depth and colour video, at the full size of the view. Request pads:
+ * `depth` and `colour` of the view #GstRangeSplit:view-id, `depth_%u` and `colour_%u` of the view
+ * with that id.
  *
  * ## Example launch line
  * |[

@@ -3,8 +3,8 @@
  * SECTION:element-rangecombine
  * @title: rangecombine
  *
- * Makes range images of any depth camera: colour and depth become one view. They may be registered
- * pixel to pixel, of different size, or of two cameras that stand side by side (see
+ * Combines the colour and depth images of any depth camera into range images of one view. They may
+ * be registered pixel to pixel, of different size, or of two cameras side by side (see
  * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16_LE in any unit
  * (default: millimetres).
  *

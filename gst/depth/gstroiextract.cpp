@@ -3,10 +3,9 @@
  * SECTION:element-roiextract
  * @title: roiextract
  *
- * Clears the background of range images and crops them to what is left. The background of each
- * view is learnt over the first frames, on #GstRoiExtract::capture-background, or loaded.
- *
- * While it learns, views come out with an empty ROI.
+ * Removes the background of range images by depth and colour and crops them to the foreground. The
+ * background of each view is learnt from the first frames or on #GstRoiExtract::capture-background,
+ * or loaded from a file. While learning, views have an empty ROI.
  *
  * ## Example launch line
  * |[

@@ -3,10 +3,10 @@
  * SECTION:element-rangedemux
  * @title: rangedemux
  *
- * Gives each view of a frame set stream, raw or coded, on a pad of its own: the inverse of
- * rangemux. Pad `src_3` has view 3. Pads come with the caps, whose rig names the views, and go
- * with a rig that lacks them. Memories are shared, no pixel is copied. A view that a frame set
- * lacks is a GAP on its pad.
+ * Splits a stream of frame sets, raw or coded, into one stream per view; the inverse of rangemux.
+ * Pad `src_3` has view 3. Pads are added with caps, whose rig names the views, and removed with a
+ * rig that lacks them. Memories are shared, no pixel is copied. A view missing in a frame set is a
+ * GAP on its pad.
  *
  * ## Example launch line
  * |[

@@ -3,17 +3,15 @@
  * SECTION:element-rangemux
  * @title: rangemux
  *
- * Puts the views of several streams together, all raw or all coded, matched by capture time. In a
- * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
- * one that is gone, and takes it back when it returns. Of up to 16 memories, as many as a
- * #GstBuffer holds, no pixel is copied (a raw stream has one a view); of more, the first 15 are
- * shared, and the others are copied once.
+ * Combines the views of several streams, all raw or all coded, into frame sets by capture time. In
+ * a live pipeline it waits for late streams up to #GstAggregator:latency, continues without streams
+ * that are gone and includes them again when they return. Frame sets of up to 16 memories share
+ * them without copying; of more, the first 15 are shared and the others copied once.
  *
- * Of recordings, the earlier one goes alone until the other one begins, and frame sets are as far
- * apart as they were captured, wherever the PTS of each recording begin.
+ * Recordings that begin at different times are aligned by capture time, independently of their PTS.
  *
- * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
- * at the same time.
+ * With #GstRangeMux:clock-port it publishes the pipeline clock, so that all camera hosts can
+ * trigger simultaneously.
  *
  * ## Example launch line
  * |[

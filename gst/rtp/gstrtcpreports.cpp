@@ -3,11 +3,10 @@
  * SECTION:element-rtcpreports
  * @title: rtcpreports
  *
- * Tells an encoder what receivers report in plain RTCP: of each report block about the stream that
- * goes through from sink to src, in the RTCP that goes through from rtcp_sink to rtcp_src, it sends
- * an event RangecastReceiverReport upstream. The stream goes through untouched, and so does RTCP of
- * its receivers, at most `max-receivers` of them; other RTCP does not get to rtpsession, which
- * would keep a source for everybody it ever names.
+ * Sends an upstream event RangecastReceiverReport for each RTCP report block about the stream that
+ * passes from sink to src, read from the RTCP that passes from rtcp_sink to rtcp_src. Both streams
+ * pass unchanged, except that only RTCP of the stream's receivers, and of at most max-receivers of
+ * them, passes: rtpsession keeps a source for every SSRC that it sees.
  *
  * ## Example launch line
  * |[

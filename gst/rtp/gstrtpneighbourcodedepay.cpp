@@ -3,10 +3,9 @@
  * SECTION:element-rtpneighbourcodedepay
  * @title: rtpneighbourcodedepay
  *
- * Takes coded frame sets out of RTP packets. What arrived of a frame set goes on, also when packets
- * are lost; damaged packets are counted and dropped. The rig comes with the caps (from SDP) or in
- * band; nothing is put out before it is known. The format is specified in
- * docs/formats/rtp-payload.md.
+ * Extracts coded frame sets from RTP packets. Incomplete frame sets are output; damaged packets are
+ * counted and dropped. The rig comes with the caps (from SDP) or in band; nothing is output before
+ * it is known. The format is specified in docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[

@@ -3,12 +3,11 @@
  * SECTION:element-rtpneighbourcodeguard
  * @title: rtpneighbourcodeguard
  *
- * Lets the packets of one sender of coded frame sets through, and nothing else that arrives at its
- * port: no other bytes, no other codec, no second sender, not its own packets from elsewhere. A
- * sender is who sends some sound packets one after another; another one takes over when it has been
- * silent, sooner from the same address and port. It belongs between udpsrc and rtpjitterbuffer,
- * which one packet of a foreign stream brings out of step. Directly behind udpsrc it has the kernel
- * drop what a flood of foreign packets brings, before it takes the good ones' room.
+ * Passes the RTP packets of one sender of coded frame sets and drops everything else that arrives
+ * at its port. A sender is accepted after consecutive valid packets, and replaced by another when
+ * it has been silent, sooner from the same address and port. Place it between udpsrc and
+ * rtpjitterbuffer, which accepts any RTP packet. Directly behind udpsrc it attaches a socket
+ * filter, so that the kernel drops floods of foreign packets.
  *
  * ## Example launch line
  * |[

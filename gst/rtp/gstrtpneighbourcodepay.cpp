@@ -3,9 +3,9 @@
  * SECTION:element-rtpneighbourcodepay
  * @title: rtpneighbourcodepay
  *
- * Puts coded frame sets into RTP packets. Each packet holds whole units, so that it decodes alone.
- * With alignment=slice a packet leaves as soon as its slice comes.
- * The format is specified in docs/formats/rtp-payload.md.
+ * Packs coded frame sets into RTP packets of whole units, which decode independently. With
+ * alignment=slice a packet is sent as soon as its slice arrives. The format is specified in
+ * docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[

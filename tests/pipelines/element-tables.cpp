@@ -257,7 +257,7 @@ changeable_text (GParamSpec *spec)
     return "any time";
   if (spec->flags & GST_PARAM_MUTABLE_PAUSED)
     return "up to PAUSED";
-  return "NULL, READY";
+  return "READY";
 }
 
 std::vector<GParamSpec *>
