@@ -4,7 +4,7 @@
 # Arguments go to `meson test`, e.g. a test's name or --suite check.
 set -uo pipefail
 cd "$(dirname "$0")/.."
-./setup.sh || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
+./setup.sh --tests || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 rm -f build/meson-logs/testlog.json # a name that no test has makes no new one
 meson test -C build --print-errorlogs --no-rebuild "$@"
 status=$?

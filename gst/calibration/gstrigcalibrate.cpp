@@ -30,8 +30,8 @@
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/geometry/size_text.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::CalibrationCamera;
 using rangecast::size_text;

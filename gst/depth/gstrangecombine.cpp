@@ -32,8 +32,8 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
-#include <string>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <string>
 
 #include "common/bufferpools.hpp"
 #include "common/properties.hpp"

@@ -100,7 +100,8 @@ choose_streams (const MuxPads &pads, bool strict, MuxFormat &format)
 /* A calibration that comes by another way (a file read again, rectified by another build) is the
  * same to rounding; one that was made anew differs by more. */
 constexpr double kSamePlace_m = 1e-3, kSameDirection = 2e-3, kSameScale = 2e-3;
-/* Rectification scales the focal length so that no pixel stays empty: by how much depends on the lenses. */
+/* Rectification scales the focal length so that no pixel stays empty: by how much depends on the
+ * lenses. */
 constexpr double kSameRectifiedScale = 0.5;
 
 static double

@@ -6,7 +6,8 @@
  * Removes redundant points: where several views of a frame set see the same surface, the points of
  * the view that faces it most directly stay and the others are cleared. Before that, pose errors
  * are corrected, views and points that contradict others are left out (#GstCylinderFilter:agree),
- * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with agree=depth.
+ * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with
+ * consistency=depth.
  *
  * ## Example launch line
  * |[

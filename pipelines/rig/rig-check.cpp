@@ -9,12 +9,12 @@
 #include <cstdio>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeinfo.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/stereo/rectification.hpp>
 #include <rangecast/surface/camera_lines.hpp>
 #include <rangecast/surface/orbit.hpp>
 #include <string>
 #include <vector>
-#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::PartnerCamera;
 using rangecast::Rig;

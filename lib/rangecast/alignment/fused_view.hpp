@@ -4,8 +4,8 @@
 #include <array>
 #include <optional>
 
-#include "../geometry/range_image.hpp"
 #include "../geometry/pixel_transfer.hpp"
+#include "../geometry/range_image.hpp"
 #include "surface_planes.hpp"
 
 namespace rangecast {

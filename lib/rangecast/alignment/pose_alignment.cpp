@@ -5,9 +5,9 @@
 #include <bit>
 #include <cmath>
 
-#include "../geometry/world_points.hpp"
 #include "../base/cholesky.hpp"
 #include "../geometry/pixel_transfer.hpp"
+#include "../geometry/world_points.hpp"
 
 namespace rangecast {
 

@@ -26,8 +26,8 @@ rotation_matrix (const Vec3 &vector)
   const Vec3 a = (1 / angle) * vector;
   const double c = std::cos (angle), s = std::sin (angle), d = 1 - c;
   return {c + d * a.x * a.x, d * a.x * a.y - s * a.z, d * a.x * a.z + s * a.y,
-      d * a.y * a.x + s * a.z, c + d * a.y * a.y, d * a.y * a.z - s * a.x,
-      d * a.z * a.x - s * a.y, d * a.z * a.y + s * a.x, c + d * a.z * a.z};
+      d * a.y * a.x + s * a.z, c + d * a.y * a.y, d * a.y * a.z - s * a.x, d * a.z * a.x - s * a.y,
+      d * a.z * a.y + s * a.x, c + d * a.z * a.z};
 }
 
 } // namespace

@@ -7,12 +7,12 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
-#include "compact/encoder.hpp"
 #include "bitstream/slice_partition.hpp"
+#include "bitstream/unit.hpp"
+#include "compact/encoder.hpp"
 #include "plain/encoder.hpp"
 #include "plain/temporal.hpp"
 #include "reference_choice.hpp"
-#include "bitstream/unit.hpp"
 
 namespace rangecast {
 

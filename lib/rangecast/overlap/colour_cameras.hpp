@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <span>
 
+#include "../base/status.hpp"
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "../base/status.hpp"
 #include "../geometry/world_points.hpp"
 
 namespace rangecast {

@@ -6,14 +6,14 @@
 #include <span>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "../base/status.hpp"
+#include "../geometry/world_points.hpp"
 #include "axis.hpp"
+#include "cells.hpp"
 #include "clusters.hpp"
 #include "redundant_points.hpp"
-#include "cells.hpp"
-#include "../geometry/world_points.hpp"
 
 namespace rangecast {
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include "axis.hpp"
 #include "../geometry/world_points.hpp"
+#include "axis.hpp"
 
 namespace rangecast {
 

@@ -20,8 +20,8 @@ inline constexpr std::uintmax_t kMaxRigFileSize = std::uintmax_t{4} << 20;
  *  possibly with .gz; layout in docs/formats/rig.md. The rig is validated.
  *  @return kNotFound, kBadData or what validate() says; the message begins with the path */
 Status load_rig (const std::string &path, Rig &rig);
-/** Writes the same text that cv::FileStorage would. @return kBadValue, kNotFound; the message begins
- *  with the path */
+/** Writes the same text that cv::FileStorage would. @return kBadValue, kNotFound; the message
+ * begins with the path */
 Status save_rig (const std::string &path, const Rig &rig);
 
 } // namespace rangecast

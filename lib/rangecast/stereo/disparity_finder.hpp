@@ -8,8 +8,8 @@
 #include "disparity_filter.hpp"
 #include "disparity_refiner.hpp"
 #include "matching.hpp"
-#include "tiles.hpp"
 #include "silhouette_filter.hpp"
+#include "tiles.hpp"
 
 namespace rangecast {
 

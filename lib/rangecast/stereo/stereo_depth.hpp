@@ -11,8 +11,8 @@
 #include "mirror_check.hpp"
 #include "occupancy.hpp"
 #include "rectification.hpp"
-#include "temporal_filter.hpp"
 #include "still_average.hpp"
+#include "temporal_filter.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {

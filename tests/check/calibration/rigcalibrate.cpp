@@ -5,8 +5,8 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 
-#include <vector>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <vector>
 
 using namespace rangecast;
 using namespace rangecast::testing;

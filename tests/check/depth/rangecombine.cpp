@@ -5,8 +5,8 @@
 
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
-#include <unistd.h>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <unistd.h>
 
 using namespace rangecast;
 using namespace rangecast::testing;

@@ -7,8 +7,8 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 
-#include <vector>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <vector>
 
 namespace rangecast::testing {
 

@@ -4,8 +4,8 @@
 #include <glib/gstdio.h>
 
 #include <map>
-#include <utility>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <utility>
 
 #include "mux-check.hpp"
 

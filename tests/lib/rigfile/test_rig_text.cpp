@@ -5,9 +5,9 @@
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 #include <random>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/rigfile/rig_text.hpp>
 #include <span>
-#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using rangecast::testing::ring_rig;

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <random>
 #include <rangecast/sync/camera_clock.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/frame_associator.hpp>
-#include <rangecast/sync/trigger_matcher.hpp>
+#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/ticks.hpp>
+#include <rangecast/sync/trigger_matcher.hpp>
 #include <set>
 
 using namespace rangecast;

@@ -9,9 +9,9 @@
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
 #include "../bitstream/slice_partition.hpp"
-#include "functions.hpp"
 #include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
+#include "functions.hpp"
 
 namespace rangecast {
 
