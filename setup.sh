@@ -9,7 +9,7 @@ packages=(
   # build
   gcc g++ meson ninja-build pkg-config git ca-certificates
   libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev
-  libopencv-dev libopencv-contrib-dev libceres-dev libassimp-dev libturbojpeg0-dev libzstd-dev zlib1g-dev libpng-dev libdraco-dev
+  libopencv-dev libopencv-contrib-dev libceres-dev libassimp-dev libturbojpeg0-dev libzstd-dev zlib1g-dev libyaml-dev libpng-dev libdraco-dev
   libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev libcairo2-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad

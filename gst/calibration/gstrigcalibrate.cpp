@@ -30,7 +30,7 @@
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/geometry/size_text.hpp>
 
 using rangecast::CalibrationCamera;

@@ -24,11 +24,11 @@ CamSourcePad::~CamSourcePad ()
 void
 CamSourcePad::remove (guint index)
 {
-  GstMiniObject *item = ring_[(first_ + index) % kMostItems];
+  GstMiniObject *item = ring_[(first_ + index) % kMaxItems];
   pictures_ -= GST_IS_BUFFER (item);
   for (guint i = index; i > 0; i--)
-    ring_[(first_ + i) % kMostItems] = ring_[(first_ + i - 1) % kMostItems];
-  first_ = (first_ + 1) % kMostItems;
+    ring_[(first_ + i) % kMaxItems] = ring_[(first_ + i - 1) % kMaxItems];
+  first_ = (first_ + 1) % kMaxItems;
   count_--;
   gst_mini_object_unref (item);
 }
@@ -38,7 +38,7 @@ bool
 CamSourcePad::let_oldest_go (bool gap_too)
 {
   for (guint i = 0; i < count_; i++) {
-    GstMiniObject *item = ring_[(first_ + i) % kMostItems];
+    GstMiniObject *item = ring_[(first_ + i) % kMaxItems];
     const bool gap = GST_IS_EVENT (item) && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_GAP;
     if (GST_IS_BUFFER (item) || (gap && gap_too)) {
       remove (i);
@@ -64,11 +64,11 @@ CamSourcePad::put (GstMiniObject *item)
     return;
   }
   const bool picture = GST_IS_BUFFER (item);
-  if (picture && pictures_ >= kMostPictures) {
+  if (picture && pictures_ >= kMaxPictures) {
     let_oldest_go (false);
     overrun_++;
     discont_ = true;
-  } else if (count_ >= kMostItems && !let_oldest_go (true)) {
+  } else if (count_ >= kMaxItems && !let_oldest_go (true)) {
     gst_mini_object_unref (item); /* that many changes of caps have no sense */
     return;
   }
@@ -76,7 +76,7 @@ CamSourcePad::put (GstMiniObject *item)
     GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
     discont_ = false;
   }
-  ring_[(first_ + count_++) % kMostItems] = item;
+  ring_[(first_ + count_++) % kMaxItems] = item;
   pictures_ += picture;
   changed_.notify_all ();
 }
@@ -107,7 +107,7 @@ CamSourcePad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
   discont_ = true;
-  if (stream == group_id_ && caps_ && count_ < kMostItems / 2)
+  if (stream == group_id_ && caps_ && count_ < kMaxItems / 2)
     put (GST_MINI_OBJECT_CAST (gst_event_new_gap (begin, duration)));
 }
 
@@ -132,7 +132,7 @@ CamSourcePad::next_item ()
   if (flushing_)
     return nullptr;
   GstMiniObject *item = ring_[first_];
-  first_ = (first_ + 1) % kMostItems;
+  first_ = (first_ + 1) % kMaxItems;
   count_--;
   pictures_ -= GST_IS_BUFFER (item);
   return item;

@@ -51,8 +51,8 @@ public:
   void reset_counters () { overrun_ = 0; }
 
 private:
-  static constexpr guint kMostPictures = 3; ///< beyond the one that is being pushed
-  static constexpr guint kMostItems = 16;   ///< with events
+  static constexpr guint kMaxPictures = 3; ///< beyond the one that is being pushed
+  static constexpr guint kMaxItems = 16;   ///< with events
 
   static GstPadProbeReturn see_flush (GstPad *pad, GstPadProbeInfo *info, gpointer self);
   static void loop (gpointer self);
@@ -76,7 +76,7 @@ private:
 
   std::mutex lock_; /* guards down to the blank line */
   std::condition_variable changed_;
-  std::array<GstMiniObject *, kMostItems> ring_{};
+  std::array<GstMiniObject *, kMaxItems> ring_{};
   guint first_ = 0, count_ = 0, pictures_ = 0;
   bool flushing_ = true, ended_ = false, discont_ = true;
   bool flushed_ = false;    ///< by an event that the application pushed on the pad

@@ -10,7 +10,7 @@ using rangecast::FrameSets;
 
 /* A camera that did not answer a shot within this time does not any more. */
 static constexpr std::int64_t kAnswerTime = 1'000'000'000;
-static constexpr std::int64_t kLeastAnswerTime = 60'000'000;
+static constexpr std::int64_t kMinAnswerTime = 60'000'000;
 
 /* How wrong the reading of a camera's clock may be. */
 static constexpr std::int64_t kClockError = 50'000'000;
@@ -122,7 +122,7 @@ std::int64_t
 CamSourcePairing::answer_time () const
 {
   std::int64_t time =
-      std::max<std::int64_t> (3 * static_cast<std::int64_t> (period_), kLeastAnswerTime);
+      std::max<std::int64_t> (3 * static_cast<std::int64_t> (period_), kMinAnswerTime);
   for (int i = 1; i < lone_shots_ && time < kAnswerTime; i++)
     time *= 2;
   return std::min (time, kAnswerTime) + 2 * static_cast<std::int64_t> (exposure_);
@@ -140,7 +140,7 @@ CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
     }
   if (!alone && std::ranges::all_of (finders, [] (const auto &f) { return f.settled (); }))
     return true;
-  if (lone_shots_ > kMostLoneShots) {
+  if (lone_shots_ > kMaxLoneShots) {
     for (auto &finder : finders)
       finder.settle ();
     lone_shots_ = 0;
@@ -195,8 +195,8 @@ CamSourcePairing::set_clock_offset (int camera, std::int64_t offset_ns)
 static std::int64_t
 stamp_of (const CameraFrame &frame)
 {
-  constexpr std::uint64_t kMost = std::uint64_t (1) << 62;
-  return frame.camera_time_ns < kMost ? static_cast<std::int64_t> (frame.camera_time_ns) : 0;
+  constexpr std::uint64_t kMax = std::uint64_t (1) << 62;
+  return frame.camera_time_ns < kMax ? static_cast<std::int64_t> (frame.camera_time_ns) : 0;
 }
 
 /* By the cameras' clocks, if all were read and this one was not set since. */

@@ -95,7 +95,7 @@ private:
     GstClockTime time = 0;
     std::int64_t fired_ns = 0;
   };
-  static constexpr int kHeld = 40, kTicks = 64, kMostLoneShots = 8;
+  static constexpr int kHeld = 40, kTicks = 64, kMaxLoneShots = 8;
 
   Held *hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns);
   void let_go (Held *held);

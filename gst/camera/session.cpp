@@ -383,9 +383,9 @@ CamSourceSession::set_has_cameras (bool has)
 bool
 CamSourceSession::wait_for_leavers ()
 {
-  static constexpr Milliseconds kLook (50), kMost (5000);
+  static constexpr Milliseconds kLook (50), kMax (5000);
   bool waited = false;
-  for (Milliseconds passed (0); leaving > 0 && !quits () && passed < kMost; passed += kLook) {
+  for (Milliseconds passed (0); leaving > 0 && !quits () && passed < kMax; passed += kLook) {
     waited = true;
     std::this_thread::sleep_for (kLook);
   }

@@ -57,7 +57,7 @@ bool
 CamSourceTicker::ask (GstClockTime time)
 {
   std::lock_guard guard (lock_);
-  if (!running_ || !playing_ || !only_when_asked_ || asked_.size () >= kMostAsked)
+  if (!running_ || !playing_ || !only_when_asked_ || asked_.size () >= kMaxAsked)
     return false;
   asked_.push_back (time);
   wishes_++;

@@ -48,7 +48,7 @@ public:
   [[nodiscard]] guint64 missed () const { return missed_; }
 
 private:
-  static constexpr std::size_t kMostAsked = 64;
+  static constexpr std::size_t kMaxAsked = 64;
 
   void run ();
   bool next_time (GstClock *clock, GstClockTime base, GstClockTime &time);

@@ -20,10 +20,10 @@ KeyUnitRequests::note (GstEvent *event)
                                 event, nullptr, nullptr, &running_time, &all_headers, &count);
   if (!parsed)
     return true;
-  constexpr std::size_t kMost = 32;
+  constexpr std::size_t kMax = 32;
   std::lock_guard guard (lock_);
   const Request request = {running_time, all_headers != FALSE, count};
-  if (waiting_.size () < kMost)
+  if (waiting_.size () < kMax)
     waiting_.push_back (request);
   else if (!GST_CLOCK_TIME_IS_VALID (running_time)) /* "at once" is never forgotten */
     waiting_.back () = request;

@@ -38,7 +38,7 @@ public:
   /** All of it; empty afterwards. @return transfer full */
   GstBuffer *take ()
   {
-    expected_ = std::min (bytes_.size () + bytes_.size () / 8, kMostExpected);
+    expected_ = std::min (bytes_.size () + bytes_.size () / 8, kMaxExpected);
     auto bytes = new std::vector<guint8> (std::move (bytes_));
     bytes_ = {};
     units_ = 0;
@@ -49,7 +49,7 @@ public:
 
 private:
   /* A single huge access unit does not claim memory for all that follow it. */
-  static constexpr std::size_t kMostExpected = std::size_t{1} << 20;
+  static constexpr std::size_t kMaxExpected = std::size_t{1} << 20;
 
   std::vector<guint8> bytes_;
   std::size_t units_ = 0;

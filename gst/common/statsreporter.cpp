@@ -11,7 +11,7 @@
 
 static constexpr guint kDefaultIntervalMs = 1000, kLongestIntervalMs = 3600000;
 /* Of more pictures in an interval, the last ones are looked at. */
-static constexpr std::size_t kMostLatencies = 1024;
+static constexpr std::size_t kMaxLatencies = 1024;
 /* A latency beyond this is that of clocks that have nothing to do with each other, ns. */
 static constexpr gint64 kNoLatency = 10 * GST_SECOND;
 
@@ -35,7 +35,7 @@ struct StatsReporter::State {
   Collect collect = nullptr; /* null: stopped */
   GstClockID timer = nullptr;
   guint64 views = 0;
-  std::array<gint32, kMostLatencies> latencies_us{};
+  std::array<gint32, kMaxLatencies> latencies_us{};
   std::size_t n_latencies = 0; /* beyond the array's size they have gone round */
 
   std::atomic<bool> is_reporting{false}; /* because of the timer */
@@ -156,7 +156,7 @@ StatsReporter::State::make_messages (
   std::lock_guard guard (lock);
   if (views)
     set_views_field (messages[0], views);
-  const std::span<gint32> known (latencies_us.data (), std::min (n_latencies, kMostLatencies));
+  const std::span<gint32> known (latencies_us.data (), std::min (n_latencies, kMaxLatencies));
   n_latencies = 0;
   if (!known.empty ())
     gst_structure_set (messages[0], "latency-p50", G_TYPE_INT64, quantile_ns (known, 0.5),
@@ -346,7 +346,7 @@ StatsReporter::passed (GstElement *element, GstBuffer *buffer)
   if (latency < -kNoLatency || latency > kNoLatency)
     return;
   std::lock_guard guard (state.lock);
-  state.latencies_us[state.n_latencies++ % kMostLatencies] = gint32 (latency / 1000);
+  state.latencies_us[state.n_latencies++ % kMaxLatencies] = gint32 (latency / 1000);
 }
 
 void

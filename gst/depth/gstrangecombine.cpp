@@ -33,6 +33,7 @@
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
 #include <string>
+#include <rangecast/rigfile/rig_file.hpp>
 
 #include "common/bufferpools.hpp"
 #include "common/properties.hpp"

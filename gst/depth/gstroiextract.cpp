@@ -30,6 +30,7 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
+#include <rangecast/roi/opencv_threads.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
@@ -363,7 +364,7 @@ process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSet
     return s;
   if (Status s = check_views (priv, frame); !s.ok ())
     return s;
-  rangecast::in_parallel (images.size (), settings.n_threads, [&] (std::size_t i) {
+  rangecast::in_parallel_with_opencv (images.size (), settings.n_threads, [&] (std::size_t i) {
     process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
         images[i], settings);
   });

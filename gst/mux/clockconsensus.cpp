@@ -8,10 +8,10 @@
 GstClockTimeDiff
 MuxSteps::offset_of (GstClockTime capture, GstClockTime arrival)
 {
-  constexpr GstClockTimeDiff kMost = G_MAXINT64 / 4;
+  constexpr GstClockTimeDiff kMax = G_MAXINT64 / 4;
   const GstClockTimeDiff offset = GstClockTimeDiff (std::min<GstClockTime> (capture, G_MAXINT64)) -
                                   GstClockTimeDiff (std::min<GstClockTime> (arrival, G_MAXINT64));
-  return std::clamp (offset, -kMost, kMost);
+  return std::clamp (offset, -kMax, kMax);
 }
 
 static bool

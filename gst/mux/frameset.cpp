@@ -10,7 +10,7 @@ using rangecast::Status;
 using rangecast::StatusCode;
 
 /* So many are kept: a few are downstream, in queues. What is beyond is given back after use. */
-static constexpr std::size_t kMostKept = 16;
+static constexpr std::size_t kMaxKept = 16;
 
 /* GStreamer's own allocator ends the process where memory is short. */
 static GstMemory *
@@ -41,7 +41,7 @@ RecycledMemories::acquire (gsize size)
     return nullptr;
   if (place != memories_.end ())
     gst_memory_unref (std::exchange (*place, gst_memory_ref (memory)));
-  else if (memories_.size () < kMostKept)
+  else if (memories_.size () < kMaxKept)
     memories_.push_back (gst_memory_ref (memory));
   return memory;
 }

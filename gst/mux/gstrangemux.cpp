@@ -28,6 +28,7 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 #include "common/properties.hpp"
 #include "rangemuxprivate.hpp"

@@ -5,7 +5,7 @@
 
 #include "outputschedule.hpp"
 
-static constexpr int kMostPicturesASecond = PictureGrid::kMostRate;
+static constexpr int kMaxPicturesASecond = PictureGrid::kMaxRate;
 
 /* The frame rate of caps that are one structure, else nullptr. */
 static const GValue *
@@ -35,12 +35,12 @@ strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filt
   const GValue *rate = frame_rate (input);
   const bool too_fast = rate && GST_VALUE_HOLDS_FRACTION (rate) &&
                         gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
-                            gst_value_get_fraction_denominator (rate), kMostPicturesASecond, 1) > 0;
+                            gst_value_get_fraction_denominator (rate), kMaxPicturesASecond, 1) > 0;
   if (too_fast)
     gst_caps_set_value (output, "framerate", rate);
   else
     gst_caps_set_simple (
-        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMostPicturesASecond, 1, nullptr);
+        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxPicturesASecond, 1, nullptr);
   return filtered (output, filter);
 }
 

@@ -200,8 +200,8 @@ StripDrawing::draw_bound (gpointer user_data)
 static const char *
 fatal_error (const GstGLFuncs *gl)
 {
-  constexpr int kMost = 8; /* more than one may be waiting; a lost context may not stop telling */
-  for (int i = 0; i < kMost; i++)
+  constexpr int kMax = 8; /* more than one may be waiting; a lost context may not stop telling */
+  for (int i = 0; i < kMax; i++)
     switch (gl->GetError ()) {
       case GL_NO_ERROR:
         return nullptr;

@@ -62,8 +62,8 @@ OrbitControl::go_back ()
 static bool
 is_place (double x, double y)
 {
-  constexpr double kMost = 1e6; /* pixels */
-  return std::abs (x) <= kMost && std::abs (y) <= kMost;
+  constexpr double kMax = 1e6; /* pixels */
+  return std::abs (x) <= kMax && std::abs (y) <= kMax;
 }
 
 bool

@@ -20,7 +20,7 @@ earlier_by (GstClockTime time, GstClockTime less)
 void
 PictureGrid::set_rate (int n, int d)
 {
-  rate_n_ = gst_util_fraction_compare (n, std::max (d, 1), kMostRate, 1) > 0 ? 0 : n;
+  rate_n_ = gst_util_fraction_compare (n, std::max (d, 1), kMaxRate, 1) > 0 ? 0 : n;
   rate_d_ = std::max (d, 1);
 }
 

@@ -23,7 +23,7 @@ struct FrameRate {
 class PictureGrid {
 public:
   /** Pictures a second; beyond that the grid is finer than times can be. */
-  static constexpr int kMostRate = 1000;
+  static constexpr int kMaxRate = 1000;
   /** ns: longer durations and holes of a stream are more likely errors than meant; each would be
    *  filled with pictures. */
   static constexpr GstClockTime kLongest = 60 * GST_SECOND;

@@ -405,7 +405,7 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
       g_param_spec_uint ("max-receivers", "Maximum receivers",
           "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
           "quarter of it",
-          1, RtcpReceivers::kMost, RtcpReceivers::kDefaultMost, kMutablePlaying));
+          1, RtcpReceivers::kMax, RtcpReceivers::kDefaultMost, kMutablePlaying));
   install_stats (object_class, PROP_STATS,
       "Current number of receivers, and the RTCP packets refused and malformed since the "
       "element was started");

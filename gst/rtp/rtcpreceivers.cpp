@@ -33,7 +33,7 @@ RtcpReceivers::forget (GstClockTime now)
 bool
 RtcpReceivers::has_room (GInetAddress *host, guint most) const
 {
-  if (size () >= std::min (most, kMost))
+  if (size () >= std::min (most, kMax))
     return false;
   const auto neighbours = std::ranges::count_if (
       receivers_, [host] (const Receiver &receiver) { return same_host (receiver.host, host); });

@@ -14,7 +14,7 @@
  *  silent for kForgotten makes room. */
 class RtcpReceivers {
 public:
-  static constexpr guint kMost = 4096, kDefaultMost = 256;
+  static constexpr guint kMax = 4096, kDefaultMost = 256;
   static constexpr GstClockTime kForgotten = 30 * GST_SECOND;
 
   struct Receiver {
@@ -26,8 +26,8 @@ public:
     bool has_reported = false;
   };
 
-  /** Takes memory for kMost; none is taken later, while packets come. */
-  RtcpReceivers () { receivers_.reserve (kMost); }
+  /** Takes memory for kMax; none is taken later, while packets come. */
+  RtcpReceivers () { receivers_.reserve (kMax); }
   ~RtcpReceivers () { clear (); }
   RtcpReceivers (const RtcpReceivers &) = delete;
 

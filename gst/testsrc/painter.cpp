@@ -7,6 +7,7 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <new>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::PixelFormat;
 using rangecast::Rgbx;
@@ -95,13 +96,13 @@ seconds (GstClockTime time)
 Status
 AvatarPainter::make_loop (SceneCamera camera)
 {
-  constexpr std::size_t kMostPixels = std::size_t{1} << 28; /* 1 GiB */
+  constexpr std::size_t kMaxPixels = std::size_t{1} << 28; /* 1 GiB */
   const int width = settings_.scene.width, height = settings_.scene.height;
   const std::size_t pixels = std::size_t (width) * std::size_t (height);
-  if (settings_.loop_frames > kMostPixels / pixels)
+  if (settings_.loop_frames > kMaxPixels / pixels)
     return {StatusCode::kBadValue,
         "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
-            std::to_string (kMostPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
+            std::to_string (kMaxPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
             std::to_string (height) + ", which take 1 GiB per camera"};
   try {
     Loop &loop = loops_[int (camera)];

@@ -14,6 +14,7 @@
 #include <rangecast/surface/orbit.hpp>
 #include <string>
 #include <vector>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::PartnerCamera;
 using rangecast::Rig;
@@ -207,8 +208,8 @@ constexpr double kFieldDeg = 45;
 static View
 with_few_pixels (View view)
 {
-  constexpr int kMost = 1024;
-  const int width = std::min (view.width, kMost), height = std::min (view.height, kMost);
+  constexpr int kMax = 1024;
+  const int width = std::min (view.width, kMax), height = std::min (view.height, kMax);
   view.intrinsics =
       view.intrinsics.scaled (double (width) / view.width, double (height) / view.height);
   view.width = width;

@@ -8,8 +8,9 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/stereo/rectification.hpp>
-#include <rangecast/base/storage_check.hpp>
+#include <rangecast/roi/storage_check.hpp>
 #include <sstream>
 #include <string>
 #include <vector>

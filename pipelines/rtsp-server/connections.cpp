@@ -8,15 +8,15 @@
 #include <algorithm>
 
 /* Connections that are no viewers: those that ask only, or have not got so far. */
-static constexpr rlim_t kSpare = 32, kLeastSpare = 8;
+static constexpr rlim_t kSpare = 32, kMinSpare = 8;
 /* Files that the server and its launch string have open. With one of avatartestsrc they are 27,
  * with multicast 34. */
-static constexpr rlim_t kOwnFiles = 256, kLeastOwnFiles = 40;
+static constexpr rlim_t kOwnFiles = 256, kMinOwnFiles = 40;
 /* Where a launch string has more than that: connections leave so many to it. */
 static constexpr int kKeptFiles = 16;
 /* Those that were closed are freed, files and all, by the threads that serve them, which may wait
  * for a first frame set meanwhile. Of kOwnFiles. */
-static constexpr std::size_t kMostClosing = 128;
+static constexpr std::size_t kMaxClosing = 128;
 /* A thread that serves them may be at work for one. */
 static constexpr gulong kEndTurn_us = 10000;
 static constexpr int kEndTurns = 300, kTurnsPerClosing = 50;
@@ -40,7 +40,7 @@ fit_connections (int max_viewers)
     if (setrlimit (RLIMIT_NOFILE, &files) != 0)
       files.rlim_cur = before;
   }
-  const rlim_t most = files.rlim_cur - std::min (files.rlim_cur, kLeastSpare + kLeastOwnFiles);
+  const rlim_t most = files.rlim_cur - std::min (files.rlim_cur, kMinSpare + kMinOwnFiles);
   if (viewers > most) {
     g_printerr ("rtsp-server: --max-viewers: expected %d at most, since a process may have %d open "
                 "files here (ulimit -n), got '%d'\n",
@@ -48,7 +48,7 @@ fit_connections (int max_viewers)
     return std::nullopt;
   }
   const rlim_t others = files.rlim_cur - std::min (files.rlim_cur, viewers + kOwnFiles);
-  return viewers + std::clamp (others, kLeastSpare, kSpare);
+  return viewers + std::clamp (others, kMinSpare, kSpare);
 }
 
 /* A new file gets the lowest number that is free, so connections never have the uppermost ones. */
@@ -299,7 +299,7 @@ Connections::close_oldest ()
 bool
 Connections::make_room (GSocket *socket)
 {
-  if (count (true) >= kMostClosing)
+  if (count (true) >= kMaxClosing)
     return false;
   if (count (false) < most_ && !are_files_short (socket))
     return true;

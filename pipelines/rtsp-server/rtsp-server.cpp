@@ -33,12 +33,12 @@
 
 static constexpr guint kThreads = 4; /* that serve connections */
 /* Requests of RTSP have bodies of a few lines at most. */
-static constexpr guint kMostContent = 16384; /* bytes */
+static constexpr guint kMaxContent = 16384; /* bytes */
 static constexpr int kBacklog = 64; /* connections that the kernel holds until they are taken */
 /* So long gst-rtsp-server waits for the first frame set before it answers. */
 static constexpr int kSlowestStart_s = 20;
 /* Idle connections are closed here: gst-rtsp-server does it after 60 s, and not well, see there. */
-static constexpr int kMostPatience_s = 50;
+static constexpr int kMaxPatience_s = 50;
 /* So long the last frame set may last, after which a stream is over. */
 static constexpr guint kSlowestEnd_ms = 3000;
 static constexpr guint kLastWords_ms = 500;
@@ -87,7 +87,7 @@ struct Server {
 static constexpr gint64 kSecond_us = G_USEC_PER_SEC;
 /* Who has run so long has not only begun again after a failure. */
 static constexpr gint64 kRecovery_us = 5 * kSecond_us;
-static constexpr std::size_t kMostFailures = 16;
+static constexpr std::size_t kMaxFailures = 16;
 /* In which a player that has got its DESCRIBE goes on to SETUP. */
 static constexpr gint64 kSetup_us = 2 * kSecond_us;
 
@@ -405,7 +405,7 @@ tell_failure (Server &server, const std::string &why)
   {
     std::lock_guard guard (server.lock);
     server.failed_at_us = g_get_monotonic_time ();
-    if (server.failures.size () >= kMostFailures || !server.failures.insert (failure).second)
+    if (server.failures.size () >= kMaxFailures || !server.failures.insert (failure).second)
       return;
   }
   g_printerr ("rtsp-server: %s\n", why.c_str ());
@@ -529,7 +529,7 @@ on_second (gpointer user_data)
   auto &server = *static_cast<Server *> (user_data);
   gst_rtsp_session_pool_cleanup (server.sessions);
   server.connections->close_idle (
-      std::min (server.options.timeout_s + kSlowestStart_s, kMostPatience_s) * G_USEC_PER_SEC);
+      std::min (server.options.timeout_s + kSlowestStart_s, kMaxPatience_s) * G_USEC_PER_SEC);
   const gint64 now = g_get_monotonic_time ();
   if (gst_rtsp_session_pool_get_n_sessions (server.sessions) > 0)
     server.idle_since_us = 0;
@@ -614,7 +614,7 @@ set_up (Server &server, std::size_t connections)
       server.server, connections, !options.certificate_file.empty ());
   gst_rtsp_server_set_address (server.server, options.address.c_str ());
   gst_rtsp_server_set_service (server.server, std::to_string (options.port).c_str ());
-  gst_rtsp_server_set_content_length_limit (server.server, kMostContent);
+  gst_rtsp_server_set_content_length_limit (server.server, kMaxContent);
   gst_rtsp_server_set_backlog (server.server, kBacklog);
   GstRTSPThreadPool *threads =
       make_thread_pool (kThreads, [&server] (GstRTSPClient *client, GstRTSPThread *thread) {

@@ -12,9 +12,9 @@
 #include "join.hpp"
 #include "transports.hpp"
 
-static constexpr std::size_t kMostFrameSets = 4;
+static constexpr std::size_t kMaxFrameSets = 4;
 /* Frame sets of many slices may come as one packet each; reports are few. */
-static constexpr std::size_t kMostMessages = 65536;
+static constexpr std::size_t kMaxMessages = 65536;
 
 struct Message {
   GstBuffer *buffer;   /* or */
@@ -179,7 +179,7 @@ void
 TcpQueue::take (const Message &message)
 {
   std::unique_lock guard (lock_);
-  if (closed_ || waiting_.size () >= kMostMessages || is_held_back (message)) {
+  if (closed_ || waiting_.size () >= kMaxMessages || is_held_back (message)) {
     guard.unlock ();
     forget (message);
     return;
@@ -190,7 +190,7 @@ TcpQueue::take (const Message &message)
       if (it->is_rtp)
         last = &*it;
     if (!last || last->timestamp != message.timestamp) {
-      if (frame_sets_ >= kMostFrameSets)
+      if (frame_sets_ >= kMaxFrameSets)
         leave_out_all ();
       frame_sets_++;
     }

@@ -7,23 +7,23 @@
 #include <random>
 #include <vector>
 
-/** Latencies of a run of any length, in bounded memory: all of them up to kMost, then as many,
+/** Latencies of a run of any length, in bounded memory: all of them up to kMax, then as many,
  *  chosen so that each one of the run is among them with the same probability (J. S. Vitter,
  *  "Random sampling with a reservoir", 1985, algorithm R). Half an hour at 30/s is exact. No
  *  locks. */
 class LatencySamples {
 public:
-  static constexpr std::size_t kMost = 65536;
+  static constexpr std::size_t kMax = 65536;
 
-  LatencySamples () { samples_.reserve (kMost); }
+  LatencySamples () { samples_.reserve (kMax); }
 
   void add (double value)
   {
     count_++;
-    if (samples_.size () < kMost)
+    if (samples_.size () < kMax)
       samples_.push_back (value);
     else if (const auto at = std::uniform_int_distribution<std::uint64_t> (0, count_ - 1) (random_);
-             at < kMost)
+             at < kMax)
       samples_[at] = value;
   }
   /** Of the whole run. */

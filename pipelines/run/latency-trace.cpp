@@ -64,7 +64,7 @@ LatencyTrace::note (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
   const Passage passage = {
       point, last_capture, now, last_rtp_time, gint64 (gettid ()), thread_cpu_ns ()};
   std::lock_guard guard (trace.lock_);
-  if (trace.passages_.size () < kMostPassages)
+  if (trace.passages_.size () < kMaxPassages)
     trace.passages_.push_back (passage);
   else
     trace.is_full_ = true;
@@ -118,7 +118,7 @@ LatencyTrace::write (const char *path) const
   std::fputs ("# factory element.pad capture-ns rtp-time passed-ns thread thread-cpu-ns\n", file);
   if (is_full_)
     g_printerr ("rangecast-run: %s: full after %zu buffers; what came later is missing\n", path,
-        kMostPassages);
+        kMaxPassages);
   for (const Passage &p : passages_)
     std::fprintf (file, "%s %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 "\n",
         p.point->name.c_str (), GST_CLOCK_TIME_IS_VALID (p.capture) ? std::int64_t (p.capture) : -1,

@@ -11,11 +11,11 @@
 
 /** Notes when each buffer passes each source pad of a pipeline (and the sinks' pads), so that
  *  tests/bench/latency-budget.py can tell where the time goes. Costs about a microsecond a buffer
- *  and pad. Of a long run the first kMostPassages are kept: some 200 MB, ten minutes of four views
+ *  and pad. Of a long run the first kMaxPassages are kept: some 200 MB, ten minutes of four views
  *  at 30/s; write() says so. */
 class LatencyTrace {
 public:
-  static constexpr std::size_t kMostPassages = 4000000;
+  static constexpr std::size_t kMaxPassages = 4000000;
 
   /** Pads that there are now; the pipeline must outlive the trace. */
   explicit LatencyTrace (GstElement *pipeline);
@@ -46,6 +46,6 @@ private:
   GstElement *pipeline_;
   std::vector<std::unique_ptr<Point>> points_;
   std::mutex lock_;              /* guards what follows */
-  std::deque<Passage> passages_; /* to kMostPassages; grows without moving what is there */
+  std::deque<Passage> passages_; /* to kMaxPassages; grows without moving what is there */
   bool is_full_ = false;
 };

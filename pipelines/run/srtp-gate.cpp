@@ -10,8 +10,8 @@
 
 namespace {
 
-constexpr std::size_t kMostKnown = 256, kKept = 128; /* senders; after some are forgotten */
-constexpr guint kClosedPackets = 64;                 /* in a row of a sender who is known, ... */
+constexpr std::size_t kMaxKnown = 256, kKept = 128; /* senders; after some are forgotten */
+constexpr guint kClosedPackets = 64;                /* in a row of a sender who is known, ... */
 constexpr gint64 kClosedTimeUs = 2'000'000; /* ... and for so long: look where it is by now */
 constexpr gint64 kGoneTimeUs = 10'000'000;  /* and after so long it may have begun anew */
 
@@ -152,10 +152,10 @@ welcome (Gate &gate, guint32 ssrc, std::optional<gint64> index, bool may_be_old)
     if (index && known && *index <= known->peak && !may_be_old)
       return false;
     again = known && known->asked && index;
-    many = !known && gate.known.size () >= kMostKnown;
+    many = !known && gate.known.size () >= kMaxKnown;
   }
   if (again || many)
-    forget (gate, many ? kKept : kMostKnown);
+    forget (gate, many ? kKept : kMaxKnown);
   const std::lock_guard guard (gate.lock);
   Known *known = find (gate, ssrc);
   if (!known)

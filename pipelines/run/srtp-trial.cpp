@@ -8,8 +8,8 @@ namespace {
 constexpr gint64 kAtOnce = 32;           /* tries; one takes 0.1 ms */
 constexpr gint64 kFirstTryTimeUs = 5000; /* between tries, in the long run: of new SSRCs, ... */
 constexpr gint64 kMoreTryTimeUs = 2500;  /* ... of roll-over counters */
-constexpr guint kOfRound[] = {16, 256, SrtpTrial::kMostRollOvers}; /* counters of a round */
-constexpr guint kNeededCredit = 3, kMostCredit = 64;
+constexpr guint kOfRound[] = {16, 256, SrtpTrial::kMaxRollOvers}; /* counters of a round */
+constexpr guint kNeededCredit = 3, kMaxCredit = 64;
 constexpr gint64 kSeekerTimeUs = 1'000'000; /* without a packet: it is gone */
 constexpr int kPlaceBits = 10;
 
@@ -125,7 +125,7 @@ SrtpTrial::place_of (guint32 ssrc, gint64 now_us)
     place = {.ssrc = ssrc};
   }
   place.seen_us = now_us;
-  place.credit = std::min (place.credit + 1, kMostCredit);
+  place.credit = std::min (place.credit + 1, kMaxCredit);
   return place.credit < kNeededCredit ? nullptr : &place;
 }
 
@@ -158,7 +158,7 @@ SrtpTrial::roll_over_of (GstBuffer *buffer, guint32 ssrc, guint first, bool from
       continue;
     seeker->next = 0;
     seeker->round++;
-    if (of_round == kMostRollOvers)
+    if (of_round == kMaxRollOvers)
       seeker->credit = 0; /* others may have the place now */
     break;
   }

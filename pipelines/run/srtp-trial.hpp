@@ -30,7 +30,7 @@ private:
  *  such SSRCs. A flood with an SSRC for each packet has no part in it. */
 class SrtpTrial {
 public:
-  static constexpr guint kMostRollOvers = 4096;
+  static constexpr guint kMaxRollOvers = 4096;
 
   /** @param key  16 bytes of key, 14 of salt */
   explicit SrtpTrial (GstBuffer *key);

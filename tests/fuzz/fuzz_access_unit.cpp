@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
-#include <rangecast/neighbourcode/compact/isa.hpp>
 
 using namespace rangecast;
 
@@ -108,7 +108,7 @@ struct Player {
     pictures.make (decoder.views ());
     const std::span<const RangeImage> older = last.images;
     std::vector<RangeImage> shown (older.begin (), conceal ? older.end () : older.begin ());
-    limit_cpu (cpu); /* here, as memory of threads is made when one first needs it */
+    limit_cpu (cpu);
     expect (decoder.decode (pictures.images, threads, result, shown).ok ());
     limit_cpu (CpuLevel::kAvx2);
     check (conceal);

@@ -16,7 +16,7 @@
 
 using Bytes = std::span<const guint8>;
 
-static constexpr guint kMost = 8;
+static constexpr guint kMax = 8;
 static constexpr guint32 kStream = 1; /* few bits, so that reports about it are found */
 
 struct Session {
@@ -63,7 +63,7 @@ Session::Session ()
   element = gst_element_factory_make ("rtcpreports", nullptr);
   if (!element)
     std::abort ();
-  g_object_set (element, "max-receivers", kMost, nullptr);
+  g_object_set (element, "max-receivers", kMax, nullptr);
   rtp = gst_harness_new_with_element (element, "sink", "src");
   rtcp = gst_harness_new_with_element (element, "rtcp_sink", "rtcp_src");
   gst_harness_set_src_caps_str (
@@ -114,7 +114,7 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
     session.push (rest.subspan (3, length), rest[0]);
     rest = rest.subspan (3 + length);
   }
-  if (session.receivers () > kMost)
+  if (session.receivers () > kMax)
     std::abort ();
   return 0;
 }

@@ -16,8 +16,8 @@
 #include "setup.hpp"
 #include "teardown_queue.hpp"
 
-static constexpr std::size_t kLeastSocketBuffer = 1 << 20; /* bytes */
-static constexpr std::size_t kMostExtra = 1 << 20; /* bytes that chunks may add to a picture */
+static constexpr std::size_t kMinSocketBuffer = 1 << 20; /* bytes */
+static constexpr std::size_t kMaxExtra = 1 << 20; /* bytes that chunks may add to a picture */
 
 namespace {
 
@@ -244,7 +244,7 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
   /* Aravis' own choice is one picture, which for small ones is less than a few packets need. */
   const std::size_t wanted = settings.socket_buffer > 0
                                  ? std::size_t (settings.socket_buffer)
-                                 : std::max (2 * format.size (), kLeastSocketBuffer);
+                                 : std::max (2 * format.size (), kMinSocketBuffer);
   const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
       bytes, nullptr);
@@ -281,7 +281,7 @@ Camera::Impl::fill (CameraRun &run)
   const auto guard = control->lock ();
   const guint payload = arv_camera_get_payload (control->camera (), &error);
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
-  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMostExtra))
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMaxExtra))
     status = control->refuse (CameraFault::kUnsupported,
         "sends " + std::to_string (payload) + " bytes a picture; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +

@@ -18,7 +18,7 @@ ask (GSocket *socket, std::uint16_t request)
 }
 
 /* More than a camera answers in the time between two looks: a flood is read later. */
-static constexpr int kMostAnswers = 16;
+static constexpr int kMaxAnswers = 16;
 
 /* Whatever came: it is connected to the camera alone. An error is a port that is not there now. */
 static bool
@@ -26,7 +26,7 @@ hears (GSocket *socket)
 {
   bool any = false;
   std::array<gchar, 64> answer;
-  for (int i = 0; i < kMostAnswers; i++) {
+  for (int i = 0; i < kMaxAnswers; i++) {
     if (!(g_socket_condition_check (socket, G_IO_IN) & (G_IO_IN | G_IO_ERR)) ||
         g_socket_receive (socket, answer.data (), answer.size (), nullptr, nullptr) <= 0)
       break;

@@ -22,7 +22,7 @@ public:
   /** Nothing was heard for 3 s, and several questions had no answer. */
   [[nodiscard]] bool is_gone (std::int64_t now_ns) const
   {
-    return unanswered_ >= kLeastUnanswered && now_ns - alive_ns_ > kPatience_ns;
+    return unanswered_ >= kMinUnanswered && now_ns - alive_ns_ > kPatience_ns;
   }
   /** A question waits for its answer, and for longer than a camera takes. */
   [[nodiscard]] bool is_doubtful () const { return unanswered_ > 1; }
@@ -36,7 +36,7 @@ private:
     void operator() (GSocket *socket) const { g_object_unref (socket); }
   };
   static constexpr std::int64_t kQuestion_ns = 400'000'000;
-  static constexpr int kLeastUnanswered = 4; ///< in 3 s there are seven if this host has the time
+  static constexpr int kMinUnanswered = 4; ///< in 3 s there are seven if this host has the time
 
   std::unique_ptr<GSocket, Unref> socket_;
   std::int64_t alive_ns_ = 0, asked_ns_ = 0;

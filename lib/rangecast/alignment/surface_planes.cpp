@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../base/for_this_cpu.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 

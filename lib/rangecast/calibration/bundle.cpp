@@ -9,7 +9,7 @@
 namespace rangecast {
 namespace {
 
-constexpr int kMostThreads = 8;
+constexpr int kMaxThreads = 8;
 /* More cameras than that: their equations are mostly zeros. */
 constexpr int kManyCameras = 50;
 
@@ -113,7 +113,7 @@ public:
     options.function_tolerance = 1e-10;
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-10;
-    options.num_threads = std::clamp (int (std::thread::hardware_concurrency ()), 1, kMostThreads);
+    options.num_threads = std::clamp (int (std::thread::hardware_concurrency ()), 1, kMaxThreads);
     options.logging_type = ceres::SILENT;
     StopWhenAsked callback (stop);
     options.callbacks.push_back (&callback);

@@ -23,7 +23,7 @@ constexpr double kGoodRmsPx = 1;
 /* Rows of a pair that differ by more are worth a warning: stereodepth looks in one row. */
 constexpr double kOddRowErrorPx = 1;
 /* A pair whose cameras are turned against each other by more cannot be rectified to any use. */
-constexpr double kMostRollDeg = 45;
+constexpr double kMaxRollDeg = 45;
 
 Status
 bad (const std::string &what)
@@ -64,7 +64,7 @@ check_pair (
   const std::string view = "view " + std::to_string (left.view_id) + ": ";
   const double roll = roll_deg (right_from_left);
   char text[64];
-  if (std::abs (roll) > kMostRollDeg) {
+  if (std::abs (roll) > kMaxRollDeg) {
     std::snprintf (text, sizeof text, "%.0f degrees", roll);
     return bad (view + right.name + " (right) " +
                 (std::abs (roll) > 135 ? "is upside down" : "lies on its side") + " against " +

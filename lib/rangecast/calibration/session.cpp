@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "session.hpp"
 
-#include "../base/parallel.hpp"
+#include "../roi/opencv_threads.hpp"
 #include "pose_chain.hpp"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
         !s.ok ())
       return s;
   }
-  in_parallel (cameras.size (), 0, [&] (std::size_t i) {
+  in_parallel_with_opencv (cameras.size (), 0, [&] (std::size_t i) {
     Eye &eye = *eyes_[i];
     eye.corners.clear ();
     eye.status = {};

@@ -8,7 +8,7 @@
 namespace rangecast {
 namespace {
 
-constexpr int kMostInARow = 4;
+constexpr int kMaxInARow = 4;
 constexpr double kTallestTile = 2, kFlattestTile = 0.01; /* height over width */
 
 cv::Mat
@@ -64,7 +64,7 @@ lay_out (std::span<const CalibrationCamera> cameras, int tile_width)
 {
   TileLayout layout;
   const int count = int (cameras.size ());
-  layout.columns = std::min (count, kMostInARow);
+  layout.columns = std::min (count, kMaxInARow);
   layout.rows = count ? (count + layout.columns - 1) / layout.columns : 0;
   double tallest = 0; /* height over width */
   for (const CalibrationCamera &camera : cameras)

@@ -52,8 +52,8 @@ check_lens (
     const View &view, const Intrinsics &k, const Distortion &distortion, const std::string &name)
 {
   const double values[] = {k.fx, k.fy, k.cx, k.cy};
-  constexpr double kLeastFocal = 1e-3; /* less, and points lie beyond what a float can hold */
-  if (!all_finite (values) || !(k.fx >= kLeastFocal) || !(k.fy >= kLeastFocal) || k.fx > 1e6 ||
+  constexpr double kMinFocal = 1e-3; /* less, and points lie beyond what a float can hold */
+  if (!all_finite (values) || !(k.fx >= kMinFocal) || !(k.fy >= kMinFocal) || k.fx > 1e6 ||
       k.fy > 1e6 || std::abs (k.cx) > 1e6 || std::abs (k.cy) > 1e6)
     return bad_field (view,
         name + "intrinsics: expected fx, fy from 0.001 to 1e6 and cx, cy within 1e6, in pixels");

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
@@ -152,18 +152,6 @@ template <typename L> struct FillLoop {
   }
 };
 
-[[RANGECAST_CYLINDER_ANY]] static std::size_t
-run_fill (const FillLoop<Narrow> &loop)
-{
-  return loop.run ();
-}
-
-[[RANGECAST_CYLINDER_AVX2]] static std::size_t
-run_fill (const FillLoop<Wide> &loop)
-{
-  return loop.run ();
-}
-
 void
 WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)
 {
@@ -171,9 +159,9 @@ WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelR
   const std::size_t begin = part.begin;
   float *px = x.data () + begin, *py = y.data () + begin, *pz = z.data () + begin;
   std::uint32_t *place = pixel.data () + begin;
-  part.end = begin + (cpu_level () >= CpuLevel::kAvx2
-                             ? run_fill (FillLoop<Wide>{image, rays, px, py, pz, place})
-                             : run_fill (FillLoop<Narrow>{image, rays, px, py, pz, place}));
+  part.end = begin + for_this_cpu ([&]<typename L> (L) {
+    return FillLoop<L>{image, rays, px, py, pz, place}.run ();
+  });
 }
 
 std::size_t

@@ -89,7 +89,7 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
 
 /* An encoder gives no pixel to two slices, and a network repeats packets a few times at most. Of
  * more than that a few bytes each would keep the decoder busy for minutes. */
-constexpr std::uint64_t kMostRepeats = 8;
+constexpr std::uint64_t kMaxRepeats = 8;
 
 void
 AccessUnitDecoder::limit_pixels (const PlannedView &planned)
@@ -100,7 +100,7 @@ AccessUnitDecoder::limit_pixels (const PlannedView &planned)
       continue;
     pixels += static_cast<std::uint64_t> (slice.header.rows) *
               static_cast<std::uint64_t> (slice.header.columns);
-    slice.too_short = pixels > kMostRepeats * planned.coded_pixels;
+    slice.too_short = pixels > kMaxRepeats * planned.coded_pixels;
   }
 }
 

@@ -5,12 +5,12 @@
 #include <tuple>
 #include <utility>
 
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
-constexpr double kLeastSpreadRatio = 1.3;
+constexpr double kMinSpreadRatio = 1.3;
 /* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
  * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
 struct Follow {
@@ -54,9 +54,6 @@ struct MomentsLoop {
           total[k] += s;
     }
   }
-
-  [[RANGECAST_CYLINDER_ANY]] void run_any (double (&total)[9]) const { run (total); }
-  [[RANGECAST_CYLINDER_AVX2]] void run_avx2 (double (&total)[9]) const { run (total); }
 };
 
 void
@@ -65,7 +62,7 @@ Moments::add (const WorldPoints &points, WorldPoints::Part part)
   const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
       points.z.data () + part.begin, part.size ()};
   double total[9] = {};
-  cpu_level () >= CpuLevel::kAvx2 ? loop.run_avx2 (total) : loop.run_any (total);
+  for_this_cpu ([&] { loop.run (total); });
   for (int k = 0; k < 9; k++)
     (k < 3 ? sum[k] : product[k - 3]) += total[k];
   n += static_cast<double> (part.size ());
@@ -147,7 +144,7 @@ axis_of_points (AxisMode mode, const Moments &moments, std::span<const PixelRays
   double values[3];
   Vec3 vectors[3];
   eigen_symmetric (covariance, values, vectors);
-  if (!(values[0] > kLeastSpreadRatio * values[1]) || !(values[0] > 1e-12))
+  if (!(values[0] > kMinSpreadRatio * values[1]) || !(values[0] > 1e-12))
     return axis;
   const Vec3 direction = vectors[0].y < 0 ? -1.0 * vectors[0] : vectors[0];
   const double along = end_on (direction, cameras);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "../base/parallel.hpp"
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
@@ -18,7 +18,7 @@ UnitRows::begin (int columns, double slice_height_m, int images, std::size_t sli
   /* This frame's memory is the next one's for what was: both have to be large enough. */
   slices_.reserve (slices);
   old_slices_.reserve (slices);
-  const int rounded = (columns + kMostLanes - 1) / kMostLanes * kMostLanes;
+  const int rounded = (columns + kMaxLanes - 1) / kMaxLanes * kMaxLanes;
   if (columns != columns_) {
     for (int k = 0; k < 2; k++)
       wall_[k].resize (static_cast<std::size_t> (rounded));
@@ -404,46 +404,16 @@ template <typename L> struct UnitRows::Loops {
   }
 };
 
-/* What each processor runs. */
-struct UnitRows::Twins {
-  using Any = Loops<Narrow>;
-  using Avx2 = Loops<Wide>;
-  static bool avx2 () { return cpu_level () >= CpuLevel::kAvx2; }
-
-  [[RANGECAST_CYLINDER_ANY]] static void along (const Any &loops, int s) { loops.along (s); }
-  [[RANGECAST_CYLINDER_AVX2]] static void along (const Avx2 &loops, int s) { loops.along (s); }
-  [[RANGECAST_CYLINDER_ANY]] static void across (const Any &loops, int s) { loops.across (s); }
-  [[RANGECAST_CYLINDER_AVX2]] static void across (const Avx2 &loops, int s) { loops.across (s); }
-  [[RANGECAST_CYLINDER_ANY]] static void carry_over (const Any &loops, const Slice &slice)
-  {
-    loops.carry_over (slice);
-  }
-  [[RANGECAST_CYLINDER_AVX2]] static void carry_over (const Avx2 &loops, const Slice &slice)
-  {
-    loops.carry_over (slice);
-  }
-  [[RANGECAST_CYLINDER_ANY]] static void decide (const Any &loops, int s, Pass pass)
-  {
-    loops.decide (s, pass);
-  }
-  [[RANGECAST_CYLINDER_AVX2]] static void decide (const Avx2 &loops, int s, Pass pass)
-  {
-    loops.decide (s, pass);
-  }
-};
-
 void
 UnitRows::sum_along (const RowRules &rules, int slice)
 {
-  Twins::avx2 () ? Twins::along (Twins::Avx2{*this, rules}, slice)
-                 : Twins::along (Twins::Any{*this, rules}, slice);
+  for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.along (slice); });
 }
 
 void
 UnitRows::sum_across (const RowRules &rules, int slice)
 {
-  Twins::avx2 () ? Twins::across (Twins::Avx2{*this, rules}, slice)
-                 : Twins::across (Twins::Any{*this, rules}, slice);
+  for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.across (slice); });
 }
 
 /* In a sweep every other slice is decided anew, then the rest: what a slice asks is then at rest
@@ -451,11 +421,10 @@ UnitRows::sum_across (const RowRules &rules, int slice)
 RowCounts
 UnitRows::decide (const RowRules &rules, int threads)
 {
-  const bool avx2 = Twins::avx2 ();
   const auto decide_slice = [&] (std::size_t s, Pass pass) {
-    const auto slice = static_cast<int> (s);
-    avx2 ? Twins::decide (Twins::Avx2{*this, rules}, slice, pass)
-         : Twins::decide (Twins::Any{*this, rules}, slice, pass);
+    for_this_cpu ([&]<typename L> (L) {
+      Loops<L>{*this, rules}.decide (static_cast<int> (s), pass);
+    });
   };
   const std::size_t count = slices_.size ();
   in_parallel (count, threads, [&] (std::size_t s) { decide_slice (s, Pass::kAlone); });
@@ -503,8 +472,7 @@ void
 UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids)
 {
   for (const Slice &slice : slices_)
-    Twins::avx2 () ? Twins::carry_over (Twins::Avx2{*this, rules}, slice)
-                   : Twins::carry_over (Twins::Any{*this, rules}, slice);
+    for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.carry_over (slice); });
   std::swap (radius_, old_radius_);
   std::swap (first_, old_first_);
   std::swap (slices_, old_slices_);
@@ -526,7 +494,7 @@ UnitRows::recall (const std::array<int, kMaxViews> &ids, int images)
   std::array<std::int32_t, kMaxViews> now;
   bool same = true;
   for (int old = 0; old < old_images_; old++) {
-    const auto *found = std::find (ids.begin (), ids.begin () + images, old_ids_[old]);
+    const auto found = std::find (ids.begin (), ids.begin () + images, old_ids_[old]);
     now[old] = found == ids.begin () + images ? -1 : static_cast<int> (found - ids.begin ());
     same &= now[old] == old;
   }

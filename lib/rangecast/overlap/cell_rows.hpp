@@ -111,7 +111,6 @@ public:
 
 private:
   template <typename L> struct Loops; /* over some columns at a time */
-  struct Twins;
   enum class Pass { kAlone, kAskNeighbours };
 
   [[nodiscard]] const Slice *old_slice (const Slice &slice) const;

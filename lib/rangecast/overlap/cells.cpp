@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "../base/parallel.hpp"
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
@@ -356,8 +356,7 @@ struct Units::Followers {
   }
 };
 
-/* Gives entries of a slice their tangents, and cells their sums. In its class, so that it becomes
- * part of the twins. */
+/* Gives entries of a slice their tangents, and cells their sums. */
 struct Units::Tangents {
   Units &units;
   const Slice &slice;
@@ -439,28 +438,18 @@ struct Units::Tangents {
   }
 };
 
-/* What each processor runs; plain code, but made for it. */
-struct Units::Twins {
-  static bool avx2 () { return cpu_level () >= CpuLevel::kAvx2; }
-  static void cut (Units &units, Slice &slice, Work &work)
-  {
-    const int columns = units.settings_.columns;
-    const std::size_t number = static_cast<std::size_t> (&slice - units.slices.data ());
-    Cutter cutter (units, slice, work);
-    cutter.cut (units.begin_.data () + number * static_cast<std::size_t> (columns), columns);
-    Tangents tangents{units, slice, work, cutter.entry_end, std::min (kReach, columns / 4)};
-    tangents.find ();
-    tangents.sum ();
-  }
-  [[RANGECAST_CYLINDER_ANY]] static void cut_any (Units &units, Slice &slice, Work &work)
-  {
-    cut (units, slice, work);
-  }
-  [[RANGECAST_CYLINDER_AVX2]] static void cut_avx2 (Units &units, Slice &slice, Work &work)
-  {
-    cut (units, slice, work);
-  }
-};
+/* Cuts a slice into layers, and finds their tangents. */
+void
+Units::cut (Slice &slice, Work &work)
+{
+  const int columns = settings_.columns;
+  const auto number = static_cast<std::size_t> (&slice - slices.data ());
+  Cutter cutter (*this, slice, work);
+  cutter.cut (begin_.data () + number * static_cast<std::size_t> (columns), columns);
+  Tangents tangents{*this, slice, work, cutter.entry_end, std::min (kReach, columns / 4)};
+  tangents.find ();
+  tangents.sum ();
+}
 
 void
 Units::sort (const WorldPoints &cloud, std::span<const float> radius,
@@ -473,8 +462,7 @@ Units::sort (const WorldPoints &cloud, std::span<const float> radius,
   scatter (cloud, radius, column, runs);
   make_works (threads);
   in_parallel (slices.size (), threads, [&] (std::size_t s, std::size_t worker) {
-    Twins::avx2 () ? Twins::cut_avx2 (*this, slices[s], works_[worker])
-                   : Twins::cut_any (*this, slices[s], works_[worker]);
+    for_this_cpu ([&] { cut (slices[s], works_[worker]); });
   });
   const auto images = static_cast<int> (cloud.parts ().size ());
   rows.begin (settings.columns, slice_height_m, images, slices.size ());

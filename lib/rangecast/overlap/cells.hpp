@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "../geometry/world_points.hpp"
 #include "cell_rows.hpp"
 #include "cylindrical_projection.hpp"
-#include "../geometry/world_points.hpp"
 
 namespace rangecast {
 
@@ -136,10 +136,10 @@ private:
   void scatter (const WorldPoints &cloud, std::span<const float> radius,
       std::span<const std::int32_t> column, std::span<const PointRun> runs);
   void make_works (int threads);
+  void cut (Slice &slice, Work &work);
   struct Cutter;
   struct Followers;
   struct Tangents;
-  struct Twins;
 
   UnitSettings settings_;
   std::array<Stack, kMaxBodies> stacks_;

@@ -97,7 +97,7 @@ Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
   queue_.reserve (kSide * kSide);
   int count = 0;
   std::uint16_t label = 0;
-  const auto enough = static_cast<std::uint32_t> (kLeastShare * counted_);
+  const auto enough = static_cast<std::uint32_t> (kMinShare * counted_);
   for (int place = 0; place < kSide * kSide; place++) {
     if (points_[place] == 0 || labels_[place] != 0)
       continue;

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "cell_rows.hpp"
 #include "../geometry/world_points.hpp"
+#include "cell_rows.hpp"
 
 namespace rangecast {
 
@@ -20,7 +20,7 @@ public:
    *  two if nothing stands in a gap of two places, so 8 cm at most. */
   static constexpr float kPlace = 0.04f;
   /** Share of all points that a body has at least; what is smaller goes to the nearest body. */
-  static constexpr double kLeastShare = 0.05;
+  static constexpr double kMinShare = 0.05;
 
   /** Finds the bodies.
    *  @param most  bodies, 1 .. kMaxBodies; of more the largest are taken

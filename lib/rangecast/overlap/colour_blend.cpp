@@ -12,12 +12,12 @@ namespace rangecast {
 namespace {
 
 constexpr std::uint8_t kFar = 255;
-constexpr int kMostSteps = 250;             /* half pixels that a seam reaches */
+constexpr int kMaxSteps = 250;              /* half pixels that a seam reaches */
 constexpr int kStraight = 2, kDiagonal = 3; /* half pixels to a neighbour */
 
 constexpr int kCell = 8;          /* pixels */
 constexpr float kPrior = 2 * 128; /* as 2 grey pixels that agree */
-constexpr float kMostRatio = 1.5f;
+constexpr float kMaxRatio = 1.5f;
 
 constexpr int kNeighbours[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 
@@ -166,7 +166,7 @@ ColourBlend::farthest (const RangeImage &image, const Work &work, float width_m)
   const float pixels = width_m *
                        cameras_.of[static_cast<std::size_t> (image.view_id)].pixels_per_metre /
                        (0.8f * static_cast<float> (work.nearest));
-  return static_cast<int> (std::min (2 * pixels + 1, static_cast<float> (kMostSteps)));
+  return static_cast<int> (std::min (2 * pixels + 1, static_cast<float> (kMaxSteps)));
 }
 
 /* One of the two passes of a chamfer distance transform over the points that are kept. */
@@ -228,7 +228,7 @@ ColourBlend::find_near (Images images, std::size_t i, int most, float width_m)
       if (seams[x].distance == kFar)
         continue;
       const float width =
-          std::min (pixels / static_cast<float> (image.depth.at (x, y)), kMostSteps / 2.0f);
+          std::min (pixels / static_cast<float> (image.depth.at (x, y)), kMaxSteps / 2.0f);
       const float t = seams[x].distance * 0.5f / width;
       if (t < 1)
         work.near.push_back ({static_cast<std::uint16_t> (x), static_cast<std::uint16_t> (y),
@@ -329,7 +329,7 @@ ColourBlend::find_ratios (const RangeImage &image, Work &work) const
       Colour &ratio = work.ratios[static_cast<std::size_t> (y) * columns + x];
       for (std::size_t c = 0; c < 3; c++)
         ratio[c] = std::clamp (
-            (sum.theirs[c] + kPrior) / (sum.mine[c] + kPrior), 1 / kMostRatio, kMostRatio);
+            (sum.theirs[c] + kPrior) / (sum.mine[c] + kPrior), 1 / kMaxRatio, kMaxRatio);
     }
 }
 

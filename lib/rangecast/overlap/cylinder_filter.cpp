@@ -313,9 +313,9 @@ CylinderFilter::set_rules (const CylinderSettings &settings, std::size_t images)
 {
   /* Units are narrow near the axis; beyond this many columns they would cost more than they tell.
    */
-  constexpr double kMostSlices = 8;
+  constexpr double kMaxSmoothingSlices = 8;
   const UnitSettings &units = settings.units;
-  const double slices = std::min (units.smoothing_m / units_.slice_height_m, kMostSlices);
+  const double slices = std::min (units.smoothing_m / units_.slice_height_m, kMaxSmoothingSlices);
   rules_.layer_gap = static_cast<float> (units.layer_gap_m);
   rules_.smoothing_columns = static_cast<float> (units.smoothing_m * units.columns / (2 * M_PI));
   rules_.most_columns = std::min (float{UnitRows::kPad}, static_cast<float> (units.columns / 4));

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 
@@ -117,18 +117,6 @@ template <typename L> struct ToWallLoop {
   }
 };
 
-[[RANGECAST_CYLINDER_ANY]] static std::size_t
-run_loop (const ToWallLoop<Narrow> &loop, WallRange &range)
-{
-  return loop.run (range);
-}
-
-[[RANGECAST_CYLINDER_AVX2]] static std::size_t
-run_loop (const ToWallLoop<Wide> &loop, WallRange &range)
-{
-  return loop.run (range);
-}
-
 WallRange
 to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame, int columns,
     float *radius, std::int32_t *column)
@@ -147,9 +135,9 @@ to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame,
   radius += part.begin;
   column += part.begin;
   const std::size_t n = part.size ();
-  std::size_t i = cpu_level () >= CpuLevel::kAvx2
-                      ? run_loop (ToWallLoop<Wide>{to, x, y, z, radius, column, n}, range)
-                      : run_loop (ToWallLoop<Narrow>{to, x, y, z, radius, column, n}, range);
+  std::size_t i = for_this_cpu ([&]<typename L> (L) {
+    return ToWallLoop<L>{to, x, y, z, radius, column, n}.run (range);
+  });
   for (; i < n; i++) {
     to (x[i], y[i], z[i], radius[i], column[i]);
     range.y_min = std::min (range.y_min, y[i]);

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstring>
 
-#include "../geometry/pixel_transfer.hpp"
 #include "../base/parallel.hpp"
-#include "../base/lanes.hpp"
+#include "../base/simd.hpp"
+#include "../geometry/pixel_transfer.hpp"
 
 namespace rangecast {
 
@@ -82,7 +82,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
   using I = typename L::I;
   static constexpr int kLanes = L::kLanes;
   /* Elements of a Row before its first pixel, and after its last. */
-  static constexpr int kPad = kMostLanes;
+  static constexpr int kPad = kMaxLanes;
 
   RedundantPoints &owner;
   const RangeImage &image, &other;
@@ -337,12 +337,6 @@ template <typename L> struct RedundantPoints::CoverLoop {
   }
 };
 
-/* What each processor runs. */
-struct RedundantPoints::Twins {
-  [[RANGECAST_CYLINDER_ANY]] static void run (const CoverLoop<Narrow> &loop) { loop.run (); }
-  [[RANGECAST_CYLINDER_AVX2]] static void run (const CoverLoop<Wide> &loop) { loop.run (); }
-};
-
 void
 RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
 {
@@ -377,7 +371,7 @@ RedundantPoints::find (const ResolvedFrame &frame, double overlap, int threads)
   if (candidates_.size () < height)
     candidates_.resize (height);
   for (Row &row : rows_) {
-    const std::size_t size = width + 4 * kMostLanes;
+    const std::size_t size = width + 4 * kMaxLanes;
     if (row.on_surface.size () >= size)
       continue;
     for (auto *numbers : {&row.depth, &row.u, &row.v})
@@ -387,12 +381,11 @@ RedundantPoints::find (const ResolvedFrame &frame, double overlap, int threads)
   in_parallel (
       count, threads, [&] (std::size_t i) { make_surface (frame.images[i], images_[i].surface); });
   list (frame);
-  const bool avx2 = cpu_level () >= CpuLevel::kAvx2;
   for (std::size_t i = 0; i < count; i++)
     for (std::uint64_t rest = images_[i].winners; rest; rest &= rest - 1) {
       const auto winner = static_cast<std::size_t> (std::countr_zero (rest));
-      avx2 ? Twins::run (CoverLoop<Wide> (*this, frame, i, winner, overlap))
-           : Twins::run (CoverLoop<Narrow> (*this, frame, i, winner, overlap));
+      for_this_cpu (
+          [&]<typename L> (L) { CoverLoop<L> (*this, frame, i, winner, overlap).run (); });
     }
 }
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "cells.hpp"
 #include "../geometry/world_points.hpp"
+#include "cells.hpp"
 
 namespace rangecast {
 
@@ -51,7 +51,6 @@ public:
 
 private:
   template <typename L> struct CoverLoop; /* over some pixels of a row at a time */
-  struct Twins;
 
   /* A byte for each pixel of an image, with a margin. */
   class Plane {

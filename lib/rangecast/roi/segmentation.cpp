@@ -16,8 +16,8 @@ constexpr float kKnownShare = 0.05f, kSteadyShare = 0.5f;
 /* Where depth says that the background is there, shadow and light may go so much farther. */
 constexpr float kConfirmed = 2;
 /* A pixel looks just like the background within so many standard deviations (which are at least
- * kLeastSpread grey levels), and within this share of its brightness. */
-constexpr float kSameFactor = 2.5f, kLeastSpread = 1.5f, kSameShare = 0.08f;
+ * kMinSpread grey levels), and within this share of its brightness. */
+constexpr float kSameFactor = 2.5f, kMinSpread = 1.5f, kSameShare = 0.08f;
 constexpr float kBurntOut = 250; /* grey levels */
 /* Noise of brightness from which the background's colour tells nothing. */
 constexpr float kVague = 0.3f;
@@ -95,7 +95,7 @@ compare (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
     const float d = rgb[c] - brightness * mean[c];
     distortion += d * d;
   }
-  return {distortion, brightness, std::max (background.spread, kLeastSpread) / std::sqrt (square)};
+  return {distortion, brightness, std::max (background.spread, kMinSpread) / std::sqrt (square)};
 }
 
 bool
@@ -118,7 +118,7 @@ bool
 has_same_hue (const Comparison &c, const BackgroundPixel &background)
 {
   constexpr float kChannels = 1.6f; /* the distance has two free directions */
-  const float chroma = kSameFactor * kChannels * std::max (background.spread, kLeastSpread);
+  const float chroma = kSameFactor * kChannels * std::max (background.spread, kMinSpread);
   return c.distortion < chroma * chroma;
 }
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
-#include "../base/for_this_cpu.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 

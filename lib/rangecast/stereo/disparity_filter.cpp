@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* clear_flying() works on 16-bit disparities with saturating arithmetic in OpenCV's vectors: Lanes
+ * (base/simd.hpp) hold 32-bit numbers, half as many. */
 #include "disparity_filter.hpp"
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Windows of 7 x 7 pixels are summed in OpenCV's vectors of fixed width (bytes for colours, four
+ * floats): the order in which floats are added up must not depend on the processor. */
 #include "disparity_refiner.hpp"
 
 #include <algorithm>
@@ -8,7 +10,7 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "../base/for_this_cpu.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 namespace {
@@ -24,7 +26,7 @@ constexpr float kDull = 15;
 /* Greys that differ by more show different things, levels. */
 constexpr float kUnlike = 20;
 /* No turn moves a disparity farther, nor do all turns, pixels. */
-constexpr float kMost = 0.5f, kMostOfAll = 1;
+constexpr float kMax = 0.5f, kMaxOfAll = 1;
 
 /* Where bytes that follow each other in memory lie in a word. */
 constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
@@ -165,11 +167,11 @@ DisparityRefiner::mark_steps (const cv::Rect &part)
 using Members = std::uint64_t;
 constexpr int kLanes = 2 * kPlane + 2;
 static_assert (kLanes == 8 && kPlane == 3);
-using Lanes = cv::v_float32x4;
+using Floats = cv::v_float32x4;
 
 /* Those of a row of members: all bits, or none. */
 struct Choice {
-  Lanes left, right;
+  Floats left, right;
   Choice (Members members, int v)
   {
     alignas (16) static constexpr int kBits[kLanes] = {1, 2, 4, 8, 16, 32, 64, 128};
@@ -178,7 +180,7 @@ struct Choice {
     left = cv::v_reinterpret_as_f32 ((row & low) == low);
     right = cv::v_reinterpret_as_f32 ((row & high) == high);
   }
-  [[nodiscard]] const Lanes &of (int part) const { return part == 0 ? left : right; }
+  [[nodiscard]] const Floats &of (int part) const { return part == 0 ? left : right; }
 };
 
 /* The pixels around one that belong to its surface, by disparity and by colour. */
@@ -186,10 +188,10 @@ Members
 DisparityRefiner::members_of (int x, int y) const
 {
   constexpr float kA = kStep, kB = kStep + kSlant, kC = kStep + 2 * kSlant;
-  alignas (16) static constexpr float kMostAt[kPlane + 1][kLanes] = {
+  alignas (16) static constexpr float kMaxAt[kPlane + 1][kLanes] = {
       {kC, kB, kA, kA, kA, kB, kC, -1}, {kC, kB, kA, kA, kA, kB, kC, -1},
       {kC, kB, kB, kB, kB, kB, kC, -1}, {kC, kC, kC, kC, kC, kC, kC, -1}};
-  const Lanes centre = cv::v_setall_f32 (now_.ptr<float> (y)[x]), zero = cv::v_setzero_f32 ();
+  const Floats centre = cv::v_setall_f32 (now_.ptr<float> (y)[x]), zero = cv::v_setzero_f32 ();
   cv::v_uint8x16 own[3];
   for (int c = 0; c < 3; c++)
     own[c] = cv::v_setall_u8 (colours_[c].ptr<std::uint8_t> (y)[x]);
@@ -203,8 +205,8 @@ DisparityRefiner::members_of (int x, int y) const
     int bits = cv::v_signmask (differs <= alike);
     int near = 0;
     for (int part = 0; part < kLanes; part += 4) {
-      const Lanes d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
-                  most = cv::v_load_aligned (kMostAt[std::abs (v)] + part);
+      const Floats d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
+                   most = cv::v_load_aligned (kMaxAt[std::abs (v)] + part);
       near |= cv::v_signmask ((cv::v_abs (d - centre) <= most) & (d > zero)) << part;
     }
     members |= Members (bits & near & 127) << (8 * (v + kPlane));
@@ -217,18 +219,18 @@ float
 DisparityRefiner::on_plane (int x, int y, Members members) const
 {
   const float own = now_.ptr<float> (y)[x];
-  const Lanes centre = cv::v_setall_f32 (own), zero = cv::v_setzero_f32 (),
-              one = cv::v_setall_f32 (1);
-  Lanes count[2] = {zero, zero}, count_y[2] = {zero, zero}, count_yy[2] = {zero, zero},
-        off[2] = {zero, zero}, off_y[2] = {zero, zero}; /* by column */
+  const Floats centre = cv::v_setall_f32 (own), zero = cv::v_setzero_f32 (),
+               one = cv::v_setall_f32 (1);
+  Floats count[2] = {zero, zero}, count_y[2] = {zero, zero}, count_yy[2] = {zero, zero},
+         off[2] = {zero, zero}, off_y[2] = {zero, zero}; /* by column */
   for (int v = -kPlane; v <= kPlane; v++) {
     const Choice choice (members, v);
-    const Lanes row = cv::v_setall_f32 (float (v));
+    const Floats row = cv::v_setall_f32 (float (v));
     for (int k = 0; k < 2; k++) {
-      const Lanes w = choice.of (k) & one,
-                  e = choice.of (k) &
-                      (cv::v_load (now_.ptr<float> (y + v) + x - kPlane + 4 * k) - centre),
-                  wy = row * w;
+      const Floats w = choice.of (k) & one,
+                   e = choice.of (k) &
+                       (cv::v_load (now_.ptr<float> (y + v) + x - kPlane + 4 * k) - centre),
+                   wy = row * w;
       count[k] += w;
       off[k] += e;
       count_y[k] += wy;
@@ -236,9 +238,9 @@ DisparityRefiner::on_plane (int x, int y, Members members) const
       off_y[k] = cv::v_muladd (row, e, off_y[k]);
     }
   }
-  const Lanes u[2] = {Lanes (-3, -2, -1, 0), Lanes (1, 2, 3, 4)};
-  const auto sum = [] (const Lanes (&l)[2]) { return cv::v_reduce_sum (l[0] + l[1]); };
-  const auto sum_x = [&u] (const Lanes (&l)[2]) {
+  const Floats u[2] = {Floats (-3, -2, -1, 0), Floats (1, 2, 3, 4)};
+  const auto sum = [] (const Floats (&l)[2]) { return cv::v_reduce_sum (l[0] + l[1]); };
+  const auto sum_x = [&u] (const Floats (&l)[2]) {
     return cv::v_reduce_sum (u[0] * l[0] + u[1] * l[1]);
   };
   const float n = sum (count), sx = sum_x (count), sy = sum (count_y), sd = sum (off),
@@ -340,15 +342,15 @@ shift_of (const Match &m, float n)
 {
   const float mean = m.slope / n,
               by = -(m.product - mean * m.difference) / (m.square - mean * m.slope + kDull);
-  return std::min (std::max (by, -kMost), kMost);
+  return std::min (std::max (by, -kMax), kMax);
 }
 
 float
 DisparityRefiner::shift_of_members (int x, int y, Members members) const
 {
   const cv::Mat *const planes[] = {&products_, &squares_, &slopes_, &differences_};
-  const Lanes zero = cv::v_setzero_f32 ();
-  Lanes sums[4] = {zero, zero, zero, zero};
+  const Floats zero = cv::v_setzero_f32 ();
+  Floats sums[4] = {zero, zero, zero, zero};
   for (int v = -kPlane; v <= kPlane; v++) {
     const Choice choice (members, v);
     for (int i = 0; i < 4; i++) {
@@ -393,8 +395,8 @@ DisparityRefiner::move (const cv::Rect &part, Memory &m)
       if (members[x] != 0)
         shift[x] = shift_of_members (part.x + x, y, members[x]);
     for (int x = 0; x < part.width; x++) {
-      const float moved = d[x] + shift[x], low = std::max (first[x] - kMostOfAll, 1 / 16.f),
-                  high = first[x] + kMostOfAll;
+      const float moved = d[x] + shift[x], low = std::max (first[x] - kMaxOfAll, 1 / 16.f),
+                  high = first[x] + kMaxOfAll;
       to[x] = d[x] > 0 ? std::min (std::max (moved, low), high) : 0;
     }
   }

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "../base/for_this_cpu.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 namespace {

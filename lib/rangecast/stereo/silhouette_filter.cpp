@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Colours and disparities are compared as 8 and 16-bit numbers with saturating arithmetic, in
+ * OpenCV's vectors: Lanes (base/simd.hpp) hold 32-bit numbers. */
 #include "silhouette_filter.hpp"
 
 #include <algorithm>

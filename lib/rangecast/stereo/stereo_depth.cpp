@@ -156,7 +156,7 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
 {
   if (settings_.silhouette_radius == 0)
     return;
-  constexpr int kLeast = 16; /* disparity, 1/16 pixel; 16 less is none */
+  constexpr int kMin = 16; /* disparity, 1/16 pixel; 16 less is none */
   const cv::Rect whole (0, 0, roi.width, roi.height);
   pieces_.set ({&whole, 1}, settings_.n_threads);
   cv::Mat &disparity = finder_.disparity ();
@@ -164,7 +164,7 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
   const int radius = settings_.silhouette_radius * 5 / 4; /* such rims are wider */
-  SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kLeast};
+  SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kMin};
   rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
   rims.only_beyond = true;
   rims.look_near = rims.nearest - 1;

@@ -7,9 +7,9 @@
 namespace rangecast {
 
 constexpr int kBlock = 8;
-constexpr float kDrift = 0.15f;   /* pixels of disparity, in two pictures running */
-constexpr float kJump = 1.0f;     /* the same, of one pixel */
-constexpr float kMostNoise = 6.f; /* grey levels: more is motion */
+constexpr float kDrift = 0.15f;  /* pixels of disparity, in two pictures running */
+constexpr float kJump = 1.0f;    /* the same, of one pixel */
+constexpr float kMaxNoise = 6.f; /* grey levels: more is motion */
 
 static float
 grey_of (const Rgbx &p)
@@ -66,7 +66,7 @@ SteadyFilter::noise ()
     return 0;
   const auto quarter = changes_.begin () + static_cast<std::ptrdiff_t> (changes_.size () / 4);
   std::ranges::nth_element (changes_, quarter);
-  return std::min (*quarter, kMostNoise);
+  return std::min (*quarter, kMaxNoise);
 }
 
 void

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "../base/for_this_cpu.hpp"
 #include "../base/parallel.hpp"
+#include "../base/simd.hpp"
 
 namespace rangecast {
 

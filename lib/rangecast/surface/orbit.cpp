@@ -101,7 +101,7 @@ struct Planes {
 /* Room for what is drawn beside its points, as the ends of bands. Twice the range costs a bit of
  * the depth buffer, which has 24. */
 constexpr double kRoom = 2;
-constexpr double kMostFarToNear = 2000;
+constexpr double kMaxFarToNear = 2000;
 
 Planes
 planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m, double room_m)
@@ -115,7 +115,7 @@ planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m,
   if (farthest <= 0) /* nothing, or nothing that is before the camera */
     return {distance_m / 50, distance_m * 20};
   const double far_m = kRoom * farthest + room_m;
-  return {std::max (nearest / kRoom, far_m / kMostFarToNear), far_m};
+  return {std::max (nearest / kRoom, far_m / kMaxFarToNear), far_m};
 }
 
 } // namespace

@@ -47,8 +47,8 @@ RecentValues::quantile (double share) const
 {
   if (count_ == 0)
     return 0;
-  std::array<std::int64_t, kMost> sorted = values_;
-  const auto n = static_cast<std::ptrdiff_t> (std::min<std::uint64_t> (count_, kMost));
+  std::array<std::int64_t, kMax> sorted = values_;
+  const auto n = static_cast<std::ptrdiff_t> (std::min<std::uint64_t> (count_, kMax));
   const auto rank = static_cast<std::ptrdiff_t> (std::ceil (share * static_cast<double> (n))) - 1;
   const auto at = sorted.begin () + std::clamp<std::ptrdiff_t> (rank, 0, n - 1);
   std::nth_element (sorted.begin (), at, sorted.begin () + n);

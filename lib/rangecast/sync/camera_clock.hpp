@@ -36,16 +36,16 @@ private:
 /** The last few values of something, for its median and its tail. Nothing is allocated. */
 class RecentValues {
 public:
-  static constexpr std::size_t kMost = 512;
+  static constexpr std::size_t kMax = 512;
 
   void forget () { count_ = 0; }
-  void add (std::int64_t value) { values_[count_++ % kMost] = value; }
+  void add (std::int64_t value) { values_[count_++ % kMax] = value; }
   [[nodiscard]] bool empty () const { return count_ == 0; }
   /** Nearest rank. @param share  0 to 1 @return 0 if there are no values */
   [[nodiscard]] std::int64_t quantile (double share) const;
 
 private:
-  std::array<std::int64_t, kMost> values_{};
+  std::array<std::int64_t, kMax> values_{};
   std::uint64_t count_ = 0;
 };
 

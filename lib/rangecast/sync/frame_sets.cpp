@@ -11,7 +11,7 @@ FrameSets::start (int cameras, std::int64_t tolerance, int waiting)
   lanes_ = {};
   cameras_ = std::clamp (cameras, 1, kMaxCameras);
   tolerance_ = tolerance;
-  waiting_ = std::clamp (waiting, 1, kMostWaiting);
+  waiting_ = std::clamp (waiting, 1, kMaxWaiting);
 }
 
 /* next() takes away what exceeds waiting_, so the ring has room. */

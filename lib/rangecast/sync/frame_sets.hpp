@@ -17,8 +17,8 @@ public:
 
   /** @param cameras    2 to kMaxCameras
    *  @param tolerance  how far the keys of one set may lie apart: 0 for trigger numbers
-   *  @param waiting    frames of one camera that may wait for partners, 1 to kMostWaiting */
-  void start (int cameras, std::int64_t tolerance, int waiting = kMostWaiting);
+   *  @param waiting    frames of one camera that may wait for partners, 1 to kMaxWaiting */
+  void start (int cameras, std::int64_t tolerance, int waiting = kMaxWaiting);
 
   struct Set {
     std::array<Frame, kMaxCameras> frames{}; ///< by camera; the caller's again
@@ -45,7 +45,7 @@ public:
   [[nodiscard]] std::uint64_t dropped (int camera) const { return lanes_[camera].dropped; }
 
   /** A partner that comes more than so many frames behind never comes. */
-  static constexpr int kMostWaiting = 8;
+  static constexpr int kMaxWaiting = 8;
 
 private:
   struct Waiting {
@@ -53,7 +53,7 @@ private:
     Frame frame;
   };
   struct Lane {
-    std::array<Waiting, kMostWaiting + 1> ring{};
+    std::array<Waiting, kMaxWaiting + 1> ring{};
     int first = 0, count = 0;
     std::int64_t last_key = 0;
     bool has_last = false;
@@ -69,7 +69,7 @@ private:
   [[nodiscard]] bool complete (int &oldest) const;
 
   std::array<Lane, kMaxCameras> lanes_{};
-  int cameras_ = 2, waiting_ = kMostWaiting;
+  int cameras_ = 2, waiting_ = kMaxWaiting;
   std::int64_t tolerance_ = 0;
 };
 

@@ -10,11 +10,11 @@ namespace rangecast {
 std::int64_t
 frame_id_step (std::uint64_t from, std::uint64_t to)
 {
-  constexpr std::int64_t kMost = 65535;
+  constexpr std::int64_t kMax = 65535;
   const auto step = static_cast<std::int64_t> (to - from);
-  if (from > kMost || to > kMost || std::llabs (step) <= kMost / 2)
+  if (from > kMax || to > kMax || std::llabs (step) <= kMax / 2)
     return step;
-  return step < 0 ? step + kMost : step - kMost;
+  return step < 0 ? step + kMax : step - kMax;
 }
 
 void
@@ -120,7 +120,7 @@ ShotFinder::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t a
     contradictions_ = by_time.known && differs == contradiction_ ? contradictions_ + 1 : 1;
     contradiction_ = differs;
     const bool near = by_time.known && std::llabs (by_time.residual_ns) < period_ns_ / 4;
-    const bool time_wins = near && (stamped_ || contradictions_ >= kMostContradictions);
+    const bool time_wins = near && (stamped_ || contradictions_ >= kMaxContradictions);
     if (!time_wins && std::llabs (by_number.residual_ns) < 2 * period_ns_)
       by_time = by_number;
   } else {

@@ -40,12 +40,12 @@ public:
   /** Enough is learnt to fire one shot after the other. */
   [[nodiscard]] bool settled () const { return settled_; }
   /** The camera lost step (restarted, its clock set): frames are not known. start() again. */
-  [[nodiscard]] bool lost_step () const { return strangers_ >= kMostStrangers; }
+  [[nodiscard]] bool lost_step () const { return strangers_ >= kMaxStrangers; }
   /** A camera that does not answer lone shots is settled by what it said so far. */
   void settle () { settled_ = learnt_; }
 
 private:
-  static constexpr int kShots = 64, kMostStrangers = 8, kMostContradictions = 3;
+  static constexpr int kShots = 64, kMaxStrangers = 8, kMaxContradictions = 3;
 
   struct Shot {
     std::int64_t number, time_ns;

@@ -26,7 +26,7 @@ name_of (ColourError error)
 namespace {
 
 constexpr double kNoise = 1;                      ///< of the pictures, grey levels
-constexpr double kMostError = 0.1;                ///< of a gain
+constexpr double kMaxError = 0.1;                 ///< of a gain
 constexpr double kCorner = 0.2;                   ///< what vignetting takes in the corners
 constexpr double kDefaultWidth = 0.02;            ///< of the blend, metres
 constexpr int kFrames = 20;                       ///< that the balance learns from
@@ -44,7 +44,7 @@ factors_of (std::size_t views)
   Factors mean{};
   for (Factors &f : logs)
     for (std::size_t c = 0; c < 3; c++)
-      mean[c] += (f[c] = random.uniform (-kMostError, kMostError)) / double (views);
+      mean[c] += (f[c] = random.uniform (-kMaxError, kMaxError)) / double (views);
   for (Factors &f : logs)
     for (std::size_t c = 0; c < 3; c++)
       f[c] = std::exp (f[c] - mean[c]);

@@ -14,7 +14,7 @@ using rangecast::StatusCode;
 namespace bench {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{1} << 30; /* of one array; more is no picture */
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30; /* of one array; more is no picture */
 
 /* Little-endian; the caller keeps it inside. */
 std::uint32_t
@@ -147,7 +147,7 @@ decode_npz (const std::vector<std::uint8_t> &zip, cv::Mat &values)
   if (Status s = find_entry (zip, entry); !s.ok ())
     return s;
   const std::size_t n = zip.size ();
-  if (entry.size > kMostBytes || entry.local > n || n - entry.local < 30)
+  if (entry.size > kMaxBytes || entry.local > n || n - entry.local < 30)
     return {StatusCode::kBadData, "NPZ: the array is larger than 1 GiB, or not in the file"};
   const std::size_t at =
       entry.local + 30 + number (&zip[entry.local + 26], 2) + number (&zip[entry.local + 28], 2);

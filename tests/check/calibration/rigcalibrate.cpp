@@ -6,6 +6,7 @@
 #include <gst/video/video.h>
 
 #include <vector>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;

@@ -81,7 +81,7 @@ GST_START_TEST (test_camera_that_is_late_from_the_start_is_never_given_another_s
 {
   for (const std::int64_t late : {70, 100, 130, 170, 250}) {
     CamSourcePairing pairing;
-    pairing.start (2, Fired::kHere, kPeriod, 0, rangecast::FrameSets::kMostWaiting);
+    pairing.start (2, Fired::kHere, kPeriod, 0, rangecast::FrameSets::kMaxWaiting);
     pairing.forget ();
     std::deque<std::pair<std::int64_t, CameraFrame>> under_way; /* with its arrival */
     std::uint64_t number = 0;

@@ -6,7 +6,7 @@
 #include <glib/gstdio.h>
 #include <gst/rtp/rtp.h>
 
-#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 

@@ -6,6 +6,7 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 #include <unistd.h>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;

@@ -8,6 +8,7 @@
 #include <gst/video/video.h>
 
 #include <vector>
+#include <rangecast/rigfile/rig_file.hpp>
 
 namespace rangecast::testing {
 

@@ -5,6 +5,7 @@
 
 #include <map>
 #include <utility>
+#include <rangecast/rigfile/rig_file.hpp>
 
 #include "mux-check.hpp"
 

@@ -261,17 +261,17 @@ TEST (CongestionControl, queue_of_one_of_50_receivers_is_seen)
  * before. */
 TEST (CongestionControl, congestion_that_eight_slow_receivers_report_does_not_become_usual_loss)
 {
-  constexpr double kCapacity = 5e6, kMost = 20e6, kStep_s = 0.05;
+  constexpr double kCapacity = 5e6, kMax = 20e6, kStep_s = 0.05;
   CongestionControl control;
-  control.configure ({100e3, kMost});
+  control.configure ({100e3, kMax});
   std::array<double, 8> sent = {}, lost = {};
   std::array<double, 10> rates; /* what the encoder sends follows half a second later */
-  rates.fill (kMost);
+  rates.fill (kMax);
   double all_sent = 0, all_lost = 0;
   for (std::size_t step = 1; step <= 4000; step++) {
     const double limit = control.bits_per_s (), rate = rates[step % rates.size ()],
                  excess = std::max (rate - kCapacity, 0.0);
-    rates[step % rates.size ()] = limit > 0 ? limit : kMost;
+    rates[step % rates.size ()] = limit > 0 ? limit : kMax;
     for (std::size_t i = 0; i < sent.size (); i++) {
       sent[i] += rate * kStep_s / 9600, lost[i] += excess * kStep_s / 9600;
       if ((step + 12 * i) % 100)

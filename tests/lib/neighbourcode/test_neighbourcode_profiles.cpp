@@ -4,7 +4,7 @@
 
 #include <cstring>
 #include <memory>
-#include <rangecast/neighbourcode/compact/isa.hpp>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/neighbourcode/compact/packed_code.hpp>
 
 using namespace rangecast;
@@ -329,8 +329,8 @@ TEST_P (Profiles, huge_steps_and_residuals_stay_in_range)
 
 TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
 {
-  if (!has_x86_64_v3 ())
-    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  if (cpu_supports () < CpuLevel::kAvx2)
+    GTEST_SKIP () << "this CPU has no AVX2";
   std::mt19937 random (7);
   for (int i = 0; i < 40; i++) {
     const auto below = [&] (unsigned n) { return static_cast<int> (random () % n); };
@@ -357,8 +357,8 @@ TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
 
 TEST_P (Profiles, code_for_every_cpu_and_for_this_one_agree_on_damage)
 {
-  if (!has_x86_64_v3 ())
-    GTEST_SKIP () << "this CPU is not one of x86-64-v3";
+  if (cpu_supports () < CpuLevel::kAvx2)
+    GTEST_SKIP () << "this CPU has no AVX2";
   std::mt19937 random (8);
   const auto stream = small_stream ();
   for (int i = 0; i < 2000; i++) {

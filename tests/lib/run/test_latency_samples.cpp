@@ -21,9 +21,9 @@ TEST (LatencySamples, none_is_zero)
 
 TEST (LatencySamples, a_short_run_is_exact)
 {
-  const int count = int (LatencySamples::kMost);
+  const int count = int (LatencySamples::kMax);
   const LatencySamples samples = ramp (count);
-  EXPECT_EQ (samples.count (), LatencySamples::kMost);
+  EXPECT_EQ (samples.count (), LatencySamples::kMax);
   EXPECT_EQ (samples.percentile (0), 0);
   EXPECT_EQ (samples.percentile (0.5), (count - 1) / 2);
   EXPECT_EQ (samples.percentile (1), count - 1);
@@ -32,7 +32,7 @@ TEST (LatencySamples, a_short_run_is_exact)
 /* Ten times as many as are kept: all of the run counts, not its beginning or its end. */
 TEST (LatencySamples, a_long_run_is_known_by_a_fair_share_of_it)
 {
-  const int count = 10 * int (LatencySamples::kMost);
+  const int count = 10 * int (LatencySamples::kMax);
   const LatencySamples samples = ramp (count);
   EXPECT_EQ (samples.count (), std::uint64_t (count));
   for (const double p : {0.01, 0.25, 0.5, 0.75, 0.99})

@@ -14,7 +14,7 @@ using namespace rangecast;
 
 namespace {
 
-constexpr int kLeast = 32, kNone = kLeast - 16;
+constexpr int kMin = 32, kNone = kMin - 16;
 
 /* Two surfaces with steps, noise and holes. */
 cv::Mat
@@ -28,7 +28,7 @@ made_up_disparity (int width, int height, int seed)
       const int noise =
           random.uniform (0, 12) ? random.uniform (-5, 6) : random.uniform (-300, 300);
       const int d = random.uniform (0, 8) ? (near ? 800 : 200) + noise : kNone;
-      disparity.at<std::int16_t> (y, x) = static_cast<std::int16_t> (d < kLeast ? kNone : d);
+      disparity.at<std::int16_t> (y, x) = static_cast<std::int16_t> (d < kMin ? kNone : d);
     }
   return disparity;
 }
@@ -122,7 +122,7 @@ TEST (StereoFilters, specks_go_as_with_opencv)
     Pieces pieces;
     pieces.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_specks (40, 48, kLeast, kLeast, pieces, mine);
+    filter.clear_specks (40, 48, kMin, kMin, pieces, mine);
     cv::filterSpeckles (theirs, kNone, 40, 48, memory);
     EXPECT_EQ (cv::countNonZero (mine != theirs), 0) << seed;
     EXPECT_GT (cv::countNonZero (mine == kNone), 90 * 61 / 5);
@@ -138,7 +138,7 @@ TEST (StereoFilters, specks_farther_than_what_is_of_interest_stay)
   const cv::Rect all (0, 0, 8, 8);
   pieces.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_specks (10, 32, kLeast, 300, pieces, disparity);
+  filter.clear_specks (10, 32, kMin, 300, pieces, disparity);
   EXPECT_EQ (disparity.at<std::int16_t> (2, 2), 100);
   EXPECT_EQ (disparity.at<std::int16_t> (2, 3), kNone);
 }
@@ -154,7 +154,7 @@ TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
     Pieces pieces;
     pieces.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_flying (kStep, kSupport, kOffset, kLeast, pieces, from, to);
+    filter.clear_flying (kStep, kSupport, kOffset, kMin, pieces, from, to);
     for (int y = 0; y < from.rows; y++)
       for (int x = 0; x < from.cols; x++) {
         const int d = from.at<std::int16_t> (y, x),
@@ -163,12 +163,12 @@ TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
         for (int v = std::max (0, y - 1); v <= std::min (from.rows - 1, y + 1); v++)
           for (int u = std::max (0, x - 1); u <= std::min (from.cols - 1, x + 1); u++) {
             const int other = from.at<std::int16_t> (v, u);
-            n += other >= kLeast && std::abs (other - d) <= most;
+            n += other >= kMin && std::abs (other - d) <= most;
           }
-        if (d < kLeast || n < kSupport)
+        if (d < kMin || n < kSupport)
           expected.at<std::int16_t> (y, x) = kNone;
       }
-    to.setTo (kNone, to < kLeast);
+    to.setTo (kNone, to < kMin);
     EXPECT_EQ (count_differences (to, expected, parts), 0) << seed;
   }
 }
@@ -181,7 +181,7 @@ TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
   const cv::Rect all (0, 0, 64, 1);
   pieces.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_hidden (kLeast, pieces, disparity);
+  filter.clear_hidden (kMin, pieces, disparity);
   /* What stands 10 pixels of disparity before the wall hides the 10 pixels left of it. */
   for (int x = 0; x < 64; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) == kNone, x >= 30 && x < 40) << x;
@@ -210,7 +210,7 @@ TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
   const cv::Rect all (0, 0, 200, 1);
   pieces.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kLeast, pieces, disparity);
+  filter.clear_doubled (left, right, 0, kMin, pieces, disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == kNone), 4);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (20, 90) == 20 * 16), 70);
 }
@@ -222,7 +222,7 @@ TEST (StereoFilters, thin_thing_before_a_wall_of_another_colour_stays)
   const cv::Rect all (0, 0, 200, 1);
   pieces.set ({&all, 1}, 1);
   DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kLeast, pieces, disparity);
+  filter.clear_doubled (left, right, 0, kMin, pieces, disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == 82 * 16), 4);
 }
 
@@ -283,7 +283,7 @@ TEST (StereoFilters, silhouettes_are_judged_as_without_vectors)
     Pieces pieces;
     pieces.set (parts, 2);
     SilhouetteFilter filter;
-    const SilhouetteFilter::Settings settings = {radius, 0.02, 20, kLeast, 250};
+    const SilhouetteFilter::Settings settings = {radius, 0.02, 20, kMin, 250};
     filter.apply (settings, colour, pieces, from, to);
     int changed = 0, differ = 0;
     for (const cv::Rect &part : parts)

@@ -6,7 +6,7 @@
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/scene_fit.hpp>
 #include <rangecast/surface/scene_hull.hpp>
-#include <rangecast/surface/stats_panel.hpp>
+#include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/view_tint.hpp>
 
 using namespace rangecast;

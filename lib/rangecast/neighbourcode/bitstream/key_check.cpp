@@ -8,7 +8,7 @@ namespace rangecast {
 namespace {
 
 /* Slices that memory is kept for: an access unit of far more is not what an encoder makes. */
-constexpr std::size_t kMostKept = 4096;
+constexpr std::size_t kMaxKept = 4096;
 
 /* By view, then place. */
 auto
@@ -24,7 +24,7 @@ KeyCheck::reset ()
 {
   all_key_ = true;
   slices_.clear ();
-  if (slices_.capacity () > kMostKept)
+  if (slices_.capacity () > kMaxKept)
     slices_.shrink_to_fit ();
 }
 

@@ -9,8 +9,8 @@ namespace rangecast {
 void
 RefreshSchedule::reset (int view_height, int view_id)
 {
-  constexpr int kLeast = 64, kBands = 4;
-  band_rows_ = std::max (kLeast, (view_height + kBands - 1) / kBands);
+  constexpr int kMin = 64, kBands = 4;
+  band_rows_ = std::max (kMin, (view_height + kBands - 1) / kBands);
   age_ns_.assign (static_cast<std::size_t> ((view_height + band_rows_ - 1) / band_rows_), 0);
   last_time_ns_ = 0;
   view_id_ = view_id;

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <span>
 
+#include "../bitstream/components.hpp"
 #include "../bitstream/reference.hpp"
 
 namespace rangecast {
@@ -40,10 +41,6 @@ inline constexpr int kChoices = 6;
 /** Depth code and colour of a pixel as one number that can be compared: from bit 0 upwards, 16 bits
  *  each, depth, Y, Co, Cg. */
 using PixelCode = std::uint64_t;
-
-/** Depth, Y, Co, Cg side by side; compilers make vector code of it where there is some. */
-typedef std::int32_t Components __attribute__ ((vector_size (16)));
-inline constexpr int kComponents = 4;
 
 typedef std::int16_t ComponentHalves __attribute__ ((vector_size (16)));
 typedef std::uint64_t ComponentPairs __attribute__ ((vector_size (16)));

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "decoder.hpp"
 
+#include "../../base/simd.hpp"
 #include "entropy_code.hpp"
 #include "packed_code.hpp"
 
@@ -139,22 +140,6 @@ CompactDecoder::decode_run (
   return true;
 }
 
-template <class Code, bool Delta>
-bool
-CompactDecoder::decode_run_every (
-    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
-{
-  return decode_run<Code, Delta> (code, quantisers, begin, end);
-}
-
-template <class Code, bool Delta>
-bool
-CompactDecoder::decode_run_v3 (
-    Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
-{
-  return decode_run<Code, Delta> (code, quantisers, begin, end);
-}
-
 /* Reads which pixels of a row are valid, and where its runs end. */
 template <class Code>
 bool
@@ -229,8 +214,7 @@ CompactDecoder::decode_row (
         return false;
     if (!valid)
       row_.invalidate (begin, end, 0);
-    else if (!(has_v3_ ? decode_run_v3<Code, Delta> (code, quantisers, begin, end)
-                       : decode_run_every<Code, Delta> (code, quantisers, begin, end)))
+    else if (!for_this_cpu ([&] { return decode_run<Code, Delta> (code, quantisers, begin, end); }))
       return false;
     points += valid ? end - begin : 0;
     begin = end;

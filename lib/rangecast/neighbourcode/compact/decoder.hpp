@@ -7,8 +7,8 @@
 
 #include "../../geometry/range_image.hpp"
 #include "encoder.hpp"
-#include "row.hpp"
 #include "entropy_code.hpp"
+#include "row.hpp"
 
 namespace rangecast {
 
@@ -44,18 +44,11 @@ private:
   [[gnu::always_inline]] bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   template <class Code, bool Delta>
-  [[RANGECAST_EVERY_CPU]] bool decode_run_every (
-      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
-  template <class Code, bool Delta>
-  [[RANGECAST_X86_64_V3]] bool decode_run_v3 (
-      Code &code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
-  template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_full (
       Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
   std::uint64_t show_older_row (const DecoderReference &reference, const SliceHeader &header,
       int row, const RangeImage &image);
 
-  const bool has_v3_ = has_x86_64_v3 ();
   CompactRow row_, upper_;
   std::vector<int> runs_;                /* ends of the row's runs */
   std::vector<PixelCode> earlier_codes_; /* what its pixels may equal in the earlier frame set */

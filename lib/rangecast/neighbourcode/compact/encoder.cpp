@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "encoder.hpp"
 
+#include "../../base/simd.hpp"
 #include "entropy_code.hpp"
 #include "packed_code.hpp"
 
@@ -8,7 +9,7 @@ namespace rangecast {
 namespace {
 
 /* What one pixel may add to a slice at most, whatever its code; and one run. */
-constexpr std::size_t kMostBytesOfPixel = 512, kMostBytesOfRun = 64;
+constexpr std::size_t kMaxBytesOfPixel = 512, kMaxBytesOfRun = 64;
 
 /* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
  * residuals come to on average in recordings; their price was found by trying. */
@@ -54,14 +55,14 @@ public:
 
 /* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
  * lacks: sizes are below 2^17 and so float's 24 bits are enough for every step. */
-typedef float Floats __attribute__ ((vector_size (16)));
 
 Components
-rounded (Components difference, Components half_steps, Floats reciprocals)
+rounded (Components difference, Components half_steps, FloatComponents reciprocals)
 {
   const Components sign = difference >> 31;
   const Components size = (difference ^ sign) - sign + half_steps;
-  const Floats quotient = (__builtin_convertvector(size, Floats) + 0.5f) * reciprocals;
+  const FloatComponents quotient =
+      (__builtin_convertvector(size, FloatComponents) + 0.5f) * reciprocals;
   return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
 }
 
@@ -82,8 +83,9 @@ Steps
 steps_within (int depth_threshold, int colour_threshold)
 {
   /* A rounded residual may be wrong by half its step. A wrong Y changes R, G and B as much; wrong
-   * Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an encoder chooses").
-   * Coarse depth steps save more than they cost; a third for Y leaves chroma the rest. */
+   * Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an encoder
+   * chooses"). Coarse depth steps save more than they cost; a third for Y leaves chroma the rest.
+   */
   const int depth = (3 * depth_threshold + 2) / 4;
   const int luma = (9 * colour_threshold + 12) / 25;
   const int chroma = std::max (0, colour_threshold - luma - 1);
@@ -116,7 +118,7 @@ CompactEncoder::set_thresholds (const CompactSettings &settings)
   bias_ = bias (d, c);
   steps_ = steps_within (d, c).components ();
   half_steps_ = steps_ / 2;
-  reciprocals_ = 1.0f / __builtin_convertvector(steps_, Floats);
+  reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   const auto weight = [] (int threshold) {
     return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
   };
@@ -181,7 +183,7 @@ CompactEncoder::resize (int columns)
   runs_.reserve (n + 1);
   /* A row is coded whole before anybody looks whether it fits. */
   const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
-                           (kMostBytesOfPixel + kMostBytesOfRun) * (n + 1);
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
   bytes_.resize (std::max (bytes_.size (), most));
 }
 
@@ -212,18 +214,6 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
         rgbx = __builtin_bswap32 (rgbx);
       own[x] |= key_of (0, rgbx);
     }
-}
-
-void
-CompactEncoder::load_row_every (const ConstRangeImage &image, int y)
-{
-  load_row (image, y);
-}
-
-void
-CompactEncoder::load_row_v3 (const ConstRangeImage &image, int y)
-{
-  load_row (image, y);
 }
 
 /* Motion of the blocks that begin in row y, or go on there. They refer to rows of their band only,
@@ -425,30 +415,6 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   slice_code = code;
 }
 
-template <class Code, bool Best, bool Delta>
-void
-CompactEncoder::code_run_every (Code &code, std::size_t begin, std::size_t end)
-{
-  code_run<Code, Best, Delta> (code, begin, end);
-}
-
-template <class Code, bool Best, bool Delta>
-void
-CompactEncoder::code_run_v3 (Code &code, std::size_t begin, std::size_t end)
-{
-  code_run<Code, Best, Delta> (code, begin, end);
-}
-
-template <class Code, bool Best, bool Delta>
-void
-CompactEncoder::code_run_here (Code &code, std::size_t begin, std::size_t end)
-{
-  if (has_v3_)
-    code_run_v3<Code, Best, Delta> (code, begin, end);
-  else
-    code_run_every<Code, Best, Delta> (code, begin, end);
-}
-
 /* Codes which pixels of the row are valid, and finds where its runs end. */
 template <class Code>
 void
@@ -511,9 +477,9 @@ CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
     if (!valid)
       row_.invalidate (begin, end, kInvalidKey);
     else if (settings_.best)
-      code_run_here<Code, true, Delta> (slice_code, begin, end);
+      for_this_cpu ([&] { code_run<Code, true, Delta> (slice_code, begin, end); });
     else
-      code_run_here<Code, false, Delta> (slice_code, begin, end);
+      for_this_cpu ([&] { code_run<Code, false, Delta> (slice_code, begin, end); });
     begin = end;
     valid = !valid;
   }
@@ -563,10 +529,7 @@ template <bool Delta>
 void
 CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
 {
-  if (has_v3_)
-    load_row_v3 (image, y);
-  else
-    load_row_every (image, y);
+  for_this_cpu ([&] { load_row (image, y); });
   if constexpr (Delta) {
     if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
       find_motions (image, y, band);

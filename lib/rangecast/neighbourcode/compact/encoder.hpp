@@ -7,12 +7,11 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
-#include "row.hpp"
-#include "entropy_code.hpp"
-#include "isa.hpp"
-#include "../bitstream/slice_partition.hpp"
-#include "pixel_key.hpp"
 #include "../bitstream/refresh.hpp"
+#include "../bitstream/slice_partition.hpp"
+#include "entropy_code.hpp"
+#include "pixel_key.hpp"
+#include "row.hpp"
 
 namespace rangecast {
 
@@ -56,7 +55,6 @@ public:
       std::vector<std::uint8_t> &to, EncoderResult &result);
 
 private:
-  typedef float Reciprocals __attribute__ ((vector_size (16)));
   /* What a pixel becomes that no neighbour replaces. */
   struct FullPixel {
     Components residual;
@@ -76,12 +74,6 @@ private:
   template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Best, bool Delta>
   [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
-  template <class Code, bool Best, bool Delta>
-  [[RANGECAST_EVERY_CPU]] void code_run_every (Code &code, std::size_t begin, std::size_t end);
-  template <class Code, bool Best, bool Delta>
-  [[RANGECAST_X86_64_V3]] void code_run_v3 (Code &code, std::size_t begin, std::size_t end);
-  template <class Code, bool Best, bool Delta>
-  void code_run_here (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Delta>
   [[gnu::always_inline]] PixelState code_full (
       Code &code, const Neighbours &n, Components residual);
@@ -90,8 +82,6 @@ private:
   int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
-  [[RANGECAST_EVERY_CPU]] void load_row_every (const ConstRangeImage &image, int y);
-  [[RANGECAST_X86_64_V3]] void load_row_v3 (const ConstRangeImage &image, int y);
   [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
   void load_earlier (int y, const RowBand &band);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
@@ -100,14 +90,13 @@ private:
   [[nodiscard]] std::size_t header_size () const;
   [[nodiscard]] bool fits (std::size_t bytes) const;
 
-  const bool has_v3_ = has_x86_64_v3 ();
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ = nullptr; /* while code_piece() runs */
   MotionMemory *motion_memory_ = nullptr;         /* too */
   SliceHeader header_;
   EncoderResult result_;
   Components steps_{}, half_steps_{};
-  Reciprocals reciprocals_{};
+  FloatComponents reciprocals_{};
   Limits limits_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};

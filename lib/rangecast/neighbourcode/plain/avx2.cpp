@@ -1,13 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What is compiled for AVX2 says so, function by function. With compiler options for the whole file
- * an inline function of a header, compiled here, could be the copy that the linker keeps for all.
- */
+/* The functions of profile plain in AVX2 intrinsics. They are not another version of the scalar
+ * text, which for_this_cpu() would make: they code four rows as one wave, each row three columns
+ * behind the one above it, with saturating arithmetic and moves between lanes that Lanes have no
+ * words for. plain_functions (cpu_level ()) chooses them, by the same level as for_this_cpu().
+ *
+ * Each function names its target. With compiler options for the whole file an inline function of a
+ * header, compiled here, could be the copy that the linker keeps for all. */
 #include "functions.hpp"
 
 #if defined __x86_64__
 #include <immintrin.h>
 
-#define AVX2 __attribute__ ((target ("avx2,bmi,bmi2,popcnt")))
+#include "../../base/simd.hpp"
+
+#define AVX2 [[RANGECAST_TARGET_AVX2]]
 
 namespace rangecast {
 namespace {

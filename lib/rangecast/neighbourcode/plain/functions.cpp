@@ -5,7 +5,7 @@
 #include <bit>
 #include <cstring>
 
-#include "pixel_lanes.hpp"
+#include "../bitstream/components.hpp"
 
 namespace rangecast {
 namespace {
@@ -34,12 +34,12 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
 
 typedef std::uint16_t Packed __attribute__ ((vector_size (8)));
 
-Lanes
-lanes_of (PlainPixel pixel)
+Components
+components_of (PlainPixel pixel)
 {
   Packed packed;
   std::memcpy (&packed, &pixel, sizeof packed);
-  return __builtin_convertvector(packed, Lanes);
+  return __builtin_convertvector(packed, Components);
 }
 
 /* The row above, which is replaced as it goes, but for the last pixel. */
@@ -49,17 +49,17 @@ struct Above {
 
 /* Codes a valid pixel that is not near its left one. @return its symbol */
 inline Symbol
-choose_above (PlainPixel &pixel, Lanes own, const Above &above, Lanes threshold)
+choose_above (PlainPixel &pixel, Components own, const Above &above, Components threshold)
 {
-  if (are_near (own, lanes_of (above.left), threshold)) {
+  if (are_near (own, components_of (above.left), threshold)) {
     pixel = above.left;
     return kUpperLeft;
   }
-  if (are_near (own, lanes_of (above.here), threshold)) {
+  if (are_near (own, components_of (above.here), threshold)) {
     pixel = above.here;
     return kUpper;
   }
-  if (are_near (own, lanes_of (above.right), threshold)) {
+  if (are_near (own, components_of (above.right), threshold)) {
     pixel = above.right;
     return kUpperRight;
   }
@@ -69,22 +69,22 @@ choose_above (PlainPixel &pixel, Lanes own, const Above &above, Lanes threshold)
 /* Codes at most a group of a row; `upper` becomes it. @return the symbols */
 std::uint64_t
 code_group (const PlainPixel *row, PlainPixel *upper, int count, PlainPixel &left_pixel,
-    PlainPixel &upper_left, Lanes threshold)
+    PlainPixel &upper_left, Components threshold)
 {
   std::uint64_t symbols = 0;
-  Lanes left = lanes_of (left_pixel);
+  Components left = components_of (left_pixel);
   for (int x = 0; x < count; x++) {
     const Above above = {upper_left, upper[x], upper[x + 1]};
     PlainPixel pixel = row[x];
     Symbol symbol = kInvalid;
     if (pixel & kInvalidPixelBit) {
-      left = lanes_of (pixel);
-    } else if (const Lanes own = lanes_of (pixel); are_near (own, left, threshold)) {
+      left = components_of (pixel);
+    } else if (const Components own = components_of (pixel); are_near (own, left, threshold)) {
       symbol = kLeft;
       pixel = left_pixel;
     } else {
       symbol = choose_above (pixel, own, above, threshold);
-      left = lanes_of (pixel);
+      left = components_of (pixel);
     }
     symbols |= std::uint64_t{symbol} << kSymbolBits * x;
     upper_left = above.here;
@@ -97,7 +97,7 @@ code_group (const PlainPixel *row, PlainPixel *upper, int count, PlainPixel &lef
 void
 code_band (const PlainBand &band)
 {
-  const Lanes threshold = lanes_of (band.threshold);
+  const Components threshold = components_of (band.threshold);
   PlainPixel *const upper = band.upper;
   BitWriter symbols (band.symbols[0]);
   PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];

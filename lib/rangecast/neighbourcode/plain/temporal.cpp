@@ -8,11 +8,11 @@
 namespace rangecast {
 namespace {
 
-constexpr Lanes kInvalidLanes = {kNoDepthCode, 0, 0, 0};
+constexpr Components kInvalidComponents = {kNoDepthCode, 0, 0, 0};
 
 /* A pixel of an earlier frame set: its four numbers, 16 bits each. */
 std::uint64_t
-kept (Lanes pixel)
+kept (Components pixel)
 {
   if (pixel[0] == kNoDepthCode)
     return ReferencePlane::kNone;
@@ -22,12 +22,12 @@ kept (Lanes pixel)
   return value;
 }
 
-Lanes
-lanes_of (std::uint64_t value)
+Components
+components_of (std::uint64_t value)
 {
   const auto part = [&] (int i) { return static_cast<std::int32_t> (value >> 16 * i & 0xffff); };
-  return value == ReferencePlane::kNone ? kInvalidLanes
-                                        : Lanes{part (0), part (1), part (2), part (3)};
+  return value == ReferencePlane::kNone ? kInvalidComponents
+                                        : Components{part (0), part (1), part (2), part (3)};
 }
 
 } // namespace
@@ -48,11 +48,11 @@ PlainTemporalEncoder::load_row (const ConstRangeImage &image, int y)
   const std::uint16_t *depth = image.depth.row (y) + header_.first_column;
   const Rgbx *colour = image.colour.row (y) + header_.first_column;
   for (int x = 0; x < header_.columns; x++) {
-    Lanes &to = row_[static_cast<std::size_t> (x) + 1];
-    to = kInvalidLanes;
+    Components &to = row_[static_cast<std::size_t> (x) + 1];
+    to = kInvalidComponents;
     if (depth_->valid (depth[x]))
-      to = Lanes{depth_->code (depth[x]), colour_->code (colour[x].r), colour_->code (colour[x].g),
-          colour_->code (colour[x].b)};
+      to = Components{depth_->code (depth[x]), colour_->code (colour[x].r),
+          colour_->code (colour[x].g), colour_->code (colour[x].b)};
     result_.points += to[0] != kNoDepthCode;
   }
   if (!header_.key)
@@ -64,7 +64,7 @@ int
 PlainTemporalEncoder::symbol_of (int x) const
 {
   const auto at = static_cast<std::size_t> (x) + 1;
-  const Lanes own = row_[at];
+  const Components own = row_[at];
   if (own[0] == kNoDepthCode)
     return kInvalid;
   if (are_near (own, row_[at - 1], threshold_))
@@ -72,7 +72,8 @@ PlainTemporalEncoder::symbol_of (int x) const
   for (std::size_t i = 0; i < 3; i++)
     if (are_near (own, upper_[at + i - 1], threshold_))
       return kUpperLeft + static_cast<int> (i);
-  return !header_.key && are_near (own, lanes_of (earlier_[at - 1]), threshold_) ? kEarlier : kFull;
+  return !header_.key && are_near (own, components_of (earlier_[at - 1]), threshold_) ? kEarlier
+                                                                                      : kFull;
 }
 
 /* Codes the row in place. @return its full pixels */
@@ -91,7 +92,7 @@ PlainTemporalEncoder::code_row (std::size_t symbols_at, std::size_t full_at)
     else if (symbol >= kUpperLeft && symbol <= kUpperRight)
       row_[at] = upper_[at + static_cast<std::size_t> (symbol) - kUpper];
     else if (symbol == kEarlier)
-      row_[at] = lanes_of (earlier_[at - 1]);
+      row_[at] = components_of (earlier_[at - 1]);
     else if (symbol == kFull)
       *full++ = std::uint64_t (row_[at][0]) | std::uint64_t (row_[at][1]) << d |
                 std::uint64_t (row_[at][2]) << (d + c) | std::uint64_t (row_[at][3]) << (d + 2 * c);
@@ -104,7 +105,7 @@ PlainTemporalEncoder::begin_slice (int first_row)
 {
   header_.first_row = first_row;
   header_.rows = 0;
-  std::ranges::fill (upper_, kInvalidLanes);
+  std::ranges::fill (upper_, kInvalidComponents);
 }
 
 void
@@ -135,8 +136,8 @@ PlainTemporalEncoder::code_rows (
     const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
 {
   const auto columns = static_cast<std::size_t> (header_.columns);
-  row_.assign (columns + 2, kInvalidLanes);
-  upper_.assign (columns + 2, kInvalidLanes);
+  row_.assign (columns + 2, kInvalidComponents);
+  upper_.assign (columns + 2, kInvalidComponents);
   earlier_.resize (std::max (earlier_.size (), columns));
   kept_.resize (earlier_.size ());
   begin_slice (band.first_row);
@@ -181,7 +182,7 @@ PlainTemporalEncoder::code_piece (const ConstRangeImage &image, const RowBand &b
   header_ = header;
   result_ = {};
   const int c = settings.colour_threshold;
-  threshold_ = Lanes{settings.depth_threshold, c, c, c};
+  threshold_ = Components{settings.depth_threshold, c, c, c};
   code_rows (image, band, to);
   result += result_;
 }

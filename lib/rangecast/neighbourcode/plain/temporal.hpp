@@ -9,10 +9,10 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
-#include "pixel_lanes.hpp"
-#include "encoder.hpp"
+#include "../bitstream/components.hpp"
 #include "../bitstream/reference.hpp"
 #include "../bitstream/refresh.hpp"
+#include "encoder.hpp"
 
 namespace rangecast {
 
@@ -42,11 +42,11 @@ private:
   const ColourQuantiser *colour_ = nullptr;
   CodingReference reference_;
   PlainSettings settings_{};
-  Lanes threshold_{};
+  Components threshold_{};
   SliceHeader header_; /* of the open slice */
   EncoderResult result_;
 
-  std::vector<Lanes> row_, upper_; /* with an invalid pixel on each side */
+  std::vector<Components> row_, upper_; /* with an invalid pixel on each side */
   std::vector<std::uint64_t> earlier_, kept_;
   std::vector<std::uint8_t> symbols_; /* of the open slice, one a byte */
   std::vector<std::uint64_t> full_;

@@ -17,14 +17,14 @@ constexpr double kGrowth = 0.008, kTimesUnrest = 2.5, kLongQueue = 0.08, kNoQueu
 
 /* Of what arrives, so much is sent after congestion (draft-ietf-rmcat-gcc-02, 5.5: beta). But
  * never less than half of what was sent, where that was little by itself. */
-constexpr double kDecrease = 0.85, kMostDecrease = 0.5;
+constexpr double kDecrease = 0.85, kMaxDecrease = 0.5;
 
 /* So long encoder and network take until a new rate shows. */
 constexpr std::uint64_t kReactionNs = 500 * kMs;
 
 /* Near the capacity that is known: additive, this times the square root of the rate, bits/s each
  * second. Below: a share each second. Beyond, a share that doubles every two seconds. */
-constexpr double kAdditive = 30, kRecovery = 0.2, kProbe = 0.08, kMostProbe = 0.35;
+constexpr double kAdditive = 30, kRecovery = 0.2, kProbe = 0.08, kMaxProbe = 0.35;
 constexpr double kNearBelow = 0.92, kNearAbove = 1.08, kDoubling = 2;
 
 /* A source that makes less than it may is not given more than this times what it makes, and so
@@ -32,10 +32,10 @@ constexpr double kNearBelow = 0.92, kNearAbove = 1.08, kDoubling = 2;
 constexpr double kHeadroom = 1.5, kMore = 50'000;
 
 constexpr std::uint64_t kLossIntervalNs = 500 * kMs;
-constexpr double kLeastPackets = 20, kManyPackets = 150;
+constexpr double kMinPackets = 20, kManyPackets = 150;
 
 constexpr std::uint64_t kSilencePacketsNs = 3'000 * kMs, kSilenceReportsNs = 15'000 * kMs;
-constexpr int kMostHalvings = 10;
+constexpr int kMaxHalvings = 10;
 
 /* Of receiver reports: round trips longer by this are a queue; jitter greater by this forbids more.
  * Reports older than the last do not count. */
@@ -58,7 +58,7 @@ is_enough (double packets, double lost, std::uint64_t span_ns)
 {
   if (span_ns >= kLongestLossNs)
     return packets > 0;
-  return packets >= kLeastPackets && (lost < 0.5 || lost > 2.5 || packets >= kManyPackets);
+  return packets >= kMinPackets && (lost < 0.5 || lost > 2.5 || packets >= kManyPackets);
 }
 
 } // namespace
@@ -105,7 +105,7 @@ void
 CongestionControl::decrease (double delivered, std::uint64_t now_ns)
 {
   const double wanted = kDecrease * delivered;
-  const double least = rate_ > 0 ? kMostDecrease * rate_ : 0;
+  const double least = rate_ > 0 ? kMaxDecrease * rate_ : 0;
   const double before = bits_per_s ();
   rate_ = limited (before > 0 ? std::min (std::max (wanted, least), before) : wanted);
   capacity_ = delivered;
@@ -142,7 +142,7 @@ CongestionControl::increase (double delivered, double elapsed_s)
     more = kAdditive * std::sqrt (rate_);
     calm_s_ = 0;
   } else {
-    more = std::min (kProbe * std::exp2 (calm_s_ / kDoubling), kMostProbe) * rate_;
+    more = std::min (kProbe * std::exp2 (calm_s_ / kDoubling), kMaxProbe) * rate_;
     calm_s_ += elapsed_s;
   }
   const double most = std::max (rate_, kHeadroom * delivered + kMore);
@@ -254,7 +254,7 @@ CongestionControl::receiver_report (
   if (source_ == Source::kPackets && now_ns - report_ns_ < kSilencePacketsNs)
     return;
   Receiver &receiver = find_receiver (report.receiver, now_ns);
-  const double packets = report.packets > 0 ? report.packets : kLeastPackets;
+  const double packets = report.packets > 0 ? report.packets : kMinPackets;
   receiver.time_ns = std::max<std::uint64_t> (now_ns, 1);
   receiver.has_news = true;
   receiver.packets += packets;
@@ -329,7 +329,7 @@ CongestionControl::tick (double sent_bits_per_s, std::uint64_t now_ns)
   const std::uint64_t patience =
       source_ == Source::kPackets ? kSilencePacketsNs : kSilenceReportsNs;
   if (source_ == Source::kNone || now_ns - silent_since_ns_ < patience || sent_bits_per_s <= 0 ||
-      halvings_ == kMostHalvings)
+      halvings_ == kMaxHalvings)
     return;
   const double before = rate_ > 0 ? rate_ : sent_bits_per_s;
   if (halvings_ == 0)

@@ -12,19 +12,19 @@ constexpr std::uint64_t kMs = 1'000'000;
 /* Packets that are sent within such a time are one burst (draft-ietf-rmcat-gcc-02, 5.2). */
 constexpr std::uint64_t kBurstNs = 5 * kMs;
 
-constexpr std::uint64_t kWindowNs = 1000 * kMs, kLeastSpanNs = 330 * kMs;
+constexpr std::uint64_t kWindowNs = 1000 * kMs, kMinSpanNs = 330 * kMs;
 
 /* The first arrival of so many packets of a burst counts: jitter may exchange them. */
 constexpr int kHead = 4;
 
 /* Of jitter the least of so long, but of so many bursts. */
 constexpr std::uint64_t kFilterNs = 250 * kMs, kGrowthNs = 500 * kMs;
-constexpr std::size_t kLeastBursts = 3;
+constexpr std::size_t kMinBursts = 3;
 
 constexpr std::uint64_t kHalfMemoryNs = 10'000 * kMs;
 
 /* Seconds; an outburst counts as the second at most. */
-constexpr double kMemoryOfUnrest = 5, kMostUnrest = 0.03;
+constexpr double kMemoryOfUnrest = 5, kMaxUnrest = 0.03;
 
 /* A delay that is so far from the last one is of another clock: of a sender or receiver that began
  * anew. */
@@ -32,10 +32,10 @@ constexpr double kOtherClock = 10;
 
 /* Below the first, loss is never congestion (draft-ietf-rmcat-gcc-02, 6); above the second it is
  * never usual. */
-constexpr double kHarmlessLoss = 0.02, kMostUsualLoss = 0.1;
+constexpr double kHarmlessLoss = 0.02, kMaxUsualLoss = 0.1;
 
 /* Packets that must be lost: of one or two nothing follows. */
-constexpr double kLeastLost = 2.5;
+constexpr double kMinLost = 2.5;
 
 /* The loss that stays of that before, where less is sent, if it was usual. */
 constexpr double kStays = 0.6;
@@ -97,7 +97,7 @@ ArrivalWindow::delivered_bits_per_s () const
     begin_ns = at (first).sent_ns;
     end_ns = last.sent_ns;
   }
-  if (bursts < 3 || begin_ns == 0 || end_ns < begin_ns + kLeastSpanNs)
+  if (bursts < 3 || begin_ns == 0 || end_ns < begin_ns + kMinSpanNs)
     return 0;
   const auto sent = static_cast<std::uint16_t> (last.sequence - at (first).sequence);
   const double share = reported > 0 ? std::clamp (double (sent) / double (reported), 1.0, 4.0) : 1;
@@ -158,7 +158,7 @@ QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
   const std::size_t known = std::min (n_, samples_.size ());
   double jitter_free = delay;
   for (std::size_t i = 1; i < known; i++) {
-    if (i >= kLeastBursts && sent_ns - latest (i).sent_ns > kFilterNs)
+    if (i >= kMinBursts && sent_ns - latest (i).sent_ns > kFilterNs)
       break;
     jitter_free = std::min (jitter_free, latest (i).delay_s);
   }
@@ -169,8 +169,8 @@ QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
     then++;
   growth_s_ = queue_s_ - latest (then).queue_s;
   unrest_s_ += (1 - std::exp (-elapsed / kMemoryOfUnrest)) *
-               (std::min (std::abs (growth_s_), kMostUnrest) - unrest_s_);
-  news_ = known >= kLeastBursts;
+               (std::min (std::abs (growth_s_), kMaxUnrest) - unrest_s_);
+  news_ = known >= kMinBursts;
 }
 
 bool
@@ -185,7 +185,7 @@ bool
 LossJudge::judge (double share, double packets, double elapsed_s)
 {
   share_ = share;
-  was_usual_ = tries_ && before_ > 0 && share > kStays * before_ && share < kMostUsualLoss;
+  was_usual_ = tries_ && before_ > 0 && share > kStays * before_ && share < kMaxUsualLoss;
   if (was_usual_)
     usual_ = std::max (usual_, share);
   tries_ = false;
@@ -194,7 +194,7 @@ LossJudge::judge (double share, double packets, double elapsed_s)
     usual_ += 0.3 * (share - usual_);
   const double chance = 2.5 * std::sqrt (usual_ * (1 - usual_) / std::max (packets, 1.0));
   const double excess = share - usual_;
-  return excess > std::max (kHarmlessLoss, chance) && excess * packets > kLeastLost;
+  return excess > std::max (kHarmlessLoss, chance) && excess * packets > kMinLost;
 }
 
 void

@@ -12,7 +12,7 @@ constexpr double kShort = 0.25, kEnough = 2;
 /* What a frame set may cost more than there is before that counts, and what there must be more than
  * it costs before there are more of them. */
 constexpr double kTooMuch = 1.03, kReserve = 1.2;
-constexpr int kMost = 1000;
+constexpr int kMax = 1000;
 /* Intervals between frame sets: so many are measured, and longer ones (seconds) are pauses. */
 constexpr int kMeasured = 32;
 constexpr double kPause = 2;
@@ -43,8 +43,8 @@ FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
 {
   const double fps = 1e9 / static_cast<double> (interval_ns_);
   const int most = in.least_fps > 0
-                       ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMost)))
-                       : kMost;
+                       ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
+                       : kMax;
   const double share = in.bits_per_s > 0 ? in.least_bits * fps / in.bits_per_s : 0;
   const auto one_of = [&] (double x) {
     return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (most))));

@@ -14,24 +14,24 @@ constexpr double kPayBack = 1.0, kSpread = 1.0;
 
 /* The share of the target that refreshes take of other frame sets at most, and the seconds' worth
  * of bytes that each of the two steps holds at most: what refreshes of that share come to. */
-constexpr double kMostForRefreshes = 0.9, kMostSpread = 1.6;
+constexpr double kMaxForRefreshes = 0.9, kMaxSpread = 1.6;
 
 constexpr double kMemoryOfModel = 0.3, kMemoryOfInterval = 0.5;
 
 /* A frame set that comes later, or so many intervals later, than the one before is a new beginning:
  * nothing was saved while nothing was there. */
-constexpr double kLongestPause = 2, kMostIntervals = 4;
+constexpr double kLongestPause = 2, kMaxIntervals = 4;
 
 /* A target that differs by more is another one; by less it is the old one that follows a network.
  */
 constexpr double kOtherTarget = 0.125;
 
 /* What a share of the target a frame set is planned for at least and at most. */
-constexpr double kLeastShare = 0.7, kGreatestShare = 1.3;
+constexpr double kMinShare = 0.7, kGreatestShare = 1.3;
 
 /* Seconds' worth of bytes that the account holds at most. Little where nothing can be done about
  * it: at the limits, and while nobody is there. */
-constexpr double kMostDebt = 0.5, kMostCredit = 0.25, kLittle = 0.05;
+constexpr double kMaxDebt = 0.5, kMaxCredit = 0.25, kLittle = 0.05;
 
 /* Logarithms of a threshold a second. More where the model says that bytes are far from the plan.
  */
@@ -40,10 +40,10 @@ constexpr double kSlowest = 1.5, kFaster = 8, kFarOff = 0.2;
 /* A whole threshold stays until the wanted one is half a code from it and so much more, codes for
  * each code. Where thresholds are small, bytes differ much from one to the next, and nobody sees
  * them change: there it is better to go to and fro between the two that the target lies between. */
-constexpr double kHysteresis = 0.02, kMostHysteresis = 0.25;
+constexpr double kHysteresis = 0.02, kMaxHysteresis = 0.25;
 
 /* b of the model: what recordings came to, and limits. */
-constexpr double kFirstSlope = 0.6, kLeastSlope = 0.15, kGreatestSlope = 1.6;
+constexpr double kFirstSlope = 0.6, kMinSlope = 0.15, kGreatestSlope = 1.6;
 
 /* Logarithm of bits by which a frame set is none that the model may follow at once. */
 constexpr double kOutlier = 0.3;
@@ -64,7 +64,7 @@ gain (double elapsed_s, double memory_s)
 int
 with_hysteresis (int present, double wanted)
 {
-  const double stays = 0.5 + std::min (kHysteresis * present, kMostHysteresis);
+  const double stays = 0.5 + std::min (kHysteresis * present, kMaxHysteresis);
   return std::abs (wanted - present) > stays ? static_cast<int> (std::lround (wanted)) : present;
 }
 
@@ -138,7 +138,7 @@ RateControl::take_time (std::uint64_t time_ns)
   const double elapsed =
       has_time_ ? 1e-9 * static_cast<double> (static_cast<std::int64_t> (time_ns - time_ns_)) : -1;
   const bool goes_on =
-      elapsed > 0 && elapsed < std::max (kLongestPause, kMostIntervals * interval_s_);
+      elapsed > 0 && elapsed < std::max (kLongestPause, kMaxIntervals * interval_s_);
   elapsed_s_ = goes_on ? elapsed : interval_s_;
   if (goes_on)
     interval_s_ += gain (elapsed, kMemoryOfInterval) * (elapsed - interval_s_);
@@ -153,8 +153,8 @@ RateControl::pay_for_refreshes ()
   const double share = gain (elapsed_s_, kSpread);
   const double moved = entering_ * share;
   entering_ -= moved;
-  spread_ = std::min (spread_ + moved, kMostSpread * bytes_per_s ());
-  const double paid = std::min (spread_ * share, kMostForRefreshes * bytes_per_s () * elapsed_s_);
+  spread_ = std::min (spread_ + moved, kMaxSpread * bytes_per_s ());
+  const double paid = std::min (spread_ * share, kMaxForRefreshes * bytes_per_s () * elapsed_s_);
   spread_ -= paid;
   return paid;
 }
@@ -168,7 +168,7 @@ RateControl::plan_bytes ()
   const double usual = fair * interval_s_ / elapsed_s_;
   const double excess = account_ + usual; /* if this one is as it should be */
   const double share = 1 - excess / usual * std::min (interval_s_ / kPayBack, 0.5);
-  return usual * std::clamp (share, kLeastShare, kGreatestShare);
+  return usual * std::clamp (share, kMinShare, kGreatestShare);
 }
 
 Thresholds
@@ -198,7 +198,7 @@ RateControl::learn (double bits)
 {
   const double x = coarseness_of (thresholds_), dx = x - learnt_x_;
   if (frames_ > 0 && std::abs (dx) > 0.01) {
-    const double slope = std::clamp ((learnt_bits_ - bits) / dx, kLeastSlope, kGreatestSlope);
+    const double slope = std::clamp ((learnt_bits_ - bits) / dx, kMinSlope, kGreatestSlope);
     const double before = b_;
     b_ += dx * dx / (dx * dx + 0.05) * (slope - b_);
     a_ += (b_ - before) * learnt_x_; /* where it was, the model stays right */
@@ -217,8 +217,8 @@ void
 RateControl::limit_account ()
 {
   const double second = bytes_per_s ();
-  const double debt = x_ >= most_x_ ? kLittle : kMostDebt;
-  const double credit = x_ <= 0 ? kLittle : kMostCredit;
+  const double debt = x_ >= most_x_ ? kLittle : kMaxDebt;
+  const double credit = x_ <= 0 ? kLittle : kMaxCredit;
   account_ = std::clamp (account_, -credit * second, debt * second);
 }
 
@@ -237,7 +237,7 @@ RateControl::coded (const CodedFrame &frame)
   points_ = points;
   const double usual = points * std::exp (a_ - b_ * coarseness_of (thresholds_)) / 8;
   const double more = refresh ? std::max (0.0, bytes - usual) : 0;
-  entering_ = std::min (entering_ + more, kMostSpread * bytes_per_s ());
+  entering_ = std::min (entering_ + more, kMaxSpread * bytes_per_s ());
   account_ += bytes - more;
   limit_account ();
   if (frame.points == 0 || frame.bytes == 0) {

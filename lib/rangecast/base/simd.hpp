@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Code for several processors from one text. for_this_cpu() runs a loop in a version compiled for
+ * the processor at hand; Lanes are the vectors of numbers of loops that cannot be left to the
+ * compiler's vectoriser. All versions do the same operations in the same order, without fused
+ * multiplication and addition (meson.build says -ffp-contract=off), so their results are equal bit
+ * by bit. */
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "cpu.hpp"
+
+/* The instructions that CpuLevel::kAvx2 stands for. */
+#define RANGECAST_TARGET_AVX2 gnu::target ("avx2,bmi,bmi2,popcnt")
+
+namespace rangecast {
+
+/** Vectors of some 32-bit numbers, which may lie anywhere in memory (hence aligned (4)). Functions
+ *  take and return them by reference: how they are passed by value depends on the processor. */
+template <int kNumbers> struct Lanes {
+  static constexpr int kLanes = kNumbers;
+  typedef float F __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
+  typedef std::int32_t I __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
+  typedef std::uint32_t U __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
+
+  static F &at (float *p) { return *reinterpret_cast<F *> (p); }
+  static const F &at (const float *p) { return *reinterpret_cast<const F *> (p); }
+  static I &at (std::int32_t *p) { return *reinterpret_cast<I *> (p); }
+  static const I &at (const std::int32_t *p) { return *reinterpret_cast<const I *> (p); }
+  static U &at (std::uint32_t *p) { return *reinterpret_cast<U *> (p); }
+  static const U &at (const std::uint32_t *p) { return *reinterpret_cast<const U *> (p); }
+
+  /** v = |v| */
+  static void make_positive (F &v) { v = (F)((I)v & 0x7fffffff); }
+
+  /** v = sqrt (v), v >= 0. std::sqrt, which may set errno, does not become vector code. */
+  static void make_root (F &v)
+  {
+#if defined __x86_64__
+    typedef float Four __attribute__ ((vector_size (16)));
+    Four parts[kLanes / 4];
+    std::memcpy (parts, &v, sizeof parts);
+    for (Four &part : parts)
+      part = __builtin_ia32_sqrtps (part);
+    std::memcpy (&v, parts, sizeof parts);
+#else
+    for (int l = 0; l < kLanes; l++)
+      v[l] = std::sqrt (v[l]);
+#endif
+  }
+
+  /** v = mask ? v : 0; mask is -1 or 0 in each lane, as comparisons give it */
+  static void keep_where (F &v, const I &mask)
+  {
+    v = (F)((I)v & mask);
+  }
+
+  /** All bits that are set in some lane. */
+  static std::uint32_t any_of (const U &bits)
+  {
+    const std::uint64_t both = fold (bits);
+    return static_cast<std::uint32_t> (both | both >> 32);
+  }
+  static bool any (const I &mask)
+  {
+    return fold ((U)mask) != 0;
+  }
+
+private:
+  static std::uint64_t fold (const U &bits)
+  {
+    std::uint64_t parts[kLanes / 2];
+    std::memcpy (parts, &bits, sizeof parts);
+    for (int k = 1; k < kLanes / 2; k++)
+      parts[0] |= parts[k];
+    return parts[0];
+  }
+};
+
+/** Lanes of the widest version, AVX2's. Others have four: SSE2, NEON. */
+inline constexpr int kMaxLanes = 8;
+
+/* gnu::flatten: all that work () calls and whose text is at hand becomes part of the version; not
+ * through a function that both versions share, as GCC 12 gives up on what an inlined one calls.
+ * gnu::noinline: that happens before it could become part of its caller instead. */
+template <typename Work>
+[[gnu::flatten, gnu::noinline]] auto
+run_for_any_cpu (const Work &work)
+{
+  if constexpr (std::is_invocable_v<const Work &, Lanes<4>>)
+    return work (Lanes<4>{});
+  else
+    return work ();
+}
+
+#if defined __x86_64__
+template <typename Work>
+[[RANGECAST_TARGET_AVX2, gnu::flatten, gnu::noinline]] auto
+run_for_avx2 (const Work &work)
+{
+  if constexpr (std::is_invocable_v<const Work &, Lanes<kMaxLanes>>)
+    return work (Lanes<kMaxLanes>{});
+  else
+    return work ();
+}
+#endif
+
+/** Returns work (), or work (Lanes<n>{}) where work takes lanes, in the version for cpu_level ().
+ */
+template <typename Work>
+auto
+for_this_cpu (const Work &work)
+{
+#if defined __x86_64__
+  if (cpu_level () >= CpuLevel::kAvx2)
+    return run_for_avx2 (work);
+#endif
+  return run_for_any_cpu (work);
+}
+
+} // namespace rangecast
