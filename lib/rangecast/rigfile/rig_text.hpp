@@ -7,7 +7,7 @@
 
 namespace rangecast {
 
-/** Of the layout that docs/rig.md describes. */
+/** Of the layout that docs/formats/rig.md describes. */
 inline constexpr int kRigFileVersion = 1;
 
 /** The file form of a valid rig, byte for byte as cv::FileStorage (4.6) writes it. */
