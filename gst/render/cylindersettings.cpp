@@ -132,7 +132,7 @@ cylinder_properties ()
 {
   using S = CylinderFilterSettings;
   using Core = rangecast::CylinderSettings;
-  using Units = rangecast::UnitSettings;
+  using Cells = rangecast::CellSettings;
   using P = PropertyTable<S>;
   static constexpr const char *kConsistencyBlurb =
       "Which consistency checks and corrections to apply between views";
@@ -160,18 +160,18 @@ cylinder_properties ()
                      "length 1e-6 to 1e6"),
           set_axis_direction,
           [] (const S &s, GValue *value) { set_vector (value, s.core.fixed_axis.direction); }),
-      P::number<&S::core, &Core::bodies> ("bodies", "Maximum bodies",
+      P::number<&S::core, &Core::max_clusters> ("bodies", "Maximum bodies",
           "Maximum number of separate bodies that get a cylinder each (1 = one cylinder for "
           "everything, as with axis=fixed)",
-          1, rangecast::kMaxBodies, kControllable),
-      P::number<&S::core, &Core::units, &Units::unit_height_m> ("unit-height", "Slice height",
+          1, rangecast::kMaxClusters, kControllable),
+      P::number<&S::core, &Core::cells, &Cells::height_m> ("unit-height", "Slice height",
           "Height of a slice of the cylinder in metres", 0.0002, 10., kControllable),
-      P::number<&S::core, &Core::units, &Units::columns> (
+      P::number<&S::core, &Core::cells, &Cells::columns> (
           "columns", "Cells per slice", "Number of cells around a slice", 8, 3600, kControllable),
-      P::number<&S::core, &Core::units, &Units::layer_gap_m> ("layer-gap", "Layer gap",
+      P::number<&S::core, &Core::cells, &Cells::layer_gap_m> ("layer-gap", "Layer gap",
           "Radial gap in metres beyond which points of one cell belong to different surfaces", 0,
           100, kControllable),
-      P::number<&S::core, &Core::units, &Units::smoothing_m> ("smoothing", "Smoothing radius",
+      P::number<&S::core, &Core::cells, &Cells::smoothing_m> ("smoothing", "Smoothing radius",
           "Radius in metres of the neighbourhood that decides which view wins a cell (0 = each "
           "cell on its own)",
           0, 1, kControllable),

@@ -223,11 +223,11 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
   counts.points_contradicted += priv->agreement.contradicted_points ();
   counts.points_in += result.points_in;
   counts.points_out += result.points_out;
-  counts.units += result.units;
-  counts.units_shared += result.units_shared;
-  counts.units_held += result.units_held;
-  counts.units_changed += result.units_changed;
-  counts.bodies = result.bodies;
+  counts.units += result.cells;
+  counts.units_shared += result.cells_shared;
+  counts.units_held += result.cells_held;
+  counts.units_changed += result.cells_changed;
+  counts.bodies = result.clusters;
   counts.axis = result.axis;
   for (auto &[view_id, consistency] : priv->views)
     consistency = priv->agreement.view (view_id);

@@ -42,7 +42,7 @@ void eigen_symmetric (const double (&matrix)[6], double (&values)[3], Vec3 (&vec
 [[nodiscard]] Axis axis_of_points (
     AxisMode mode, const Moments &moments, std::span<const PixelRays> cameras);
 
-/** Follows the axis from frame to frame, so that neither noise nor a raised arm makes units jump.
+/** Follows the axis from frame to frame, so that neither noise nor a raised arm makes cells jump.
  */
 class AxisTracker {
 public:

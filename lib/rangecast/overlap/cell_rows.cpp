@@ -12,7 +12,7 @@
 namespace rangecast {
 
 void
-UnitRows::begin (int columns, double slice_height_m, int images, std::size_t slices)
+CellRows::begin (int columns, double slice_height_m, int images, std::size_t slices)
 {
   slice_height_m_ = slice_height_m;
   /* This frame's memory is the next one's for what was: both have to be large enough. */
@@ -21,11 +21,11 @@ UnitRows::begin (int columns, double slice_height_m, int images, std::size_t sli
   const int rounded = (columns + kMaxLanes - 1) / kMaxLanes * kMaxLanes;
   if (columns != columns_) {
     for (int k = 0; k < 2; k++)
-      wall_[k].resize (static_cast<std::size_t> (rounded));
+      circle_tangent_[k].resize (static_cast<std::size_t> (rounded));
     for (int c = 0; c < rounded; c++) {
       const double phi = 2 * M_PI * (c + 0.5) / columns;
-      wall_[0][c] = static_cast<float> (-std::sin (phi));
-      wall_[1][c] = static_cast<float> (std::cos (phi));
+      circle_tangent_[0][c] = static_cast<float> (-std::sin (phi));
+      circle_tangent_[1][c] = static_cast<float> (std::cos (phi));
     }
     columns_ = columns;
   }
@@ -36,9 +36,9 @@ UnitRows::begin (int columns, double slice_height_m, int images, std::size_t sli
 }
 
 void
-UnitRows::add_slice (int body, int number, int planes)
+CellRows::add_slice (int cluster, int number, int planes)
 {
-  slices_.push_back ({rows_, planes, body, number});
+  slices_.push_back ({rows_, planes, cluster, number});
   rows_ += static_cast<std::uint32_t> (planes);
 }
 
@@ -52,35 +52,35 @@ grow (Vector &vector, std::size_t size)
 }
 
 void
-UnitRows::make_room ()
+CellRows::make_room ()
 {
-  const std::size_t cells = std::size_t{rows_} * width_;
-  grow (radius_, cells);
-  grow (old_radius_, cells);
-  grow (old_first_, cells);
+  const std::size_t nodes = std::size_t{rows_} * width_;
+  grow (radius_, nodes);
+  grow (old_radius_, nodes);
+  grow (old_first_, nodes);
   for (auto *plane : {&tangent_[0], &tangent_[1], &sum_[0], &sum_[1]})
-    grow (*plane, cells);
+    grow (*plane, nodes);
   for (auto *plane : {&first_, &next_, &held_})
-    grow (*plane, cells);
+    grow (*plane, nodes);
   for (int w = 0; w < words_; w++) {
-    grow (views_[w], cells);
-    grow (covering_[w], cells);
-    std::fill_n (views_[w].begin (), cells, 0);
+    grow (views_[w], nodes);
+    grow (covering_[w], nodes);
+    std::fill_n (views_[w].begin (), nodes, 0);
   }
-  std::fill_n (radius_.begin (), cells, kNowhere);
+  std::fill_n (radius_.begin (), nodes, kNowhere);
   for (auto &plane : tangent_)
-    std::fill_n (plane.begin (), cells, 0.f);
+    std::fill_n (plane.begin (), nodes, 0.f);
 }
 
 /* ---- loops over eight columns ---- */
 
-template <typename L> struct UnitRows::Loops {
+template <typename L> struct CellRows::Loops {
   using F = typename L::F;
   using I = typename L::I;
   using U = typename L::U;
   static constexpr int kLanes = L::kLanes;
 
-  UnitRows &rows;
+  CellRows &rows;
   const RowRules &rules;
 
   /* Columns of the other end beside both ends of a row. */
@@ -192,12 +192,12 @@ template <typename L> struct UnitRows::Loops {
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const std::size_t here = std::size_t{row} * rows.width_ + kPad + c;
       const F radius = L::at (&rows.radius_[here]);
-      if (!L::any (radius < kNowhere)) /* nobody looks at what is in an empty cell */
+      if (!L::any (radius < kNowhere)) /* nobody looks at what is in an empty node */
         continue;
       F x = L::at (&rows.sum_[0][here]), z = L::at (&rows.sum_[1][here]);
       U below[2] = {}, above[2] = {};
       for (int s = bottom; s <= top; s++)
-        if (s != number && rows.slices_[s].body == slice.body)
+        if (s != number && rows.slices_[s].cluster == slice.cluster)
           add_nearest<kWords> (rows.slices_[s], static_cast<std::size_t> (c), radius, x, z,
               s < number ? below : above);
       normalise (x, z, c);
@@ -218,8 +218,8 @@ template <typename L> struct UnitRows::Loops {
     L::make_root (length);
     const I known = length > 1e-6f;
     const F by = known ? length : 1.f + F{};
-    x = known ? x / by : L::at (&rows.wall_[0][column]);
-    z = known ? z / by : L::at (&rows.wall_[1][column]);
+    x = known ? x / by : L::at (&rows.circle_tangent_[0][column]);
+    z = known ? z / by : L::at (&rows.circle_tangent_[1][column]);
   }
 
   void across (int number) const
@@ -234,7 +234,7 @@ template <typename L> struct UnitRows::Loops {
 
   /* ---- decisions ---- */
 
-  /* Who held each cell of a row: the winner of the layer whose radius was nearest. */
+  /* Who held each node of a row: the winner of the layer whose radius was nearest. */
   void find_held (std::uint32_t row, const Slice &slice) const
   {
     const Slice *old = rows.old_slice (slice);
@@ -255,7 +255,7 @@ template <typename L> struct UnitRows::Loops {
     }
   }
 
-  /* A unit that has no point for a frame does not forget who held it. */
+  /* A cell that has no point for a frame does not forget who held it. */
   void carry_over (const Slice &slice) const
   {
     const Slice *old = rows.old_slice (slice);
@@ -273,7 +273,7 @@ template <typename L> struct UnitRows::Loops {
     }
   }
 
-  /* Winners of up to 4 neighbours of some cells, of all planes; -1 where there is none. */
+  /* Winners of up to 4 neighbours of some nodes, of all planes; -1 where there is none. */
   struct Neighbours {
     I winners[4 * kPlanes];
     int count = 0;
@@ -299,11 +299,11 @@ template <typename L> struct UnitRows::Loops {
     add_neighbours (all, slice, column + 1, radius);
     for (int other : {number - 1, number + 1})
       if (other >= 0 && other < static_cast<int> (rows.slices_.size ()) &&
-          rows.slices_[other].body == slice.body)
+          rows.slices_[other].cluster == slice.cluster)
         add_neighbours (all, rows.slices_[other], column, radius);
   }
 
-  /* -1 where that view covers the cell. */
+  /* -1 where that view covers the node. */
   void covers (I &in, std::size_t here, int view) const
   {
     const U bits = L::at (&rows.covering_[view >> 5][here]);
@@ -350,7 +350,7 @@ template <typename L> struct UnitRows::Loops {
     Best best = {F{} - 1, I{} - 1};
     for (std::uint64_t rest = views; rest; rest &= rest - 1) {
       const int view = std::countr_zero (rest);
-      compare_view (best, here, view, rules.optical[slice.body][view], around);
+      compare_view (best, here, view, rules.optical[slice.cluster][view], around);
     }
     L::at (&rows.next_[here]) = best.view; /* not yet: the next columns ask for this one's */
   }
@@ -405,13 +405,13 @@ template <typename L> struct UnitRows::Loops {
 };
 
 void
-UnitRows::sum_along (const RowRules &rules, int slice)
+CellRows::sum_along (const RowRules &rules, int slice)
 {
   for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.along (slice); });
 }
 
 void
-UnitRows::sum_across (const RowRules &rules, int slice)
+CellRows::sum_across (const RowRules &rules, int slice)
 {
   for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.across (slice); });
 }
@@ -419,7 +419,7 @@ UnitRows::sum_across (const RowRules &rules, int slice)
 /* In a sweep every other slice is decided anew, then the rest: what a slice asks is then at rest
  * while it asks, with any number of threads, and two neighbours cannot swap for ever. */
 RowCounts
-UnitRows::decide (const RowRules &rules, int threads)
+CellRows::decide (const RowRules &rules, int threads)
 {
   const auto decide_slice = [&] (std::size_t s, Pass pass) {
     for_this_cpu ([&]<typename L> (L) {
@@ -439,10 +439,10 @@ UnitRows::decide (const RowRules &rules, int threads)
 }
 
 /* The slice of the frame before that has the same place; null if there is none. */
-const UnitRows::Slice *
-UnitRows::old_slice (const Slice &slice) const
+const CellRows::Slice *
+CellRows::old_slice (const Slice &slice) const
 {
-  const std::uint32_t begin = old_begin_[slice.body], end = old_begin_[slice.body + 1];
+  const std::uint32_t begin = old_begin_[slice.cluster], end = old_begin_[slice.cluster + 1];
   if (begin == end || old_columns_ != columns_ || old_slice_height_m_ != slice_height_m_)
     return nullptr;
   const std::int64_t at = std::int64_t{slice.number} - old_slices_[begin].number;
@@ -450,7 +450,7 @@ UnitRows::old_slice (const Slice &slice) const
 }
 
 void
-UnitRows::count_slice (const Slice &slice, RowCounts &counts) const
+CellRows::count_slice (const Slice &slice, RowCounts &counts) const
 {
   for (int p = 0; p < slice.planes; p++) {
     const std::size_t row = std::size_t{slice.first_row + p} * width_ + kPad;
@@ -469,7 +469,7 @@ UnitRows::count_slice (const Slice &slice, RowCounts &counts) const
 /* ---- from frame to frame ---- */
 
 void
-UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids)
+CellRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids)
 {
   for (const Slice &slice : slices_)
     for_this_cpu ([&]<typename L> (L) { Loops<L>{*this, rules}.carry_over (slice); });
@@ -478,9 +478,9 @@ UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids
   std::swap (slices_, old_slices_);
   old_begin_.fill (0);
   for (const Slice &slice : old_slices_)
-    old_begin_[slice.body + 1]++;
-  for (int body = 0; body < kMaxBodies; body++)
-    old_begin_[body + 1] += old_begin_[body];
+    old_begin_[slice.cluster + 1]++;
+  for (int cluster = 0; cluster < kMaxClusters; cluster++)
+    old_begin_[cluster + 1] += old_begin_[cluster];
   old_width_ = width_;
   old_columns_ = columns_;
   old_slice_height_m_ = slice_height_m_;
@@ -489,7 +489,7 @@ UnitRows::remember (const RowRules &rules, const std::array<int, kMaxViews> &ids
 }
 
 void
-UnitRows::recall (const std::array<int, kMaxViews> &ids, int images)
+CellRows::recall (const std::array<int, kMaxViews> &ids, int images)
 {
   std::array<std::int32_t, kMaxViews> now;
   bool same = true;
@@ -507,7 +507,7 @@ UnitRows::recall (const std::array<int, kMaxViews> &ids, int images)
 }
 
 int
-UnitRows::old_winner (int slice, int column) const
+CellRows::old_winner (int slice, int column) const
 {
   if (slice < 0 || slice >= old_slices () || column < 0 || column >= old_columns_)
     return -1;
@@ -522,7 +522,7 @@ UnitRows::old_winner (int slice, int column) const
 }
 
 void
-UnitRows::forget ()
+CellRows::forget ()
 {
   old_slices_.clear ();
   old_begin_.fill (0);

@@ -9,22 +9,22 @@
 
 namespace rangecast {
 
-/** The radius of a cell without points, metres: further than any layer gap from all others. */
+/** The radius of a node without points, metres: further than any layer gap from all others. */
 inline constexpr float kNowhere = 1e30f;
 /** Cylinders at a time, at most. */
-inline constexpr int kMaxBodies = 8;
+inline constexpr int kMaxClusters = 8;
 
-/** How units are decided from their neighbours. Lengths in metres. */
+/** How cells are decided from their neighbours. Lengths in metres. */
 struct RowRules {
   float layer_gap = 0;
   float smoothing_columns = 0; ///< columns at a radius of 1 m; at radius r this divided by r
-  float most_columns = 0;      ///< but never more than so many, 0 .. UnitRows::kPad
+  float most_columns = 0;      ///< but never more than so many, 0 .. CellRows::kPad
   int smoothing_slices = 0;
   float hysteresis = 0; ///< what last frame's winner has for nothing, 0 .. 2 (a cosine)
   float agreement = 0;  ///< what a view gets if all neighbours are its own, 0 .. 2 (a cosine)
   int images = 0;
-  /** x, z of each image's optical axis in each body's cylinder. */
-  std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxBodies> optical;
+  /** x, z of each image's optical axis in each cluster's cylinder. */
+  std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxClusters> optical;
 };
 
 /** What decide() counted. */
@@ -33,15 +33,15 @@ struct RowCounts {
   std::uint64_t changed = 0; ///< of those, layers that have another one now
 };
 
-/** The layers of all units as numbers in rows, one for each slice and each layer of its units, one
- *  number a column, so that neighbours are worked on eight at a time. The first layer of a unit
+/** The layers of all cells as numbers in rows, one for each slice and each layer of its cells, one
+ *  number a column, so that neighbours are worked on eight at a time. The first layer of a cell
  *  lies in plane 0 of its slice, the next in plane 1 and so on; a slice has as many planes as its
- *  units need, a slice without points none.
+ *  cells need, a slice without points none.
  *
- *  Order of calls for a frame: begin(), add_slice() and layers into cells(), sum_along() of all
+ *  Order of calls for a frame: begin(), add_slice() and layers into nodes(), sum_along() of all
  *  slices, sum_across() of all, decide(), remember(). Calls for different slices may be made at the
  *  same time. All planes have pads of columns repeated from the other end of the row. */
-class UnitRows {
+class CellRows {
 public:
   static constexpr int kPad = 8;
   static constexpr int kPlanes = 4;
@@ -49,44 +49,44 @@ public:
   struct Slice {
     std::uint32_t first_row = 0;
     int planes = 0;
-    int body = 0;
+    int cluster = 0;
     int number = 0; ///< floor (height / slice height), counted from the axis' own origin
   };
 
   /** Of one layer. */
-  struct Cell {
+  struct Node {
     float radius = kNowhere;
     float tangent[2] = {}; ///< x, z; unit vector after sum_across()
     std::uint64_t views = 0;
   };
 
   void begin (int columns, double slice_height_m, int images, std::size_t slices);
-  /** Appends a slice with room for so many planes; slices of a body are consecutive. */
-  void add_slice (int body, int number, int planes);
+  /** Appends a slice with room for so many planes; slices of a cluster are consecutive. */
+  void add_slice (int cluster, int number, int planes);
   /** Makes room for the slices' rows, and empties them. */
   void make_room ();
 
-  [[nodiscard]] std::uint32_t cell (int slice, int plane, int column) const
+  [[nodiscard]] std::uint32_t node (int slice, int plane, int column) const
   {
     return (slices_[slice].first_row + static_cast<std::uint32_t> (plane)) * width_ + kPad +
            static_cast<std::uint32_t> (column);
   }
-  void put (std::uint32_t cell, const Cell &layer)
+  void put (std::uint32_t node, const Node &layer)
   {
-    radius_[cell] = layer.radius;
-    tangent_[0][cell] = layer.tangent[0];
-    tangent_[1][cell] = layer.tangent[1];
-    views_[0][cell] = static_cast<std::uint32_t> (layer.views);
+    radius_[node] = layer.radius;
+    tangent_[0][node] = layer.tangent[0];
+    tangent_[1][node] = layer.tangent[1];
+    views_[0][node] = static_cast<std::uint32_t> (layer.views);
     if (words_ > 1)
-      views_[1][cell] = static_cast<std::uint32_t> (layer.views >> 32);
+      views_[1][node] = static_cast<std::uint32_t> (layer.views >> 32);
   }
-  /** The image that won the cell; -1 if it is empty. */
-  [[nodiscard]] int winner (std::uint32_t cell) const { return first_[cell]; }
+  /** The image that won the node; -1 if it is empty. */
+  [[nodiscard]] int winner (std::uint32_t node) const { return first_[node]; }
   [[nodiscard]] const std::vector<Slice> &slices () const { return slices_; }
   [[nodiscard]] int columns () const { return columns_; }
 
   /** Adds up tangents over the neighbourhood of each layer (smoothing each way along the slice,
-   *  then across slices, not across layer gaps), so that winners do not change from unit to unit by
+   *  then across slices, not across layer gaps), so that winners do not change from cell to cell by
    *  chance; and finds the views that cover a layer without a point in it: those with points on
    *  both sides of it (in angle or in height) in that neighbourhood. */
   void sum_along (const RowRules &rules, int slice);
@@ -99,13 +99,13 @@ public:
   /** Keeps the winners for the next frame's hysteresis.
    *  @param ids  view-id of each image */
   void remember (const RowRules &rules, const std::array<int, kMaxViews> &ids);
-  /** Before the next decide(): what images the winners kept have now. Units of another size are
-   *  other units: what was kept of them is not used. */
+  /** Before the next decide(): what images the winners kept have now. Cells of another size are
+   *  other cells: what was kept of them is not used. */
   void recall (const std::array<int, kMaxViews> &ids, int images);
   void forget ();
 
-  /** The slices of the frame that remember() saw, and the view-id of the winner of a unit's
-   *  outermost layer in it; -1 where the unit had no points, whoever held it before. */
+  /** The slices of the frame that remember() saw, and the view-id of the winner of a cell's
+   *  outermost layer in it; -1 where the cell had no points, whoever held it before. */
   [[nodiscard]] int old_slices () const { return static_cast<int> (old_slices_.size ()); }
   [[nodiscard]] int old_winner (int slice, int column) const;
 
@@ -127,11 +127,11 @@ private:
   std::array<Plane<std::uint32_t>, 2> views_, covering_;
   Plane<std::int32_t> first_, held_;
   Plane<std::int32_t> next_; /* after decide(): as first_, and carry_over() leaves it alone */
-  std::array<std::vector<float>, 2> wall_; /* tangent of the wall in each column */
+  std::array<std::vector<float>, 2> circle_tangent_; /* tangent of the wall in each column */
 
   /* Of the frame before. */
   std::vector<Slice> old_slices_;
-  std::array<std::uint32_t, kMaxBodies + 1> old_begin_{}; /* of each body in old_slices_ */
+  std::array<std::uint32_t, kMaxClusters + 1> old_begin_{}; /* of each cluster in old_slices_ */
   std::uint32_t old_width_ = 0;
   int old_columns_ = 0, old_images_ = 0;
   double old_slice_height_m_ = 0;

@@ -12,20 +12,20 @@ namespace rangecast {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
 /* Cells of rows, at most; slices beyond have fewer planes. */
-constexpr std::uint32_t kMaxCells = 2 * kMaxUnits;
+constexpr std::uint32_t kMaxNodes = 2 * kMaxCells;
 
 void
-Units::lay_out (std::span<const WallRange> ranges)
+Cells::lay_out (std::span<const HeightRange> ranges)
 {
   double height = 0;
-  for (const WallRange &range : ranges)
+  for (const HeightRange &range : ranges)
     height += std::max (0.0, double{range.y_max} - range.y_min);
-  const double most = kMaxUnits / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
-  const double step = slice_height_m = std::max (settings_.unit_height_m, height / most);
+  const double most = kMaxCells / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
+  const double step = slice_height_m = std::max (settings_.height_m, height / most);
   slices.clear ();
-  for (std::size_t body = 0; body < ranges.size (); body++) {
-    const WallRange &range = ranges[body];
-    Stack &stack = stacks_[body];
+  for (std::size_t cluster = 0; cluster < ranges.size (); cluster++) {
+    const HeightRange &range = ranges[cluster];
+    Stack &stack = stacks_[cluster];
     stack = {static_cast<int> (slices.size ()), 0, 0};
     if (!(range.y_min <= range.y_max))
       continue;
@@ -35,14 +35,14 @@ Units::lay_out (std::span<const WallRange> ranges)
     stack.first_y = static_cast<float> (first * step);
     for (int i = 0; i < stack.count; i++) {
       Slice &slice = slices.emplace_back ();
-      slice.body = static_cast<int> (body);
+      slice.cluster = static_cast<int> (cluster);
       slice.number = static_cast<int> (std::clamp (first, -1e9, 1e9)) + i;
     }
   }
 }
 
 void
-Units::count_units (
+Cells::count_cells (
     const WorldPoints &cloud, std::span<const std::int32_t> column, std::span<const PointRun> runs)
 {
   if (slice_of.size () < cloud.x.size ())
@@ -51,7 +51,7 @@ Units::count_units (
   const auto per_metre = static_cast<float> (1 / slice_height_m);
   const auto columns = static_cast<std::uint32_t> (settings_.columns);
   for (const PointRun &run : runs) {
-    const Stack &stack = stacks_[run.body];
+    const Stack &stack = stacks_[run.cluster];
     const float first_y = stack.first_y;
     const int last = stack.count - 1, first = stack.first_slice;
     for (std::size_t i = run.begin; i < run.end; i++) {
@@ -64,7 +64,7 @@ Units::count_units (
 }
 
 void
-Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
+Cells::scatter (const WorldPoints &cloud, std::span<const float> radius,
     std::span<const std::int32_t> column, std::span<const PointRun> runs)
 {
   std::uint32_t total = 0;
@@ -90,12 +90,12 @@ Units::scatter (const WorldPoints &cloud, std::span<const float> radius,
       to[ends[slice_of[i] * columns + at]++] = {radius[i], cloud.x[i], cloud.z[i],
           static_cast<std::uint32_t> (i), at * kMaxViews + run.view};
     }
-  /* Now each element is its unit's end, which is the next one's begin. */
+  /* Now each element is its cell's end, which is the next one's begin. */
 }
 
 /* Makes room for as many entries as the largest slice has points. */
 void
-Units::make_works (int threads)
+Cells::make_works (int threads)
 {
   const std::size_t workers = workers_for (slices.size (), threads);
   std::size_t most = 0;
@@ -111,9 +111,9 @@ Units::make_works (int threads)
     }
 }
 
-/* Cuts the units of a slice into layers, and links the entries of each view in their order. */
-struct Units::Cutter {
-  Units &units;
+/* Cuts the cells of a slice into layers, and links the entries of each view in their order. */
+struct Cells::Cutter {
+  Cells &cells;
   Slice &slice;
   Work &work;
   float gap;
@@ -122,8 +122,8 @@ struct Units::Cutter {
   std::uint64_t views = 0; /* of the slice */
   std::uint32_t first[kMaxViews], last[kMaxViews];
 
-  Cutter (Units &owner, Slice &cut, Work &memory)
-      : units (owner), slice (cut), work (memory),
+  Cutter (Cells &owner, Slice &cut, Work &memory)
+      : cells (owner), slice (cut), work (memory),
         gap (static_cast<float> (owner.settings_.layer_gap_m)), layer_end (cut.begin)
   {
   }
@@ -144,9 +144,9 @@ struct Units::Cutter {
     }
   }
 
-  /* Adds up the points of each entry of the slice as if its units had one layer each. Without
+  /* Adds up the points of each entry of the slice as if its cells had one layer each. Without
    * branches: runs of one or two points, which all here are, are what processors guess worst.
-   * @return whether they have: no unit's radii lie further apart than a gap */
+   * @return whether they have: no cell's radii lie further apart than a gap */
   bool sum_entries (std::uint32_t end)
   {
     typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
@@ -157,8 +157,8 @@ struct Units::Cutter {
     float low = 0, high = 0, span = 0;
     std::uint32_t before = UINT32_MAX, to = UINT32_MAX;
     /* Not through the vectors: stores of vectors may alias them, for all that compilers know. */
-    const Point *points = units.points.data ();
-    UnitEntry *entries = work.entries.data ();
+    const Point *points = cells.points.data ();
+    CellEntry *entries = work.entries.data ();
     for (std::uint32_t i = slice.begin; i < end; i++) {
       const Point &point = points[i];
       const std::uint32_t differs = point.key ^ before;
@@ -170,9 +170,9 @@ struct Units::Cutter {
       sum = (F4)((I4)sum & keep) + values;
       *reinterpret_cast<F4 *> (&entries[to].radius) = sum;
       entries[to].key = point.key;
-      const bool new_unit = differs >= kMaxViews;
-      low = new_unit || point.radius < low ? point.radius : low;
-      high = new_unit || point.radius > high ? point.radius : high;
+      const bool new_cell = differs >= kMaxViews;
+      low = new_cell || point.radius < low ? point.radius : low;
+      high = new_cell || point.radius > high ? point.radius : high;
       span = high - low > span ? high - low : span;
     }
     entry_end = to + 1;
@@ -184,15 +184,15 @@ struct Units::Cutter {
   void finish_entries ()
   {
     typedef float F4 __attribute__ ((vector_size (16), aligned (4), may_alias));
-    UnitEntry *entries = work.entries.data ();
-    UnitLayer *layer = units.layers.data () + slice.begin - 1;
+    CellEntry *entries = work.entries.data ();
+    CellLayer *layer = cells.layers.data () + slice.begin - 1;
     layer_end = slice.begin - 1;
     std::uint32_t *chain = work.chain.data ();
     std::uint32_t column_before = UINT32_MAX, first_entry = 0, shared = 0;
     std::uint64_t layer_views = 0;
     float weight = 0, radii = 0;
     for (std::uint32_t e = 0; e < entry_end; e++) {
-      UnitEntry &entry = entries[e];
+      CellEntry &entry = entries[e];
       const std::uint32_t at = entry.key / kMaxViews, view = entry.key % kMaxViews;
       const bool fresh = at != column_before;
       const std::uint64_t bit = std::uint64_t{1} << view;
@@ -230,9 +230,9 @@ struct Units::Cutter {
    * @return whether they do; then nothing has been made */
   bool add_layer (std::uint32_t begin, std::uint32_t end, int plane, bool any)
   {
-    UnitLayer &layer = units.layers[layer_end];
+    CellLayer &layer = cells.layers[layer_end];
     layer = {0, entry_end, 0, column, plane, 0, {}, begin, end - begin};
-    const Point *points = units.points.data ();
+    const Point *points = cells.points.data ();
     float radii = 0, low = kNowhere, high = 0;
     std::uint32_t to = entry_end;
     for (std::uint32_t i = begin; i < end; to++) {
@@ -268,7 +268,7 @@ struct Units::Cutter {
       return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
     };
     auto by_index = [] (const Point &a, const Point &b) { return a.index < b.index; };
-    Point *points = units.points.data ();
+    Point *points = cells.points.data ();
     std::sort (points + begin, points + end, by_radius);
     int plane = 0;
     for (std::uint32_t from = begin, to = begin + 1; to <= end; to++)
@@ -280,7 +280,7 @@ struct Units::Cutter {
     return plane;
   }
 
-  void cut_units (const std::uint32_t *ends, int columns)
+  void cut_cells (const std::uint32_t *ends, int columns)
   {
     std::uint32_t begin = slice.begin;
     for (column = 0; column < columns; column++) {
@@ -292,7 +292,7 @@ struct Units::Cutter {
       slice.planes = std::max (slice.planes, planes);
       std::uint64_t all = 0;
       for (std::uint32_t i = first_layer; i < layer_end; i++)
-        all |= units.layers[i].views;
+        all |= cells.layers[i].views;
       slice.occupied++;
       slice.shared += (all & (all - 1)) != 0;
       begin = end;
@@ -305,18 +305,18 @@ struct Units::Cutter {
       finish_entries ();
     } else {
       entry_end = 0;
-      cut_units (ends, columns);
+      cut_cells (ends, columns);
     }
     close_rings ();
     slice.layer_count = layer_end - slice.begin;
   }
 };
 
-/* A view's next entries where slices have several layers. A unit may have as many as a view has
+/* A view's next entries where slices have several layers. A cell may have as many as a view has
  * points, and going through all of them for each of them would take minutes. But both a view's
- * entries in a unit and those in the units after it come from the axis outwards: where the search
+ * entries in a cell and those in the cells after it come from the axis outwards: where the search
  * for one entry ended the one for the next begins. */
-struct Units::Followers {
+struct Cells::Followers {
   int column = -1;               /* of the view's entries asked for */
   int count = 0;                 /* columns with entries of the view that follow it within reach */
   std::uint32_t entry[kReach]{}; /* of each, the next to be looked at; kNone after its last */
@@ -336,12 +336,12 @@ struct Units::Followers {
     }
   }
 
-  std::uint32_t find (const Units &units, const Work &work, std::uint32_t number)
+  std::uint32_t find (const Cells &cells, const Work &work, std::uint32_t number)
   {
     const float radius = work.entries[number].radius;
-    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    const auto gap = static_cast<float> (cells.settings_.layer_gap_m);
     const auto radius_of = [&] (std::uint32_t other) {
-      return units.layers[work.entries[other].layer].radius;
+      return cells.layers[work.entries[other].layer].radius;
     };
     for (int k = 0; k < count; k++) {
       while (entry[k] != kNone && radius_of (entry[k]) - radius < -gap) {
@@ -356,30 +356,30 @@ struct Units::Followers {
   }
 };
 
-/* Gives entries of a slice their tangents, and cells their sums. */
-struct Units::Tangents {
-  Units &units;
+/* Gives entries of a slice their tangents, and nodes their sums. */
+struct Cells::Tangents {
+  Cells &cells;
   const Slice &slice;
   Work &work;
   std::uint32_t entry_count;
   int reach;
 
   /* The view's next entry within reach, across 2 pi too, whose layer is not across a layer gap. For
-   * slices of one layer a unit, where each step goes a column further. */
+   * slices of one layer a cell, where each step goes a column further. */
   [[nodiscard]] std::uint32_t next_entry (std::uint32_t from) const
   {
-    const UnitEntry &entry = work.entries[from];
-    const auto gap = static_cast<float> (units.settings_.layer_gap_m);
+    const CellEntry &entry = work.entries[from];
+    const auto gap = static_cast<float> (cells.settings_.layer_gap_m);
     int column = entry.column ();
     for (std::uint32_t next = work.chain[from], before = from; next != from;
          before = next, next = work.chain[next]) {
-      const UnitEntry &other = work.entries[next];
+      const CellEntry &other = work.entries[next];
       if (next < before)
-        column -= units.settings_.columns;
+        column -= cells.settings_.columns;
       const int distance = other.column () - column;
       if (distance > reach)
         return kNone;
-      if (std::abs (units.layers[other.layer].radius - entry.radius) <= gap)
+      if (std::abs (cells.layers[other.layer].radius - entry.radius) <= gap)
         return next;
     }
     return kNone;
@@ -389,7 +389,7 @@ struct Units::Tangents {
   {
     if (found == kNone)
       return;
-    UnitEntry &entry = work.entries[from], &next = work.entries[found];
+    CellEntry &entry = work.entries[from], &next = work.entries[found];
     const float dx = next.x - entry.x, dz = next.z - entry.z;
     const float squared = dx * dx + dz * dz;
     if (!(squared > 1e-18f))
@@ -417,16 +417,16 @@ struct Units::Tangents {
     for (std::uint32_t e = 0; e < entry_count; e++) {
       Followers &of_view = followers[work.entries[e].view ()];
       if (of_view.column != work.entries[e].column ())
-        of_view.begin_column (work, e, reach, units.settings_.columns);
-      point_at (e, of_view.find (units, work, e));
+        of_view.begin_column (work, e, reach, cells.settings_.columns);
+      point_at (e, of_view.find (cells, work, e));
     }
   }
 
   void sum ()
   {
     for (std::uint32_t l = slice.begin; l < slice.begin + slice.layer_count; l++) {
-      UnitLayer &layer = units.layers[l];
-      const UnitEntry *entry = work.entries.data () + layer.first_entry;
+      CellLayer &layer = cells.layers[l];
+      const CellEntry *entry = work.entries.data () + layer.first_entry;
       float x = 0, z = 0;
       for (std::uint32_t e = 0; e < layer.entry_count; e++, entry++) {
         x += entry->weight * entry->tangent[0];
@@ -440,7 +440,7 @@ struct Units::Tangents {
 
 /* Cuts a slice into layers, and finds their tangents. */
 void
-Units::cut (Slice &slice, Work &work)
+Cells::cut (Slice &slice, Work &work)
 {
   const int columns = settings_.columns;
   const auto number = static_cast<std::size_t> (&slice - slices.data ());
@@ -452,13 +452,13 @@ Units::cut (Slice &slice, Work &work)
 }
 
 void
-Units::sort (const WorldPoints &cloud, std::span<const float> radius,
+Cells::sort (const WorldPoints &cloud, std::span<const float> radius,
     std::span<const std::int32_t> column, std::span<const PointRun> runs,
-    std::span<const WallRange> ranges, const UnitSettings &settings, int threads)
+    std::span<const HeightRange> ranges, const CellSettings &settings, int threads)
 {
   settings_ = settings;
   lay_out (ranges);
-  count_units (cloud, column, runs);
+  count_cells (cloud, column, runs);
   scatter (cloud, radius, column, runs);
   make_works (threads);
   in_parallel (slices.size (), threads, [&] (std::size_t s, std::size_t worker) {
@@ -466,22 +466,22 @@ Units::sort (const WorldPoints &cloud, std::span<const float> radius,
   });
   const auto images = static_cast<int> (cloud.parts ().size ());
   rows.begin (settings.columns, slice_height_m, images, slices.size ());
-  int most = static_cast<int> (kMaxCells / (settings.columns + 24)); /* rows */
+  int most = static_cast<int> (kMaxNodes / (settings.columns + 24)); /* rows */
   for (const Slice &slice : slices) {
-    const int planes = std::min ({slice.planes, UnitRows::kPlanes, most});
-    rows.add_slice (slice.body, slice.number, planes);
+    const int planes = std::min ({slice.planes, CellRows::kPlanes, most});
+    rows.add_slice (slice.cluster, slice.number, planes);
     most -= planes;
   }
   rows.make_room ();
 }
 
 void
-Units::fill_rows (int number)
+Cells::fill_rows (int number)
 {
   const int planes = rows.slices ()[number].planes;
-  for (const UnitLayer &layer : layers_of (slices[number]))
+  for (const CellLayer &layer : layers_of (slices[number]))
     if (layer.plane < planes)
-      rows.put (rows.cell (number, layer.plane, layer.column),
+      rows.put (rows.node (number, layer.plane, layer.column),
           {layer.radius, {layer.tangent[0], layer.tangent[1]}, layer.views});
 }
 

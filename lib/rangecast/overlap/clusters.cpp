@@ -11,7 +11,7 @@ namespace rangecast {
 constexpr std::size_t kStep = 4;
 
 void
-Bodies::lay_grid (const WorldPoints &cloud)
+Clusters::lay_grid (const WorldPoints &cloud)
 {
   constexpr float kHuge = std::numeric_limits<float>::max ();
   float x_max = -kHuge, z_max = -kHuge;
@@ -28,7 +28,7 @@ Bodies::lay_grid (const WorldPoints &cloud)
 }
 
 void
-Bodies::count_points (const WorldPoints &cloud)
+Clusters::count_points (const WorldPoints &cloud)
 {
   points_.assign (kSide * kSide, 0);
   counted_ = 0;
@@ -50,7 +50,7 @@ for_neighbours (int place, int side, const Work &work)
 
 /* Labels all that is connected with a place. @return its points */
 std::uint32_t
-Bodies::fill_body (std::uint16_t place, std::uint16_t label)
+Clusters::fill_cluster (std::uint16_t place, std::uint16_t label)
 {
   std::uint32_t points = 0;
   queue_.clear ();
@@ -68,18 +68,18 @@ Bodies::fill_body (std::uint16_t place, std::uint16_t label)
   return points;
 }
 
-/* Places of nobody go to the nearest body. */
+/* Places of nobody go to the nearest cluster. */
 void
-Bodies::spread ()
+Clusters::spread ()
 {
   queue_.clear ();
   for (int place = 0; place < kSide * kSide; place++)
-    if (body_[place] != kNobody)
+    if (cluster_[place] != kNoCluster)
       queue_.push_back (static_cast<std::uint16_t> (place));
   for (std::size_t next = 0; next < queue_.size (); next++)
     for_neighbours (queue_[next], kSide, [&] (int other) {
-      if (body_[other] == kNobody) {
-        body_[other] = body_[queue_[next]];
+      if (cluster_[other] == kNoCluster) {
+        cluster_[other] = cluster_[queue_[next]];
         queue_.push_back (static_cast<std::uint16_t> (other));
       }
     });
@@ -87,9 +87,9 @@ Bodies::spread ()
 
 /* Labels connected places, and lists the largest. @return how many are listed */
 int
-Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
+Clusters::label_places (int most, std::array<Found, kMaxClusters + 1> &found)
 {
-  /* A place with a point or two is noise between bodies, not a bridge. */
+  /* A place with a point or two is noise between clusters, not a bridge. */
   const std::uint32_t least = 1 + counted_ / 5000;
   for (std::uint32_t &points : points_)
     points = points > least ? points : 0;
@@ -101,7 +101,7 @@ Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
   for (int place = 0; place < kSide * kSide; place++) {
     if (points_[place] == 0 || labels_[place] != 0)
       continue;
-    const std::uint32_t points = fill_body (static_cast<std::uint16_t> (place), ++label);
+    const std::uint32_t points = fill_cluster (static_cast<std::uint16_t> (place), ++label);
     if (points <= enough)
       continue;
     found[count] = {points, label};
@@ -115,22 +115,22 @@ Bodies::label_places (int most, std::array<Found, kMaxBodies + 1> &found)
 }
 
 int
-Bodies::find (const WorldPoints &cloud, int most)
+Clusters::find (const WorldPoints &cloud, int most)
 {
   count_ = 1;
   if (most <= 1 || cloud.size () == 0)
     return 1;
   lay_grid (cloud);
   count_points (cloud);
-  std::array<Found, kMaxBodies + 1> found{};
+  std::array<Found, kMaxClusters + 1> found{};
   count_ = std::max (1, label_places (most, found));
   if (count_ == 1)
     return 1;
-  body_.assign (kSide * kSide, kNobody);
+  cluster_.assign (kSide * kSide, kNoCluster);
   for (int place = 0; place < kSide * kSide; place++)
-    for (int body = 0; body < count_; body++)
-      if (labels_[place] == found[body].label)
-        body_[place] = static_cast<std::uint8_t> (body);
+    for (int cluster = 0; cluster < count_; cluster++)
+      if (labels_[place] == found[cluster].label)
+        cluster_[place] = static_cast<std::uint8_t> (cluster);
   spread ();
   const std::size_t points = cloud.x.size ();
   if (pixel_.size () < points) { /* the last to grow: all have grown */
@@ -142,19 +142,21 @@ Bodies::find (const WorldPoints &cloud, int most)
 }
 
 void
-Bodies::sort_part (
-    WorldPoints &cloud, std::size_t number, std::array<std::size_t, kMaxBodies> &ends)
+Clusters::sort_part (
+    WorldPoints &cloud, std::size_t number, std::array<std::size_t, kMaxClusters> &ends)
 {
   const WorldPoints::Part part = cloud.parts ()[number];
-  const auto body_of = [&] (std::size_t i) { return body_[place_of (cloud.x[i], cloud.z[i])]; };
-  std::array<std::size_t, kMaxBodies + 1> to{};
+  const auto cluster_of = [&] (std::size_t i) {
+    return cluster_[place_of (cloud.x[i], cloud.z[i])];
+  };
+  std::array<std::size_t, kMaxClusters + 1> to{};
   for (std::size_t i = part.begin; i < part.end; i++)
-    to[body_of (i) + 1]++;
+    to[cluster_of (i) + 1]++;
   to[0] = part.begin;
-  for (int body = 0; body < kMaxBodies; body++)
-    to[body + 1] += to[body];
+  for (int cluster = 0; cluster < kMaxClusters; cluster++)
+    to[cluster + 1] += to[cluster];
   for (std::size_t i = part.begin; i < part.end; i++) {
-    const std::size_t at = to[body_of (i)]++;
+    const std::size_t at = to[cluster_of (i)]++;
     x_[at] = cloud.x[i];
     y_[at] = cloud.y[i];
     z_[at] = cloud.z[i];
@@ -167,7 +169,7 @@ Bodies::sort_part (
   put_back (y_, cloud.y);
   put_back (z_, cloud.z);
   put_back (pixel_, cloud.pixel);
-  std::copy_n (to.begin (), kMaxBodies, ends.begin ());
+  std::copy_n (to.begin (), kMaxClusters, ends.begin ());
 }
 
 } // namespace rangecast

@@ -13,28 +13,30 @@ namespace rangecast {
 
 /** Tells apart what stands beside each other: connected places of the floor plan, seen from above
  *  (world x, z) on a coarse grid. Keeps its memory from frame to frame: some 100 KB, and 16 bytes a
- *  point once there are two bodies. */
-class Bodies {
+ *  point once there are two clusters. */
+class Clusters {
 public:
-  /** Side of a place, metres, unless the points spread over more than kSide of them: bodies are
+  /** Side of a place, metres, unless the points spread over more than kSide of them: clusters are
    *  two if nothing stands in a gap of two places, so 8 cm at most. */
   static constexpr float kPlace = 0.04f;
-  /** Share of all points that a body has at least; what is smaller goes to the nearest body. */
+  /** Share of all points that a cluster has at least; what is smaller goes to the nearest cluster.
+   */
   static constexpr double kMinShare = 0.05;
 
-  /** Finds the bodies.
-   *  @param most  bodies, 1 .. kMaxBodies; of more the largest are taken
+  /** Finds the clusters.
+   *  @param most  clusters, 1 .. kMaxClusters; of more the largest are taken
    *  @return how many there are, at least 1 */
   int find (const WorldPoints &cloud, int most);
 
-  /** Brings the points of each body together in a part.
-   *  @param[out] ends  end of each body in the part; the first one begins with it. Parts may be
+  /** Brings the points of each cluster together in a part.
+   *  @param[out] ends  end of each cluster in the part; the first one begins with it. Parts may be
    *                    sorted at the same time */
-  void sort_part (WorldPoints &cloud, std::size_t part, std::array<std::size_t, kMaxBodies> &ends);
+  void sort_part (
+      WorldPoints &cloud, std::size_t part, std::array<std::size_t, kMaxClusters> &ends);
 
 private:
   static constexpr int kSide = 128; /* places each way */
-  static constexpr std::uint8_t kNobody = 255;
+  static constexpr std::uint8_t kNoCluster = 255;
 
   void lay_grid (const WorldPoints &cloud);
   void count_points (const WorldPoints &cloud);
@@ -42,8 +44,8 @@ private:
     std::uint32_t points = 0;
     std::uint16_t label = 0;
   };
-  int label_places (int most, std::array<Found, kMaxBodies + 1> &found);
-  std::uint32_t fill_body (std::uint16_t place, std::uint16_t label);
+  int label_places (int most, std::array<Found, kMaxClusters + 1> &found);
+  std::uint32_t fill_cluster (std::uint16_t place, std::uint16_t label);
   void spread ();
   [[nodiscard]] int place_of (float x, float z) const
   {
@@ -57,7 +59,7 @@ private:
   int count_ = 1;
   std::vector<std::uint32_t> points_; /* of each place */
   std::vector<std::uint16_t> labels_; /* of each place */
-  std::vector<std::uint8_t> body_;    /* of each place */
+  std::vector<std::uint8_t> cluster_; /* of each place */
   std::vector<std::uint16_t> queue_;
 
   std::vector<float> x_, y_, z_; /* while a part is sorted; as large as the cloud */

@@ -22,59 +22,59 @@ inline constexpr double kMaxOverlap = 16; ///< pixels
 struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
-  UnitSettings units; ///< unit_height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
+  CellSettings cells; ///< height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
   /** How far round a point the winner's surface must cover its view's own before it goes, 0 ..
    *  kMaxOverlap pixels of its view; 1: as far as its triangles reach, and no hole opens. */
   double overlap = 1;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
-  /** What the view that won a unit in the frame before has for nothing, 0 .. 2: it loses the unit
+  /** What the view that won a cell in the frame before has for nothing, 0 .. 2: it loses the cell
    *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
   double hysteresis = 0.2;
-  /** What a view's |N . a| gains where all neighbours of a unit are won by it (of four, a quarter
+  /** What a view's |N . a| gains where all neighbours of a cell are won by it (of four, a quarter
    *  each), 0 .. 2. 0 = none. */
   double agreement = 0.1;
-  /** Bodies that stand beside each other get a cylinder each, so many at most, 1 .. kMaxBodies; 1:
-   *  one cylinder for all. Not with AxisMode::kFixed. */
-  int bodies = 4;
+  /** Clusters that stand beside each other get a cylinder each, so many at most, 1 .. kMaxClusters;
+   * 1: one cylinder for all. Not with AxisMode::kFixed. */
+  int max_clusters = 4;
 };
 
 /** What one frame came to. */
 struct CylinderResult {
   std::uint64_t points_in = 0;    ///< valid pixels before
   std::uint64_t points_out = 0;   ///< valid pixels after
-  std::uint64_t units = 0;        ///< units with points
-  std::uint64_t units_shared = 0; ///< units with points of more than one view
-  Axis axis;                      ///< of the cylinder of the largest body
-  int bodies = 0;                 ///< cylinders
-  /** Surfaces in units that some view won in the frame before, too; and those of them that another
+  std::uint64_t cells = 0;        ///< cells with points
+  std::uint64_t cells_shared = 0; ///< cells with points of more than one view
+  Axis axis;                      ///< of the cylinder of the largest cluster
+  int clusters = 0;               ///< cylinders
+  /** Surfaces in cells that some view won in the frame before, too; and those of them that another
    *  view won now. */
-  std::uint64_t units_held = 0, units_changed = 0;
+  std::uint64_t cells_held = 0, cells_changed = 0;
 };
 
 /** Clears the points that several views see of the same place, all but those of the view that sees
  * it most squarely.
  *
- *  All points go onto the inner wall of a cylinder about the object's axis, which is cut into units
- * of equal height and angle. In a unit with points of several views, let T be the mean of the
- * views' tangents in the slice, weighted by their numbers of points (Units). The view whose optical
+ *  All points go onto the inner wall of a cylinder about the object's axis, which is cut into cells
+ * of equal height and angle. In a cell with points of several views, let T be the mean of the
+ * views' tangents in the slice, weighted by their numbers of points (Cells). The view whose optical
  * axis has the smallest inner product with T stays; the others' points there become invalid.
  *
  *  Beyond that plain rule:
- *  - Points of a unit with a gap in radius between them are different surfaces and do not compete.
- *  - T is summed over a neighbourhood, and a view competes in a unit that it has no point in, but
+ *  - Points of a cell with a gap in radius between them are different surfaces and do not compete.
+ *  - T is summed over a neighbourhood, and a view competes in a cell that it has no point in, but
  *    points on both sides of. Without either, winners along a seam are a matter of chance.
  *  - Optical axes need not lie in the slice plane. What is compared is |N . a| (N: normal of T in
  *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
  *  - A point goes only if the winner's own surface covers what its view draws of it
- *    (RedundantPoints): a unit can be larger than what its winner sees of it, the winner may see
+ *    (RedundantPoints): a cell can be larger than what its winner sees of it, the winner may see
  *    something before the point, have a hole there, or see a thin thing from its other side.
  *  - Where no tangent is known, T is the wall's own. Of equals, the first image wins.
- *  - Added to |N . a| is something for the view that won the unit in the frame before (hysteresis)
+ *  - Added to |N . a| is something for the view that won the cell in the frame before (hysteresis)
  *    and for those that won its neighbours (agreement).
- *  - Bodies that stand beside each other have a cylinder each (Bodies).
- *  - Of more than four surfaces in a unit, those beyond the fourth stay (UnitRows).
+ *  - Clusters that stand beside each other have a cylinder each (Clusters).
+ *  - Of more than four surfaces in a cell, those beyond the fourth stay (CellRows).
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
 public:
@@ -92,14 +92,14 @@ public:
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
-  /** The winners of the last frame set, to draw or to measure them: slices of all bodies one above
-   *  the other, from the lowest up. None if it had points of fewer than two views. */
-  [[nodiscard]] int unit_slices () const { return decided_ ? units_.rows.old_slices () : 0; }
-  /** The view-id of the winner of a unit's outermost surface; -1 where the frame set has no points.
+  /** The winners of the last frame set, to draw or to measure them: slices of all clusters one
+   * above the other, from the lowest up. None if it had points of fewer than two views. */
+  [[nodiscard]] int cell_slices () const { return decided_ ? cells_.rows.old_slices () : 0; }
+  /** The view-id of the winner of a cell's outermost surface; -1 where the frame set has no points.
    */
-  [[nodiscard]] int unit_winner (int slice, int column) const
+  [[nodiscard]] int cell_winner (int slice, int column) const
   {
-    return decided_ ? units_.rows.old_winner (slice, column) : -1;
+    return decided_ ? cells_.rows.old_winner (slice, column) : -1;
   }
 
 private:
@@ -108,22 +108,21 @@ private:
   Status take_cameras (std::span<const RangeImage> images);
   void forget_other_geometry (const CylinderSettings &settings);
   void make_points (std::span<const RangeImage> images, int threads);
-  void find_bodies (const CylinderSettings &settings);
+  void find_clusters (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);
-  void choose_slots (const std::array<Axis, kMaxBodies> &measured);
+  void choose_slots (const std::array<Axis, kMaxClusters> &measured);
   void unroll (const CylinderSettings &settings, std::size_t images);
-  void look_from (int body, const CylinderFrame &frame, std::size_t images);
+  void look_from (int cluster, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
-  void decide_units (const CylinderSettings &settings, CylinderResult &result);
+  void decide_cells (const CylinderSettings &settings, CylinderResult &result);
   void clear_redundant (std::span<const RangeImage> images, const CylinderSettings &settings);
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
-  std::array<float, kMaxViews> rig_units_per_metre_{};
   std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
-  /* Of each body. A body keeps its place in these as long as it is there. */
-  std::array<AxisTracker, kMaxBodies> trackers_;
-  Bodies bodies_;
+  /* Of each cluster. A cluster keeps its place in these as long as it is there. */
+  std::array<AxisTracker, kMaxClusters> trackers_;
+  Clusters clusters_;
   AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set, and its */
   Axis fixed_axis_;
   bool decided_ = false; /* it had winners */
@@ -132,19 +131,19 @@ private:
   std::array<PixelRays, kMaxViews> rays_;
   std::array<int, kMaxViews> ids_{};
   std::vector<Moments> moments_; /* of each run */
-  /* Where images see points of each body's cylinder. */
-  std::array<std::array<PixelLookup, kMaxViews>, kMaxBodies> lookups_;
-  Axis axis_; /* of the largest body */
-  std::array<Axis, kMaxBodies> axes_;
-  int body_count_ = 0;
-  std::array<int, kMaxBodies> slots_{}; /* of the bodies, the largest first */
+  /* Where images see points of each cluster's cylinder. */
+  std::array<std::array<PixelLookup, kMaxViews>, kMaxClusters> lookups_;
+  Axis axis_; /* of the largest cluster */
+  std::array<Axis, kMaxClusters> axes_;
+  int cluster_count_ = 0;
+  std::array<int, kMaxClusters> slots_{}; /* of the clusters, the largest first */
   WorldPoints cloud_;
   std::vector<PointRun> runs_;
-  std::vector<WallRange> run_ranges_;
-  std::array<WallRange, kMaxBodies> ranges_;
+  std::vector<HeightRange> run_ranges_;
+  std::array<HeightRange, kMaxClusters> ranges_;
   std::vector<float> radius_;
   std::vector<std::int32_t> column_;
-  Units units_;
+  Cells cells_;
   RowRules rules_;
   RedundantPoints redundant_;
 };

@@ -38,7 +38,7 @@ fast_atan2 (float y, float x)
 }
 
 /* Where a point goes, with plain arithmetic: the twin of the vector loop, and its tail. */
-struct ToWall {
+struct Projection {
   float origin[3], rotation[9], columns_per_radian;
   int last_column;
 
@@ -55,13 +55,13 @@ struct ToWall {
   }
 };
 
-/* Some points at a time; the same operations in the same order as ToWall. */
-template <typename L> struct ToWallLoop {
+/* Some points at a time; the same operations in the same order as Projection. */
+template <typename L> struct ProjectionLoop {
   using F = typename L::F;
   using I = typename L::I;
   static constexpr int kLanes = L::kLanes;
 
-  const ToWall &to;
+  const Projection &to;
   float *x, *y, *z, *radius;
   std::int32_t *column;
   std::size_t n;
@@ -83,7 +83,7 @@ template <typename L> struct ToWallLoop {
     a = pz < 0 ? 2 * kPi - a : a;
   }
 
-  std::size_t run (WallRange &range) const
+  std::size_t run (HeightRange &range) const
   {
     const float *m = to.rotation;
     F lowest = range.y_min + F{}, highest = range.y_max + F{};
@@ -117,11 +117,11 @@ template <typename L> struct ToWallLoop {
   }
 };
 
-WallRange
-to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame, int columns,
-    float *radius, std::int32_t *column)
+HeightRange
+project_to_cylinder (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame,
+    int columns, float *radius, std::int32_t *column)
 {
-  ToWall to;
+  Projection to;
   const double origin[] = {frame.origin.x, frame.origin.y, frame.origin.z};
   std::copy_n (origin, 3, to.origin);
   std::copy_n (frame.rotation.begin (), 9, to.rotation);
@@ -129,14 +129,14 @@ to_wall (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame,
   to.last_column = columns - 1;
 
   constexpr float kHuge = std::numeric_limits<float>::max ();
-  WallRange range{kHuge, -kHuge};
+  HeightRange range{kHuge, -kHuge};
   float *x = cloud.x.data () + part.begin, *y = cloud.y.data () + part.begin,
         *z = cloud.z.data () + part.begin;
   radius += part.begin;
   column += part.begin;
   const std::size_t n = part.size ();
   std::size_t i = for_this_cpu ([&]<typename L> (L) {
-    return ToWallLoop<L>{to, x, y, z, radius, column, n}.run (range);
+    return ProjectionLoop<L>{to, x, y, z, radius, column, n}.run (range);
   });
   for (; i < n; i++) {
     to (x[i], y[i], z[i], radius[i], column[i]);

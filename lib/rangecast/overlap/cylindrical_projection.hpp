@@ -17,7 +17,7 @@ struct CylinderFrame {
 };
 
 /** Heights and angles of points on a cylinder's inner wall. */
-struct WallRange {
+struct HeightRange {
   float y_min = 0, y_max = 0; ///< metres along the axis; y_min > y_max if there is no point
 };
 
@@ -29,7 +29,7 @@ struct WallRange {
 /** Moves the points of a part from world to cylinder coordinates, in place, and gives for each its
  *  radius sqrt (x^2 + z^2) (metres) and its column floor (phi / 2 pi * columns), phi = atan2 (z,
  * x). radius and column have the cloud's size. Reentrant for different parts. */
-[[nodiscard]] WallRange to_wall (WorldPoints &cloud, WorldPoints::Part part,
+[[nodiscard]] HeightRange project_to_cylinder (WorldPoints &cloud, WorldPoints::Part part,
     const CylinderFrame &frame, int columns, float *radius, std::int32_t *column);
 
 } // namespace rangecast

@@ -29,43 +29,43 @@ RedundantPoints::Plane::reset (int width, int height, std::uint8_t value)
   std::fill_n (bytes_.begin (), size, value);
 }
 
-/* Where units of a slice have several layers, a point's column does not tell its cell. */
+/* Where cells of a slice have several layers, a point's column does not tell its node. */
 void
-RedundantPoints::find_cells (const ResolvedFrame &frame)
+RedundantPoints::find_nodes (const ResolvedFrame &frame)
 {
-  const Units &units = frame.units;
-  const UnitRows &rows = units.rows;
-  cell_of_.resize (std::max (cell_of_.size (), frame.cloud.x.size ()));
-  first_cell_.resize (units.slices.size ());
-  for (std::size_t s = 0; s < units.slices.size (); s++) {
+  const Cells &cells = frame.cells;
+  const CellRows &rows = cells.rows;
+  node_of_.resize (std::max (node_of_.size (), frame.cloud.x.size ()));
+  first_node_.resize (cells.slices.size ());
+  for (std::size_t s = 0; s < cells.slices.size (); s++) {
     const auto number = static_cast<int> (s);
-    const bool plain = units.is_plain (static_cast<std::uint32_t> (s));
-    first_cell_[s] = plain ? rows.cell (number, 0, 0) : kNoCell;
+    const bool plain = cells.is_plain (static_cast<std::uint32_t> (s));
+    first_node_[s] = plain ? rows.node (number, 0, 0) : kNoNode;
     if (plain)
       continue;
-    for (const UnitLayer &layer : units.layers_of (units.slices[s])) {
-      const std::uint32_t cell =
-          units.has_cell (number, layer) ? rows.cell (number, layer.plane, layer.column) : kNoCell;
+    for (const CellLayer &layer : cells.layers_of (cells.slices[s])) {
+      const std::uint32_t node =
+          cells.has_node (number, layer) ? rows.node (number, layer.plane, layer.column) : kNoNode;
       for (std::uint32_t i = 0; i < layer.point_count; i++)
-        cell_of_[units.points[layer.first_point + i].index] = cell;
+        node_of_[cells.points[layer.first_point + i].index] = node;
     }
   }
 }
 
-/* Who won the unit of each point. */
+/* Who won the cell of each point. */
 void
 RedundantPoints::list (const ResolvedFrame &frame)
 {
-  find_cells (frame);
-  const UnitRows &rows = frame.units.rows;
-  const std::uint32_t *slice_of = frame.units.slice_of.data ();
+  find_nodes (frame);
+  const CellRows &rows = frame.cells.rows;
+  const std::uint32_t *slice_of = frame.cells.slice_of.data ();
   for (const PointRun &run : frame.runs) {
     ImageState &image = images_[run.view];
     for (std::size_t i = run.begin; i < run.end; i++) {
-      const std::uint32_t first = first_cell_[slice_of[i]];
-      const std::uint32_t cell =
-          first != kNoCell ? first + static_cast<std::uint32_t> (frame.column[i]) : cell_of_[i];
-      const int winner = cell == kNoCell ? -1 : rows.winner (cell);
+      const std::uint32_t first = first_node_[slice_of[i]];
+      const std::uint32_t node =
+          first != kNoNode ? first + static_cast<std::uint32_t> (frame.column[i]) : node_of_[i];
+      const int winner = node == kNoNode ? -1 : rows.winner (node);
       if (winner < 0 || winner == static_cast<int> (run.view))
         continue;
       const std::uint32_t pixel = frame.cloud.pixel[i];
@@ -363,7 +363,7 @@ RedundantPoints::find (const ResolvedFrame &frame, double overlap, int threads)
   for (std::size_t i = 0; i < count; i++) {
     const auto &depth = frame.images[i].depth;
     images_[i].winners = 0;
-    images_[i].winner.reset (depth.width, depth.height, kNobody);
+    images_[i].winner.reset (depth.width, depth.height, kNoWinner);
     images_[i].surface.reset (depth.width, depth.height, 0);
     width = std::max (width, static_cast<std::size_t> (depth.width));
     height = std::max (height, static_cast<std::size_t> (depth.height));

@@ -12,7 +12,7 @@
 
 namespace rangecast {
 
-/** A frame set whose units have been decided. */
+/** A frame set whose cells have been decided. */
 struct ResolvedFrame {
   std::span<const RangeImage> images;
   std::span<const PixelRays> rays;      ///< of each image's camera
@@ -20,13 +20,13 @@ struct ResolvedFrame {
   const WorldPoints &cloud;
   std::span<const PointRun> runs; ///< ordered by view
   std::span<const std::int32_t> column;
-  const Units &units;
+  const Cells &cells;
 };
 
 /** The points that can go without opening a hole. Keeps its memory from frame to frame: 2 bytes a
  *  pixel, 4 a point.
  *
- *  A point whose unit another view won is a candidate. With it go the triangles between it and its
+ *  A point whose cell another view won is a candidate. With it go the triangles between it and its
  *  eight neighbours, so it goes only if the winner's own triangles cover all of these:
  *  - Where the winner sees the point and each neighbour that joins it, the winner's surface is no
  *    more than kTolerance pixel footprints away.
@@ -73,11 +73,11 @@ private:
     /* kSurface where the pixel, the one to its right and the two below are one surface of points
      * that stay; else 0. */
     Plane surface;
-    /* Number of the image that won the pixel's unit; kNobody: it is no candidate; kGoes. */
+    /* Number of the image that won the pixel's cell; kNoWinner: it is no candidate; kGoes. */
     Plane winner;
     std::uint64_t winners = 0; /* bit i: image i is in there */
   };
-  static constexpr std::uint8_t kSurface = 0xff, kNobody = 0xff, kGoes = 0xfe;
+  static constexpr std::uint8_t kSurface = 0xff, kNoWinner = 0xff, kGoes = 0xfe;
 
   /* A row of an image and of what lies left and right of it, as another image sees it. */
   struct Row {
@@ -90,7 +90,7 @@ private:
     int begin = 0, end = 0;
   };
 
-  void find_cells (const ResolvedFrame &frame);
+  void find_nodes (const ResolvedFrame &frame);
   void list (const ResolvedFrame &frame);
   void make_surface (const RangeImage &image, Plane &surface) const;
 
@@ -98,10 +98,10 @@ private:
   std::size_t count_ = 0;
   std::array<Row, 3> rows_;
   std::vector<Range> candidates_; /* of each row */
-  /* Of each slice of one plane its first cell, kNoCell of others. There cell_of_ tells the cell of
-   * each point; kNoCell for the fifth and further surfaces of a unit, whose points all stay. */
-  std::vector<std::uint32_t> first_cell_, cell_of_;
-  static constexpr std::uint32_t kNoCell = UINT32_MAX;
+  /* Of each slice of one plane its first node, kNoNode of others. There node_of_ tells the node of
+   * each point; kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
+  std::vector<std::uint32_t> first_node_, node_of_;
+  static constexpr std::uint32_t kNoNode = UINT32_MAX;
 };
 
 } // namespace rangecast

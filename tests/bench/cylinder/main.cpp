@@ -220,7 +220,7 @@ main (int argc, char **argv)
   options.number ("--pose-mm", truth.pose_mm, 0.0, 100.0);
   options.number ("--pose-deg", truth.pose_deg, 0.0, 20.0);
   options.number ("--overlap", truth.settings.overlap, 0.0, kMaxOverlap);
-  options.number ("--smoothing", truth.settings.units.smoothing_m, 0.0, 1.0);
+  options.number ("--smoothing", truth.settings.cells.smoothing_m, 0.0, 1.0);
   options.text ("--json", job.json);
   if (const auto status = options.parse (argc, argv))
     return *status;

@@ -108,7 +108,7 @@ measure_speed (const std::string &name, FrameSet set, int rounds)
   run ("cylinder, 1 thread", settings);
   settings.threads = 0;
   run ("cylinder, all cores", settings);
-  settings.units.smoothing_m = 0;
+  settings.cells.smoothing_m = 0;
   run ("and smoothing 0", settings);
   const int few = std::max (3, rounds / 10);
   line ("plain rule", median_ms (set, few, [&] { plain_rule (set); }));

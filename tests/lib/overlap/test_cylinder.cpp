@@ -262,9 +262,9 @@ TEST (Wall, vector_and_plain_code_agree_and_columns_stay_in_range)
   std::vector<float> r4 (37), r1 (37);
   std::vector<std::int32_t> c4 (37), c1 (37);
   const CylinderFrame frame{Axis{}};
-  (void)to_wall (four, {0, 37}, frame, 360, r4.data (), c4.data ());
+  (void)project_to_cylinder (four, {0, 37}, frame, 360, r4.data (), c4.data ());
   for (std::size_t i = 0; i < 37; i++)
-    (void)to_wall (one, {i, i + 1}, frame, 360, r1.data (), c1.data ());
+    (void)project_to_cylinder (one, {i, i + 1}, frame, 360, r1.data (), c1.data ());
   for (int i = 0; i < 37; i++) {
     EXPECT_FLOAT_EQ (r4[i], r1[i]);
     EXPECT_EQ (c4[i], c1[i]) << i;
@@ -345,7 +345,7 @@ TEST (Decision, the_camera_that_looks_squarely_at_a_patch_keeps_it)
   ASSERT_GT (shots.points_of (0).size (), 100u);
   shots.filter (vertical_through_origin ());
   EXPECT_EQ (shots.points_of (1).size (), squarely);
-  /* At the patch's very edge another view's points may lie in a unit that it has to itself. */
+  /* At the patch's very edge another view's points may lie in a cell that it has to itself. */
   EXPECT_LT (shots.points_of (0).size () + shots.points_of (2).size (), squarely / 10);
 }
 
@@ -356,9 +356,9 @@ TEST (Decision, the_plain_rule_decides_unit_by_unit)
   Shots shots (rig, patch ({0, 0, 0.1}, {0, 0, 1}, 0.03));
   const std::size_t squarely = shots.points_of (1).size ();
   CylinderSettings settings = vertical_through_origin ();
-  settings.units.smoothing_m = 0;
-  settings.units.columns = 90; /* wide enough for a point of each view */
-  settings.units.unit_height_m = 0.006;
+  settings.cells.smoothing_m = 0;
+  settings.cells.columns = 90; /* wide enough for a point of each view */
+  settings.cells.height_m = 0.006;
   shots.filter (settings);
   EXPECT_EQ (shots.points_of (1).size (), squarely);
   EXPECT_LT (shots.points_of (0).size (), squarely / 5);
@@ -374,12 +374,12 @@ TEST (Decision, of_two_that_see_it_equally_the_first_keeps_all_and_the_second_it
   EXPECT_EQ (shots.points_of (0).size (), first);
   EXPECT_LT (shots.points_of (1).size (), first / 10);
   EXPECT_EQ (result.points_in, 2 * first);
-  EXPECT_EQ (result.units, result.units_shared);
+  EXPECT_EQ (result.cells, result.cells_shared);
 }
 
 TEST (Decision, surfaces_further_apart_than_the_layer_gap_do_not_compete)
 {
-  /* Front sees the chest, the side camera an arm before it: same units, other radii. */
+  /* Front sees the chest, the side camera an arm before it: same cells, other radii. */
   Rig rig;
   rig.views = {ring_view (0, 0), ring_view (1, 0)};
   Shots chest (rig, patch ({0, 0, 0.1}, {0, 0, 1}, 0.03)),
@@ -388,10 +388,10 @@ TEST (Decision, surfaces_further_apart_than_the_layer_gap_do_not_compete)
   const std::size_t points = chest.points ().size ();
   const CylinderResult apart = chest.filter (vertical_through_origin ());
   EXPECT_EQ (apart.points_out, points);
-  EXPECT_GT (apart.units_shared, 0u);
+  EXPECT_GT (apart.cells_shared, 0u);
   /* Even where they do, neither covers the other. */
   CylinderSettings settings = vertical_through_origin ();
-  settings.units.layer_gap_m = 0.2;
+  settings.cells.layer_gap_m = 0.2;
   EXPECT_EQ (chest.filter (settings).points_out, points);
 }
 
@@ -669,8 +669,8 @@ TEST (Filter, takes_64_views_single_pixels_and_extreme_depths)
     images.push_back ({i, {300 - i, 7, view.width, view.height}, view, {}, 0});
   }
   CylinderSettings settings;
-  settings.units.columns = 3600;
-  settings.units.unit_height_m = 0.0002;
+  settings.cells.columns = 3600;
+  settings.cells.height_m = 0.0002;
   for (int frame = 0; frame < 3; frame++) {
     const Status status = filter.process (images, settings, result);
     ASSERT_TRUE (status.ok ()) << status.message ();
@@ -692,7 +692,7 @@ TEST (Filter, refuses_views_that_the_rig_has_not_and_settings_out_of_range)
   EXPECT_EQ (status.code (), StatusCode::kNotFound);
   EXPECT_NE (status.message ().find ("view 7"), std::string::npos);
   CylinderSettings settings;
-  settings.units.columns = 0;
+  settings.cells.columns = 0;
   EXPECT_EQ (filter.process (shots.images (), settings, result).code (), StatusCode::kBadValue);
   settings = {};
   settings.axis = AxisMode::kFixed;

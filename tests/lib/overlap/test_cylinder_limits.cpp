@@ -37,7 +37,7 @@ using namespace rangecast::testing;
 
 namespace {
 
-/* All cameras at one place, so that each unit has all of them. */
+/* All cameras at one place, so that each cell has all of them. */
 Rig
 same_place_rig (int views, int width, int height)
 {
@@ -50,8 +50,8 @@ same_place_rig (int views, int width, int height)
 } // namespace
 
 /* Eight columns, one slice, and no two points of a view on the same surface. What takes a second
- * here takes hours where work grows with the square of a unit's points. */
-TEST (Limits, as_many_layers_as_points_in_units_that_all_views_share)
+ * here takes hours where work grows with the square of a cell's points. */
+TEST (Limits, as_many_layers_as_points_in_cells_that_all_views_share)
 {
   const Rig rig = same_place_rig (16, 640, 480);
   Frame frame (rig);
@@ -62,7 +62,7 @@ TEST (Limits, as_many_layers_as_points_in_units_that_all_views_share)
       for (int u = 0; u < 640; u++, points++)
         image.view ().at (u, v) = static_cast<std::uint16_t> (1 + random () % 65535);
   CylinderSettings settings = vertical_through_origin ();
-  settings.units = {10, 8, 0, 1};
+  settings.cells = {10, 8, 0, 1};
   CylinderFilter filter;
   ASSERT_TRUE (filter.set_rig (rig).ok ());
   const CylinderResult result = run (filter, frame, settings);
@@ -73,7 +73,7 @@ TEST (Limits, as_many_layers_as_points_in_units_that_all_views_share)
 TEST (Limits, with_layers_tangents_are_those_of_each_surface)
 {
   /* Two walls one behind the other, which the second camera sees more squarely: both are its own,
-   * though each unit has points of both. */
+   * though each cell has points of both. */
   Rig rig;
   rig.views = {ring_view (0, 40), ring_view (1, 0)};
   const Surface near = patch (0), far = [near] (Vec3 o, Vec3 d) {
@@ -93,9 +93,9 @@ TEST (Limits, with_layers_tangents_are_those_of_each_surface)
   run (filter, frame, settings);
   EXPECT_EQ (frame.points (1), squarely);
   int winners[2] = {};
-  for (int s = 0; s < filter.unit_slices (); s++)
-    for (int c = 0; c < settings.units.columns; c++)
-      if (const int winner = filter.unit_winner (s, c); winner >= 0)
+  for (int s = 0; s < filter.cell_slices (); s++)
+    for (int c = 0; c < settings.cells.columns; c++)
+      if (const int winner = filter.cell_winner (s, c); winner >= 0)
         winners[winner]++;
   EXPECT_GT (winners[1], 100);
   EXPECT_LT (winners[0], winners[1] / 20);

@@ -36,7 +36,7 @@ struct StillScene {
 };
 
 struct Steadiness {
-  double changed = 0; ///< share of units, mean of frames
+  double changed = 0; ///< share of cells, mean of frames
   double shift_mm = 0, turn_deg = 0;
 };
 
@@ -53,11 +53,11 @@ watch_still_scene (const CylinderSettings &settings)
     Frame frame = still.shoot (1);
     const CylinderResult now = run (filter, frame, settings);
     if (i > 0) {
-      all.changed += double (now.units_changed) / double (now.units) / kFrames;
+      all.changed += double (now.cells_changed) / double (now.cells) / kFrames;
       all.shift_mm = std::max (all.shift_mm, 1e3 * norm (now.axis.position - before.axis.position));
       const double cosine = std::min (1.0, dot (now.axis.direction, before.axis.direction));
       all.turn_deg = std::max (all.turn_deg, std::acos (cosine) * 180 / M_PI);
-      EXPECT_GT (now.units_held, now.units * 4 / 5);
+      EXPECT_GT (now.cells_held, now.cells * 4 / 5);
     }
     before = now;
   }
@@ -66,13 +66,13 @@ watch_still_scene (const CylinderSettings &settings)
 
 /* Units whose left and right neighbours agree with each other but not with it. */
 double
-share_of_lone_units (const CylinderFilter &filter, int columns)
+share_of_lone_cells (const CylinderFilter &filter, int columns)
 {
   int lone = 0, all = 0;
-  for (int s = 0; s < filter.unit_slices (); s++)
+  for (int s = 0; s < filter.cell_slices (); s++)
     for (int c = 0; c < columns; c++) {
-      const int left = filter.unit_winner (s, (c + columns - 1) % columns),
-                right = filter.unit_winner (s, (c + 1) % columns), own = filter.unit_winner (s, c);
+      const int left = filter.cell_winner (s, (c + columns - 1) % columns),
+                right = filter.cell_winner (s, (c + 1) % columns), own = filter.cell_winner (s, c);
       all += own >= 0;
       lone += own >= 0 && left == right && left >= 0 && left != own;
     }
@@ -86,7 +86,7 @@ TEST (Steady, fewer_than_one_unit_in_a_hundred_changes_while_the_head_is_still)
   EXPECT_LT (watch_still_scene ({}).changed, 0.01);
 }
 
-TEST (Steady, without_hysteresis_units_do_change)
+TEST (Steady, without_hysteresis_cells_do_change)
 {
   CylinderSettings settings;
   settings.hysteresis = 0;
@@ -134,7 +134,7 @@ TEST (Steady, the_holder_stays_until_another_view_is_better_by_the_hysteresis)
     const CylinderResult result = run (filter, second, vertical_through_origin ());
     /* cos 30 = 0.87 against cos 20 = 0.94. */
     EXPECT_EQ (second.points (0) > second.points (1), !forget);
-    EXPECT_EQ (result.units_held > 0, !forget);
+    EXPECT_EQ (result.cells_held > 0, !forget);
   }
 }
 
@@ -147,7 +147,7 @@ TEST (Steady, a_new_rig_forgets_who_won)
   Frame first (rig, patch (0)), second (rig, patch (30));
   run (filter, first, vertical_through_origin ());
   ASSERT_TRUE (filter.set_rig (rig).ok ());
-  EXPECT_EQ (run (filter, second, vertical_through_origin ()).units_held, 0u);
+  EXPECT_EQ (run (filter, second, vertical_through_origin ()).cells_held, 0u);
   EXPECT_LT (second.points (0), second.points (1));
 }
 
@@ -158,8 +158,8 @@ TEST (Steady, units_of_another_size_or_about_another_axis_do_not_hold_what_was_w
   const CylinderSettings first = vertical_through_origin ();
   CylinderSettings higher = first, more = first, found = first, elsewhere = first, turned = first,
                    nearby = first;
-  higher.units.unit_height_m = 0.005;
-  more.units.columns = 400;
+  higher.cells.height_m = 0.005;
+  more.cells.columns = 400;
   found.axis = AxisMode::kVertical;
   elsewhere.fixed_axis.position = {0, 0, -0.06};
   turned.fixed_axis.direction = {0.2, 1, 0};
@@ -172,20 +172,20 @@ TEST (Steady, units_of_another_size_or_about_another_axis_do_not_hold_what_was_w
     run (filter, before, first);
     const CylinderResult result = run (filter, after, all[i]);
     const bool held = i < 2; /* the same place, and one that follows somebody */
-    EXPECT_EQ (result.units_held > 0, held) << i;
+    EXPECT_EQ (result.cells_held > 0, held) << i;
     EXPECT_EQ (after.points (0) > after.points (1), held) << i;
   }
 }
 
 /* Units that are said to have a winner. */
 static std::uint64_t
-units_with_winner (const CylinderFilter &filter, int columns)
+cells_with_winner (const CylinderFilter &filter, int columns)
 {
-  std::uint64_t units = 0;
-  for (int s = 0; s < filter.unit_slices (); s++)
+  std::uint64_t cells = 0;
+  for (int s = 0; s < filter.cell_slices (); s++)
     for (int c = 0; c < columns; c++)
-      units += filter.unit_winner (s, c) >= 0;
-  return units;
+      cells += filter.cell_winner (s, c) >= 0;
+  return cells;
 }
 
 TEST (Steady, a_unit_without_points_has_no_winner_but_its_holder_is_not_forgotten)
@@ -195,7 +195,7 @@ TEST (Steady, a_unit_without_points_has_no_winner_but_its_holder_is_not_forgotte
   const CylinderSettings settings = vertical_through_origin ();
   CylinderFilter filter;
   ASSERT_TRUE (filter.set_rig (rig).ok ());
-  std::uint64_t units = 0;
+  std::uint64_t cells = 0;
   const Surface whole = patch (0);
   for (const double half_m : {0.03, 0.01, 0.03}) {
     Frame frame (rig, [&] (Vec3 o, Vec3 d) {
@@ -203,16 +203,16 @@ TEST (Steady, a_unit_without_points_has_no_winner_but_its_holder_is_not_forgotte
       return std::abs (o.x + s * d.x) < half_m ? s : INFINITY;
     });
     const CylinderResult result = run (filter, frame, settings);
-    EXPECT_GT (result.units, 20u);
-    EXPECT_EQ (units_with_winner (filter, settings.units.columns), result.units) << half_m;
-    if (units > 0) { /* the rest comes back to who had it */
-      EXPECT_EQ (result.units_held, result.units);
+    EXPECT_GT (result.cells, 20u);
+    EXPECT_EQ (cells_with_winner (filter, settings.cells.columns), result.cells) << half_m;
+    if (cells > 0) { /* the rest comes back to who had it */
+      EXPECT_EQ (result.cells_held, result.cells);
     }
-    units = result.units;
+    cells = result.cells;
   }
   Frame empty (rig);
   run (filter, empty, settings);
-  EXPECT_EQ (units_with_winner (filter, settings.units.columns), 0u);
+  EXPECT_EQ (cells_with_winner (filter, settings.cells.columns), 0u);
 }
 
 TEST (Steady, winners_are_remembered_by_view_and_not_by_place_in_the_frame_set)
@@ -228,7 +228,7 @@ TEST (Steady, winners_are_remembered_by_view_and_not_by_place_in_the_frame_set)
       std::reverse (images.begin (), images.end ());
     ASSERT_TRUE (filter.process (images, {}, result).ok ());
     if (i > 0) {
-      EXPECT_LT (result.units_changed, result.units / 50);
+      EXPECT_LT (result.cells_changed, result.cells / 50);
     }
   }
   Frame frame = still.shoot (1);
@@ -238,7 +238,7 @@ TEST (Steady, winners_are_remembered_by_view_and_not_by_place_in_the_frame_set)
   EXPECT_LT (result.points_out, result.points_in);
 }
 
-TEST (Steady, neighbouring_units_agree)
+TEST (Steady, neighbouring_cells_agree)
 {
   StillScene still;
   for (const double smoothing_m : {0.0, 0.01}) {
@@ -246,10 +246,10 @@ TEST (Steady, neighbouring_units_agree)
     ASSERT_TRUE (filter.set_rig (still.scene->range_rig ()).ok ());
     Frame frame = still.shoot (1);
     CylinderSettings settings;
-    settings.units.smoothing_m = smoothing_m;
+    settings.cells.smoothing_m = smoothing_m;
     settings.agreement = smoothing_m > 0 ? settings.agreement : 0;
     run (filter, frame, settings);
-    const double lone = share_of_lone_units (filter, settings.units.columns);
+    const double lone = share_of_lone_cells (filter, settings.cells.columns);
     if (smoothing_m > 0)
       EXPECT_LT (lone, 0.002);
     else
@@ -280,28 +280,28 @@ TEST (Rungs, every_processor_gives_the_same)
   }
 }
 
-TEST (Bodies, those_that_stand_apart_get_a_cylinder_each)
+TEST (Clusters, those_that_stand_apart_get_a_cylinder_each)
 {
   const Rig rig = ring_rig (4);
   const Surface left = ellipsoid ({-0.15, 0, 0}, {0.07, 0.2, 0.08}),
                 right = ellipsoid ({0.15, 0, 0.05}, {0.07, 0.19, 0.08});
   CylinderSettings settings;
   for (const int bodies : {1, 4}) {
-    settings.bodies = bodies;
+    settings.max_clusters = bodies;
     CylinderFilter filter;
     ASSERT_TRUE (filter.set_rig (rig).ok ());
     Frame frame (rig, both (left, right));
     const CylinderResult result = run (filter, frame, settings);
-    EXPECT_EQ (result.bodies, bodies == 1 ? 1 : 2);
+    EXPECT_EQ (result.clusters, bodies == 1 ? 1 : 2);
     EXPECT_EQ (std::abs (result.axis.position.x) > 0.1, bodies > 1);
   }
   CylinderFilter filter;
   ASSERT_TRUE (filter.set_rig (rig).ok ());
   Frame frame (rig, left);
-  EXPECT_EQ (run (filter, frame, settings).bodies, 1);
+  EXPECT_EQ (run (filter, frame, settings).clusters, 1);
 }
 
-TEST (Bodies, winners_do_not_change_when_another_body_comes_and_goes)
+TEST (Clusters, winners_do_not_change_when_another_body_comes_and_goes)
 {
   const Rig rig = ring_rig (4);
   const Surface left = ellipsoid ({-0.15, 0, 0}, {0.07, 0.2, 0.08}),
@@ -311,15 +311,15 @@ TEST (Bodies, winners_do_not_change_when_another_body_comes_and_goes)
   for (int i = 0; i < 6; i++) {
     Frame frame (rig, i == 2 || i == 3 ? both (left, right) : left);
     const CylinderResult result = run (filter, frame);
-    EXPECT_EQ (result.bodies, i == 2 || i == 3 ? 2 : 1);
+    EXPECT_EQ (result.clusters, i == 2 || i == 3 ? 2 : 1);
     if (i > 0) { /* not more than what one hides of the other */
-      EXPECT_GT (result.units_held, i == 2 ? 9000u : 17000u) << i;
-      EXPECT_LT (result.units_changed, result.units / 8) << i;
+      EXPECT_GT (result.cells_held, i == 2 ? 9000u : 17000u) << i;
+      EXPECT_LT (result.cells_changed, result.cells / 8) << i;
     }
   }
 }
 
-TEST (Bodies, one_thread_and_many_give_the_same_over_several_frames)
+TEST (Clusters, one_thread_and_many_give_the_same_over_several_frames)
 {
   const Rig rig = ring_rig (6);
   const Surface people = both (ellipsoid ({-0.15, 0, 0}, {0.07, 0.2, 0.08}),
@@ -336,13 +336,13 @@ TEST (Bodies, one_thread_and_many_give_the_same_over_several_frames)
     settings.threads = 5;
     const CylinderResult b = run (many, second, settings);
     EXPECT_TRUE (first == second);
-    EXPECT_EQ (a.bodies, 2);
-    EXPECT_EQ (a.units_changed, b.units_changed);
-    EXPECT_EQ (a.units_held, b.units_held);
+    EXPECT_EQ (a.clusters, 2);
+    EXPECT_EQ (a.cells_changed, b.cells_changed);
+    EXPECT_EQ (a.cells_held, b.cells_held);
   }
 }
 
-TEST (Bodies, stray_points_are_no_body)
+TEST (Clusters, stray_points_are_no_body)
 {
   const Rig rig = ring_rig (4);
   Frame frame (rig, ellipsoid ({0, 0, 0}, {0.09, 0.2, 0.11}));
@@ -353,7 +353,7 @@ TEST (Bodies, stray_points_are_no_body)
           static_cast<std::uint16_t> (3000 + random () % 12000);
   CylinderFilter filter;
   ASSERT_TRUE (filter.set_rig (rig).ok ());
-  EXPECT_EQ (run (filter, frame).bodies, 1);
+  EXPECT_EQ (run (filter, frame).clusters, 1);
 }
 
 /* ---- degenerate input: nothing is NaN, nothing is out of bounds, points only disappear ---- */
@@ -464,13 +464,13 @@ TEST (Degenerate, settings_at_their_ends)
     for (const double gap_m : {0.0, 0.03, 100.0})
       for (const double smoothing_m : {0.0, 1.0}) {
         CylinderSettings settings;
-        settings.units = {0.0002, columns, gap_m, smoothing_m};
+        settings.cells = {0.0002, columns, gap_m, smoothing_m};
         settings.hysteresis = settings.agreement = 2;
         expect_sane (rig, bumpy, settings);
       }
 }
 
-TEST (Degenerate, more_slices_than_the_wall_has_units_for)
+TEST (Degenerate, more_slices_than_the_cylinder_has_cells_for)
 {
   /* 65 m of depth along the axis, slices of 0.2 mm, as narrow as they get and as wide. */
   Rig rig;
@@ -483,8 +483,8 @@ TEST (Degenerate, more_slices_than_the_wall_has_units_for)
     CylinderSettings settings;
     settings.axis = AxisMode::kFixed;
     settings.fixed_axis.direction = {0, 0, 1};
-    settings.units.columns = columns;
-    settings.units.unit_height_m = 0.0002;
+    settings.cells.columns = columns;
+    settings.cells.height_m = 0.0002;
     const auto scattered = [] (int i, int u, int v) {
       return std::uint16_t (u * 40503 + v * 30011 + i);
     };
@@ -519,9 +519,9 @@ TEST (Degenerate, the_rig_and_all_settings_may_change_between_frames)
     for (const int columns : {360, 90, 721}) {
       Frame frame (rig, ellipsoid ({0, 0, 0}, {0.09, 0.2, 0.11}));
       CylinderSettings settings;
-      settings.units.columns = columns;
-      settings.units.unit_height_m = 1.0 / columns;
-      settings.bodies = 1 + views % 8;
+      settings.cells.columns = columns;
+      settings.cells.height_m = 1.0 / columns;
+      settings.max_clusters = 1 + views % 8;
       const CylinderResult result = run (filter, frame, settings);
       const bool some_went = result.points_out < result.points_in;
       EXPECT_TRUE (some_went || views < 30); /* few that coarse see no place twice */
