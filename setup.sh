@@ -2,20 +2,37 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
 # Quick when nothing changed. Everything it prints beyond a line goes to build/setup.log.
+# usage: setup.sh [--demo | --tests]
+#   --demo   plugins and programs of the demo only, without calibration, cameras, RTSP server, tests and benchmarks
+#   --tests  everything, as without an option
 set -euo pipefail
 cd "$(dirname "$0")"
 
+targets=(all)
+case "${1:-}" in
+  --demo) targets=(plugins programs) ;;
+  --tests | "") ;;
+  *)
+    echo "setup.sh: unknown option '$1'; expected --demo or --tests" >&2
+    exit 2
+    ;;
+esac
+
 packages=(
   # build
-  gcc g++ meson ninja-build pkg-config git ca-certificates
-  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev
-  libopencv-dev libopencv-contrib-dev libceres-dev libassimp-dev libturbojpeg0-dev libzstd-dev zlib1g-dev libpng-dev libdraco-dev
-  libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev libcairo2-dev
+  gcc g++ meson ninja-build pkg-config git ca-certificates python3
+  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev libopencv-dev libassimp-dev libyaml-dev zlib1g-dev libcairo2-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
-  # test
-  libgtest-dev python3 iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
+)
+[ "${targets[0]}" != all ] || packages+=(
+  # calibration, cameras, RTSP server
+  libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
+  # benchmarks
+  libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev
+  # tests
+  libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )
 
 installed= # "yes" once packages were
@@ -51,7 +68,7 @@ build () {
     { meson configure build --clearcache && meson setup build --reconfigure; } >"$log" 2>&1 || { cat "$log" >&2; return 1; }
   fi
   [ -f build/build.ninja ] || { echo "setup.sh: configuring"; meson setup build >"$log" 2>&1 || { cat "$log" >&2; return 1; }; }
-  ninja -C build >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+  ninja -C build "${targets[@]}" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
 }
 
 install_packages

@@ -71,7 +71,7 @@ sheet gallery-overlap.jpg stereo.rcnc "mode=off|$near mode=strips" "overlap=1|$n
 sheet gallery-modes.jpg exact.rcnc "overlap=1|$near mode=points" "overlap=1|$near mode=rectangles" "overlap=1|$near mode=strips" "overlap=8|$near mode=blend"
 sheet gallery-bare.jpg bare.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
 sheet gallery-dressed.jpg dressed.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
-units="azimuth=20 elevation=8 show-units=true mode=strips"
+units="azimuth=20 elevation=8 tint-views=true mode=strips"
 sheet gallery-units.jpg exact.rcnc "mode=off|$units" "overlap=1|$units"
 python3 "$docs/../tests/bench/bad-views.py" "$out/gallery-bad-views.jpg"
 if command -v ffmpeg >/dev/null; then

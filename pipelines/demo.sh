@@ -63,7 +63,7 @@ while [ $# -gt 0 ]; do
   shift || { echo "demo.sh: the last option lacks its value" >&2; exit 2; }
 done
 
-./setup.sh
+./setup.sh --demo
 source pipelines/env.sh
 need_size "$size" --size
 [ "${size%x*}" -ge 16 ] && [ "${size#*x}" -ge 16 ] && [ "${size%x*}" -le 4096 ] && [ "${size#*x}" -le 4096 ] ||

@@ -19,8 +19,9 @@ build = pathlib.Path(os.environ.get("RANGECAST_BUILD", pages.parent.parent / "bu
 def tables(*element):
     environment = os.environ | {"GST_PLUGIN_PATH": str(build / "gst")}
     environment.setdefault("GST_REGISTRY", str(build / "registry.bin"))
-    return subprocess.run([build / "tests/pipelines/element-tables", *element], env=environment, check=True, text=True,
+    text = subprocess.run([build / "tests/pipelines/element-tables", *element], env=environment, check=True, text=True,
                           capture_output=True).stdout
+    return text.replace("between rangecast-stats messages", "between [rangecast-stats](../guide/statistics.md) messages")
 
 
 def updated(element, text):

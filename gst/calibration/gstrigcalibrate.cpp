@@ -3,10 +3,10 @@
  * SECTION:element-rigcalibrate
  * @title: rigcalibrate
  *
- * Calibrates any number of cameras from pictures of a chessboard or ChArUco board: each camera,
- * each stereo pair, and where all of them stand. Picks the frames itself, says by element messages
- * which camera saw the board and what is still missing, and writes the rig file that all elements
- * read, at EOS or on the action signal #GstRigCalibrate::calibrate.
+ * Calibrates any number of cameras, stereo pairs and their poses from images of a chessboard or
+ * ChArUco board. Selects frames automatically, reports in element messages which camera saw the
+ * board and what is still missing, and writes the rig file at EOS or on the action signal
+ * #GstRigCalibrate::calibrate.
  *
  * ## Example launch line
  * |[
@@ -30,8 +30,8 @@
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/geometry/rig_file.hpp>
 #include <rangecast/geometry/size_text.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::CalibrationCamera;
 using rangecast::size_text;
@@ -668,10 +668,8 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   object_class->get_property = gst_rig_calibrate_get_property;
   object_class->finalize = gst_rig_calibrate_finalize;
   calibration_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: examined, taken, skipped, dropped",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: examined, taken, skipped, dropped");
   install_signals (klass);
 
   gst_element_class_add_static_pad_template_with_gtype (

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "pad.hpp"
 
+#include "common/properties.hpp"
+
 #include <rangecast/geometry/range_image.hpp>
 
 using rangecast::CameraRole;
@@ -90,8 +92,7 @@ gst_rig_calibrate_pad_class_init (GstRigCalibratePadClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   object_class->set_property = gst_rig_calibrate_pad_set_property;
   object_class->get_property = gst_rig_calibrate_pad_get_property;
-  constexpr auto kReady =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  constexpr auto kReady = kMutableReady;
   g_object_class_install_property (object_class, PROP_VIEW,
       g_param_spec_int ("view", "View",
           "view-id of the view that the camera belongs to (default: the number of the pad)", 0,

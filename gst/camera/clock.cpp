@@ -58,7 +58,9 @@ CamSourceClock::open (const std::string &text)
     clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
   } else {
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))
-      return {StatusCode::kNotFound, "clock-server " + text + ": PTP is not available; expected"};
+      return {StatusCode::kNotFound, "clock-server " + text +
+                                         ": PTP is not available; expected gst-ptp-helper with the "
+                                         "right to bind ports 319 and 320"};
     clock_ = gst_ptp_clock_new ("stereocamsrc-clock", static_cast<guint> (server.port));
   }
   if (!clock_)

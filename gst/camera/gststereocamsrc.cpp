@@ -3,14 +3,14 @@
  * SECTION:element-stereocamsrc
  * @title: stereocamsrc
  *
- * Two or three machine-vision cameras (GigE Vision, USB3 Vision) that take their pictures together.
- * Pads `left` and `right` are always there, `third` if such a camera is named. Pictures of one
- * trigger have one PTS and one capture time; a picture whose partner was lost is dropped, counted,
- * and never shifts the others.
+ * Captures synchronised images from two or three machine-vision cameras (GigE Vision, USB3 Vision).
+ * Pads `left` and `right` always exist, `third` if a third camera is named. Images of one trigger
+ * have one PTS and one capture time; an image whose partner was lost is dropped and counted,
+ * without affecting later pairs.
  *
- * With trigger=software or action the cameras are fired at the multiples of the frame period of the
- * pipeline's clock: hosts that share a clock (#GstStereoCamSrc:clock-server) fire at the same
- * moments. Pixels are not copied: buffers are the cameras' own, and go back to them.
+ * With trigger=software or action the cameras are triggered at multiples of the frame period on the
+ * pipeline clock, so hosts that share a clock (#GstStereoCamSrc:clock-server) capture
+ * simultaneously. Images are not copied: buffers return to their camera when released.
  *
  * ## Element messages
  * - `stereocamsrc-stats`, every 5 s: the fields of #GstStereoCamSrc:stats.
@@ -35,6 +35,7 @@
 #include <utility>
 
 #include "clock.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "session.hpp"
 
@@ -461,9 +462,7 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->get_property = gst_stereo_cam_src_get_property;
   object_class->finalize = gst_stereo_cam_src_finalize;
   camera_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS, "Counters since the element was started");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
   install_capture (klass);
 

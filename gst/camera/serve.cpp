@@ -201,7 +201,7 @@ CamSourceSession::watch_clock (std::int64_t now_ns, std::int64_t most_ns)
   if (!fires () || now_ns - std::max (ticker_.last_shot_ns (), playing_since_ns_) <= most_ns)
     return;
   fail ({CameraFault::kTimedOut,
-      "the pipeline clock has stopped: no tick for" + std::to_string (most_ns / kSecond) + " s" +
+      "the pipeline clock has stopped: no tick for " + std::to_string (most_ns / kSecond) + " s" +
           (settings_.clock_server.empty ()
                   ? ""
                   : "; is clock-server " + settings_.clock_server + " still the same server?")});

@@ -2,6 +2,7 @@
 #include "settings.hpp"
 
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::Status;
 using rangecast::StatusCode;

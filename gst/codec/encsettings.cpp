@@ -114,19 +114,22 @@ encoder_properties ()
           0, G_MAXUINT, kControllable),
       P::number<&S::rate, &Rate::max_depth_threshold> ("max-depth-threshold",
           "Maximum depth threshold",
-          "Upper limit of the depth threshold with target-bitrate, in quantisation steps", 0, 65535,
-          kControllable),
+          "Upper limit of the depth threshold with target-bitrate, in quantisation steps (at least "
+          "depth-threshold)",
+          0, 65535, kControllable),
       P::number<&S::rate, &Rate::max_colour_threshold> ("max-colour-threshold",
           "Maximum colour threshold",
-          "Upper limit of the colour threshold with target-bitrate, in quantisation steps", 0, 255,
-          kControllable),
+          "Upper limit of the colour threshold with target-bitrate, in quantisation steps (at "
+          "least colour-threshold)",
+          0, 255, kControllable),
       P::boolean<&S::rate, &Rate::adaptive> ("adaptive-bitrate", "Adaptive bit rate",
           "Adapt the bit rate between min-bitrate and target-bitrate to the receiver reports "
           "(RTPTWCCPackets and RangecastReceiverReport events)",
           kMutablePlaying),
       P::number<&S::rate, &Rate::min_bitrate> ("min-bitrate", "Minimum bit rate",
-          "Lower limit of the bit rate with adaptive-bitrate, in bits per second", 1000, G_MAXUINT,
-          kControllable),
+          "Lower limit of the bit rate with adaptive-bitrate, in bits per second (at most "
+          "target-bitrate)",
+          1000, G_MAXUINT, kControllable),
       P::custom (
           gst_param_spec_fraction ("min-framerate", "Minimum frame rate",
               "Minimum number of frame sets per second to keep when adaptive-bitrate drops frame "

@@ -3,15 +3,15 @@
  * SECTION:element-neighbourcodedec
  * @title: neighbourcodedec
  *
- * Decodes range images from the neighbour code. Slices that are lost or damaged leave invalid
- * pixels (or, by #GstNeighbourCodeDec:conceal, the last ones), never an error.
+ * Decodes neighbour-coded range images. Lost or damaged slices leave invalid pixels (or repeat the
+ * last ones, see #GstNeighbourCodeDec:conceal) and are never an error.
  *
- * Frame sets may refer to earlier ones (neighbourcodeenc temporal=true). What refers to something
- * that was lost is left out as if it were lost itself, and the decoder asks upstream for a key
- * frame set (GstForceKeyUnit; RTP: PLI), unless #GstNeighbourCodeDec:request-key-units is off.
+ * Frame sets may refer to earlier ones (neighbourcodeenc temporal=true). Pixels that refer to lost
+ * data are treated as lost, and the decoder requests a key frame set from upstream
+ * (GstForceKeyUnit; RTP: PLI) unless #GstNeighbourCodeDec:request-key-units is false.
  *
- * Where buffers are slices (alignment=slice), a frame set ends with a buffer that has the MARKER
- * flag, before one of another capture time, or where the stream ends.
+ * With alignment=slice a frame set ends with a buffer that has the MARKER flag, before one of
+ * another capture time, or at the end of the stream.
  *
  * ## Example launch line
  * |[

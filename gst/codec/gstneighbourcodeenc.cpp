@@ -3,17 +3,16 @@
  * SECTION:element-neighbourcodeenc
  * @title: neighbourcodeenc
  *
- * Codes range images with the neighbour code: depth and colour of a pixel together, in slices that
- * decode without one another. The format is specified in docs/formats/bitstream.md.
+ * Encodes depth and colour of range images jointly with the neighbour code, in slices that decode
+ * independently. The format is specified in docs/formats/bitstream.md.
  *
- * With temporal=true pixels may also equal those of the frame set before; this takes half the bytes
- * or less where a person moves before a still camera. Key frame sets, which need no earlier one,
- * come first, at least every key-interval, and when somebody asks (GstForceKeyUnit, from up- or
- * downstream; RTP: PLI, FIR); all others have the DELTA_UNIT flag. What a loss damaged is whole
- * again after refresh-period at the latest, also without key frame sets.
+ * With temporal=true pixels may be predicted from the previous frame set, which halves the bit rate
+ * of a person moving before a still camera. Key frame sets come first, at least every key-interval,
+ * and on GstForceKeyUnit from upstream or downstream (RTP: PLI, FIR); others have the DELTA_UNIT
+ * flag. Damage from losses ends after refresh-period at the latest.
  *
- * A buffer is a frame set, or a slice of one where downstream asks for alignment=slice: then the
- * last of a frame set has the MARKER flag.
+ * A buffer is a frame set, or a slice if downstream requires alignment=slice; the last slice of a
+ * frame set has the MARKER flag.
  *
  * ## Example launch line
  * |[

@@ -3,9 +3,9 @@
  * SECTION:element-neighbourcodeparse
  * @title: neighbourcodeparse
  *
- * Turns files of coded frame sets into access units, and access units into the byte stream that
- * files hold: whichever downstream asks for. Goes on after damage at the next start code. Files
- * can be sought by time. Comes with a typefinder.
+ * Converts between files of coded frame sets and access units, as downstream requires. Parsing
+ * resumes at the next start code after damage. Files can be sought by time. Comes with a
+ * typefinder.
  *
  * ## Example launch lines
  * |[

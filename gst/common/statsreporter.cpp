@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "statsreporter.hpp"
 
+#include "common/properties.hpp"
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -282,8 +284,7 @@ StatsReporter::install (GObjectClass *object_class, guint property_id)
   g_object_class_install_property (object_class, property_id,
       g_param_spec_uint ("stats-interval", "Statistics interval",
           "Interval between rangecast-stats messages in milliseconds (0 = never)", 0,
-          kLongestIntervalMs, kDefaultIntervalMs,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          kLongestIntervalMs, kDefaultIntervalMs, kMutablePlaying));
 }
 
 void

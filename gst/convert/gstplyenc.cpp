@@ -3,7 +3,7 @@
  * SECTION:element-plyenc
  * @title: plyenc
  *
- * Writes each frame set as a point cloud: one binary PLY (or PCD) file a buffer, in world
+ * Encodes each frame set as a point cloud: one binary PLY or PCD file per buffer, in world
  * coordinates and metres, for multifilesink.
  *
  * ## Example launch line
@@ -21,9 +21,10 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <new>
-#include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/base/guarded.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
 
+#include "common/properties.hpp"
 #include "common/streamlock.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
@@ -237,16 +238,14 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
 
   g_object_class_install_property (object_class, PROP_VIEW_ID,
       g_param_spec_boolean ("view-id", "View ID",
-          "Write the view-id of each point as property view_id", FALSE,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          "Write the view-id of each point as property view_id", FALSE, kMutablePlaying));
   g_object_class_install_property (object_class, PROP_NORMALS,
       g_param_spec_boolean ("normals", "Normals",
           "Write a unit normal for each point, estimated from the neighbouring pixels", FALSE,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          kMutablePlaying));
   g_object_class_install_property (object_class, PROP_FORMAT,
       g_param_spec_enum ("format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT,
-          PointCloudFormat::kPly,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
+          PointCloudFormat::kPly, kMutableReady));
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

@@ -3,9 +3,9 @@
  * SECTION:element-rangesplit
  * @title: rangesplit
  *
- * Gives depth and colour of single views as ordinary video, at the full size of the view, to look
- * at or to hand on. Request pads: `depth` and `colour` of the view that #GstRangeSplit:view-id
- * names, `depth_%u` and `colour_%u` of the view with that id.
+ * Converts single views to depth and colour video, at the full size of the view. Request pads:
+ * `depth` and `colour` of the view #GstRangeSplit:view-id, `depth_%u` and `colour_%u` of the view
+ * with that id.
  *
  * ## Example launch line
  * |[
@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "common/bufferpools.hpp"
+#include "common/properties.hpp"
 
 using rangecast::ConstRangeImage;
 using rangecast::ImageView;
@@ -451,8 +452,6 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
-  const auto playing =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
   object_class->set_property = gst_range_split_set_property;
   object_class->get_property = gst_range_split_get_property;
@@ -461,10 +460,10 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
   g_object_class_install_property (object_class, PROP_VIEW_ID,
       g_param_spec_int ("view-id", "View ID",
           "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
-          rangecast::kMaxViews - 1, kFirstView, playing));
+          rangecast::kMaxViews - 1, kFirstView, kMutablePlaying));
   g_object_class_install_property (object_class, PROP_MASK,
-      g_param_spec_boolean (
-          "mask", "Mask colour", "Make colour black where depth is invalid", TRUE, playing));
+      g_param_spec_boolean ("mask", "Mask colour", "Make colour black where depth is invalid", TRUE,
+          kMutablePlaying));
 
   for (GstStaticPadTemplate *pad_template :
       {&sink_template, &depth_template, &colour_template, &depth_of_template, &colour_of_template})

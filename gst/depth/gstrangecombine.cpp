@@ -3,8 +3,8 @@
  * SECTION:element-rangecombine
  * @title: rangecombine
  *
- * Makes range images of any depth camera: colour and depth become one view. They may be registered
- * pixel to pixel, of different size, or of two cameras that stand side by side (see
+ * Combines the colour and depth images of any depth camera into range images of one view. They may
+ * be registered pixel to pixel, of different size, or of two cameras side by side (see
  * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16_LE in any unit
  * (default: millimetres).
  *
@@ -32,9 +32,11 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <string>
 
 #include "common/bufferpools.hpp"
+#include "common/properties.hpp"
 
 using rangecast::RangeImage;
 using rangecast::RegisterInto;
@@ -46,21 +48,7 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_range_combine_debug);
 #define GST_CAT_DEFAULT gst_range_combine_debug
 
-enum {
-  PROP_0,
-  PROP_RIG,
-  PROP_VIEW_ID,
-  PROP_COLOUR_VIEW_ID,
-  PROP_INTO,
-  PROP_FOCAL_LENGTH,
-  PROP_PRINCIPAL_X,
-  PROP_PRINCIPAL_Y,
-  PROP_DEPTH_SCALE,
-  PROP_DEPTH_UNIT,
-  PROP_NEAR,
-  PROP_FAR,
-  PROP_STATS
-};
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 
 static constexpr double kDefaultDepthScale = 0.001;
 static constexpr double kDefaultDepthUnit = 0.0001;
@@ -519,49 +507,52 @@ gst_range_combine_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
+static PropertyTable<CombineSettings> &
+combine_properties ()
+{
+  using S = CombineSettings;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::text<&S::rig> ("rig", "Rig",
+          "Rig file with the calibration of the view (unset = a pinhole camera at the origin with "
+          "focal-length)",
+          kMutableReady),
+      P::number<&S::view_id> ("view-id", "View ID",
+          "view-id of the depth camera, and of the output unless into=colour", 0,
+          rangecast::kMaxViews - 1, kMutableReady),
+      P::number<&S::colour_view_id> ("colour-view-id", "Colour view ID",
+          "view-id of the colour camera in the rig (-1 = colour and depth are registered)", -1,
+          rangecast::kMaxViews - 1, kMutableReady),
+      P::enumeration<&S::into> ("into", "Output view",
+          "Output view if colour and depth come from different cameras",
+          GST_TYPE_RANGE_COMBINE_INTO, kMutableReady),
+      P::number<&S::focal_length> ("focal-length", "Focal length",
+          "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, kMutableReady),
+      P::number<&S::principal_x> ("principal-x", "Principal point x",
+          "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
+          kMutableReady),
+      P::number<&S::principal_y> ("principal-y", "Principal point y",
+          "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
+          kMutableReady),
+      P::number<&S::depth_scale> ("depth-scale", "Depth scale",
+          "Metres per unit of the input depth", 1e-7, 1, kMutableReady),
+      P::number<&S::depth_unit> ("depth-unit", "Depth unit",
+          "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, kMutableReady),
+      P::number<&S::near> ("near", "Near",
+          "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
+      P::number<&S::far> ("far", "Far", "Farthest valid depth in metres (0 = from the rig, or 6)",
+          0, 1e4, kMutableReady),
+  };
+  return table;
+}
+
 static void
 gst_range_combine_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
   std::lock_guard guard (priv->lock);
-  CombineSettings &settings = priv->settings;
-  switch (id) {
-    case PROP_RIG:
-      settings.rig = g_value_get_string (value) ? g_value_get_string (value) : "";
-      break;
-    case PROP_VIEW_ID:
-      settings.view_id = g_value_get_int (value);
-      break;
-    case PROP_COLOUR_VIEW_ID:
-      settings.colour_view_id = g_value_get_int (value);
-      break;
-    case PROP_INTO:
-      settings.into = RegisterInto (g_value_get_enum (value));
-      break;
-    case PROP_FOCAL_LENGTH:
-      settings.focal_length = g_value_get_double (value);
-      break;
-    case PROP_PRINCIPAL_X:
-      settings.principal_x = g_value_get_double (value);
-      break;
-    case PROP_PRINCIPAL_Y:
-      settings.principal_y = g_value_get_double (value);
-      break;
-    case PROP_DEPTH_SCALE:
-      settings.depth_scale = g_value_get_double (value);
-      break;
-    case PROP_DEPTH_UNIT:
-      settings.depth_unit = g_value_get_double (value);
-      break;
-    case PROP_NEAR:
-      settings.near = g_value_get_double (value);
-      break;
-    case PROP_FAR:
-      settings.far = g_value_get_double (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!combine_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -569,50 +560,13 @@ gst_range_combine_get_property (GObject *object, guint id, GValue *value, GParam
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
   std::lock_guard guard (priv->lock);
-  const CombineSettings &settings = priv->settings;
-  switch (id) {
-    case PROP_RIG:
-      g_value_set_string (value, settings.rig.empty () ? nullptr : settings.rig.c_str ());
-      break;
-    case PROP_VIEW_ID:
-      g_value_set_int (value, settings.view_id);
-      break;
-    case PROP_COLOUR_VIEW_ID:
-      g_value_set_int (value, settings.colour_view_id);
-      break;
-    case PROP_INTO:
-      g_value_set_enum (value, int (settings.into));
-      break;
-    case PROP_FOCAL_LENGTH:
-      g_value_set_double (value, settings.focal_length);
-      break;
-    case PROP_PRINCIPAL_X:
-      g_value_set_double (value, settings.principal_x);
-      break;
-    case PROP_PRINCIPAL_Y:
-      g_value_set_double (value, settings.principal_y);
-      break;
-    case PROP_DEPTH_SCALE:
-      g_value_set_double (value, settings.depth_scale);
-      break;
-    case PROP_DEPTH_UNIT:
-      g_value_set_double (value, settings.depth_unit);
-      break;
-    case PROP_NEAR:
-      g_value_set_double (value, settings.near);
-      break;
-    case PROP_FAR:
-      g_value_set_double (value, settings.far);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (
-          value, gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
-                     priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
-                     "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    g_value_take_boxed (
+        value, gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
+                   priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
+                   "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr));
+  else if (!combine_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -635,53 +589,6 @@ gst_range_combine_init (GstRangeCombine *self)
 }
 
 static void
-install_properties (GObjectClass *object_class)
-{
-  const auto ready =
-      GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-  const auto install_double = [&] (guint id, const char *name, const char *nick, const char *blurb,
-                                  double minimum, double maximum, double fallback) {
-    g_object_class_install_property (object_class, id,
-        g_param_spec_double (name, nick, blurb, minimum, maximum, fallback, ready));
-  };
-  g_object_class_install_property (object_class, PROP_RIG,
-      g_param_spec_string ("rig", "Rig",
-          "Rig file with the calibration of the view (unset = a pinhole camera at the origin with "
-          "focal-length)",
-          nullptr, ready));
-  g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View ID",
-          "view-id of the depth camera, and of the output unless into=colour", 0,
-          rangecast::kMaxViews - 1, 0, ready));
-  g_object_class_install_property (object_class, PROP_COLOUR_VIEW_ID,
-      g_param_spec_int ("colour-view-id", "Colour view ID",
-          "view-id of the colour camera in the rig (-1 = colour and depth are registered)", -1,
-          rangecast::kMaxViews - 1, -1, ready));
-  g_object_class_install_property (object_class, PROP_INTO,
-      g_param_spec_enum ("into", "Output view",
-          "Output view if colour and depth come from different cameras",
-          GST_TYPE_RANGE_COMBINE_INTO, int (RegisterInto::kDepth), ready));
-  install_double (PROP_FOCAL_LENGTH, "focal-length", "Focal length",
-      "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, 0);
-  install_double (PROP_PRINCIPAL_X, "principal-x", "Principal point x",
-      "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
-  install_double (PROP_PRINCIPAL_Y, "principal-y", "Principal point y",
-      "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6, -1);
-  install_double (PROP_DEPTH_SCALE, "depth-scale", "Depth scale",
-      "Metres per unit of the input depth", 1e-7, 1, kDefaultDepthScale);
-  install_double (PROP_DEPTH_UNIT, "depth-unit", "Depth unit",
-      "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, 0);
-  install_double (PROP_NEAR, "near", "Near",
-      "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, 0);
-  install_double (
-      PROP_FAR, "far", "Far", "Farthest valid depth in metres (0 = from the rig, or 6)", 0, 1e4, 0);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, dropped-colour, dropped-depth",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-}
-
-static void
 gst_range_combine_class_init (GstRangeCombineClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -691,7 +598,9 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   object_class->set_property = gst_range_combine_set_property;
   object_class->get_property = gst_range_combine_get_property;
   object_class->finalize = gst_range_combine_finalize;
-  install_properties (object_class);
+  combine_properties ().install (object_class, PROP_SETTINGS);
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, dropped-colour, dropped-depth");
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &colour_template, GST_TYPE_AGGREGATOR_PAD);
@@ -701,8 +610,6 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
       "Combines the colour and depth images of a depth camera into range images", "gst-rangecast");
-
-  gst_type_mark_as_plugin_api (GST_TYPE_RANGE_COMBINE_INTO, GstPluginAPIFlags (0));
 
   aggregator_class->start = gst_range_combine_start;
   aggregator_class->stop = gst_range_combine_stop;

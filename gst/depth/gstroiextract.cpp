@@ -3,10 +3,9 @@
  * SECTION:element-roiextract
  * @title: roiextract
  *
- * Clears the background of range images and crops them to what is left. The background of each
- * view is learnt over the first frames, on #GstRoiExtract::capture-background, or loaded.
- *
- * While it learns, views come out with an empty ROI.
+ * Removes the background of range images by depth and colour and crops them to the foreground. The
+ * background of each view is learnt from the first frames or on #GstRoiExtract::capture-background,
+ * or loaded from a file. While learning, views have an empty ROI.
  *
  * ## Example launch line
  * |[
@@ -31,6 +30,7 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
+#include <rangecast/roi/opencv_threads.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
@@ -364,7 +364,7 @@ process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSet
     return s;
   if (Status s = check_views (priv, frame); !s.ok ())
     return s;
-  rangecast::in_parallel (images.size (), settings.n_threads, [&] (std::size_t i) {
+  rangecast::in_parallel_with_opencv (images.size (), settings.n_threads, [&] (std::size_t i) {
     process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
         images[i], settings);
   });
@@ -539,11 +539,9 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   object_class->get_property = gst_roi_extract_get_property;
   object_class->finalize = gst_roi_extract_finalize;
   roi_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, points-in, points-out; and the last ROI "
-          "of the first view",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, points-in, points-out; and the last ROI "
+      "of the first view");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   /**

@@ -3,17 +3,16 @@
  * SECTION:element-stereodepth
  * @title: stereodepth
  *
- * Makes range images of a stereo pair: rectifies both pictures with the calibration of a rig file,
- * matches them, checks left against right, filters, and converts disparity to depth. Pictures that
- * are rectified already need only #GstStereoDepth:focal-length and #GstStereoDepth:baseline.
+ * Computes range images from a stereo pair: rectifies both images with the calibration of a rig
+ * file, matches them, filters the disparities and converts them to depth. Rectified input needs
+ * only #GstStereoDepth:focal-length and #GstStereoDepth:baseline.
  *
- * An element downstream can tell which part of the picture it wants with a custom upstream event
- * `GstRangeRoi` (view-id, x, y, width, height: uint); roiextract does. Then only that part is
- * matched, at the depths where its surfaces were, but for one full picture every
- * #GstStereoDepth:refresh-interval frames.
+ * Downstream can request a region with a custom upstream event `GstRangeRoi` (view-id, x, y, width,
+ * height: uint), as roiextract does. Only that region is then matched, near its previous depths,
+ * with a full image every #GstStereoDepth:refresh-interval frames.
  *
- * A third camera on the request pad `third`, beside or above the left one, fills in what the right
- * one does not see. It needs a rig file that has it.
+ * A third camera on the request pad `third`, beside or above the left one, adds depth that the
+ * right camera cannot see. It needs a rig file that contains it.
  *
  * ## Example launch line
  * |[
@@ -745,11 +744,9 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   object_class->get_property = gst_stereo_depth_get_property;
   object_class->finalize = gst_stereo_depth_finalize;
   stereo_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, restricted-frames, third-frames, "
-          "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, restricted-frames, third-frames, "
+      "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template :

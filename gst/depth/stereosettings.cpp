@@ -2,6 +2,7 @@
 #include "stereosettings.hpp"
 
 #include <rangecast/geometry/range_image.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::MatchAlgorithm;
 using rangecast::Status;

@@ -4,9 +4,9 @@
 #include <gst/gst.h>
 
 #include <array>
+#include <rangecast/base/status.hpp>
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
-#include <rangecast/base/status.hpp>
 #include <span>
 #include <vector>
 

@@ -3,10 +3,10 @@
  * SECTION:element-rangedemux
  * @title: rangedemux
  *
- * Gives each view of a frame set stream, raw or coded, on a pad of its own: the inverse of
- * rangemux. Pad `src_3` has view 3. Pads come with the caps, whose rig names the views, and go
- * with a rig that lacks them. Memories are shared, no pixel is copied. A view that a frame set
- * lacks is a GAP on its pad.
+ * Splits a stream of frame sets, raw or coded, into one stream per view; the inverse of rangemux.
+ * Pad `src_3` has view 3. Pads are added with caps, whose rig names the views, and removed with a
+ * rig that lacks them. Memories are shared, no pixel is copied. A view missing in a frame set is a
+ * GAP on its pad.
  *
  * ## Example launch line
  * |[
@@ -33,6 +33,7 @@
 #include <vector>
 
 #include "codedviews.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
 using gstrange::RangeInfo;
@@ -483,10 +484,8 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   object_class->get_property = gst_range_demux_get_property;
   object_class->finalize = gst_range_demux_finalize;
 
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, buffers, gaps, dropped",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, buffers, gaps, dropped");
 
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 

@@ -3,17 +3,15 @@
  * SECTION:element-rangemux
  * @title: rangemux
  *
- * Puts the views of several streams together, all raw or all coded, matched by capture time. In a
- * live pipeline it waits for a late stream no longer than #GstAggregator:latency, goes on without
- * one that is gone, and takes it back when it returns. Of up to 16 memories, as many as a
- * #GstBuffer holds, no pixel is copied (a raw stream has one a view); of more, the first 15 are
- * shared, and the others are copied once.
+ * Combines the views of several streams, all raw or all coded, into frame sets by capture time. In
+ * a live pipeline it waits for late streams up to #GstAggregator:latency, continues without streams
+ * that are gone and includes them again when they return. Frame sets of up to 16 memories share
+ * them without copying; of more, the first 15 are shared and the others copied once.
  *
- * Of recordings, the earlier one goes alone until the other one begins, and frame sets are as far
- * apart as they were captured, wherever the PTS of each recording begin.
+ * Recordings that begin at different times are aligned by capture time, independently of their PTS.
  *
- * With #GstRangeMux:clock-port it publishes the pipeline's clock, so that all camera hosts may fire
- * at the same time.
+ * With #GstRangeMux:clock-port it publishes the pipeline clock, so that all camera hosts can
+ * trigger simultaneously.
  *
  * ## Example launch line
  * |[
@@ -30,7 +28,9 @@
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
+#include "common/properties.hpp"
 #include "rangemuxprivate.hpp"
 
 using rangecast::Status;
@@ -415,25 +415,20 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
       g_param_spec_uint64 ("max-skew", "Maximum skew",
           "Maximum difference of the capture times within a frame set in nanoseconds (0 = half a "
           "frame period, or 5 ms if the frame rate is unknown)",
-          0, G_MAXINT64, 0,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          0, G_MAXINT64, 0, kMutablePlaying));
   g_object_class_install_property (object_class, PROP_CLOCK_PORT,
       g_param_spec_int ("clock-port", "Clock port",
           "UDP port on which to publish the pipeline clock for GstNetClientClock (-1 = do not "
           "publish, 0 = any free port, readable once published)",
-          -1, 65535, ClockPublisher::kOff,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
+          -1, 65535, ClockPublisher::kOff, kMutableReady));
   g_object_class_install_property (object_class, PROP_RIG,
       g_param_spec_string ("rig", "Rig",
           "Rig file that all streams must agree with; a stream with other cameras is left out when "
           "live, else it is an error (unset = no check)",
-          nullptr,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: frames, complete, incomplete, dropped-late, "
-          "out-of-step, left-out, and a structure for each sink pad",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          nullptr, kMutableReady));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: frames, complete, incomplete, dropped-late, "
+      "out-of-step, left-out, and a structure for each sink pad");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template_with_gtype (

@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "clockconsensus.hpp"
 #include "clockpublisher.hpp"
-#include "gstrangemux.h"
+#include "common/statsreporter.hpp"
 #include "frameset.hpp"
+#include "gstrangemux.h"
 #include "recordings.hpp"
 #include "stats.hpp"
-#include "clockconsensus.hpp"
 #include "streams.hpp"
 #include "waiting.hpp"
-#include "common/statsreporter.hpp"
 
 struct GstRangeMuxPrivate {
   std::mutex lock; /* guards pads (the vector), counters, max_skew and rig_file; never held across a

@@ -3,8 +3,8 @@
 
 /* What rangemux counts, as applications read it. Call with the element's lock. */
 
-#include "streams.hpp"
 #include "common/statsreporter.hpp"
+#include "streams.hpp"
 
 /** Frame sets since start: those that went out, and of them those with a buffer of every pad. */
 struct MuxCounters {

@@ -3,11 +3,11 @@
  * SECTION:element-cylinderfilter
  * @title: cylinderfilter
  *
- * Clears the points that several views of a frame set see of the same place, all but those of the
- * view that sees it most squarely. Before that, errors of the rig are corrected, views that
- * contradict the others left out, points that another view contradicts cleared, and colours made to
- * agree (#GstCylinderFilter:agree, #GstCylinderFilter:colour-balance); points move only with
- * agree=depth.
+ * Removes redundant points: where several views of a frame set see the same surface, the points of
+ * the view that faces it most directly stay and the others are cleared. Before that, pose errors
+ * are corrected, views and points that contradict others are left out (#GstCylinderFilter:agree),
+ * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with
+ * consistency=depth.
  *
  * ## Example launch line
  * |[

@@ -3,10 +3,10 @@
  * SECTION:element-rangerender
  * @title: rangerender
  *
- * Draws range images as ordinary video: cylinderfilter, striprender and gldownload in one. Players
- * that put pipelines together by themselves (playbin, decodebin) find it as the decoder of range
- * images. The picture stays in OpenGL memory where downstream takes that. The elements inside are
- * named `cylinder` and `render`; gst-launch-1.0 sets their properties as `render::auto-orbit=30`.
+ * Renders range images as raw video: cylinderfilter, striprender and gldownload in one bin, which
+ * playbin and decodebin plug as the decoder of range images. Pictures stay in OpenGL memory if
+ * downstream accepts it. The elements inside are named `cylinder` and `render`; gst-launch-1.0 sets
+ * their properties with names such as `render::auto-orbit=30`.
  *
  * ## Example launch lines
  * |[

@@ -3,14 +3,13 @@
  * SECTION:element-striprender
  * @title: striprender
  *
- * Draws range images with OpenGL as bands of triangles along their rows, without building a mesh.
- * The camera orbits what the rig's cameras look at: by properties, which are controllable, and by
- * mouse, touch and keys (GstNavigation): drag to turn, drag with another button to move, wheel to
- * zoom, arrows, + and -, and the keys r and Home to go back. With #GstStripRender:fit it is centred
- * on what is drawn.
+ * Renders range images with OpenGL without building a mesh. The virtual camera orbits the point
+ * that the rig's cameras look at, controlled by properties and by navigation events: left-drag
+ * orbits, other buttons pan, the wheel, + and - zoom, arrows orbit, r and Home reset. With
+ * #GstStripRender:fit it is centred on the content.
  *
- * Where downstream asks for a frame rate of its own, the element makes it: it repeats and leaves
- * out frame sets, and in a live pipeline goes on drawing the last one when no other comes.
+ * If downstream requests a frame rate, the element generates it by repeating and dropping frame
+ * sets, and in a live pipeline repeats the last one while the stream stalls.
  *
  * ## Example launch line
  * |[

@@ -27,7 +27,7 @@ public:
 
   /** Makes the strips of images that check() has found good; if it is the same frame set as the
    * last time and nothing that strips depend on has changed, all is still there. Colours are of the
-   * images, or tinted (show-units). In mode blend views that look against the viewer are reduced to
+   * images, or tinted (tint-views). In mode blend views that look against the viewer are reduced to
    * half their resolution: they only fill holes. The images must stay mapped as long as the layers
    * are used. */
   void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,

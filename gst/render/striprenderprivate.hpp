@@ -18,7 +18,7 @@
 
 #include <gstrange/gstrangeinfo.hpp>
 #include <mutex>
-#include <rangecast/surface/stats_panel.hpp>
+#include <rangecast/overlay/stats_panel.hpp>
 
 #include "common/statsreporter.hpp"
 #include "drawing.hpp"

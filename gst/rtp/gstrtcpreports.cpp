@@ -3,11 +3,10 @@
  * SECTION:element-rtcpreports
  * @title: rtcpreports
  *
- * Tells an encoder what receivers report in plain RTCP: of each report block about the stream that
- * goes through from sink to src, in the RTCP that goes through from rtcp_sink to rtcp_src, it sends
- * an event RangecastReceiverReport upstream. The stream goes through untouched, and so does RTCP of
- * its receivers, at most `max-receivers` of them; other RTCP does not get to rtpsession, which
- * would keep a source for everybody it ever names.
+ * Sends an upstream event RangecastReceiverReport for each RTCP report block about the stream that
+ * passes from sink to src, read from the RTCP that passes from rtcp_sink to rtcp_src. Both streams
+ * pass unchanged, except that only RTCP of the stream's receivers, and of at most max-receivers of
+ * them, passes: rtpsession keeps a source for every SSRC that it sees.
  *
  * ## Example launch line
  * |[
@@ -29,6 +28,7 @@
 #include <optional>
 #include <span>
 
+#include "common/properties.hpp"
 #include "netarrival.hpp"
 #include "rtcppackets.hpp"
 #include "rtcpreceivers.hpp"
@@ -405,13 +405,10 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
       g_param_spec_uint ("max-receivers", "Maximum receivers",
           "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
           "quarter of it",
-          1, RtcpReceivers::kMax, RtcpReceivers::kDefaultMost,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Current number of receivers, and the RTCP packets refused and malformed since the "
-          "element was started",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          1, RtcpReceivers::kMax, RtcpReceivers::kDefaultMost, kMutablePlaying));
+  install_stats (object_class, PROP_STATS,
+      "Current number of receivers, and the RTCP packets refused and malformed since the "
+      "element was started");
 
   element_class->change_state = gst_rtcp_reports_change_state;
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -3,10 +3,9 @@
  * SECTION:element-rtpneighbourcodedepay
  * @title: rtpneighbourcodedepay
  *
- * Takes coded frame sets out of RTP packets. What arrived of a frame set goes on, also when packets
- * are lost; damaged packets are counted and dropped. The rig comes with the caps (from SDP) or in
- * band; nothing is put out before it is known. The format is specified in
- * docs/formats/rtp-payload.md.
+ * Extracts coded frame sets from RTP packets. Incomplete frame sets are output; damaged packets are
+ * counted and dropped. The rig comes with the caps (from SDP) or in band; nothing is output before
+ * it is known. The format is specified in docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[
@@ -31,8 +30,9 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <vector>
 
-#include "common/statsreporter.hpp"
 #include "common/accessunitassembler.hpp"
+#include "common/properties.hpp"
+#include "common/statsreporter.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -454,7 +454,7 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
       g_param_spec_boxed ("unit-stats", "Unit statistics",
           "Counters since the element was started: packets, units, bad-units, access-units, "
           "unmarked, without-rig, lost-packets, bytes",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          GST_TYPE_STRUCTURE, kReadOnly));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -3,12 +3,11 @@
  * SECTION:element-rtpneighbourcodeguard
  * @title: rtpneighbourcodeguard
  *
- * Lets the packets of one sender of coded frame sets through, and nothing else that arrives at its
- * port: no other bytes, no other codec, no second sender, not its own packets from elsewhere. A
- * sender is who sends some sound packets one after another; another one takes over when it has been
- * silent, sooner from the same address and port. It belongs between udpsrc and rtpjitterbuffer,
- * which one packet of a foreign stream brings out of step. Directly behind udpsrc it has the kernel
- * drop what a flood of foreign packets brings, before it takes the good ones' room.
+ * Passes the RTP packets of one sender of coded frame sets and drops everything else that arrives
+ * at its port. A sender is accepted after consecutive valid packets, and replaced by another when
+ * it has been silent, sooner from the same address and port. Place it between udpsrc and
+ * rtpjitterbuffer, which accepts any RTP packet. Directly behind udpsrc it attaches a socket
+ * filter, so that the kernel drops floods of foreign packets.
  *
  * ## Example launch line
  * |[
@@ -31,6 +30,7 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
 
+#include "common/properties.hpp"
 #include "netarrival.hpp"
 #include "senderfilter.hpp"
 #include "senderprobation.hpp"
@@ -388,7 +388,7 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
   if (verdict == Verdict::kUnsound)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
         ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
-                              "version %d; they belong to another codec, or are encrypted (--key)",
+         "version %d; they belong to another codec, or are encrypted (--key)",
             unsound, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
@@ -579,12 +579,9 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
       g_param_spec_uint64 ("timeout", "Timeout",
           "Silence of the current sender in nanoseconds after which another sender is accepted "
           "(G_MAXUINT64 = never)",
-          0, G_MAXUINT64, kDefaultTimeout,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics",
-          "Counters since the element was started: passed and foreign packets, and senders",
-          GST_TYPE_STRUCTURE, GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+          0, G_MAXUINT64, kDefaultTimeout, kMutablePlaying));
+  install_stats (object_class, PROP_STATS,
+      "Counters since the element was started: passed and foreign packets, and senders");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

@@ -3,9 +3,9 @@
  * SECTION:element-rtpneighbourcodepay
  * @title: rtpneighbourcodepay
  *
- * Puts coded frame sets into RTP packets. Each packet holds whole units, so that it decodes alone.
- * With alignment=slice a packet leaves as soon as its slice comes.
- * The format is specified in docs/formats/rtp-payload.md.
+ * Packs coded frame sets into RTP packets of whole units, which decode independently. With
+ * alignment=slice a packet is sent as soon as its slice arrives. The format is specified in
+ * docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[
@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "common/codedunits.hpp"
+#include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
 using rangecast::Status;
@@ -416,8 +417,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       g_param_spec_int ("config-interval", "Config interval",
           "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
           "frame set)",
-          -1, 3600, kDefaultConfigInterval,
-          GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING)));
+          -1, 3600, kDefaultConfigInterval, kMutablePlaying));
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -3,19 +3,16 @@
  * SECTION:element-avatartestsrc
  * @title: avatartestsrc
  *
- * A rig without cameras: a moving head and shoulders in a textured room, seen by stereo cameras
- * that stand round it. The figure is a built-in one, which may wear hair, glasses, a collar and a
- * hand before its chest (#GstAvatarTestSrc:dress), or a model: #GstAvatarTestSrc:location names a
- * glTF or OBJ file. Of a model of a whole person only head and shoulders are shown unless
- * #GstAvatarTestSrc:model-top says otherwise.
+ * Renders a moving head and shoulders in a textured room, as seen by a rig of stereo cameras. The
+ * figure is built in, with accessories (#GstAvatarTestSrc:dress), or a glTF or OBJ model
+ * (#GstAvatarTestSrc:location, #GstAvatarTestSrc:model-top).
  *
- * Request pads: `left`, `right` and `third` give the cameras of one view, `src` gives exact range
- * images. All pads are fed by one thread; where several are used, put a queue behind each. Pads
- * may come and go in any state.
+ * Request pads `left`, `right` and `third` output the cameras of one view, `src` outputs exact
+ * range images. One thread feeds all pads: put a queue behind each where there are several. Pads
+ * may be requested and released in any state.
  *
- * The same properties, size and time give the same pictures in every process. Live, pictures are
- * taken at multiples of the frame period of the pipeline's clock. Not live, the source can be
- * sought.
+ * The same properties, size and time give the same images in every process. Live, frames are at
+ * multiples of the frame period on the pipeline clock. Not live, the source can be sought in TIME.
  *
  * ## Example launch lines
  * |[
@@ -257,9 +254,7 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
   object_class->get_property = gst_avatar_test_src_get_property;
   object_class->finalize = gst_avatar_test_src_finalize;
   avatar_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_STATS,
-      g_param_spec_boxed ("stats", "Statistics", "Counters since the element was started",
-          GST_TYPE_STRUCTURE, kReadOnly));
+  install_stats (object_class, PROP_STATS, "Counters since the element was started");
 
   for (GstStaticPadTemplate *pad_template :
       {&src_template, &left_template, &right_template, &third_template})

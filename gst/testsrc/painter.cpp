@@ -7,6 +7,7 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <new>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::PixelFormat;
 using rangecast::Rgbx;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
-#include <rangecast/geometry/range_image.hpp>
 #include <rangecast/base/status.hpp>
+#include <rangecast/geometry/range_image.hpp>
 #include <span>
 
 #include "gstrangemeta.h"

@@ -22,31 +22,35 @@ domain_of (StatusCode code)
       return {GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_SETTINGS};
     case StatusCode::kUnsupported:
       return {GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE};
+    case StatusCode::kInternal:
+      return {GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_FAILED};
     default:
       return {GST_STREAM_ERROR, GST_STREAM_ERROR_DECODE};
   }
 }
 
 static void
-post (GstElement *element, const Status &status, GstMessageType type)
+post (GstElement *element, const Status &status, GstMessageType type,
+    const std::source_location &caller)
 {
   const ErrorDomain error = domain_of (status.code ());
   gst_element_message_full (element, type, error.domain, error.code,
-      g_strdup (status.message ().c_str ()), nullptr, __FILE__, GST_FUNCTION, __LINE__);
+      g_strdup (status.message ().c_str ()), nullptr, caller.file_name (), caller.function_name (),
+      gint (caller.line ()));
 }
 
 GstFlowReturn
-gst_range_flow_return (GstElement *element, const Status &status)
+gst_range_flow_return (GstElement *element, const Status &status, std::source_location caller)
 {
   if (status.ok ())
     return GST_FLOW_OK;
-  post (element, status, GST_MESSAGE_ERROR);
+  post (element, status, GST_MESSAGE_ERROR, caller);
   return GST_FLOW_ERROR;
 }
 
 void
-gst_range_post_warning (GstElement *element, const Status &status)
+gst_range_post_warning (GstElement *element, const Status &status, std::source_location caller)
 {
   if (!status.ok ())
-    post (element, status, GST_MESSAGE_WARNING);
+    post (element, status, GST_MESSAGE_WARNING, caller);
 }

@@ -11,17 +11,18 @@
 static void
 print_view (const GstRangeView *view, const GstRangeCamera *camera)
 {
-  gdouble centre[3] = { 0, 0, 0 };
+  gdouble centre[3] = {0, 0, 0};
   guint points = 0;
 
   for (guint row = 0; row < view->height; row++) {
-    const guint16 *depth = (const guint16 *) ((const guint8 *) view->depth + row * view->depth_stride);
+    const guint16 *depth =
+        (const guint16 *)((const guint8 *)view->depth + row * view->depth_stride);
     for (guint column = 0; column < view->width; column++) {
       if (depth[column] == 0)
         continue;
       const gdouble z = depth[column] * camera->depth_unit;
-      const gdouble p[3] = { (view->x + column - camera->cx) / camera->fx * z,
-        (view->y + row - camera->cy) / camera->fy * z, z };
+      const gdouble p[3] = {(view->x + column - camera->cx) / camera->fx * z,
+          (view->y + row - camera->cy) / camera->fy * z, z};
       for (int i = 0; i < 3; i++) {
         const gdouble *r = &camera->world_from_view[4 * i];
         centre[i] += r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3];
@@ -31,7 +32,8 @@ print_view (const GstRangeView *view, const GstRangeCamera *camera)
   }
   g_print ("  view %u: %u points", view->view_id, points);
   if (points)
-    g_print (", centre %.3f %.3f %.3f m", centre[0] / points, centre[1] / points, centre[2] / points);
+    g_print (
+        ", centre %.3f %.3f %.3f m", centre[0] / points, centre[1] / points, centre[2] / points);
   g_print ("\n");
 }
 
@@ -47,8 +49,8 @@ print_frame_set (GstSample *sample)
   while ((meta = gst_buffer_iterate_range_meta (buffer, &state))) {
     GstRangeView view;
     GstRangeCamera camera;
-    if (!gst_range_caps_get_camera (caps, meta->view_id, &camera)
-        || !gst_range_view_map (&view, buffer, meta, GST_MAP_READ))
+    if (!gst_range_caps_get_camera (caps, meta->view_id, &camera) ||
+        !gst_range_view_map (&view, buffer, meta, GST_MAP_READ))
       continue;
     print_view (&view, &camera);
     gst_range_view_unmap (&view);
@@ -66,7 +68,8 @@ main (int argc, char **argv)
 
   GError *error = NULL;
   GstElement *pipeline = gst_parse_launch (
-      "filesrc name=file ! neighbourcodeparse ! neighbourcodedec ! appsink name=sink sync=false", &error);
+      "filesrc name=file ! neighbourcodeparse ! neighbourcodedec ! appsink name=sink sync=false",
+      &error);
   if (error) {
     g_printerr ("count-points: %s\n", error->message);
     g_clear_error (&error);

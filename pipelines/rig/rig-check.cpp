@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeinfo.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/stereo/rectification.hpp>
 #include <rangecast/surface/camera_lines.hpp>
 #include <rangecast/surface/orbit.hpp>

@@ -8,8 +8,9 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
+#include <rangecast/roi/storage_check.hpp>
 #include <rangecast/stereo/rectification.hpp>
-#include <rangecast/base/storage_check.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -449,7 +450,8 @@ main (int argc, char **argv)
     status = bad.exit_status;
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
-    g_printerr ("rig-convert: the calibration is not what its format has; see docs/formats/rig.md\n");
+    g_printerr (
+        "rig-convert: the calibration is not what its format has; see docs/formats/rig.md\n");
     status = 1;
   }
   g_free (options.name);

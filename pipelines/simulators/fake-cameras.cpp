@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <string>
 #include <vector>

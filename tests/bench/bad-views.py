@@ -89,7 +89,7 @@ def main():
         print(f'without that view: {psnr(without, truth):.1f} dB')
         for name, change in cases.items():
             record('bad', **change)
-            before, after = picture('bad', 'agree=none colour-balance=off'), picture('bad', '')
+            before, after = picture('bad', 'consistency=none colour-balance=off'), picture('bad', '')
             print(f'{name}: {psnr(before, truth):.1f} dB -> {psnr(after, truth):.1f} dB')
             rows.append(np.hstack([before[0], after[0], without[0]]))
         if sheet:

@@ -9,11 +9,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "simulators/gige-camera.hpp"
 #include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include "simulators/gige-camera.hpp"
 #include <string>
 #include <vector>
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Any bytes as what stereocamsrc reads besides pictures: a features string, and a camera's answer
  * that holds its user-defined name. */
-#include <algorithm>
 #include "camera/aravis/features.hpp"
-#include <cstdlib>
 #include "camera/aravis/user_name.hpp"
+#include <algorithm>
+#include <cstdlib>
 
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)

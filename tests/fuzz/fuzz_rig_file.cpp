@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Any text as a rig file: refused, or read as a valid rig, which its blob keeps. What is no YAML or
- * JSON ends in OpenCV's parser, so this needs its dictionary and seeds. */
+ * JSON ends in libyaml, so this needs its dictionary and seeds. */
 #include <cstdlib>
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 #include "memory_file.hpp"
 

@@ -16,15 +16,18 @@ from collections import defaultdict
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 SOURCES = (".c", ".cpp", ".h", ".hpp")
 CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "sync")
-VISION = ("stereo", "roi", "registration", "calibration")
+RIGFILE = ("rigfile",)
+VISION = ("stereo", "roi", "registration", "calibration", "overlay")
 SCENE = ("scene",)
 
 # What a folder may include besides itself and its own subfolders: the first row whose prefix matches.
 CORE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in CORE)
+RIGFILE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in RIGFILE)
 VISION_FOLDERS = tuple(f"lib/rangecast/{name}" for name in VISION)
 SCENE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in SCENE)
 LAYERS = (
     (CORE_FOLDERS, CORE_FOLDERS),
+    (RIGFILE_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS),
     (VISION_FOLDERS, CORE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
     (("lib/gstrange",), CORE_FOLDERS),
@@ -35,10 +38,11 @@ LAYERS = (
 # Headers of other projects that a folder must do without.
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")
 FOREIGN = (
-    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/") + GSTREAMER),
+    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/", "zlib.h", "yaml.h") + GSTREAMER),
+    (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/") + GSTREAMER),
     (VISION_FOLDERS, ("assimp/",) + GSTREAMER),
     (SCENE_FOLDERS, ("ceres/",) + GSTREAMER),
-    (("lib/gstrange", "gst/codec", "gst/rtp", "gst/mux", "gst/convert"), ("opencv2/", "ceres/", "assimp/", "arv.h")),
+    (("lib/gstrange", "gst/common", "gst/codec", "gst/rtp", "gst/mux", "gst/convert"), ("opencv2/", "ceres/", "assimp/", "arv.h")),
 )
 
 

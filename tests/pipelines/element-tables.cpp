@@ -257,7 +257,13 @@ changeable_text (GParamSpec *spec)
     return "any time";
   if (spec->flags & GST_PARAM_MUTABLE_PAUSED)
     return "up to PAUSED";
-  return "NULL, READY";
+  return "READY";
+}
+
+std::string
+deprecated_text (GParamSpec *spec)
+{
+  return spec->flags & G_PARAM_DEPRECATED ? "Deprecated. " : "";
 }
 
 std::vector<GParamSpec *>
@@ -325,9 +331,10 @@ print_properties (GObject *object, const char *of)
   for (const auto spec : specs)
     std::printf ("| `%s` | %s | %s | %s | %s |\n", spec->name, type_text (spec).c_str (),
         default_text (object, spec).c_str (), changeable_text (spec),
-        cell (g_param_spec_get_blurb (spec)).c_str ());
+        (deprecated_text (spec) + cell (g_param_spec_get_blurb (spec))).c_str ());
   for (const auto spec : specs)
-    print_values (spec);
+    if (!(spec->flags & G_PARAM_DEPRECATED))
+      print_values (spec);
 }
 
 void

@@ -14,7 +14,7 @@ test_tables_are_those_of_the_elements () {
 # usage: adapt <script >script
 adapt () {
   sed -E -e 's/num-buffers=[0-9]{2,}/num-buffers=8/g' -e 's/\bavatartestsrc\b/avatartestsrc num-buffers=8/g' \
-    -e 's/\bvideotestsrc\b/videotestsrc num-buffers=8/g' -e 's/\b(autovideosink|glimagesink)\b/fakesink/g' \
+    -e 's/\bvideotestsrc\b/videotestsrc num-buffers=8/g' -e 's/\b(autovideosink|glimagesink)( [a-z-]+=[^ ]+)*/fakesink/g' \
     -e "s/\\bport=500([0-9])\\b/port=$((ports / 10))\\1/g" \
     -e "s/\\bfake-cameras /fake-cameras --address-base 127.$((ports / 256)).$((ports % 256)).1 --size 160x120 /g"
 }
@@ -26,10 +26,9 @@ run_page () {
     "$pages/$1.md"
   for script in "$1"-*.sh; do
     [ -f "$script" ] || fail "$1.md has no block '\`\`\`sh run'"
-    adapt <"$script" >run.sh
-    # In a process group of its own, which ends with it.
-    setsid timeout -k 5 60 bash -e run.sh >log.txt 2>&1 || fail "$script: $(cat "$script" log.txt)"
-    ! grep -E '^(ERROR|WARNING)|CRITICAL' log.txt >errors.txt || fail "$script: $(cat "$script" errors.txt log.txt)"
+    { echo "trap 'kill \$(jobs -p) 2>/dev/null || true' EXIT"; adapt <"$script"; } >run.sh
+    timeout -k 5 60 bash -e run.sh >log.txt 2>&1 || fail "$script: $(cat "$script"; tail -n 20 log.txt)"
+    ! grep -E '^(ERROR|WARNING)|CRITICAL' log.txt >errors.txt || fail "$script: $(cat "$script" errors.txt)"
     n=$((n + 1))
   done
   echo "$1: $n blocks"
@@ -53,5 +52,10 @@ need_command () { command -v "$1" >/dev/null || skip "no $1"; }
 need_boards () {
   local boards=/usr/share/doc/opencv-doc/examples/data
   [ -f "$boards/left01.jpg" ] || skip "no opencv-doc"
-  cp "$boards"/left0[1-9].jpg "$boards"/right0[1-9].jpg .
+  local file n=0
+  for file in "$boards"/left[01]?.jpg; do # left10.jpg is missing
+    n=$((n + 1))
+    cp "$file" "$(printf left%02d.jpg $n)"
+    cp "${file/left/right}" "$(printf right%02d.jpg $n)"
+  done
 }

@@ -148,7 +148,7 @@ test_an_encrypted_stream_to_a_receiver_without_a_key_is_told () {
   sleep 4
   kill -TERM "${camera[0]}" "$viewer"
   wait_for viewer.log "nothing came to port $((port + 9))" 30
-  [ "$(grep -c 'none is sound' viewer.log)" = 1 ] || fail "told more than once: $(cat viewer.log)"
+  [ "$(grep -c 'none is valid' viewer.log)" = 1 ] || fail "told more than once: $(cat viewer.log)"
 }
 
 # At a port with a key a flood has an SSRC of its own for each packet, and srtpdec would keep all.

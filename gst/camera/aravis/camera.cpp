@@ -265,7 +265,7 @@ Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
       run.get (), nullptr, &error); /* end() keeps the run until the stream is gone */
   if (!stream)
     return error ? control->status ("stream", error, CameraFault::kFailed)
-                 : control->refuse (CameraFault::kFailed, "gives no stream");
+                 : control->refuse (CameraFault::kFailed, "does not provide a stream");
   g_clear_error (&error);
   set_stream_properties (stream);
   std::lock_guard run_guard (run->lock);
@@ -305,7 +305,7 @@ Camera::start (Arrived arrived, Lost lost)
     return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
   stop ();
   if (!impl_->take_down.wait (TakeDown::kLongest))
-    return control.refuse (CameraFault::kTimedOut, "still ends what it did before");
+    return control.refuse (CameraFault::kTimedOut, "is still stopping");
   auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
   run->format = impl_->format;
@@ -455,6 +455,6 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
       is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
                  : read_usb_clock (control, camera_time_ns, read_at_us);
   if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kLatestTime_ns))
-    return control.refuse (CameraFault::kFailed, "does not tell its clock");
+    return control.refuse (CameraFault::kFailed, "has no readable clock");
   return impl_->judged (status);
 }

@@ -135,7 +135,7 @@ describe (const std::vector<ListedCamera> &list)
   for (const ListedCamera &camera : list)
     words.push_back (
         camera.info.id + " (" + camera.info.address + ", serial " + camera.info.serial + ")");
-  return words.empty () ? "no camera at all answers" : "these answer: " + joined (words);
+  return words.empty () ? "no camera answers" : "these answer: " + joined (words);
 }
 
 static CameraStatus

@@ -93,7 +93,7 @@ choose_pixel_format (CameraControl &control, const std::string &wanted, const Pi
   all.insert (all.end (), abilities.other_formats.begin (), abilities.other_formats.end ());
   if (fit.empty ())
     return control.refuse (CameraFault::kUnsupported,
-        "none of its pixel formats can be carried: it has " + joined (all) +
+        "none of its pixel formats is supported: it has " + joined (all) +
             "; expected Mono8, RGB8, BGR8 or an 8-bit Bayer format");
   name = wanted;
   if (wanted.empty () && (!control.read ("PixelFormat", name) || !find_pixel_format (name)))
@@ -105,7 +105,7 @@ choose_pixel_format (CameraControl &control, const std::string &wanted, const Pi
   if (!find_pixel_format (name))
     return control.refuse (CameraFault::kUnsupported,
         "pixel format " + name +
-            " cannot be carried; of what the camera has, these can: " + joined (fit));
+            " is not supported; supported formats of this camera: " + joined (fit));
   if (found == fit.end ())
     return control.refuse (
         CameraFault::kBadSetting, "has no pixel format " + name + "; it has " + joined (all));
@@ -199,13 +199,13 @@ read_format (CameraControl &control, CameraFormat &format)
   if (!status.ok ())
     return status;
   if (!control.read ("PixelFormat", format.pixel_format))
-    return control.refuse (CameraFault::kFailed, "does not tell its pixel format");
+    return control.refuse (CameraFault::kFailed, "does not report its pixel format");
   const PixelFormat *pixel = find_pixel_format (format.pixel_format);
   if (!pixel || format.width < 1 || format.height < 1 || format.width > kLongestSide ||
       format.height > kLongestSide)
     return control.refuse (CameraFault::kUnsupported,
         "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
-            " " + format.pixel_format + " cannot be carried");
+            " " + format.pixel_format + " is not supported");
   format.video_format = pixel->video_format;
   format.bayer = pixel->bayer;
   if (std::uint64_t (format.width) * format.height * pixel->bytes > kLargestPicture)
@@ -259,9 +259,10 @@ follow_actions (CameraControl &control, const ActionTrigger &action)
     if (source.empty () && entry.starts_with ("Action"))
       source = entry;
   if (source.empty ())
-    return control.refuse (CameraFault::kBadSetting,
-        "does not know action commands: none of its trigger sources begins with Action; it has " +
-            joined (control.entries ("TriggerSource")));
+    return control.refuse (
+        CameraFault::kBadSetting, "does not support action commands: none of its trigger sources "
+                                  "begins with Action; it has " +
+                                      joined (control.entries ("TriggerSource")));
   CameraStatus status;
   if (control.has ("ActionSelector")) /* "Action1" goes by the number, 0 or 1 for the first */
     status = control.assign ("ActionSelector", source.substr (std::string ("Action").size ()));
@@ -272,8 +273,8 @@ follow_actions (CameraControl &control, const ActionTrigger &action)
   if (status.ok ())
     status = control.assign ("ActionGroupMask", std::to_string (action.group_mask));
   if (status.ok () && action.ptp && !control.has ("PtpEnable") && !control.has ("GevIEEE1588"))
-    return control.refuse (
-        CameraFault::kBadSetting, "does not know IEEE 1588, which scheduled action commands need");
+    return control.refuse (CameraFault::kBadSetting,
+        "does not support IEEE 1588, which scheduled action commands require");
   if (status.ok () && action.ptp)
     status = control.assign_if_there ({"PtpEnable", "GevIEEE1588"}, "true");
   if (status.ok ())

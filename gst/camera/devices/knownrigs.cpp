@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <glib.h>
-#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 namespace rangecast {
 

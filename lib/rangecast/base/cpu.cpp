@@ -6,6 +6,13 @@
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
+#if defined __linux__
+#include <sched.h>
+#include <unistd.h>
+#endif
+#if !defined __wasm__
+#include <thread>
+#endif
 
 namespace rangecast {
 
@@ -51,6 +58,29 @@ void
 limit_cpu (CpuLevel most)
 {
   limit.store (most, std::memory_order_relaxed);
+}
+
+static int
+count_cores ()
+{
+#if defined __linux__
+  cpu_set_t cores;
+  /* Of the first thread, so that a thread that is bound to a core does not count for all. */
+  if (sched_getaffinity (getpid (), sizeof cores, &cores) == 0)
+    return std::max (CPU_COUNT (&cores), 1);
+#endif
+#if defined __wasm__
+  return 1;
+#else
+  return std::max (static_cast<int> (std::thread::hardware_concurrency ()), 1);
+#endif
+}
+
+int
+core_count ()
+{
+  static const int count = count_cores ();
+  return count;
 }
 
 } // namespace rangecast

@@ -22,4 +22,9 @@ CpuLevel cpu_level ();
 /** For tests: no rung above this one from now on. */
 void limit_cpu (CpuLevel most);
 
+/** How many threads can run at a time: the processors that the process may use (its affinity, as
+ *  taskset and containers with a set of processors have it), counted once; at least 1. A share of
+ *  processor time that a container grants does not count. */
+int core_count ();
+
 } // namespace rangecast

@@ -12,14 +12,15 @@ namespace rangecast {
 /** Runs work (), which returns a Status, and makes one of whatever it throws: where exceptions must
  *  not go further, at the core's border and in functions that C calls.
  *  @param what  of whom the text speaks, as "cylinder"
- *  @return what work () returns, else kNoSpace */
+ *  @return what work () returns, kNoSpace if there was no memory, else kInternal with the exception's
+ *  what () */
 template <typename Work>
 [[nodiscard]] Status
 guarded (const char *what, const Work &work) noexcept
 {
-  const auto failed = [what] (const char *how) -> Status {
+  const auto failed = [what] (StatusCode code, const char *how, const char *why) -> Status {
     try {
-      return {StatusCode::kNoSpace, std::string (what) + ": " + how};
+      return {code, std::string (what) + ": " + how + why};
     } catch (...) {
       return {StatusCode::kNoSpace, "no memory"}; /* short enough to need none */
     }
@@ -27,9 +28,11 @@ guarded (const char *what, const Work &work) noexcept
   try {
     return work ();
   } catch (const std::bad_alloc &) {
-    return failed ("out of memory");
+    return failed (StatusCode::kNoSpace, "out of memory", "");
+  } catch (const std::exception &e) {
+    return failed (StatusCode::kInternal, "internal error: ", e.what ());
   } catch (...) {
-    return failed ("internal error");
+    return failed (StatusCode::kInternal, "internal error", "");
   }
 }
 

@@ -5,33 +5,44 @@
 #include <atomic>
 #include <concepts>
 #include <cstddef>
+#include <exception>
 #include <memory>
-#include <opencv2/core/utility.hpp>
-#include <thread>
 #include <vector>
+
+#include "cpu.hpp"
 
 namespace rangecast {
 
-/** How many of n jobs in_parallel() runs at a time, at most. The number of cores is OpenCV's, which
- *  anybody may set at any time: who makes room for workers hands their number on, as `threads`.
- *  @param threads  at a time; 0 = number of cores */
+/** Calls work (context, worker) on this thread with worker 0 and, where threads of the pool are
+ * free, on them with other numbers below `workers`, each number at most once; returns when all
+ * these calls have returned. One such call at a time has the pool: a nested one, and one from
+ * another thread meanwhile, gets worker 0 alone. Allocates only when the pool has to grow.
+ *
+ *  The pool is the process's only one, so its definition is not part of the core, which several
+ *  plugins link: libgstrange exports it, programs without libgstrange link rangecast_threads.
+ *  @param work  must not throw */
+[[gnu::visibility ("default")]] void run_workers (
+    std::size_t workers, void (*work) (void *context, std::size_t worker), void *context);
+
+/** How many of n jobs in_parallel() runs at a time, at most.
+ *  @param threads  at a time; 0 = core_count() */
 inline std::size_t
 workers_for (std::size_t n, int threads)
 {
-  const int most = threads > 0 ? threads : cv::getNumThreads ();
-  return std::min (n, static_cast<std::size_t> (std::max (most, 1)));
+  return std::min (n, static_cast<std::size_t> (threads > 0 ? threads : core_count ()));
 }
 
 /** Runs work (i), or work (i, worker), for each i below n, some at a time, and waits for all of
  *  them. Each begins when a thread is free, in order of i. Calls of different i must not touch the
  *  same memory, but for that of their worker: a number below workers_for() that no two calls have
- *  at the same time.
- *  @param threads  at a time; 0 = number of cores */
+ *  at the same time. If one throws, calls that have not begun are left out, and its exception is
+ *  thrown here.
+ *  @param threads  at a time; 0 = core_count() */
 template <typename Work>
 void
 in_parallel (std::size_t n, int threads, const Work &work)
 {
-  const auto call = [&] (std::size_t i, [[maybe_unused]] std::size_t worker) {
+  const auto call = [&work] (std::size_t i, [[maybe_unused]] std::size_t worker) {
     if constexpr (std::invocable<const Work &, std::size_t, std::size_t>)
       work (i, worker);
     else
@@ -43,25 +54,32 @@ in_parallel (std::size_t n, int threads, const Work &work)
       call (i, 0);
     return;
   }
-  std::atomic<std::size_t> next{0};
-  const auto run = [&] (std::size_t worker) {
-    for (std::size_t i; (i = next.fetch_add (1)) < n;)
-      call (i, worker);
+  struct Loop {
+    const decltype (call) &call_one;
+    const std::size_t count;
+    std::atomic<std::size_t> next{0};
+    std::atomic<bool> failed{false};
+    std::exception_ptr error{}; /* whoever sets `failed` writes it */
+
+    void run (std::size_t worker) noexcept
+    {
+      try {
+        for (std::size_t i; (i = next.fetch_add (1)) < count;)
+          call_one (i, worker);
+      } catch (...) {
+        if (!failed.exchange (true))
+          error = std::current_exception ();
+        next = count;
+      }
+    }
   };
-#ifdef __SANITIZE_THREAD__
-  /* ThreadSanitizer cannot see how OpenCV's pool, built without it, hands work to its threads. */
-  std::vector<std::jthread> workers_running;
-  for (std::size_t worker = 0; worker < workers; worker++)
-    workers_running.emplace_back (run, worker);
-#else
-  cv::parallel_for_ (
-      cv::Range (0, static_cast<int> (workers)),
-      [&] (const cv::Range &range) {
-        for (int worker = range.start; worker < range.end; worker++)
-          run (static_cast<std::size_t> (worker));
-      },
-      static_cast<double> (workers));
-#endif
+  Loop loop{call, n};
+  run_workers (
+      workers,
+      [] (void *context, std::size_t worker) { static_cast<Loop *> (context)->run (worker); },
+      &loop);
+  if (loop.error)
+    std::rethrow_exception (loop.error);
 }
 
 /** Memory that jobs need while they run and that nobody needs afterwards; one for each worker, kept

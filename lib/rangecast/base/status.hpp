@@ -17,6 +17,7 @@ enum class StatusCode {
   kNotFound,    ///< a file, view or field that should be there is not
   kNoSpace,     ///< the caller's output is too small; its contents are unspecified
   kInterrupted, ///< the caller asked to stop
+  kInternal,    ///< an exception that no caller can do anything about
 };
 
 /** The result of a core function: kOk, or a code and one sentence that names the thing and what

@@ -206,7 +206,7 @@ validate (const BoardSpec &board)
   if (have < want)
     return bad_board ("dictionary " + std::string (kDictionaries[board.dictionary].name) + " has " +
                       std::to_string (have) + " markers; expected at least " +
-                      std::to_string (want) + " for so many squares");
+                      std::to_string (want) + " for a board of this size");
   return {};
 }
 

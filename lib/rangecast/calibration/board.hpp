@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "../geometry/camera.hpp"
 #include "../geometry/image_view.hpp"
-#include "../base/status.hpp"
 
 namespace rangecast {
 

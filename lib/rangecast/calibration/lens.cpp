@@ -136,7 +136,7 @@ check_lens (const CalibrationCamera &camera, const LensParameters &lens, double 
   if (!std::ranges::all_of (lens, [] (double v) { return std::isfinite (v); }) || fx <= 0 ||
       fy <= 0 || fx > 1e5 || fy > 1e5)
     return {StatusCode::kBadValue,
-        text_of (camera) + ": no camera fits these boards (focal length " + number (fx) +
+        text_of (camera) + ": no lens model fits these boards (focal length " + number (fx) +
             " pixels); expected tilted boards all over the picture"};
   if (cx < 0 || cy < 0 || cx >= camera.width || cy >= camera.height)
     return {StatusCode::kBadValue,
@@ -151,8 +151,8 @@ check_lens (const CalibrationCamera &camera, const LensParameters &lens, double 
             " pixels from the middle; expected boards nearer to the picture's corners, or fewer "
             "coefficients of distortion"};
   if (fold < corner)
-    warning = text_of (camera) + ": lens distortion is not known more than " + number (fold) +
-              " pixels from the middle; boards nearer to the picture's corners would tell";
+    warning = text_of (camera) + ": lens distortion is undetermined beyond " + number (fold) +
+              " pixels from the image centre; show the board nearer to the image corners";
   else if (std::abs (std::log (fx / fy)) > 0.05)
     warning = text_of (camera) + ": focal lengths " + number (fx) + " and " + number (fy) +
               " pixels differ; are the pixels square?";

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "session.hpp"
 
-#include "../base/parallel.hpp"
+#include "../roi/opencv_threads.hpp"
 #include "pose_chain.hpp"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
         !s.ok ())
       return s;
   }
-  in_parallel (cameras.size (), 0, [&] (std::size_t i) {
+  in_parallel_with_opencv (cameras.size (), 0, [&] (std::size_t i) {
     Eye &eye = *eyes_[i];
     eye.corners.clear ();
     eye.status = {};
@@ -129,22 +129,22 @@ CalibrationSession::check_kept () const
     const int kept = coverage (int (i)).frames, wanted = settings_.calibration.min_frames;
     if (eyes_[i]->detector.is_mirrored ())
       return {StatusCode::kBadValue,
-          text_of (cameras_[i]) + ": its pictures are mirrored; expected them as a photograph is: "
-                                  "switch off the camera's mirror mode, or use videoflip"};
+          text_of (cameras_[i]) +
+              ": its images are mirrored; switch off the camera's mirror mode, or use videoflip"};
     if (kept >= wanted || kept >= all)
       continue;
     std::string text = text_of (cameras_[i]) + ": the board was found in " + std::to_string (all) +
                        " pictures, but only " + std::to_string (kept) +
                        " were kept; expected at least " + std::to_string (wanted) + ". Of the rest";
     const std::pair<FrameVerdict, const char *> reasons[] = {{FrameVerdict::kMoving, "moving"},
-        {FrameVerdict::kBlurred, "blurred"}, {FrameVerdict::kSimilar, "as one before"}};
+        {FrameVerdict::kBlurred, "blurred"}, {FrameVerdict::kSimilar, "similar to an earlier one"}};
     const char *comma = "";
     for (const auto &[verdict, reason] : reasons)
       if (const int count = seen[int (verdict)]) {
         text += std::string (comma) + " " + std::to_string (count) + " were " + reason;
         comma = ",";
       }
-    return {StatusCode::kNotFound, text + ": hold the board still for a moment in each new place"};
+    return {StatusCode::kNotFound, text + ": hold the board still for a moment at each new place"};
   }
   return {};
 }

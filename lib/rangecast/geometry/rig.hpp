@@ -72,13 +72,6 @@ Status validate (const Rig &rig);
  *  than kMaxRigPixels (`into` is then untouched). */
 Status merge (Rig &into, const Rig &other);
 
-/** @name The file form
- *  What cv::FileStorage reads and writes: YAML or JSON by the file's ending; layout in docs/formats/rig.md.
- *  Loaded rigs are validated. Messages begin with the path. @{ */
-Status load_rig (const std::string &path, Rig &rig);
-Status save_rig (const std::string &path, const Rig &rig);
-/** @} */
-
 /** @name The binary form
  *  Versioned, little-endian, for caps, byte streams and SDP; layout in docs/formats/rig.md. @{ */
 std::vector<std::uint8_t> encode_rig (const Rig &rig);

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "range_image.hpp"
 #include "rig.hpp"
-#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -8,10 +8,10 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "bitstream/unit.hpp"
 #include "compact/decoder.hpp"
 #include "plain/decoder.hpp"
 #include "plain/temporal.hpp"
-#include "bitstream/unit.hpp"
 
 namespace rangecast {
 

@@ -223,7 +223,7 @@ CellRows::renumber_winners (const std::array<int, kMaxViews> &ids, int images)
   std::array<std::int32_t, kMaxViews> now;
   bool same = true;
   for (int old = 0; old < old_images_; old++) {
-    const auto *found = std::find (ids.begin (), ids.begin () + images, old_ids_[old]);
+    const auto found = std::find (ids.begin (), ids.begin () + images, old_ids_[old]);
     now[old] = found == ids.begin () + images ? -1 : static_cast<int> (found - ids.begin ());
     same &= now[old] == old;
   }

@@ -4,10 +4,10 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "../geometry/camera.hpp"
 #include "../geometry/image_view.hpp"
 #include "../geometry/rig.hpp"
-#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "../base/storage_check.hpp"
+#include "storage_check.hpp"
 
 namespace rangecast {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "../geometry/range_image.hpp"
 #include "../base/status.hpp"
+#include "../geometry/range_image.hpp"
 
 namespace cv {
 class FileNode;

@@ -6,9 +6,9 @@
 #include <span>
 #include <string>
 
+#include "../base/status.hpp"
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "../base/status.hpp"
 
 namespace rangecast {
 

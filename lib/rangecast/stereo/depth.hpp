@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "../geometry/range_image.hpp"
 #include "../base/status.hpp"
+#include "../geometry/range_image.hpp"
 
 namespace rangecast {
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rectification.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "../geometry/rectified_pose.hpp"
 
 namespace rangecast {
 namespace {
@@ -27,22 +28,6 @@ bad_pair (const View &view, const char *what)
   return {StatusCode::kBadValue, "view " + std::to_string (view.id) + ": " + what};
 }
 
-/* No lenses, no rotation, one focal length, displaced along x alone. */
-bool
-is_ideal (const View &view)
-{
-  const PartnerCamera &right = *view.right;
-  const Vec3 &t = right.partner_from_left.translation;
-  for (int i = 0; i < 9; i++)
-    if (std::abs (right.partner_from_left.rotation[i] - kIdentity3[i]) > 1e-9)
-      return false;
-  const auto is_zero = [] (double v) { return v == 0; };
-  return std::ranges::all_of (view.distortion, is_zero) &&
-         std::ranges::all_of (right.distortion, is_zero) && std::abs (t.y) < 1e-9 &&
-         std::abs (t.z) < 1e-9 && view.intrinsics.fx == right.intrinsics.fx &&
-         view.intrinsics.fy == right.intrinsics.fy && view.intrinsics.cy == right.intrinsics.cy;
-}
-
 } // namespace
 
 Status
@@ -58,7 +43,7 @@ Rectifier::set (const View &view)
   for (auto &maps : maps_)
     for (cv::Mat &map : maps)
       map.release ();
-  return is_ideal (view) ? set_ideal (view) : set_from_rectification (view);
+  return is_rectified (view) ? set_ideal (view) : set_from_rectification (view);
 }
 
 Status

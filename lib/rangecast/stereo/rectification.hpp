@@ -3,8 +3,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "../geometry/rig.hpp"
 #include "../base/status.hpp"
+#include "../geometry/rig.hpp"
 
 namespace rangecast {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <rangecast/neighbourcode/encoder.hpp>
 #include <rangecast/base/status.hpp>
+#include <rangecast/neighbourcode/encoder.hpp>
 #include <string>
 #include <utility>
 #include <vector>

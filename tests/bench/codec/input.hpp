@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <rangecast/base/status.hpp>
 #include <rangecast/geometry/range_image.hpp>
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/scene/scene.hpp>
-#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <rangecast/base/status.hpp>
 #include <rangecast/geometry/range_image.hpp>
 #include <rangecast/geometry/rig.hpp>
-#include <rangecast/base/status.hpp>
 #include <string>
 #include <vector>
 

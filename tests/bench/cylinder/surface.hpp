@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <rangecast/geometry/camera.hpp>
 #include <rangecast/base/status.hpp>
+#include <rangecast/geometry/camera.hpp>
 #include <string>
 #include <vector>
 

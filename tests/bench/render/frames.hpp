@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <rangecast/overlap/cylinder_filter.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
+#include <rangecast/overlap/cylinder_filter.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <vector>
 

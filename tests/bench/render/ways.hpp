@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "render/strippainter.hpp"
 #include "frames.hpp"
+#include "render/strippainter.hpp"
 
 namespace bench {
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <rangecast/rigfile/rig_file.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"

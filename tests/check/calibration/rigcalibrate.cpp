@@ -5,6 +5,7 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 
+#include <rangecast/rigfile/rig_file.hpp>
 #include <vector>
 
 using namespace rangecast;
@@ -336,8 +337,9 @@ GST_START_TEST (test_boards_that_were_seen_but_not_kept_are_counted)
   for (int i = 0; i < 5; i++)
     c.push_picture (0, i * GST_SECOND, picture);
   c.end ();
-  c.expect_error ("sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
-                  "expected at least 6. Of the rest 4 were as one before: hold the board still");
+  c.expect_error (
+      "sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
+      "expected at least 6. Of the rest 4 were similar to an earlier one: hold the board still");
 }
 GST_END_TEST;
 
@@ -435,7 +437,7 @@ GST_START_TEST (test_calibrate_signal_gives_a_result_and_the_stream_goes_on)
   Calibrate c (1);
   g_signal_emit_by_name (c.element, "calibrate");
   std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
-  fail_unless (text.find ("no pictures") != std::string::npos, text.c_str ());
+  fail_unless (text.find ("no images") != std::string::npos, text.c_str ());
   c.push_boards (10);
   c.wait_until_examined (10);
   g_signal_emit_by_name (c.element, "calibrate");

@@ -2,8 +2,8 @@
 /* What the tests with cameras share: a network of their own, and fake GigE Vision cameras in it. */
 #pragma once
 
-#include <arv.h>
 #include "camera/aravis/camera.hpp"
+#include <arv.h>
 #include <condition_variable>
 #include <deque>
 #include <memory>

@@ -66,7 +66,7 @@ GST_START_TEST (test_no_camera_at_all_is_said)
 {
   SKIP_WITHOUT_NETWORK ();
   std::unique_ptr<Camera> camera;
-  assert_refused (Camera::open ("", camera), CameraFault::kNotFound, "no camera at all answers");
+  assert_refused (Camera::open ("", camera), CameraFault::kNotFound, "no camera answers");
 }
 GST_END_TEST;
 
@@ -221,7 +221,7 @@ GST_START_TEST (test_refused_settings_say_what_the_camera_accepts)
   assert_refused (refusal ([] (auto &s) { s.x = 2000; }), bad,
       "width of 64 pixels from 2000: the sensor ends at 2048");
   assert_refused (refusal ([] (auto &s) { s.pixel_format = "Mono16"; }), CameraFault::kUnsupported,
-      "pixel format Mono16 cannot be carried");
+      "pixel format Mono16 is not supported");
   assert_refused (refusal ([] (auto &s) { s.pixel_format = "BGR8"; }), bad,
       "has no pixel format BGR8; it has ");
   assert_refused (refusal ([] (auto &s) { s.frame_rate = 5000; }), bad,
@@ -246,7 +246,7 @@ GST_START_TEST (test_refused_settings_say_what_the_camera_accepts)
   }),
       bad, "has no trigger source Line7; it has Line0, Software");
   assert_refused (refusal ([] (auto &s) { s.trigger = TriggerMode::kAction; }), bad,
-      "does not know action commands");
+      "does not support action commands");
   assert_refused (refusal ([] (auto &s) {
     s.trigger = TriggerMode::kHardware;
     s.line.master = true;
@@ -277,7 +277,7 @@ GST_START_TEST (test_refused_features_name_feature_value_and_range)
       {"AcquisitionStart=1", "is a command and takes no value"},
       {"GainRaw", "is no command; give it a value"},
       {"GainRaw=1 =", "features: expected a feature's name"},
-      {"PixelFormat=Mono16", "Mono16 cannot be carried"},
+      {"PixelFormat=Mono16", "Mono16 is not supported"},
   };
   for (const auto &c : cases) {
     CameraSettings settings = small_pictures ();

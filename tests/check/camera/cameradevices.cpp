@@ -15,6 +15,7 @@
 
 #include "camera/devices/knownrigs.hpp"
 #include <rangecast/geometry/rig.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 

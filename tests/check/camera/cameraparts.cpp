@@ -4,13 +4,13 @@
 #include "camera/aravis/action_command.hpp"
 #include "camera/aravis/discovery.hpp"
 #include "camera/aravis/features.hpp"
-#include <filesystem>
 #include "camera/aravis/frame_counter.hpp"
-#include <fstream>
 #include "camera/aravis/receive_buffer.hpp"
+#include "camera/aravis/user_name.hpp"
+#include <filesystem>
+#include <fstream>
 #include <sys/socket.h>
 #include <unistd.h>
-#include "camera/aravis/user_name.hpp"
 
 #include "../rangecast-check.hpp"
 

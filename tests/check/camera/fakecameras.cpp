@@ -5,10 +5,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include "simulators/gige-camera.hpp"
 #include "simulators/gige-description.hpp"
 #include "simulators/gige-listener.hpp"
+#include <algorithm>
 #include <string>
 #include <vector>
 

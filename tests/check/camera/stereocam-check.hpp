@@ -6,10 +6,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstring>
 #include "simulators/gige-camera.hpp"
 #include "simulators/gige-listener.hpp"
+#include <array>
+#include <cstring>
 #include <map>
 #include <memory>
 #include <mutex>

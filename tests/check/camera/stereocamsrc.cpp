@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* stereocamsrc: pairs, pads, formats, life. */
 #include "stereocam-check.hpp"
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;

@@ -563,8 +563,9 @@ GST_START_TEST (test_a_controller_may_set_what_costs_no_new_tables)
           "max-depth-threshold max-slice-size min-bitrate min-force-key-unit-interval "
           "refresh-period "
           "target-bitrate"},
-      {"cylinderfilter", "agree agreement axis blend-width bodies colour-balance columns hysteresis "
-                         "layer-gap mode overlap smoothing unit-height"},
+      {"cylinderfilter",
+          "agree agreement axis blend-width bodies colour-balance columns hysteresis "
+          "layer-gap mode overlap smoothing unit-height"},
       {"neighbourcodedec", ""}, {"neighbourcodeparse", ""}, {"rtpneighbourcodepay", ""},
       {"rtpneighbourcodedepay", ""}, {"rangemux", ""}, {"rangesplit", ""}, {"plyenc", ""},
       {"avatartestsrc", ""}, {"stereodepth", ""}, {"rangecombine", ""}};

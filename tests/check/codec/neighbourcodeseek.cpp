@@ -2,8 +2,8 @@
 /* Seeks, durations and times of files in neighbourcodeparse. */
 #include <cstring>
 
-#include "parse-check.hpp"
 #include "../scene-check.hpp"
+#include "parse-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;

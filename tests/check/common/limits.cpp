@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One over each limit of docs/engineering/limits.md that no other test goes over: one error or a drop that is
- * counted, and no more memory. */
+/* One over each limit of docs/engineering/limits.md that no other test goes over: one error or a
+ * drop that is counted, and no more memory. */
 #include "../coded-check.hpp"
 
 #include <glib/gstdio.h>
 #include <gst/rtp/rtp.h>
 
-#include <rangecast/geometry/rig_file.hpp>
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;

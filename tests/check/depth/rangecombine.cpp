@@ -5,6 +5,7 @@
 
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <unistd.h>
 
 using namespace rangecast;

@@ -7,6 +7,7 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 
+#include <rangecast/rigfile/rig_file.hpp>
 #include <vector>
 
 namespace rangecast::testing {

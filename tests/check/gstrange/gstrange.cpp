@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <dlfcn.h>
+
+#include <rangecast/base/parallel.hpp>
+
 #include "../rangecast-check.hpp"
 
 using namespace rangecast;
@@ -407,6 +411,17 @@ GST_START_TEST (test_lack_of_memory_is_one_error_and_no_abort)
 }
 GST_END_TEST;
 
+/* Another would be found here, or by plugins, than by this program. */
+GST_START_TEST (test_process_has_one_pool_of_threads)
+{
+  Dl_info found{};
+  fail_unless (dladdr (reinterpret_cast<void *> (&rangecast::run_workers), &found) != 0);
+  fail_unless (found.dli_sname != nullptr);
+  fail_unless (dlsym (RTLD_DEFAULT, found.dli_sname) == found.dli_saddr);
+  fail_unless (found.dli_saddr == reinterpret_cast<void *> (&rangecast::run_workers));
+}
+GST_END_TEST;
+
 static Suite *
 gstrange_suite ()
 {
@@ -430,6 +445,7 @@ gstrange_suite ()
   tcase_add_test (tc, test_frame_set_beyond_the_limit_is_refused);
   tcase_add_test (tc, test_caps_beyond_the_limit_are_refused_by_name);
   tcase_add_test (tc, test_lack_of_memory_is_one_error_and_no_abort);
+  tcase_add_test (tc, test_process_has_one_pool_of_threads);
   return suite;
 }
 

@@ -4,6 +4,7 @@
 #include <glib/gstdio.h>
 
 #include <map>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <utility>
 
 #include "mux-check.hpp"

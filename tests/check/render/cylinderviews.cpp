@@ -108,8 +108,8 @@ GST_START_TEST (test_without_poses_and_with_mode_off_the_rig_is_as_it_came)
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
   GstCaps *wrong = nudged_caps (scene, {0.003, 0, 0.002}, 0);
-  for (const char *launch : {"cylinderfilter agree=none", "cylinderfilter agree=depth+views",
-           "cylinderfilter mode=off"}) {
+  for (const char *launch : {"cylinderfilter consistency=none",
+           "cylinderfilter consistency=depth+views", "cylinderfilter mode=off"}) {
     Filter filter (launch, gst_caps_ref (wrong));
     filter.run (scene, 5);
     GstCaps *caps = filter.caps ();
@@ -133,7 +133,7 @@ GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_a_warning_and_stats_
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
   for (const bool leaves_out : {true, false}) {
-    Filter filter (leaves_out ? "cylinderfilter" : "cylinderfilter agree=poses+depth",
+    Filter filter (leaves_out ? "cylinderfilter" : "cylinderfilter consistency=poses+depth",
         nudged_caps (scene, {0.03, 0.04, 0}, 5));
     GstElement *cylinder = filter.element ();
     GstBus *bus = gst_bus_new ();

@@ -354,7 +354,7 @@ GST_START_TEST (test_units_are_in_their_cameras_colours)
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Rig rig = ring_rig (4);
-  GstHarness *h = render_harness (rig, {"show-units=true"});
+  GstHarness *h = render_harness (rig, {"tint-views=true"});
   GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
   for (guint i = 0; i < 4; i++) {
     g_object_set (r, "azimuth", 90.0 * i, nullptr);

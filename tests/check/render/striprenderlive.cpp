@@ -203,7 +203,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
 {
-  Live live ("auto-orbit=45 show-cameras=true show-units=true");
+  Live live ("auto-orbit=45 show-cameras=true tint-views=true");
   if (!live.h)
     RANGECAST_SKIP ("no OpenGL context");
   live.push (0);

@@ -9,6 +9,7 @@
 
 #include <cstring>
 #include <gstrange/gstrangebufferpool.h>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
-#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 
 using namespace rangecast;
 using rangecast::testing::ring_rig;

@@ -312,7 +312,7 @@ TEST (CongestionControl, jitter_that_rises_keeps_receiver_reports_from_raising_t
   }
 }
 
-/* The table of docs/elements/neighbourcodeenc.md: --gtest_also_run_disabled_tests
+/* The table of tests/bench/results/reliability.md: --gtest_also_run_disabled_tests
  * --gtest_filter=*table */
 TEST (CongestionControl, DISABLED_table)
 {

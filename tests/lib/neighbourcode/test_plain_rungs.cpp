@@ -5,9 +5,9 @@
 #include <memory>
 #include <optional>
 #include <rangecast/base/cpu.hpp>
+#include <rangecast/neighbourcode/bitstream/symbols.hpp>
 #include <rangecast/neighbourcode/decoder.hpp>
 #include <rangecast/neighbourcode/encoder.hpp>
-#include <rangecast/neighbourcode/bitstream/symbols.hpp>
 
 #include "neighbourcode-support.hpp"
 

@@ -3,8 +3,8 @@
  * without the points that go, too. */
 #include <rangecast/scene/scene.hpp>
 
-#include "cylinder-support.hpp"
 #include "../surface/strip-picture.hpp"
+#include "cylinder-support.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;

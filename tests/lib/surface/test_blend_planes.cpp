@@ -2,8 +2,8 @@
 #include "../test-support.hpp"
 
 #include <cmath>
-#include <rangecast/surface/strips.hpp>
 #include <rangecast/surface/blend_planes.hpp>
+#include <rangecast/surface/strips.hpp>
 
 using namespace rangecast;
 using rangecast::testing::Image;

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/scene_fit.hpp>
 #include <rangecast/surface/scene_hull.hpp>
-#include <rangecast/surface/stats_panel.hpp>
 #include <rangecast/surface/view_tint.hpp>
 
 using namespace rangecast;

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <rangecast/surface/reduced_view.hpp>
 #include <rangecast/surface/scene_hull.hpp>
 #include <rangecast/surface/strips.hpp>
 #include <rangecast/surface/view_matrices.hpp>
-#include <rangecast/surface/reduced_view.hpp>
 #include <vector>
 
 using namespace rangecast;

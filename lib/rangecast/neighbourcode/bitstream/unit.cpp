@@ -43,7 +43,8 @@ expect_type (std::span<const std::uint8_t> unit, UnitType type, std::size_t mini
   if (Status s = read_unit_header (unit, header); !s.ok ())
     return s;
   if (header.type != static_cast<std::uint8_t> (type) || header.size < minimum)
-    return {StatusCode::kBadData, std::string (name) + ": not one, or shorter than its header"};
+    return {StatusCode::kBadData,
+        std::string (name) + ": unexpected unit type, or shorter than its header"};
   if (header.flags & ~flags)
     return {StatusCode::kUnsupported, std::string (name) + ": reserved flags are set"};
   return {};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The units that a coded stream consists of. The format is specified in docs/formats/bitstream.md. */
+/* The units that a coded stream consists of. The format is specified in docs/formats/bitstream.md.
+ */
 #pragma once
 
 #include <array>
@@ -8,9 +9,9 @@
 #include <span>
 #include <vector>
 
+#include "../../base/status.hpp"
 #include "../../geometry/range_image.hpp"
 #include "../../geometry/rig.hpp"
-#include "../../base/status.hpp"
 
 namespace rangecast {
 

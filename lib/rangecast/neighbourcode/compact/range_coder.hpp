@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A binary range coder with adaptive probabilities. docs/formats/bitstream.md says what it writes. */
+/* A binary range coder with adaptive probabilities. docs/formats/bitstream.md says what it writes.
+ */
 #pragma once
 
 #include <bit>

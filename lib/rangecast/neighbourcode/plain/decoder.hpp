@@ -7,9 +7,9 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
-#include "functions.hpp"
 #include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
+#include "functions.hpp"
 
 namespace rangecast {
 

@@ -3,9 +3,9 @@
 
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
-#include <rangecast/geometry/rig_file.hpp>
+#include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/roi/background.hpp>
-#include <rangecast/base/storage_check.hpp>
+#include <rangecast/roi/storage_check.hpp>
 #include <unistd.h>
 #include <zlib.h>
 

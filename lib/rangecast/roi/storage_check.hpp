@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "status.hpp"
+#include "../base/status.hpp"
 
 namespace rangecast {
 

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "rectified_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangecast {
+namespace {
+
+/* Axis times angle, of rotations by less than 180 degrees. */
+Vec3
+rotation_vector (const Mat3 &r)
+{
+  const Vec3 axis = {r[7] - r[5], r[2] - r[6], r[3] - r[1]}; /* times 2 sin (angle) */
+  const double sine = norm (axis) / 2, cosine = (r[0] + r[4] + r[8] - 1) / 2;
+  return sine > 0 ? (std::atan2 (sine, cosine) / (2 * sine)) * axis : Vec3{};
+}
+
+/* Rodrigues' formula. */
+Mat3
+rotation_matrix (const Vec3 &vector)
+{
+  const double angle = norm (vector);
+  if (angle == 0)
+    return kIdentity3;
+  const Vec3 a = (1 / angle) * vector;
+  const double c = std::cos (angle), s = std::sin (angle), d = 1 - c;
+  return {c + d * a.x * a.x, d * a.x * a.y - s * a.z, d * a.x * a.z + s * a.y,
+      d * a.y * a.x + s * a.z, c + d * a.y * a.y, d * a.y * a.z - s * a.x, d * a.z * a.x - s * a.y,
+      d * a.z * a.y + s * a.x, c + d * a.z * a.z};
+}
+
+} // namespace
+
+bool
+is_rectified (const View &view)
+{
+  const PartnerCamera &right = *view.right;
+  const Vec3 &t = right.partner_from_left.translation;
+  for (int i = 0; i < 9; i++)
+    if (std::abs (right.partner_from_left.rotation[i] - kIdentity3[i]) > 1e-9)
+      return false;
+  const auto is_zero = [] (double v) { return v == 0; };
+  return std::ranges::all_of (view.distortion, is_zero) &&
+         std::ranges::all_of (right.distortion, is_zero) && std::abs (t.y) < 1e-9 &&
+         std::abs (t.z) < 1e-9 && view.intrinsics.fx == right.intrinsics.fx &&
+         view.intrinsics.fy == right.intrinsics.fy && view.intrinsics.cy == right.intrinsics.cy;
+}
+
+Mat3
+rectifying_rotation (const Pose &partner_from_left)
+{
+  const Mat3 half = rotation_matrix (-0.5 * rotation_vector (partner_from_left.rotation));
+  const Vec3 baseline = half * partner_from_left.translation;
+  const Vec3 turn = cross (baseline, {baseline.x > 0 ? 1. : -1., 0, 0});
+  const double sine = norm (turn);
+  const double angle = std::atan2 (sine, std::abs (baseline.x));
+  return (sine > 0 ? rotation_matrix ((angle / sine) * turn) : kIdentity3) * transposed (half);
+}
+
+} // namespace rangecast

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "../base/output_path.hpp"
+#include "../geometry/rig.hpp"
+
+namespace rangecast {
+
+/** What the name of a rig file may end in; see check_output_path(). */
+inline constexpr std::string_view kRigExtensions[] = {".yml", ".yaml", ".json"};
+
+/** Bytes of the longest rig file that is read: many times what 64 views with three cameras take. */
+inline constexpr std::uintmax_t kMaxRigFileSize = std::uintmax_t{4} << 20;
+
+/** Reads a rig from a file that cv::FileStorage opens, too: YAML or JSON by the file's ending,
+ *  possibly with .gz; layout in docs/formats/rig.md. The rig is validated.
+ *  @return kNotFound, kBadData or what validate() says; the message begins with the path */
+Status load_rig (const std::string &path, Rig &rig);
+/** Writes the same text that cv::FileStorage would. @return kBadValue, kNotFound; the message
+ * begins with the path */
+Status save_rig (const std::string &path, const Rig &rig);
+
+} // namespace rangecast

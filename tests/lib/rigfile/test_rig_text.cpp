@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The text of rig files against cv::FileStorage, which must be able to read and write the same. */
+#include "test-support.hpp"
+
+#include <fstream>
+#include <opencv2/core/persistence.hpp>
+#include <random>
+#include <rangecast/rigfile/rig_file.hpp>
+#include <rangecast/rigfile/rig_text.hpp>
+#include <span>
+
+using namespace rangecast;
+using rangecast::testing::ring_rig;
+
+namespace {
+
+void
+write_numbers (cv::FileStorage &file, const char *name, std::span<const double> values)
+{
+  file.startWriteStruct (name, cv::FileNode::SEQ | cv::FileNode::FLOW);
+  for (double v : values)
+    file << v;
+  file.endWriteStruct ();
+}
+
+void
+write_pose (cv::FileStorage &file, const char *name, const Pose &pose)
+{
+  const double t[] = {pose.translation.x, pose.translation.y, pose.translation.z};
+  file.startWriteStruct (name, cv::FileNode::MAP);
+  write_numbers (file, "rotation", pose.rotation);
+  write_numbers (file, "translation", t);
+  file.endWriteStruct ();
+}
+
+void
+write_lens (cv::FileStorage &file, const Intrinsics &k, const Distortion &distortion)
+{
+  const double values[] = {k.fx, k.fy, k.cx, k.cy};
+  write_numbers (file, "intrinsics", values);
+  if (!distortion.empty ())
+    write_numbers (file, "distortion", distortion);
+}
+
+void
+write_camera (cv::FileStorage &file, const std::string &camera)
+{
+  if (!camera.empty ())
+    file.write ("camera", camera);
+}
+
+void
+write_partner (cv::FileStorage &file, const char *name, const std::optional<PartnerCamera> &partner)
+{
+  if (!partner)
+    return;
+  file.startWriteStruct (name, cv::FileNode::MAP);
+  write_camera (file, partner->camera);
+  write_lens (file, partner->intrinsics, partner->distortion);
+  write_pose (file, "partner_from_left", partner->partner_from_left);
+  file.endWriteStruct ();
+}
+
+void
+write_view (cv::FileStorage &file, const View &view)
+{
+  const double size[] = {double (view.width), double (view.height)};
+  file.startWriteStruct ("", cv::FileNode::MAP);
+  file << "id" << view.id;
+  if (!view.name.empty ())
+    file.write ("name", view.name);
+  write_camera (file, view.camera);
+  write_numbers (file, "image_size", size);
+  write_lens (file, view.intrinsics, view.distortion);
+  write_pose (file, "world_from_view", view.world_from_view);
+  file << "depth_unit" << view.depth_unit_m << "near" << view.near_m << "far" << view.far_m;
+  write_partner (file, "right", view.right);
+  write_partner (file, "third", view.third);
+  file.endWriteStruct ();
+}
+
+std::string
+text_of_opencv (const Rig &rig, bool json)
+{
+  cv::FileStorage file (
+      json ? "a.json" : "a.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+  file << "rangecast_rig" << kRigFileVersion;
+  file.startWriteStruct ("views", cv::FileNode::SEQ);
+  for (const View &view : rig.views)
+    write_view (file, view);
+  file.endWriteStruct ();
+  return file.releaseAndGetString ();
+}
+
+void
+expect_same_text (const Rig &rig)
+{
+  for (bool json : {false, true})
+    EXPECT_EQ (rig_text (rig, json), text_of_opencv (rig, json));
+}
+
+class RandomRig {
+public:
+  explicit RandomRig (unsigned seed) : random_ (seed) {}
+
+  Rig next ()
+  {
+    Rig rig = ring_rig (whole (0, 4));
+    for (View &view : rig.views) {
+      view.name = name ();
+      view.camera = name ();
+      view.intrinsics = {number (), number (), number (), number ()};
+      view.distortion = numbers ();
+      view.world_from_view = pose ();
+      view.depth_unit_m = number ();
+      view.near_m = number ();
+      view.far_m = number ();
+      if (whole (0, 1))
+        view.right = partner ();
+      if (whole (0, 1))
+        view.third = partner ();
+    }
+    return rig;
+  }
+
+private:
+  int whole (int least, int most) { return std::uniform_int_distribution (least, most) (random_); }
+
+  double number ()
+  {
+    const double small = std::uniform_real_distribution (-1.0, 1.0) (random_);
+    switch (whole (0, 5)) {
+      case 0:
+        return whole (-3, 3);
+      case 1:
+        return whole (-1000000, 1000000);
+      case 2:
+        return std::ldexp (small, whole (-1070, 1000));
+      case 3:
+        return whole (-9, 9) / 8.0;
+      case 4:
+        return double (whole (0, 1) ? INT_MIN : INT_MAX) + whole (-1, 1);
+      default:
+        return small;
+    }
+  }
+
+  std::vector<double> numbers ()
+  {
+    static constexpr int kCounts[] = {0, 4, 5, 8, 12, 14};
+    std::vector<double> all (std::size_t (kCounts[whole (0, 5)]));
+    for (double &value : all)
+      value = number ();
+    return all;
+  }
+
+  Pose pose ()
+  {
+    Pose pose;
+    for (double &value : pose.rotation)
+      value = number ();
+    pose.translation = {number (), number (), number ()};
+    return pose;
+  }
+
+  PartnerCamera partner ()
+  {
+    return {{number (), number (), number (), number ()}, numbers (), pose (), name ()};
+  }
+
+  std::string name ()
+  {
+    static const std::string kParts[] = {"a", "Z", "0", "7", " ", "_", "-", "(", ")", "/", "+", ";",
+        ".", ":", "#", "[", "{", ",", "\"", "'", "\\", "\n", "\r", "\t", "\u00e9", "\u4e2d", "x"};
+    std::string text;
+    for (int i = whole (0, 6); i > 0; i--)
+      text += kParts[whole (0, int (std::size (kParts)) - 1)];
+    /* OpenCV takes what begins and ends with a quote for a text that has its quotes. */
+    if (!text.empty () && text.front () == text.back () && (text[0] == '"' || text[0] == '\''))
+      text += "x";
+    return text;
+  }
+
+  std::mt19937 random_;
+};
+
+std::string
+temporary (const std::string &name)
+{
+  return ::testing::TempDir () + "rangecast-" + std::to_string (getpid ()) + "-" + name;
+}
+
+} // namespace
+
+TEST (RigText, is_what_opencv_writes)
+{
+  expect_same_text ({});
+  expect_same_text (ring_rig (1));
+  expect_same_text (ring_rig (kMaxViews));
+  RandomRig random (1);
+  for (int i = 0; i < 3000 && !HasFailure (); i++)
+    expect_same_text (random.next ());
+}
+
+TEST (RigText, what_opencv_writes_is_read_back_exactly)
+{
+  Rig rig = ring_rig (3);
+  for (View &view : rig.views) /* -0 is written as 0 */
+    for (double &value : view.world_from_view.rotation)
+      value += 0.0;
+  rig.views[0].name = "Tom's \"left\" \\ #1: [x] \u00e9\n";
+  rig.views[0].camera = "0022301001";
+  rig.views[1].name = "'quoted' and not";
+  rig.views[1].distortion = {1.0 / 3, -1e-300, 0, 2};
+  rig.views[2].right =
+      PartnerCamera{rig.views[0].intrinsics, {}, {kIdentity3, {-0.1, 0, 0}}, "\\'\\"};
+  for (const char *name : {"opencv.yaml", "opencv.json"}) {
+    const std::string path = temporary (name), again = temporary (std::string ("again-") + name);
+    std::ofstream (path) << text_of_opencv (rig, path.ends_with ("json"));
+    Rig read;
+    const Status status = load_rig (path, read);
+    ASSERT_TRUE (status.ok ()) << status.message ();
+    EXPECT_EQ (read.views[0].name, rig.views[0].name);
+    EXPECT_EQ (read.views[0].camera, rig.views[0].camera);
+    EXPECT_EQ (read.views[1].name, rig.views[1].name);
+    EXPECT_EQ (read.views[2].right->camera, rig.views[2].right->camera);
+    EXPECT_EQ (encode_rig (read), encode_rig (rig));
+    ASSERT_TRUE (save_rig (again, read).ok ());
+    std::ifstream a (path), b (again);
+    EXPECT_TRUE (std::equal (std::istreambuf_iterator<char> (a), {},
+        std::istreambuf_iterator<char> (b), std::istreambuf_iterator<char> ()));
+    std::filesystem::remove (path);
+    std::filesystem::remove (again);
+  }
+}
+
+TEST (RigText, compressed_files_of_opencv_are_read)
+{
+  for (const char *name : {"packed.yml.gz", "packed.json.gz"}) {
+    const std::string path = temporary (name);
+    {
+      cv::FileStorage file (path, cv::FileStorage::WRITE);
+      file << "rangecast_rig" << kRigFileVersion;
+      file.startWriteStruct ("views", cv::FileNode::SEQ);
+      write_view (file, ring_rig (1).views[0]);
+      file.endWriteStruct ();
+    }
+    Rig read;
+    const Status status = load_rig (path, read);
+    EXPECT_TRUE (status.ok ()) << status.message ();
+    EXPECT_EQ (read.views.size (), 1U);
+    std::filesystem::remove (path);
+  }
+}
