@@ -170,7 +170,7 @@ TEST (Threads, encoder_gives_the_same_bytes_where_pieces_were_too_wide)
     SliceHeader header;
     const auto noise = encode_all (settings, 1, picture_that_becomes_noise)[3].bytes;
     ASSERT_TRUE (read_slice_header (units_of (noise)[0], header).ok ());
-    const int first_guess = compact_pieces (header, {0, header.roi.height}, 256, false, 0);
+    const int first_guess = compact_partitions (header, {0, header.roi.height}, 256, false, 0);
     EXPECT_LT (header.columns, header.roi.width / first_guess); /* or this shows nothing */
   }
 }

@@ -302,15 +302,16 @@ protected:
     for (CpuLevel level : rungs ()) {
       limit_cpu (level);
       static std::map<CpuLevel, ViewEncoder> encoders; /* memory is used again */
-      static std::map<CpuLevel, PieceEncoder> piece_encoders;
+      static std::map<CpuLevel, PartitionEncoder> partition_encoders;
       ViewEncoder &encoder = encoders[level];
       EXPECT_TRUE (encoder.configure (view_of (pixels.width, pixels.height), settings).ok ());
       std::vector<std::uint8_t> bytes;
       EXPECT_TRUE (encoder.begin (pixels.image (), 5).ok ());
-      encoder.for_open_pieces (
-          [&] (ViewEncoder::PieceId piece) { encoder.code (piece, piece_encoders[level]); });
+      encoder.for_open_partitions ([&] (ViewEncoder::PartitionId partition) {
+        encoder.code (partition, partition_encoders[level]);
+      });
       EXPECT_TRUE (encoder.finish ());
-      encoder.for_coded_pieces (
+      encoder.for_coded_partitions (
           [&] (auto piece) { bytes.insert (bytes.end (), piece.begin (), piece.end ()); });
       EXPECT_EQ (bytes, straight) << cpu_level_name (level) << ": " << pixels.width << "x"
                                   << pixels.height << ", bits " << settings.depth_bits << " + "
