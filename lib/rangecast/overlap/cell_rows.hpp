@@ -11,17 +11,17 @@ namespace rangecast {
 
 /** The radius of a node without points, metres: further than any layer gap from all others. */
 inline constexpr float kNoRadius = 1e30f;
-/** Cylinders at a time, at most. */
+/** Maximum number of cylinders. */
 inline constexpr int kMaxClusters = 8;
 
-/** How cells are decided from their neighbours. Lengths in metres. */
+/** How the winners of cells follow from their neighbourhood. Lengths in metres. */
 struct RowRules {
   float layer_gap = 0;
   float smoothing_columns = 0; ///< columns at a radius of 1 m; at radius r this divided by r
-  float most_columns = 0;      ///< but never more than so many, 0 .. CellRows::kPad
+  float most_columns = 0;      ///< maximum number of columns, 0 .. CellRows::kPad
   int smoothing_slices = 0;
-  float hysteresis = 0; ///< what last frame's winner has for nothing, 0 .. 2 (a cosine)
-  float agreement = 0;  ///< what a view gets if all neighbours are its own, 0 .. 2 (a cosine)
+  float hysteresis = 0; ///< bonus of the previous frame's winner, 0 .. 2 (a cosine)
+  float agreement = 0;  ///< bonus of a view that won all neighbours, 0 .. 2 (a cosine)
   int images = 0;
   /** x, z of each image's optical axis in each cluster's cylinder. */
   std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxClusters> optical;
@@ -33,12 +33,12 @@ struct RowCounts {
   std::uint64_t changed = 0; ///< of those, layers that have another one now
 };
 
-/** The layers of all cells as numbers in rows, one for each slice and each layer of its cells, one
- *  number a column, so that neighbours are worked on eight at a time. The first layer of a cell
- *  lies in plane 0 of its slice, the next in plane 1 and so on; a slice has as many planes as its
- *  cells need, a slice without points none.
+/** The layers of all cells as a grid of nodes, one node for each layer of each cell, in rows so
+ * that eight columns can be worked on together. The first layer of a cell lies in plane 0 of its
+ * slice, the next in plane 1 and so on; a slice has one row for each plane that its cells need,
+ * none without points.
  *
- *  Order of calls for a frame: begin(), add_slice() and layers into nodes(), sum_along() of all
+ *  Order of calls for a frame: begin(), add_slice(), make_room(), put(), sum_along() of all
  *  slices, sum_across() of all, decide(), keep_winners(). Calls for different slices may be made at
  * the same time. All planes have pads of columns repeated from the other end of the row. */
 class CellRows {

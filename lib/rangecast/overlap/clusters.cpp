@@ -7,7 +7,7 @@
 
 namespace rangecast {
 
-/* One point in so many tells where somebody stands. */
+/* One point in so many is enough to find the clusters. */
 constexpr std::size_t kStep = 4;
 
 void

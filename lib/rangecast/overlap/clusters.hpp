@@ -11,16 +11,15 @@
 
 namespace rangecast {
 
-/** Tells apart what stands beside each other: connected places of the floor plan, seen from above
- *  (world x, z) on a coarse grid. Keeps its memory from frame to frame: some 100 KB, and 16 bytes a
- *  point once there are two clusters. */
+/** Finds clusters of points: connected components of occupied places of the floor plan (world x, z)
+ *  on a coarse grid. Keeps its memory from frame to frame: some 100 KB, and 16 bytes a point once
+ *  there are two clusters. */
 class Clusters {
 public:
-  /** Side of a place, metres, unless the points spread over more than kSide of them: clusters are
-   *  two if nothing stands in a gap of two places, so 8 cm at most. */
+  /** Side of a place, metres; larger where the points spread over more than kSide places. A gap of
+   *  two empty places, 8 cm at most, separates two clusters. */
   static constexpr float kPlace = 0.04f;
-  /** Share of all points that a cluster has at least; what is smaller goes to the nearest cluster.
-   */
+  /** Minimum share of all points; smaller components join the nearest cluster. */
   static constexpr double kMinShare = 0.05;
 
   /** Finds the clusters.

@@ -23,22 +23,23 @@ struct CylinderSettings {
   AxisMode axis = AxisMode::kPrincipal;
   Axis fixed_axis;    ///< for AxisMode::kFixed; any direction but 0
   CellSettings cells; ///< height_m >= 0.0002, columns 8 .. 3600, lengths >= 0
-  /** How far round a point the winner's surface must cover its view's own before it goes, 0 ..
-   *  kMaxOverlap pixels of its view; 1: as far as its triangles reach, and no hole opens. */
+  /** Radius around a point within which the winner's surface must cover the surface of the point's
+   *  own view before the point is cleared, 0 .. kMaxOverlap pixels of that view. 1: as far as its
+   *  triangles reach, so that no hole opens. */
   double overlap = 1;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
-  /** What the view that won a cell in the frame before has for nothing, 0 .. 2: it loses the cell
-   *  only to a view whose |N . a| is larger by more than this. A cosine. 0 = none. */
+  /** Bonus of the view that won a cell in the previous frame, a cosine, 0 .. 2 (0 = none): it loses
+   *  the cell only to a view whose |N . a| is larger by more than this. */
   double hysteresis = 0.2;
-  /** What a view's |N . a| gains where all neighbours of a cell are won by it (of four, a quarter
-   *  each), 0 .. 2. 0 = none. */
+  /** Bonus of a view that won all four neighbours of a cell (a quarter for each), a cosine, 0 .. 2
+   *  (0 = none). */
   double agreement = 0.1;
-  /** Clusters that stand beside each other get a cylinder each, so many at most, 1 .. kMaxClusters;
-   * 1: one cylinder for all. Not with AxisMode::kFixed. */
+  /** Maximum number of clusters (people who stand apart) that get a cylinder each, 1 ..
+   *  kMaxClusters; 1: one cylinder for all points, as with AxisMode::kFixed. */
   int max_clusters = 4;
 };
 
-/** What one frame came to. */
+/** Statistics of one frame. */
 struct CylinderResult {
   std::uint64_t points_in = 0;    ///< valid pixels before
   std::uint64_t points_out = 0;   ///< valid pixels after
@@ -46,13 +47,13 @@ struct CylinderResult {
   std::uint64_t cells_shared = 0; ///< cells with points of more than one view
   Axis axis;                      ///< of the cylinder of the largest cluster
   int clusters = 0;               ///< cylinders
-  /** Surfaces in cells that some view won in the frame before, too; and those of them that another
-   *  view won now. */
+  /** Surfaces in cells that also had a winner in the previous frame; those of them whose winner
+   *  changed. */
   std::uint64_t cells_held = 0, cells_changed = 0;
 };
 
-/** Clears the points that several views see of the same place, all but those of the view that sees
- * it most squarely.
+/** Where several views see the same surface, keeps the points of the view that faces it most
+ * directly and clears those of the others.
  *
  *  All points go onto a cylinder about the object's axis, which is cut into cells
  * of equal height and angle. In a cell with points of several views, let T be the mean of the
@@ -71,10 +72,10 @@ struct CylinderResult {
  *    (RedundantPoints): a cell can be larger than what its winner sees of it, the winner may see
  *    something before the point, have a hole there, or see a thin thing from its other side.
  *  - Where no tangent is known, T is the circle's. Of equals, the first image wins.
- *  - Added to |N . a| is something for the view that won the cell in the frame before (hysteresis)
- *    and for those that won its neighbours (agreement).
- *  - Clusters that stand beside each other have a cylinder each (Clusters).
- *  - Of more than four surfaces in a cell, those beyond the fourth stay (CellRows).
+ *  - The view that won the cell in the previous frame (hysteresis) and the views that won its
+ *    neighbours (agreement) get a bonus.
+ *  - Each cluster of points has a cylinder of its own (Clusters).
+ *  - Of more than four surfaces in a cell, those beyond the fourth are kept (CellRows).
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
 public:

@@ -6,14 +6,15 @@
 
 namespace rangecast {
 
-/** Finds the trigger that a camera's frame answers. One a camera.
+/** Finds the trigger that a camera's frame belongs to. One instance for each camera.
  *
- *  Two things tell: the frame's number, which grows by one a frame, and its time stamp, which lies
- * one fixed delay after the trigger on the camera's own clock. Numbers alone would shift for good
- * when a camera misses a trigger, because it does not count what it did not take; stamps alone
- * would shift a frame that a busy camera took late. So numbers and stamps are compared, and where
- * they differ the stamp wins if it lies within a quarter of a period of a trigger. Cameras without
- * time stamps are known by arrival, which wins only when it says the same thing three times.
+ *  There are two clues: the frame's number, which grows by one with each frame, and its time stamp,
+ * which lies a fixed delay after the trigger on the camera's own clock. Numbers alone would shift
+ * for good when a camera misses a trigger, because it does not count what it did not take; stamps
+ * alone would shift a frame that a busy camera took late. So numbers and stamps are compared, and
+ * where they differ the stamp wins if it lies within a quarter of a period of a trigger. Cameras
+ * without time stamps are known by arrival, which wins only when it says the same thing three
+ * times.
  *
  *  What is fixed is learnt from triggers that were fired alone, with all before answered or given
  * up: fire such ones until settled() says that two of them agreed. Nothing is allocated. */
@@ -22,7 +23,7 @@ public:
   /** @param period_ns  between two triggers, > 0; decides what is near */
   void start (std::int64_t period_ns);
 
-  /** A trigger went out. Shots count up; so do times.
+  /** A trigger was sent. Numbers and times increase.
    *  @param alone  no other trigger is under way */
   void fired (std::int64_t trigger, std::int64_t time_ns, bool alone);
 
@@ -39,7 +40,8 @@ public:
 
   /** Enough is learnt to fire one trigger after the other. */
   [[nodiscard]] bool settled () const { return settled_; }
-  /** The camera lost step (restarted, its clock set): frames are not known. start() again. */
+  /** The camera is out of sync (restarted, its clock set): its frames match no trigger. Call
+   * start() again. */
   [[nodiscard]] bool lost_sync () const { return unmatched_ >= kMaxUnmatched; }
   /** A camera that does not answer lone triggers is settled by what it said so far. */
   void settle () { settled_ = learnt_; }
