@@ -91,7 +91,7 @@ test_a_host_whose_clock_is_an_hour_ahead_is_told_and_left_out_until_it_is_in_ste
   start_camera 2
   wait_for_sets '0 1 3 .*0 1 2 3 ' 10 60
   end_job
-  [ "$(grep -c 'not in step' parent.log)" = 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
+  [ "$(grep -c 'not synchronised' parent.log)" = 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
   others_went_on "$stopped" 0 1 3
   list | awk 'NR > 1 && $1 < last { exit 1 } { last = $1 }' || fail "capture times go back"
   report "clock an hour ahead" "told once; longest pause of the others $(longest_gap "$stopped" 0 1 3) ms"

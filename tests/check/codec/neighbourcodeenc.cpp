@@ -564,7 +564,7 @@ GST_START_TEST (test_a_controller_may_set_what_costs_no_new_tables)
           "refresh-period "
           "target-bitrate"},
       {"cylinderfilter",
-          "agree agreement axis blend-width bodies colour-balance columns hysteresis "
+          "agree agreement axis blend-width bodies colour-balance columns consistency hysteresis "
           "layer-gap mode overlap smoothing unit-height"},
       {"neighbourcodedec", ""}, {"neighbourcodeparse", ""}, {"rtpneighbourcodepay", ""},
       {"rtpneighbourcodedepay", ""}, {"rangemux", ""}, {"rangesplit", ""}, {"plyenc", ""},
