@@ -31,7 +31,7 @@ test_elements_are_found_where_they_were_installed () {
   export GST_PLUGIN_PATH=$plugins GST_REGISTRY=$PWD/registry.bin LD_LIBRARY_PATH=
   while read -r plugin elements; do
     [ -f "$plugins/libgst$plugin.so" ] || fail "no plugin $plugin in $plugins"
-    gst-inspect-1.0 "$plugin" >inspect.txt
+    gst-inspect-1.0 --plugin "$plugin" >inspect.txt
     for element in $elements; do
       grep -q "^  $element: " inspect.txt || fail "no element $element: $(cat inspect.txt)"
     done

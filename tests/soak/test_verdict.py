@@ -142,8 +142,8 @@ class Remains(unittest.TestCase):
             self.assertEqual(len(self.findings()), 1)
             (self.path / f"{name}-0.threads").write_text("gmain\n")
 
-    def test_workers_of_OpenCV_may_stay(self) -> None:
-        (self.path / "viewer-0.threads").write_text("gmain\n" + "queue0:src\n" * ((os.cpu_count() or 1) - 1))
+    def test_workers_may_stay(self) -> None:
+        (self.path / "viewer-0.threads").write_text("gmain\n" + "rangecast-pool\n" * ((os.cpu_count() or 1) - 1))
         self.assertEqual(self.findings(), [])
 
 

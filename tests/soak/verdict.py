@@ -28,8 +28,10 @@ PASSING = ("GstBuffer", "GstMemory", "GstEvent", "GstMessage", "GstQuery", "GstS
 PASSING_MORE = 150  # there may be at one time than at another
 # Threads of libraries that stay until the process ends: GLib's for signals, the tracer's, the clock's, Mesa's.
 LIBRARIES_THREADS = re.compile(r"gmain|gdbus|gstleak-signal|GstSystemClock|llvmpipe-\d+|.*:(disk|sh|gl|cs|shlo|gdrv)\w*\d*")
-# OpenCV's workers stay for the process's life, and have the name of the thread that first needed them.
-FIRST_OF_OPENCV = {"camera": "depth:src", "viewer": "queue0:src"}
+# Workers that stay for the process's life: those of libgstrange's pool, and OpenCV's, which have the name of the thread that
+# first needed them. At most one for each core but the caller's.
+POOL = "rangecast-pool"
+FIRST_OF_OPENCV = {"camera": "depth:src"}
 
 
 @dataclass
@@ -237,7 +239,7 @@ def judge_threads_left(folder: Path) -> list[Finding]:
     for path in files:
         others = [name for name in path.read_text().split("\n") if name and not LIBRARIES_THREADS.fullmatch(name)]
         workers = FIRST_OF_OPENCV.get(path.stem.split("-")[0].rstrip("0123456789"), "")
-        if set(others) - {workers} or len(others) > (os.cpu_count() or 1) - 1:
+        if set(others) - {POOL, workers} or any(others.count(name) > (os.cpu_count() or 1) - 1 for name in others):
             bad.append(f"{path.stem}: {' '.join(others)}")
     return [Finding(f"threads that outlive the pipeline, in {len(files)} processes", "; ".join(bad) or 0, 0, bool(files) and not bad)]
 
