@@ -12,8 +12,8 @@ namespace rangecast {
 /** Runs work (), which returns a Status, and makes one of whatever it throws: where exceptions must
  *  not go further, at the core's border and in functions that C calls.
  *  @param what  of whom the text speaks, as "cylinder"
- *  @return what work () returns, kNoSpace if there was no memory, else kInternal with the exception's
- *  what () */
+ *  @return what work () returns, kNoSpace if there was no memory, else kInternal with the
+ * exception's what () */
 template <typename Work>
 [[nodiscard]] Status
 guarded (const char *what, const Work &work) noexcept
