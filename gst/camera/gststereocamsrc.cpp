@@ -16,7 +16,7 @@
  * - `stereocamsrc-stats`, every 5 s: the fields of #GstStereoCamSrc:stats.
  * - `stereocamsrc-lost` (`reason`: string) and `stereocamsrc-back` (`left`: string): with
  *   #GstStereoCamSrc:reconnect, a camera went away, or all are there again.
- * - `stereocamsrc-clock` (`server`: string): the clock of clock-server is in step.
+ * - `stereocamsrc-clock` (`server`: string): the pipeline clock is synchronised with clock-server.
  *
  * ## Example launch line
  * |[
@@ -39,7 +39,7 @@
 #include "common/statsreporter.hpp"
 #include "session.hpp"
 
-GST_DEBUG_CATEGORY (gst_stereo_cam_src_debug); /* the other camsource files log to it too */
+GST_DEBUG_CATEGORY (gst_stereo_cam_src_debug); /* the other files of this plugin log to it, too */
 #define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
