@@ -17,7 +17,7 @@ struct CalibrationSource {
   GstVideoInfo info; /* streaming thread */
   bool has_info = false;
   bool refused = false; /* the caps that it has now; the error was posted */
-  PictureReader reader; /* jobs */
+  VideoFrameReader reader; /* jobs */
   GstVideoInfo reader_info;
   bool reader_set = false;
 

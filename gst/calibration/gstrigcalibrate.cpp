@@ -687,7 +687,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
 
   aggregator_class->start = gst_rig_calibrate_start;
   aggregator_class->flush = gst_rig_calibrate_flush;
-  aggregator_class->propose_allocation = propose_picture_allocation;
+  aggregator_class->propose_allocation = propose_video_meta;
   aggregator_class->stop = gst_rig_calibrate_stop;
   aggregator_class->sink_event = gst_rig_calibrate_sink_event;
   aggregator_class->update_src_caps = gst_rig_calibrate_update_src_caps;

@@ -95,7 +95,7 @@ struct GstStereoDepthPrivate {
   guint64 dropped_before = 0; /* by the matcher, up to the last pair */
   gstrange::GapSender gaps;
   GstClockTime head_start = 0; /* live: of the element's own latency, what matching takes */
-  PictureReader readers[3];
+  VideoFrameReader readers[3];
   rangecast::StereoDepth core;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstBufferPool *pool = nullptr;
@@ -669,7 +669,7 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
   priv->reporter.stop ();
   drop_pool (priv->pool);
   forget_pair (priv);
-  for (PictureReader &reader : priv->readers)
+  for (VideoFrameReader &reader : priv->readers)
     reader.reset ();
   return TRUE;
 }
