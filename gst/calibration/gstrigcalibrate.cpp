@@ -388,10 +388,8 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   const PadFronts fronts (cameras, live);
   if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
     return finish (self, cameras);
-  if (fronts.list.empty () || (fronts.missing > 0 && !timeout)) {
-    GST_LOG_OBJECT (self, "waiting for %d of %zu cameras", fronts.missing, cameras.size ());
+  if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  }
   const GstClockTime tolerance = max_capture_skew (cameras, current_settings (self).max_skew);
   guint64 dropped = 0;
   if (drop_unmatched (cameras, fronts, tolerance, GST_CAT_DEFAULT, dropped)) {
@@ -407,7 +405,12 @@ static GstClockTime
 gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 {
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  const PadFronts fronts (current_cameras (GST_RIG_CALIBRATE (aggregator)), true);
+  const Cameras cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
+  for (const auto &camera : cameras)
+    if (!gst_aggregator_pad_has_buffer (camera->aggregator_pad ()))
+      GST_LOG_OBJECT (camera->pad, "waiting for %s",
+          gst_pad_has_current_caps (GST_PAD (camera->pad)) ? "an image" : "caps and an image");
+  const PadFronts fronts (cameras, true);
   for (const PadFronts::Front &front : fronts.list)
     oldest = std::min (oldest, front.running);
   return oldest;

@@ -41,10 +41,6 @@ PairMatcher::take (GstClockTime frame_duration, Pair &pair)
         GST_CAT_DEBUG_OBJECT (category_, pads_[i], "EOS");
         return GST_FLOW_EOS;
       }
-    for (int i = 0; i < 2; i++)
-      if (!fronts[i].buffer)
-        GST_CAT_LOG_OBJECT (category_, pads_[i], "waiting for %s",
-            gst_pad_has_current_caps (GST_PAD (pads_[i])) ? "a frame" : "caps and a frame");
     if (!a.buffer || !b.buffer)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
 
@@ -190,9 +186,19 @@ take_companion (GstAggregatorPad *pad, GstDebugCategory *category, GstClockTime 
   }
   if (gst_aggregator_pad_is_eos (pad))
     return GST_FLOW_OK;
-  GST_CAT_LOG_OBJECT (category, pad, "%s for the pair at %" GST_TIME_FORMAT,
-      timeout ? "no frame arrived in time" : "waiting for the frame", GST_TIME_ARGS (running_time));
-  return timeout ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (!timeout)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  GST_CAT_DEBUG_OBJECT (category, pad, "no frame for the pair at %" GST_TIME_FORMAT " in time",
+      GST_TIME_ARGS (running_time));
+  return GST_FLOW_OK;
+}
+
+void
+log_waiting (GstDebugCategory *category, GstAggregatorPad *pad)
+{
+  if (!gst_aggregator_pad_has_buffer (pad) && !gst_aggregator_pad_is_eos (pad))
+    GST_CAT_LOG_OBJECT (category, pad, "waiting for %s",
+        gst_pad_has_current_caps (GST_PAD (pad)) ? "a frame" : "caps and a frame");
 }
 
 GstAggregatorPad *

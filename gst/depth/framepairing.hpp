@@ -75,6 +75,10 @@ GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
     GstClockTime running_time, GstClockTime tolerance, bool timeout, guint64 &dropped,
     GstBuffer **buffer);
 
+/** Logs that a pad has no frame; for get_next_time(), which GstAggregator calls before it waits.
+ *  aggregate() is not called without a frame on every pad, unless live. */
+void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
+
 /** Adds the always pad of this name from its template; for instance_init.
  *  @return transfer none */
 GstAggregatorPad *add_sink_pad (GstElement *aggregator, const char *name);

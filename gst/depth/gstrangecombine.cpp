@@ -428,6 +428,16 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
   return flow;
 }
 
+/* Without a frame on both pads there is nothing to push, so there is no deadline. */
+static GstClockTime
+gst_range_combine_get_next_time (GstAggregator *aggregator)
+{
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  log_waiting (GST_CAT_DEFAULT, priv->colour_pad);
+  log_waiting (GST_CAT_DEFAULT, priv->depth_pad);
+  return GST_CLOCK_TIME_NONE;
+}
+
 /* ---- lifecycle ---- */
 
 static gboolean
@@ -564,4 +574,5 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_combine_update_src_caps);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_combine_aggregate);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_combine_get_next_time);
 }

@@ -567,6 +567,12 @@ static GstClockTime
 gst_stereo_depth_get_next_time (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  log_waiting (GST_CAT_DEFAULT, priv->left);
+  log_waiting (GST_CAT_DEFAULT, priv->right);
+  if (GstPad *third = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third")) {
+    log_waiting (GST_CAT_DEFAULT, GST_AGGREGATOR_PAD (third));
+    gst_object_unref (third);
+  }
   GstClockTime time = priv->pair.running;
   if (!priv->pair.buffers.first) {
     if (gst_aggregator_pad_is_eos (priv->left) || gst_aggregator_pad_is_eos (priv->right))
