@@ -21,14 +21,14 @@ MappedImages::MappedImages (ImageSet &set) : views (set.cameras.size ())
 
 MappedImages::~MappedImages ()
 {
-  for (Camera *camera : open_)
+  for (CameraInput *camera : open_)
     camera->reader.close ();
 }
 
 void
 MappedImages::open (ImageSet &set, std::size_t i)
 {
-  Camera &camera = *set.cameras[i];
+  CameraInput &camera = *set.cameras[i];
   const std::string &name = set.described[i].name;
   if (!camera.reader_info || !gst_video_info_is_equal (&*camera.reader_info, &set.infos[i])) {
     camera.reader_info.reset ();
@@ -45,7 +45,7 @@ MappedImages::open (ImageSet &set, std::size_t i)
   }
 }
 
-PadFronts::PadFronts (const Cameras &cameras, bool live)
+PadFronts::PadFronts (const CameraInputs &cameras, bool live)
 {
   for (std::size_t i = 0; i < cameras.size (); i++) {
     GstAggregatorPad *pad = cameras[i]->aggregator_pad ();
@@ -64,7 +64,7 @@ PadFronts::~PadFronts ()
 }
 
 GstClockTime
-max_capture_skew (const Cameras &cameras, GstClockTime max_skew)
+max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew)
 {
   if (max_skew > 0)
     return max_skew;
@@ -77,7 +77,7 @@ max_capture_skew (const Cameras &cameras, GstClockTime max_skew)
 }
 
 bool
-drop_unmatched (const Cameras &cameras, const PadFronts &fronts, GstClockTime tolerance,
+drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
     GstDebugCategory *category, guint64 &dropped)
 {
   GstClockTime latest = 0;
@@ -106,7 +106,7 @@ drop_unmatched (const Cameras &cameras, const PadFronts &fronts, GstClockTime to
 }
 
 std::shared_ptr<ImageSet>
-pop_images (const Cameras &cameras, const PadFronts &fronts, guint64 number)
+pop_images (const CameraInputs &cameras, const PadFronts &fronts, guint64 number)
 {
   auto set = std::make_shared<ImageSet> ();
   set->cameras = cameras;

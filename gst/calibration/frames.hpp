@@ -12,7 +12,7 @@
 /* From the sink pads of rigcalibrate to sets of images of one moment. */
 
 /** One sink pad. */
-struct Camera {
+struct CameraInput {
   GstRigCalibratePad *pad; /* reference */
 
   /* streaming thread */
@@ -23,17 +23,17 @@ struct Camera {
   VideoFrameReader reader;
   std::optional<GstVideoInfo> reader_info;
 
-  explicit Camera (GstRigCalibratePad *p) : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))) {}
-  ~Camera () { gst_object_unref (pad); }
-  Camera (const Camera &) = delete;
-  Camera &operator= (const Camera &) = delete;
+  explicit CameraInput (GstRigCalibratePad *p) : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))) {}
+  ~CameraInput () { gst_object_unref (pad); }
+  CameraInput (const CameraInput &) = delete;
+  CameraInput &operator= (const CameraInput &) = delete;
   [[nodiscard]] GstAggregatorPad *aggregator_pad () const { return GST_AGGREGATOR_PAD (pad); }
 };
-using Cameras = std::vector<std::shared_ptr<Camera>>;
+using CameraInputs = std::vector<std::shared_ptr<CameraInput>>;
 
 /** Images of one moment on their way to the board detector; vectors are by camera. */
 struct ImageSet {
-  Cameras cameras;
+  CameraInputs cameras;
   std::vector<rangecast::CalibrationCamera> described;
   std::vector<GstVideoInfo> infos;
   std::vector<GstBuffer *> buffers; /* references; null where there is none */
@@ -63,7 +63,7 @@ public:
 private:
   void open (ImageSet &set, std::size_t i);
 
-  std::vector<Camera *> open_;
+  std::vector<CameraInput *> open_;
 };
 
 /** The oldest image of every pad. */
@@ -75,7 +75,7 @@ public:
     GstClockTime capture, running;
   };
 
-  PadFronts (const Cameras &cameras, bool live);
+  PadFronts (const CameraInputs &cameras, bool live);
   ~PadFronts ();
   PadFronts (const PadFronts &) = delete;
   PadFronts &operator= (const PadFronts &) = delete;
@@ -86,15 +86,15 @@ public:
 
 /** Maximum difference of the capture times of one set, ns.
  *  @param max_skew  the property; 0: half a frame of the fastest camera, or 5 ms */
-GstClockTime max_capture_skew (const Cameras &cameras, GstClockTime max_skew);
+GstClockTime max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew);
 
 /** Drops GAPs, images that are older than the newest by more than the tolerance, and all images
  *  while a camera has no caps yet. Each dropped image is logged.
  *  @param[out] dropped  number of dropped images
  *  @return whether anything was dropped */
-bool drop_unmatched (const Cameras &cameras, const PadFronts &fronts, GstClockTime tolerance,
+bool drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
     GstDebugCategory *category, guint64 &dropped);
 
 /** Takes the front images off their pads. */
 std::shared_ptr<ImageSet> pop_images (
-    const Cameras &cameras, const PadFronts &fronts, guint64 number);
+    const CameraInputs &cameras, const PadFronts &fronts, guint64 number);

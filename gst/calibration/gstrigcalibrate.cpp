@@ -43,11 +43,10 @@ using rangecast::TileLayout;
 GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
 #define GST_CAT_DEFAULT gst_rig_calibrate_debug
 
-/* Data flow, in the order of this file. aggregate waits for one image of each camera, drops those
- * whose capture times do not match, and posts the set as a job. Jobs look for the board, keep
- * useful sets, draw a preview and, at EOS, on `calibrate` or with auto-finish, calibrate. If live,
- * sets that arrive while a job runs are skipped; otherwise the streaming thread waits for each job.
- * It pushes the previews. */
+/* aggregate waits for one image of each camera, drops those whose capture times do not match, and
+ * posts the set as a job. Jobs look for the board, keep useful sets, draw a preview and, at EOS, on
+ * `calibrate` or with auto-finish, calibrate. If live, sets that arrive while a job runs are skipped;
+ * otherwise the streaming thread waits for each job. It pushes the previews. */
 
 enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
 static guint signals[LAST_SIGNAL];
@@ -59,7 +58,7 @@ struct GstRigCalibratePrivate {
   /* Guards the members up to stale; never held across a push, message or job. */
   std::mutex lock;
   RigCalibrateSettings settings;
-  Cameras cameras;
+  CameraInputs cameras;
   guint64 examined = 0, taken = 0, skipped = 0, dropped = 0;
   GstBuffer *still = nullptr; /* preview that was not pushed yet */
   TileLayout still_layout;
@@ -96,7 +95,7 @@ G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR
     G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
 GST_ELEMENT_REGISTER_DEFINE (rigcalibrate, "rigcalibrate", GST_RANK_NONE, GST_TYPE_RIG_CALIBRATE)
 
-static Cameras
+static CameraInputs
 current_cameras (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
@@ -108,6 +107,57 @@ current_settings (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
   return self->priv->settings;
+}
+
+/* ---- sink caps ---- */
+
+static Status
+handle_caps (GstRigCalibrate *self, CameraInput &camera, GstCaps *caps)
+{
+  const std::string name = calibration_camera (camera.pad).name;
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return {StatusCode::kUnsupported, "pad " + name + ": not the caps of raw video"};
+  bool begun;
+  {
+    std::lock_guard guard (self->priv->lock);
+    begun = self->priv->examined > 0;
+  }
+  if (begun && camera.info &&
+      (info.width != camera.info->width || info.height != camera.info->height))
+    return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
+                                      size_text (camera.info->width, camera.info->height) + " to " +
+                                      size_text (info.width, info.height) +
+                                      "; expected one size throughout a calibration"};
+  GST_INFO_OBJECT (camera.pad, "caps %" GST_PTR_FORMAT, caps);
+  camera.info = info;
+  return {};
+}
+
+/* Ends waits for jobs on a flush. */
+static gboolean
+gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  auto self = GST_RIG_CALIBRATE (aggregator);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START)
+    self->priv->jobs.set_flushing (true);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    self->priv->jobs.set_flushing (false);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    gst_event_parse_caps (event, &caps);
+    for (const auto &camera : current_cameras (self)) {
+      if (camera->aggregator_pad () != pad)
+        continue;
+      camera->refused = gst_range_flow_return (
+                            GST_ELEMENT (self), handle_caps (self, *camera, caps)) != GST_FLOW_OK;
+      if (camera->refused) {
+        gst_event_unref (event);
+        return FALSE;
+      }
+    }
+  }
+  return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
 }
 
 /* ---- jobs ---- */
@@ -332,7 +382,7 @@ examine_set (GstRigCalibrate *self, std::shared_ptr<ImageSet> set, bool live)
 
 /* The reason why no set was examined. */
 static Status
-explain_no_images (const Cameras &cameras)
+explain_no_images (const CameraInputs &cameras)
 {
   for (const auto &camera : cameras)
     if (!camera->info)
@@ -345,7 +395,7 @@ explain_no_images (const Cameras &cameras)
 
 /* All pads are at EOS: calibrates, unless that was done already. */
 static GstFlowReturn
-finish (GstRigCalibrate *self, const Cameras &cameras)
+finish (GstRigCalibrate *self, const CameraInputs &cameras)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (!priv->jobs.wait_until_idle ())
@@ -381,7 +431,7 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
     if (priv->finished)
       return GST_FLOW_EOS;
   }
-  const Cameras cameras = current_cameras (self);
+  const CameraInputs cameras = current_cameras (self);
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
     return GST_FLOW_ERROR;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
@@ -405,7 +455,7 @@ static GstClockTime
 gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 {
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  const Cameras cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
+  const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
   for (const auto &camera : cameras)
     if (!gst_aggregator_pad_has_buffer (camera->aggregator_pad ()))
       GST_LOG_OBJECT (camera->pad, "waiting for %s",
@@ -414,55 +464,6 @@ gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
   for (const PadFronts::Front &front : fronts.list)
     oldest = std::min (oldest, front.running);
   return oldest;
-}
-
-static Status
-handle_caps (GstRigCalibrate *self, Camera &camera, GstCaps *caps)
-{
-  const std::string name = calibration_camera (camera.pad).name;
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, caps))
-    return {StatusCode::kUnsupported, "pad " + name + ": not the caps of raw video"};
-  bool begun;
-  {
-    std::lock_guard guard (self->priv->lock);
-    begun = self->priv->examined > 0;
-  }
-  if (begun && camera.info &&
-      (info.width != camera.info->width || info.height != camera.info->height))
-    return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
-                                      size_text (camera.info->width, camera.info->height) + " to " +
-                                      size_text (info.width, info.height) +
-                                      "; expected one size throughout a calibration"};
-  GST_INFO_OBJECT (camera.pad, "caps %" GST_PTR_FORMAT, caps);
-  camera.info = info;
-  return {};
-}
-
-/* Ends waits for jobs on a flush. */
-static gboolean
-gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
-{
-  auto self = GST_RIG_CALIBRATE (aggregator);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START)
-    self->priv->jobs.set_flushing (true);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    self->priv->jobs.set_flushing (false);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    GstCaps *caps;
-    gst_event_parse_caps (event, &caps);
-    for (const auto &camera : current_cameras (self)) {
-      if (camera->aggregator_pad () != pad)
-        continue;
-      camera->refused = gst_range_flow_return (
-                            GST_ELEMENT (self), handle_caps (self, *camera, caps)) != GST_FLOW_OK;
-      if (camera->refused) {
-        gst_event_unref (event);
-        return FALSE;
-      }
-    }
-  }
-  return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
 }
 
 /* ---- request pads ---- */
@@ -482,7 +483,7 @@ gst_rig_calibrate_request_new_pad (
         GST_RIG_CALIBRATE_PAD (pad), int (std::min<unsigned> (number, rangecast::kMaxViews - 1)));
   {
     std::lock_guard guard (self->priv->lock);
-    self->priv->cameras.push_back (std::make_shared<Camera> (GST_RIG_CALIBRATE_PAD (pad)));
+    self->priv->cameras.push_back (std::make_shared<CameraInput> (GST_RIG_CALIBRATE_PAD (pad)));
   }
   gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   return pad;
@@ -506,7 +507,7 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
 static GObject *
 gst_rig_calibrate_get_child_by_index (GstChildProxy *proxy, guint index)
 {
-  const Cameras cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
+  const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
   return index < cameras.size () ? G_OBJECT (gst_object_ref (cameras[index]->pad)) : nullptr;
 }
 

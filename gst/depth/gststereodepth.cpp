@@ -67,7 +67,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
  *     drop_if_late   drops the pair if its depth would arrive too late (QoS)
  *     take_third     takes the third image of that time, if there is a pad for it
  *     negotiate      after new caps: loads the view, configures the matcher, sets output caps
- *     push_pair      rectifies, matches and pushes
+ *     push_gap,
+ *     push_pair      announces time without pairs; rectifies, matches and pushes
  *
  * A pair that waits for its third image is kept in `pair`, off its pads: a source that feeds all
  * pads from one thread and loses a third image would otherwise block on pad left for ever. So caps
@@ -214,93 +215,6 @@ gst_stereo_depth_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, G
   return handled;
 }
 
-/* ---- negotiation ---- */
-
-static bool
-same_size (const GstVideoInfo &a, const GstVideoInfo &b)
-{
-  return a.width == b.width && a.height == b.height;
-}
-
-/* Configures matcher and readers for the caps of all inputs. The third camera may change its size
- * somewhat earlier or later than the others; until then pairs are matched without it.
- * @param third_here  the pair has a third image, so its size must be right */
-static Status
-configure_core (GstStereoDepthPrivate *priv, bool third_here)
-{
-  Input *inputs = priv->inputs;
-  const GstVideoInfo &left = *inputs[kLeft].info;
-  for (const Side side : {kRight, kThird})
-    if (const auto &other = inputs[side].info;
-        other && !same_size (left, *other) && (side == kRight || third_here))
-      return {StatusCode::kBadSize, std::string ("pad ") + kPadNames[side] + " is " +
-                                        size_text (other->width, other->height) +
-                                        " but pad left is " + size_text (left.width, left.height) +
-                                        "; expected the same size"};
-  const View &before = priv->core.range_view ();
-  if (before.width != left.width || before.height != left.height)
-    priv->rois.reset (); /* downstream requests a region again only if the output caps change */
-  StereoDepthSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
-  View view;
-  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
-    return s;
-  if (inputs[kThird].info && !view.third)
-    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
-                                   "rig with a file that has one in view " +
-                                       std::to_string (view.id)};
-  const bool with_third = inputs[kThird].info && same_size (left, *inputs[kThird].info);
-  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
-    return s;
-  for (int side = kLeft; side <= (with_third ? kThird : kRight); side++)
-    if (!inputs[side].reader.set (*inputs[side].info))
-      return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
-  priv->negotiate_third = inputs[kThird].info && !with_third;
-  priv->warned_mirrored = false;
-  return {};
-}
-
-static GstFlowReturn
-negotiate (GstStereoDepth *self, bool third_here)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  for (const Side side : {kLeft, kRight})
-    if (!priv->inputs[side].info) {
-      GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
-      return GST_FLOW_NOT_NEGOTIATED;
-    }
-  if (const GstFlowReturn flow =
-          gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, third_here));
-      flow != GST_FLOW_OK)
-    return flow;
-  const GstVideoInfo &left = *priv->inputs[kLeft].info;
-  const auto info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
-  GstCaps *caps = gstrange::make_range_caps (info);
-  GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
-  const View &view = info.rig.views.front ();
-  GST_DEBUG_OBJECT (self, "view %d, %g to %g m, focal length %g pixels, %s third camera", view.id,
-      view.near_m, view.far_m, view.intrinsics.fx,
-      priv->inputs[kThird].info && !priv->negotiate_third ? "with" : "without");
-  drop_pool (priv->pool);
-  const Status status = gstrange::make_pool (caps, priv->pool);
-  if (status.ok ())
-    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
-  gst_caps_unref (caps);
-  priv->rois.restart_interval ();
-  priv->reporter.set_views (info.rig);
-  priv->negotiate = !status.ok ();
-  return gst_range_flow_return (GST_ELEMENT (self), status);
-}
-
-static GstFlowReturn
-gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
-}
-
 /* ---- pairs of images ---- */
 
 /* Two cameras with unrelated clocks may never capture at the same time. */
@@ -321,24 +235,6 @@ warn_if_unpaired (GstStereoDepth *self, bool paired)
           dropped - priv->dropped_before_pair));
 }
 
-/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
-static GstFlowReturn
-push_gap (GstStereoDepth *self)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  GstClockTime begin, end;
-  if (!priv->matcher->take_gap (priv->pair.running, begin, end))
-    return GST_FLOW_OK;
-  if (!priv->pool) { /* caps come before a GAP */
-    if (!priv->inputs[kLeft].info || !priv->inputs[kRight].info)
-      return GST_FLOW_OK;
-    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
-      return flow;
-  }
-  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
-  return GST_FLOW_OK;
-}
-
 static GstFlowReturn
 take_pair (GstStereoDepth *self)
 {
@@ -350,8 +246,7 @@ take_pair (GstStereoDepth *self)
     pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
     pair.capture = gstrange::capture_time_of (priv->left, pair.buffers.first, is_live (self));
   }
-  const GstFlowReturn pushed = push_gap (self);
-  return pushed == GST_FLOW_OK ? flow : pushed;
+  return flow;
 }
 
 /* Caps that followed the pair apply from now on. */
@@ -426,7 +321,112 @@ take_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
   return flow;
 }
 
-/* ---- one pair ---- */
+/* ---- negotiation ---- */
+
+static bool
+same_size (const GstVideoInfo &a, const GstVideoInfo &b)
+{
+  return a.width == b.width && a.height == b.height;
+}
+
+/* Configures matcher and readers for the caps of all inputs. The third camera may change its size
+ * somewhat earlier or later than the others; until then pairs are matched without it.
+ * @param has_third  the pair has a third image, whose size must match */
+static Status
+configure_core (GstStereoDepthPrivate *priv, bool has_third)
+{
+  Input *inputs = priv->inputs;
+  const GstVideoInfo &left = *inputs[kLeft].info;
+  for (const Side side : {kRight, kThird})
+    if (const auto &other = inputs[side].info;
+        other && !same_size (left, *other) && (side == kRight || has_third))
+      return {StatusCode::kBadSize, std::string ("pad ") + kPadNames[side] + " is " +
+                                        size_text (other->width, other->height) +
+                                        " but pad left is " + size_text (left.width, left.height) +
+                                        "; expected the same size"};
+  const View &before = priv->core.range_view ();
+  if (before.width != left.width || before.height != left.height)
+    priv->rois.reset (); /* downstream requests a region again only if the output caps change */
+  StereoDepthSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  View view;
+  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
+    return s;
+  if (inputs[kThird].info && !view.third)
+    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
+                                   "rig with a file that has one in view " +
+                                       std::to_string (view.id)};
+  const bool with_third = inputs[kThird].info && same_size (left, *inputs[kThird].info);
+  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
+    return s;
+  for (int side = kLeft; side <= (with_third ? kThird : kRight); side++)
+    if (!inputs[side].reader.set (*inputs[side].info))
+      return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
+  priv->negotiate_third = inputs[kThird].info && !with_third;
+  priv->warned_mirrored = false;
+  return {};
+}
+
+static GstFlowReturn
+negotiate (GstStereoDepth *self, bool has_third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  for (const Side side : {kLeft, kRight})
+    if (!priv->inputs[side].info) {
+      GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
+      return GST_FLOW_NOT_NEGOTIATED;
+    }
+  if (const GstFlowReturn flow =
+          gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, has_third));
+      flow != GST_FLOW_OK)
+    return flow;
+  const GstVideoInfo &left = *priv->inputs[kLeft].info;
+  const auto info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
+  GstCaps *caps = gstrange::make_range_caps (info);
+  GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
+  const View &view = info.rig.views.front ();
+  GST_DEBUG_OBJECT (self, "view %d, %g to %g m, focal length %g pixels, %s third camera", view.id,
+      view.near_m, view.far_m, view.intrinsics.fx,
+      priv->inputs[kThird].info && !priv->negotiate_third ? "with" : "without");
+  drop_pool (priv->pool);
+  const Status status = gstrange::make_pool (caps, priv->pool);
+  if (status.ok ())
+    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
+  gst_caps_unref (caps);
+  priv->rois.restart_interval ();
+  priv->reporter.set_views (info.rig);
+  priv->negotiate = !status.ok ();
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+static GstFlowReturn
+gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+{
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
+}
+
+/* ---- output ---- */
+
+/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
+static GstFlowReturn
+push_gap (GstStereoDepth *self)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  GstClockTime begin, end;
+  if (!priv->matcher->take_gap (priv->pair.running, begin, end))
+    return GST_FLOW_OK;
+  if (!priv->pool) { /* caps come before a GAP */
+    if (!priv->inputs[kLeft].info || !priv->inputs[kRight].info)
+      return GST_FLOW_OK;
+    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
+      return flow;
+  }
+  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
+  return GST_FLOW_OK;
+}
 
 /* Matches the images that the readers have open. */
 static Status
@@ -539,12 +539,15 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
   apply_release_of_third (priv);
-  if (!priv->pair.buffers.first)
-    if (const GstFlowReturn flow = take_pair (self); flow != GST_FLOW_OK) {
-      if (flow == GST_FLOW_EOS)
-        priv->reporter.finish ();
+  if (!priv->pair.buffers.first) {
+    const GstFlowReturn taken = take_pair (self);
+    if (const GstFlowReturn flow = push_gap (self); flow != GST_FLOW_OK)
       return flow;
-    }
+    if (taken == GST_FLOW_EOS)
+      priv->reporter.finish ();
+    if (taken != GST_FLOW_OK)
+      return taken;
+  }
   if (drop_if_late (self))
     return GST_FLOW_OK;
   GstBuffer *third = nullptr;
