@@ -6,11 +6,12 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
 
-/** Goes through the units of a buffer that holds whole ones, memory by memory: to map a buffer of
- *  several memories is to copy it. Where a unit lies across two memories it is mapped as a whole.
- *  @param take  bool (gsize offset, std::span<const guint8> unit, const UnitHeader &); false: no
- * more
- *  @param[out] status  how it ended: kTruncated, kBadData or kUnsupported at damage
+/** Calls `take` for each unit of a buffer that holds whole units. Maps one memory at a time,
+ * because mapping a buffer of several memories copies it; the whole buffer is mapped only if a unit
+ * crosses two memories.
+ *  @param take  bool (gsize offset, std::span<const guint8> unit, const UnitHeader &); returns
+ * false to stop
+ *  @param[out] status  kTruncated, kBadData or kUnsupported if a unit is damaged
  *  @return FALSE if the buffer cannot be mapped */
 template <typename Take>
 bool

@@ -2,6 +2,8 @@
 /* stereodepth with two cameras. With three: stereodepththird. */
 #include "stereodepth-check.hpp"
 
+#include <mutex>
+
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -481,6 +483,79 @@ GST_START_TEST (test_cameras_that_never_take_a_picture_at_once_are_one_warning)
 }
 GST_END_TEST;
 
+/* What GST_DEBUG=stereodepth:6 prints, as "object: message". */
+struct Log {
+  std::mutex lock;
+  std::vector<std::string> lines;
+
+  Log ()
+  {
+    gst_debug_set_active (TRUE);
+    gst_debug_remove_log_function (gst_debug_log_default); /* not on stderr */
+    gst_debug_add_log_function (add, this, nullptr);
+    gst_debug_set_threshold_for_name ("stereodepth", GST_LEVEL_LOG);
+  }
+  ~Log ()
+  {
+    gst_debug_unset_threshold_for_name ("stereodepth");
+    gst_debug_remove_log_function (add);
+  }
+  static void add (GstDebugCategory *category, GstDebugLevel, const gchar *, const gchar *, gint,
+      GObject *object, GstDebugMessage *message, gpointer data)
+  {
+    if (!g_str_equal (gst_debug_category_get_name (category), "stereodepth"))
+      return;
+    auto log = static_cast<Log *> (data);
+    std::lock_guard guard (log->lock);
+    log->lines.push_back (
+        (GST_IS_PAD (object) ? std::string (GST_OBJECT_NAME (object)) + ": " : std::string ()) +
+        gst_debug_message_get (message));
+  }
+  /* Waits for a line that contains the text. */
+  bool says (const char *text)
+  {
+    for (const gint64 end = g_get_monotonic_time () + 20 * G_USEC_PER_SEC;
+         g_get_monotonic_time () < end; g_usleep (1000)) {
+      std::lock_guard guard (lock);
+      for (const std::string &line : lines)
+        if (line.find (text) != std::string::npos)
+          return true;
+    }
+    return false;
+  }
+};
+
+GST_START_TEST (test_log_says_why_nothing_comes)
+{
+  Log log;
+  {
+    Stereo s;
+    s.push (s.left, 0);
+    fail_unless (log.says ("right: waiting for a frame"));
+    s.push (s.right, 3 * kFrame / 4);
+    fail_unless (
+        log.says ("left: dropping frame at 0:00:00.000000000: no partner, pad right is 30.0 "
+                  "ms ahead, tolerance 20.0 ms"));
+    s.push (s.left, kFrame);
+    gst_buffer_unref (gst_harness_pull (s.left));
+    gst_harness_push_upstream_event (
+        s.left, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2.0, kFrame, kFrame));
+    s.push (s.left, 2 * kFrame);
+    s.push (s.right, 2 * kFrame);
+    fail_unless (log.says ("dropping pair at 0:00:00.080000000: late by 40.0 ms (QoS)"));
+    GstCaps *caps = gst_caps_from_string ("video/x-h264");
+    fail_if (gst_pad_peer_query_accept_caps (s.right->srcpad, caps));
+    gst_caps_unref (caps);
+    fail_unless (log.says ("right: refused caps video/x-h264"));
+  }
+  RigFile rig;
+  Stereo s (rig.property () + " view-id=7");
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  fail_unless (log.says ("has no view with view-id 7"));
+}
+GST_END_TEST;
+
 static Suite *
 stereodepth_suite ()
 {
@@ -510,6 +585,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_sources_with_padded_rows_need_not_copy);
   tcase_add_test (tc, test_without_a_framerate_pictures_5_ms_apart_are_a_pair);
   tcase_add_test (tc, test_cameras_that_never_take_a_picture_at_once_are_one_warning);
+  tcase_add_test (tc, test_log_says_why_nothing_comes);
   return suite;
 }
 
