@@ -143,7 +143,7 @@ common_caps (GstCaps *offered, std::span<GstPad *const> pads)
 
 bool
 choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
-    std::span<const CameraAbilities> cameras, CamSourceFormat &format)
+    std::span<const CameraAbilities> cameras, SourceFormat &format)
 {
   GstCaps *common = common_caps (offered, pads);
   GstCaps *caps = gst_caps_intersect_full (common, offered, GST_CAPS_INTERSECT_FIRST);

@@ -9,16 +9,16 @@
 #include <vector>
 
 /** What all cameras of stereocamsrc take their pictures as. */
-struct CamSourceFormat {
+struct SourceFormat {
   std::string pixel_format; ///< GenICam's name
   int width = 0, height = 0;
   int fps_n = 0, fps_d = 1; ///< 0/1: single pictures
   GstCaps *caps = nullptr;  ///< fixed; owned
 
-  CamSourceFormat () = default;
-  ~CamSourceFormat () { gst_clear_caps (&caps); }
-  CamSourceFormat (const CamSourceFormat &) = delete;
-  CamSourceFormat &operator= (const CamSourceFormat &) = delete;
+  SourceFormat () = default;
+  ~SourceFormat () { gst_clear_caps (&caps); }
+  SourceFormat (const SourceFormat &) = delete;
+  SourceFormat &operator= (const SourceFormat &) = delete;
 
   /** ns; 0: there is none */
   [[nodiscard]] GstClockTime period () const
@@ -42,4 +42,4 @@ GstCaps *camera_source_caps (std::span<const CameraAbilities> cameras,
  *  @param offered  of camera_source_caps(); transfer none
  *  @return false if there is none */
 bool choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
-    std::span<const CameraAbilities> cameras, CamSourceFormat &format);
+    std::span<const CameraAbilities> cameras, SourceFormat &format);

@@ -42,7 +42,7 @@ parse_clock_server (const std::string &text, ClockServer &server)
  * stays until another is wanted: it is in step already then, and GStreamer 1.22's must not be let
  * go at the moment when it gets into step. */
 Status
-CamSourceClock::open (const std::string &text)
+NetworkClock::open (const std::string &text)
 {
   if (clock_ && text == server_)
     return {};
@@ -54,7 +54,7 @@ CamSourceClock::open (const std::string &text)
   if (Status s = parse_clock_server (text, server); !s.ok ())
     return s;
   if (!server.ptp) {
-    const PromptThread prompt; /* that asks: what it is late is error of the clock */
+    const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
     clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
   } else {
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))

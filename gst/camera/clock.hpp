@@ -7,12 +7,12 @@
 #include <string>
 
 /** The clock that stereocamsrc provides: one that another host serves. */
-class CamSourceClock {
+class NetworkClock {
 public:
-  CamSourceClock () = default;
-  ~CamSourceClock () { gst_clear_object (&clock_); }
-  CamSourceClock (const CamSourceClock &) = delete;
-  CamSourceClock &operator= (const CamSourceClock &) = delete;
+  NetworkClock () = default;
+  ~NetworkClock () { gst_clear_object (&clock_); }
+  NetworkClock (const NetworkClock &) = delete;
+  NetworkClock &operator= (const NetworkClock &) = delete;
 
   /** Begins to ask the server; nothing waits for it, but for the look-up of a host's name.
    *  @param server  HOST:PORT, [IPv6]:PORT or ptp:DOMAIN; empty: no clock

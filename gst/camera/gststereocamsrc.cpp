@@ -52,15 +52,15 @@ static constexpr std::chrono::milliseconds kGiveBack{2000};
 
 struct GstStereoCamSrcPrivate {
   std::mutex lock; /* guards settings and session; taken before the session's */
-  CamSourceSettings settings;
-  std::shared_ptr<CamSourceSession> session; ///< the last one; it may have ended
+  StereoCamSettings settings;
+  std::shared_ptr<CameraSession> session; ///< the last one; it may have ended
 
   /* State changes; constant between them. */
-  CamSourcePads pads; ///< left, right, and third while it is there
-  CamSourceClock clock;
+  CameraPads pads; ///< left, right, and third while it is there
+  NetworkClock clock;
   StatsReporter reporter; /* has locks of its own */
 
-  std::shared_ptr<CamSourceSession> current ()
+  std::shared_ptr<CameraSession> current ()
   {
     std::lock_guard guard (lock);
     return session;
@@ -123,7 +123,7 @@ end_stream (GstStereoCamSrc *self, GstEvent *event)
 {
   const auto session = self->priv->current ();
   if (session)
-    session->end (gst_event_get_seqnum (event));
+    session->send_eos (gst_event_get_seqnum (event));
   return session != nullptr;
 }
 
@@ -135,7 +135,7 @@ flush_stream (GstStereoCamSrc *self, GstEvent *event)
     return false;
   const bool start = GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START;
   if (!start)
-    session->flushed ();
+    session->flush ();
   for (const auto &pad : self->priv->pads)
     start ? pad->flush_start (event) : pad->flush_stop (event);
   return true;
@@ -166,7 +166,7 @@ gst_stereo_cam_src_send_event (GstElement *element, GstEvent *event)
 static gboolean
 gst_stereo_cam_src_activate_mode (GstPad *pad, GstObject *, GstPadMode mode, gboolean active)
 {
-  auto entry = static_cast<CamSourcePad *> (gst_pad_get_element_private (pad));
+  auto entry = static_cast<CameraPad *> (gst_pad_get_element_private (pad));
   return mode == GST_PAD_MODE_PUSH && entry->activate (active);
 }
 
@@ -178,10 +178,10 @@ add_pad (GstStereoCamSrc *self, GstStaticPadTemplate *pad_template)
   gst_pad_set_event_function (pad, gst_stereo_cam_src_event);
   gst_pad_set_activatemode_function (pad, gst_stereo_cam_src_activate_mode);
   gst_pad_use_fixed_caps (pad);
-  self->priv->pads.push_back (std::make_shared<CamSourcePad> (
-      GST_ELEMENT (self), pad, [self] (CamSourcePad &pushed, GstFlowReturn flow) {
+  self->priv->pads.push_back (std::make_shared<CameraPad> (
+      GST_ELEMENT (self), pad, [self] (CameraPad &pushed, GstFlowReturn flow) {
         if (const auto session = self->priv->current ())
-          session->pad_flowed (pushed, flow);
+          session->handle_flow (pushed, flow);
       }));
   gst_pad_set_element_private (pad, self->priv->pads.back ().get ());
 }
@@ -248,7 +248,7 @@ collect_stats (GstElement *element)
 }
 
 static bool
-check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames &names)
+check_settings (GstStereoCamSrc *self, StereoCamSettings &settings, CameraNames &names)
 {
   {
     std::lock_guard guard (self->priv->lock);
@@ -264,7 +264,7 @@ check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames 
 static bool
 open_clock (GstStereoCamSrc *self)
 {
-  CamSourceSettings settings;
+  StereoCamSettings settings;
   CameraNames names;
   if (!check_settings (self, settings, names))
     return false;
@@ -286,14 +286,14 @@ open_clock (GstStereoCamSrc *self)
 
 /* Names and pads of the session that start() begins. */
 static bool
-prepare (GstStereoCamSrc *self, CamSourceSession::Setup &setup)
+prepare (GstStereoCamSrc *self, CameraSession::Setup &setup)
 {
   if (!check_settings (self, setup.settings, setup.names))
     return false;
   setup.element = GST_ELEMENT (self);
   setup.clock = self->priv->clock.clock ();
-  setup.stream = gst_util_group_id_next ();
-  add_third_pad (self, !setup.names[2].empty (), setup.stream);
+  setup.group_id = gst_util_group_id_next ();
+  add_third_pad (self, !setup.names[2].empty (), setup.group_id);
   gst_element_no_more_pads (setup.element);
   setup.pads = self->priv->pads;
   return true;
@@ -301,10 +301,10 @@ prepare (GstStereoCamSrc *self, CamSourceSession::Setup &setup)
 
 /* The pads are active. */
 static bool
-start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
+start (GstStereoCamSrc *self, CameraSession::Setup setup)
 {
   setup.previous = self->priv->current ();
-  auto session = CamSourceSession::begin (std::move (setup));
+  auto session = CameraSession::begin (std::move (setup));
   if (!session) {
     GST_ELEMENT_ERROR (self, RESOURCE, FAILED, ("Could not start the camera thread"), (nullptr));
     return false;
@@ -318,7 +318,7 @@ static void
 stop (GstStereoCamSrc *self)
 {
   if (const auto session = self->priv->current ())
-    session->ask_to_stop ();
+    session->request_stop ();
 }
 
 /* READY to NULL: other programs may have the cameras then. A camera that does not answer is given
@@ -327,7 +327,7 @@ static void
 close (GstStereoCamSrc *self)
 {
   const auto session = self->priv->current ();
-  if (session && !session->wait_for_cameras (kGiveBack))
+  if (session && !session->wait_until_closed (kGiveBack))
     GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
 }
 
@@ -337,7 +337,7 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
   auto self = GST_STEREO_CAM_SRC (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !open_clock (self))
     return GST_STATE_CHANGE_FAILURE;
-  CamSourceSession::Setup setup;
+  CameraSession::Setup setup;
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare (self, setup))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)

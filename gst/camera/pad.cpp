@@ -4,13 +4,13 @@
 #include <chrono>
 #include <utility>
 
-CamSourcePad::CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed)
+CameraPad::CameraPad (GstElement *element, GstPad *pad, Flowed flowed)
     : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))), flowed_ (std::move (flowed))
 {
   flush_probe_ = gst_pad_add_probe (pad_, GST_PAD_PROBE_TYPE_EVENT_FLUSH, see_flush, this, nullptr);
 }
 
-CamSourcePad::~CamSourcePad ()
+CameraPad::~CameraPad ()
 {
   gst_pad_remove_probe (pad_, flush_probe_);
   clear ();
@@ -22,7 +22,7 @@ CamSourcePad::~CamSourcePad ()
 
 /* With the lock. */
 void
-CamSourcePad::remove (guint index)
+CameraPad::remove (guint index)
 {
   GstMiniObject *item = ring_[(first_ + index) % kMaxItems];
   pictures_ -= GST_IS_BUFFER (item);
@@ -35,7 +35,7 @@ CamSourcePad::remove (guint index)
 
 /* With the lock. @return false: there is none */
 bool
-CamSourcePad::let_oldest_go (bool gap_too)
+CameraPad::let_oldest_go (bool gap_too)
 {
   for (guint i = 0; i < count_; i++) {
     GstMiniObject *item = ring_[(first_ + i) % kMaxItems];
@@ -49,7 +49,7 @@ CamSourcePad::let_oldest_go (bool gap_too)
 }
 
 void
-CamSourcePad::clear ()
+CameraPad::clear ()
 {
   while (count_ > 0)
     remove (0);
@@ -57,7 +57,7 @@ CamSourcePad::clear ()
 
 /* Takes it; with the lock. */
 void
-CamSourcePad::put (GstMiniObject *item)
+CameraPad::put (GstMiniObject *item)
 {
   if (flushing_ || ended_) {
     gst_mini_object_unref (item);
@@ -82,7 +82,7 @@ CamSourcePad::put (GstMiniObject *item)
 }
 
 void
-CamSourcePad::set_caps (guint stream, GstCaps *caps)
+CameraPad::set_caps (guint stream, GstCaps *caps)
 {
   std::lock_guard guard (lock_);
   if (stream != group_id_ || (caps_ && gst_caps_is_equal (caps_, caps)))
@@ -92,7 +92,7 @@ CamSourcePad::set_caps (guint stream, GstCaps *caps)
 }
 
 void
-CamSourcePad::send (guint stream, GstBuffer *buffer)
+CameraPad::send (guint stream, GstBuffer *buffer)
 {
   std::lock_guard guard (lock_);
   if (stream == group_id_)
@@ -103,7 +103,7 @@ CamSourcePad::send (guint stream, GstBuffer *buffer)
 
 /* Of many in a row some do: it is the same silence. Before there are caps nobody waits. */
 void
-CamSourcePad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
+CameraPad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
   discont_ = true;
@@ -112,7 +112,7 @@ CamSourcePad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
 }
 
 void
-CamSourcePad::send_eos (guint stream, guint32 seqnum)
+CameraPad::send_eos (guint stream, guint32 seqnum)
 {
   std::lock_guard guard (lock_);
   if (stream != group_id_)
@@ -125,7 +125,7 @@ CamSourcePad::send_eos (guint stream, guint32 seqnum)
 
 /* Waits. @return null: flushing */
 GstMiniObject *
-CamSourcePad::next_item ()
+CameraPad::next_item ()
 {
   std::unique_lock guard (lock_);
   changed_.wait (guard, [this] { return flushing_ || count_ > 0; });
@@ -141,16 +141,16 @@ CamSourcePad::next_item ()
 /* ---- flushes that are not ours ---- */
 
 GstPadProbeReturn
-CamSourcePad::see_flush (GstPad *, GstPadProbeInfo *info, gpointer self)
+CameraPad::see_flush (GstPad *, GstPadProbeInfo *info, gpointer self)
 {
   if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
-    static_cast<CamSourcePad *> (self)->flushed_by_others ();
+    static_cast<CameraPad *> (self)->flushed_by_others ();
   return GST_PAD_PROBE_OK;
 }
 
 /* The pad has forgotten its segment. The task may have ended because the branch had. */
 void
-CamSourcePad::flushed_by_others ()
+CameraPad::flushed_by_others ()
 {
   std::lock_guard guard (lock_);
   if (flushing_)
@@ -161,7 +161,7 @@ CamSourcePad::flushed_by_others ()
 
 /* What is pushed meanwhile is refused. */
 void
-CamSourcePad::wait_while_flushing ()
+CameraPad::wait_while_flushing ()
 {
   std::unique_lock guard (lock_);
   changed_.wait_for (guard, std::chrono::milliseconds (20), [this] { return flushing_; });
@@ -170,7 +170,7 @@ CamSourcePad::wait_while_flushing ()
 /* ---- the task ---- */
 
 void
-CamSourcePad::push_stream_start ()
+CameraPad::push_stream_start ()
 {
   if (!needs_start_)
     return;
@@ -183,7 +183,7 @@ CamSourcePad::push_stream_start ()
 }
 
 void
-CamSourcePad::push_segment ()
+CameraPad::push_segment ()
 {
   if (!needs_segment_)
     return;
@@ -195,7 +195,7 @@ CamSourcePad::push_segment ()
 
 /* Takes the item. */
 GstFlowReturn
-CamSourcePad::push (GstMiniObject *item)
+CameraPad::push (GstMiniObject *item)
 {
   if (GST_IS_BUFFER (item)) {
     push_segment ();
@@ -212,7 +212,7 @@ CamSourcePad::push (GstMiniObject *item)
 }
 
 void
-CamSourcePad::one_item ()
+CameraPad::one_item ()
 {
   push_stream_start ();
   GstMiniObject *item = next_item ();
@@ -236,15 +236,15 @@ CamSourcePad::one_item ()
 }
 
 void
-CamSourcePad::loop (gpointer self)
+CameraPad::loop (gpointer self)
 {
-  static_cast<CamSourcePad *> (self)->one_item ();
+  static_cast<CameraPad *> (self)->one_item ();
 }
 
 /* ---- life ---- */
 
 void
-CamSourcePad::prepare (guint group_id)
+CameraPad::prepare (guint group_id)
 {
   std::lock_guard guard (lock_);
   clear ();
@@ -256,7 +256,7 @@ CamSourcePad::prepare (guint group_id)
 }
 
 bool
-CamSourcePad::activate (bool active)
+CameraPad::activate (bool active)
 {
   {
     std::lock_guard guard (lock_);
@@ -269,7 +269,7 @@ CamSourcePad::activate (bool active)
 }
 
 void
-CamSourcePad::flush_start (GstEvent *event)
+CameraPad::flush_start (GstEvent *event)
 {
   {
     std::lock_guard guard (lock_);
@@ -282,7 +282,7 @@ CamSourcePad::flush_start (GstEvent *event)
 }
 
 void
-CamSourcePad::flush_stop (GstEvent *event)
+CameraPad::flush_stop (GstEvent *event)
 {
   GST_PAD_STREAM_LOCK (pad_); /* the task stands still */
   gst_pad_push_event (pad_, gst_event_ref (event));

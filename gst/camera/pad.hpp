@@ -7,22 +7,24 @@
 #include <atomic>
 #include <condition_variable>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <vector>
 
 /** One pad of stereocamsrc: a short queue and the task that empties it, so that a branch that is
  *  held up holds up neither the other branches nor the cameras. A full queue lets its oldest
  *  picture go and counts it. Any thread, but for what is said. */
-class CamSourcePad {
+class CameraPad {
 public:
   /** From the task: what a push gave, if it is something else than the last one's. */
-  using Flowed = std::function<void (CamSourcePad &, GstFlowReturn)>;
+  using Flowed = std::function<void (CameraPad &, GstFlowReturn)>;
 
   /** @param pad  not active; this has a reference */
-  CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed);
+  CameraPad (GstElement *element, GstPad *pad, Flowed flowed);
   /** The pad is not active any more. */
-  ~CamSourcePad ();
-  CamSourcePad (const CamSourcePad &) = delete;
-  CamSourcePad &operator= (const CamSourcePad &) = delete;
+  ~CameraPad ();
+  CameraPad (const CameraPad &) = delete;
+  CameraPad &operator= (const CameraPad &) = delete;
 
   [[nodiscard]] GstPad *pad () const { return pad_; }
   [[nodiscard]] const char *name () const { return GST_PAD_NAME (pad_); }
@@ -87,3 +89,5 @@ private:
   bool needs_start_ = true, needs_segment_ = true;
   GstFlowReturn last_flow_ = GST_FLOW_OK;
 };
+
+using CameraPads = std::vector<std::shared_ptr<CameraPad>>; ///< left, right, perhaps third

@@ -6,7 +6,7 @@
 
 using rangecast::Status;
 using rangecast::StatusCode;
-using Settings = CamSourceSettings;
+using Settings = StereoCamSettings;
 
 GType
 gst_stereo_cam_src_trigger_get_type (void)
@@ -27,10 +27,10 @@ gst_stereo_cam_src_trigger_get_type (void)
   return type;
 }
 
-PropertyTable<CamSourceSettings> &
+PropertyTable<StereoCamSettings> &
 camera_properties ()
 {
-  using S = CamSourceSettings;
+  using S = StereoCamSettings;
   using P = PropertyTable<S>;
   static P table = {P::text < [](auto &s) -> auto &{return s.names[0];
 }
@@ -153,7 +153,7 @@ names_from_rig (const Settings &settings, CameraNames &found)
 }
 
 Status
-CamSourceSettings::find_names (CameraNames &found) const
+StereoCamSettings::find_names (CameraNames &found) const
 {
   found = names;
   if (names[0].empty () && names[1].empty () && !rig.empty ()) {
@@ -181,7 +181,7 @@ CamSourceSettings::find_names (CameraNames &found) const
 }
 
 Status
-CamSourceSettings::check () const
+StereoCamSettings::check () const
 {
   const bool by_element = trigger == TriggerMode::kSoftware || trigger == TriggerMode::kAction;
   if (single_shot && !by_element)
@@ -201,7 +201,7 @@ mode_of (bool regulates, bool follows, bool is_left, bool fixed)
 }
 
 CameraSettings
-CamSourceSettings::for_camera (int camera) const
+StereoCamSettings::for_camera (int camera) const
 {
   CameraSettings s;
   const bool left = camera == 0;

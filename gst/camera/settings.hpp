@@ -14,7 +14,7 @@
 using CameraNames = std::array<std::string, rangecast::kMaxCameras>; ///< left, right, third
 
 /** What an application wants of stereocamsrc. Any thread, under the element's lock. */
-struct CamSourceSettings {
+struct StereoCamSettings {
   CameraNames names;  ///< empty third: two cameras
   std::string rig;    ///< file that names them, unless `names` does
   int view_id = 0;    ///< in it
@@ -42,7 +42,12 @@ struct CamSourceSettings {
   [[nodiscard]] rangecast::Status check () const;
   /** For one camera. Size and frame rate are still to be set. @param camera  0 is the left one */
   [[nodiscard]] CameraSettings for_camera (int camera) const;
-  /** Whether the left camera's regulators steer the others, too. */
+  /** Whether this element triggers the cameras. */
+  [[nodiscard]] bool triggers_cameras () const
+  {
+    return trigger == TriggerMode::kSoftware || (trigger == TriggerMode::kAction && action_send);
+  }
+  /** Whether the left camera's automatic settings are copied to the others. */
   [[nodiscard]] bool follows_left () const
   {
     return lock_exposure && (auto_exposure || auto_gain || auto_white_balance);
@@ -50,7 +55,7 @@ struct CamSourceSettings {
 };
 
 /** Their properties, which may change in NULL and READY. */
-PropertyTable<CamSourceSettings> &camera_properties ();
+PropertyTable<StereoCamSettings> &camera_properties ();
 
 GType gst_stereo_cam_src_trigger_get_type (void);
 #define GST_TYPE_STEREO_CAM_SRC_TRIGGER (gst_stereo_cam_src_trigger_get_type ())

@@ -47,7 +47,7 @@ CameraRun::deliver (ArvBuffer *buffer)
   frame.arrived_us = g_get_monotonic_time ();
   const std::uint64_t taken = arv_buffer_get_timestamp (buffer);
   if (taken != arv_buffer_get_system_timestamp (buffer) &&
-      taken < kLatestTime_ns) /* else Aravis' makeshift */
+      taken < kMaxCameraTime_ns) /* else Aravis' makeshift */
     frame.camera_time_ns = taken;
   if (ARV_IS_GV_STREAM (stream)) {
     guint64 missing = 0;

@@ -9,9 +9,6 @@
 #include "frame_counter.hpp"
 #include "frame_store.hpp"
 
-/* Cameras that say more do not know the time; nobody's sums must overflow. */
-inline constexpr std::uint64_t kLatestTime_ns = std::uint64_t (1) << 62;
-
 /** One run of a camera's stream, from start() to stop(). */
 struct CameraRun {
   std::mutex lock; /* guards all of it, held while `arrived` runs; only the stream's thread waits */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A camera that is gone lets every call wait for seconds, so what is taken down goes in a thread of
- * its own, for which nobody waits longer than a second (see TakeDown). */
+ * its own, for which nobody waits longer than a second (see TeardownQueue). */
 #include "camera.hpp"
 
 #include <arv.h>
@@ -49,7 +49,7 @@ struct Camera::Impl {
   int packet_size = 0;
   std::shared_ptr<LossWatch> watch = std::make_shared<LossWatch> ();
   gulong watch_handler = 0;
-  TakeDown take_down;
+  TeardownQueue teardown;
 
   std::mutex run_lock; /* guards what follows */
   std::shared_ptr<CameraRun> run;
@@ -58,8 +58,8 @@ struct Camera::Impl {
   /* Guards what follows, and features that consist of several (a selector and its value, a latch
    * and what it keeps). Taken before the control's, which triggers wait for and which is therefore
    * held for one feature at a time. */
-  std::mutex look_lock;
-  CameraLook written;
+  std::mutex imaging_lock;
+  ImagingParameters written;
   guint64 tick_frequency = 0; /* of the camera's clock, 1/s; 0: not yet read */
 
   void describe ();
@@ -155,8 +155,8 @@ Camera::~Camera ()
 {
   stop ();
   g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
-  impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
-                             std::move (impl_->control))] () mutable { control.reset (); },
+  impl_->teardown.run ([control = std::shared_ptr<CameraControl> (
+                            std::move (impl_->control))] () mutable { control.reset (); },
       !is_lost ());
 }
 
@@ -207,13 +207,13 @@ Camera::configure (const CameraSettings &settings)
   if (status.ok ())
     status = set_trigger (control, settings);
   if (status.ok ())
-    status = set_look (control, settings, frame_rate);
+    status = set_imaging (control, settings, frame_rate);
   if (status.ok ())
     status = set_features (control, settings.features);
   if (status.ok ())
     status = read_format (control, impl_->format);
   impl_->format.frame_rate = frame_rate;
-  std::lock_guard guard (impl_->look_lock);
+  std::lock_guard guard (impl_->imaging_lock);
   impl_->written = {};
   return impl_->judged (status);
 }
@@ -304,7 +304,7 @@ Camera::start (Arrived arrived, Lost lost)
   if (impl_->watch->lost)
     return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
   stop ();
-  if (!impl_->take_down.wait (TakeDown::kLongest))
+  if (!impl_->teardown.wait (TeardownQueue::kMaxWait))
     return control.refuse (CameraFault::kTimedOut, "is still stopping");
   auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
@@ -340,7 +340,7 @@ void
 Camera::Impl::end (const std::shared_ptr<CameraRun> &run)
 {
   const bool answers = !watch->lost;
-  take_down.run (
+  teardown.run (
       [control = control.get (), run, answers] {
         if (answers) {
           const auto guard = control->lock ();
@@ -415,21 +415,21 @@ Camera::trigger_software ()
 }
 
 CameraStatus
-Camera::read_look (CameraLook &look)
+Camera::read_imaging (ImagingParameters &parameters)
 {
   if (is_lost ())
     return impl_->control->refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
-  return impl_->judged (::read_look (*impl_->control, look));
+  std::lock_guard guard (impl_->imaging_lock);
+  return impl_->judged (::read_imaging (*impl_->control, parameters));
 }
 
 CameraStatus
-Camera::write_look (const CameraLook &look)
+Camera::write_imaging (const ImagingParameters &parameters)
 {
   if (is_lost ())
     return impl_->control->refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
-  return impl_->judged (::write_look (*impl_->control, look, impl_->written));
+  std::lock_guard guard (impl_->imaging_lock);
+  return impl_->judged (::write_imaging (*impl_->control, parameters, impl_->written));
 }
 
 bool
@@ -450,11 +450,11 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
   camera_time_ns = 0;
   if (is_lost ())
     return control.refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
+  std::lock_guard guard (impl_->imaging_lock);
   CameraStatus status =
       is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
                  : read_usb_clock (control, camera_time_ns, read_at_us);
-  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kLatestTime_ns))
+  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kMaxCameraTime_ns))
     return control.refuse (CameraFault::kFailed, "has no readable clock");
   return impl_->judged (status);
 }

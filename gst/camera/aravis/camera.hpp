@@ -94,13 +94,13 @@ struct CameraStatistics {
 
 /** What the camera's own regulators steer, to give it to another camera. Absent: it has no such
  * feature. */
-struct CameraLook {
+struct ImagingParameters {
   std::optional<double> exposure_us;
   std::optional<double> gain;
   std::optional<double> white_balance_red, white_balance_green,
       white_balance_blue; ///< BalanceRatio
 
-  bool operator== (const CameraLook &) const = default;
+  bool operator== (const ImagingParameters &) const = default;
 };
 
 class Camera {
@@ -146,7 +146,7 @@ public:
    *  @param arrived  a frame came, or was given up; in order of `number`
    *  @param lost     at most once: the camera does not answer any more, or another program took
    * control. GigE tells so after its heartbeat, within about 6 s; who wants to know sooner has a
-   * CameraPulse. */
+   * Heartbeat. */
   CameraStatus start (Arrived arrived, Lost lost);
   /** No callback runs or comes after it. */
   void stop ();
@@ -160,11 +160,11 @@ public:
   CameraStatistics statistics () const; ///< any thread
   /** Any thread: the values that the camera has now, as its regulators left them. A few round
    * trips. */
-  CameraStatus read_look (CameraLook &look);
+  CameraStatus read_imaging (ImagingParameters &parameters);
   /** Any thread: sets those values, within the ranges of this camera, where they differ by more
    * than a thousandth from what was last written. Its own regulators must be off
    * (AutoMode::kManual). */
-  CameraStatus write_look (const CameraLook &look);
+  CameraStatus write_imaging (const ImagingParameters &parameters);
   /** Any thread: whether the camera's clock follows IEEE 1588 now (PtpStatus Slave or Master). */
   bool clock_is_ptp ();
   /** Any thread: the camera's clock now, ns, and when it was read (g_get_monotonic_time, middle of

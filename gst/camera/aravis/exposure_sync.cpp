@@ -6,7 +6,7 @@
 #include <thread>
 
 /* Belongs to the thread as well, which may be late to end. */
-struct LookFollower::Work {
+struct ExposureSync::Work {
   std::shared_ptr<Camera> leader;
   std::vector<std::shared_ptr<Camera>> followers;
   std::chrono::milliseconds period{};
@@ -21,18 +21,18 @@ struct LookFollower::Work {
 };
 
 CameraStatus
-LookFollower::Work::follow () const
+ExposureSync::Work::follow () const
 {
-  CameraLook look;
-  CameraStatus status = leader->read_look (look);
+  ImagingParameters parameters;
+  CameraStatus status = leader->read_imaging (parameters);
   for (const auto &follower : followers)
     if (status.ok ())
-      status = follower->write_look (look);
+      status = follower->write_imaging (parameters);
   return status;
 }
 
 void
-LookFollower::Work::run ()
+ExposureSync::Work::run ()
 {
   bool was_ok = true; /* a camera that refuses once would refuse every time */
   std::unique_lock guard (lock);
@@ -54,7 +54,7 @@ LookFollower::Work::run ()
 }
 
 void
-LookFollower::start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
+ExposureSync::start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
     std::chrono::milliseconds period, Failed failed)
 {
   stop ();
@@ -67,7 +67,7 @@ LookFollower::start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr
 }
 
 void
-LookFollower::stop ()
+ExposureSync::stop ()
 {
   if (!work_)
     return;

@@ -10,14 +10,14 @@
 
 /** Keeps the look of cameras equal: reads what the leader's regulators chose, and writes it into
  * the followers, from a thread of its own. */
-class LookFollower {
+class ExposureSync {
 public:
   using Failed = std::function<void (const CameraStatus &)>;
 
-  LookFollower () = default;
-  LookFollower (const LookFollower &) = delete;
-  LookFollower &operator= (const LookFollower &) = delete;
-  ~LookFollower () { stop (); }
+  ExposureSync () = default;
+  ExposureSync (const ExposureSync &) = delete;
+  ExposureSync &operator= (const ExposureSync &) = delete;
+  ~ExposureSync () { stop (); }
 
   /** @param failed  from its thread; the first time that a camera refuses, and again after a
    * success */

@@ -10,6 +10,9 @@ struct GstBufferUnref {
 };
 using GstBufferPtr = std::unique_ptr<GstBuffer, GstBufferUnref>;
 
+/** Cameras that report a later time do not know it. Keeps sums of times from overflowing. */
+inline constexpr std::uint64_t kMaxCameraTime_ns = std::uint64_t (1) << 62;
+
 /** What became of a picture that a camera took. */
 enum class FrameState {
   kComplete, ///< `buffer` has all of it

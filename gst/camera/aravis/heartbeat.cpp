@@ -36,7 +36,7 @@ hears (GSocket *socket)
 }
 
 void
-CameraPulse::start (const std::string &address, std::int64_t now_ns)
+Heartbeat::start (const std::string &address, std::int64_t now_ns)
 {
   socket_ = nullptr;
   alive_ns_ = asked_ns_ = now_ns;
@@ -54,7 +54,7 @@ CameraPulse::start (const std::string &address, std::int64_t now_ns)
 }
 
 void
-CameraPulse::feel (std::int64_t heard_ns, std::int64_t now_ns)
+Heartbeat::poll (std::int64_t heard_ns, std::int64_t now_ns)
 {
   if (!socket_)
     return;

@@ -408,7 +408,7 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
 }
 
 CameraStatus
-set_look (CameraControl &control, const CameraSettings &settings, double &frame_rate)
+set_imaging (CameraControl &control, const CameraSettings &settings, double &frame_rate)
 {
   const auto guard = control.lock ();
   /* A long exposure limits the rate, and a high rate the exposure, of some cameras: whichever is
@@ -475,16 +475,16 @@ set_features (CameraControl &control, const std::string &features)
   return status;
 }
 
-/* The leader's look, and the followers' */
+/* The leader's parameters, and the followers' */
 
 static constexpr const char *kBalanceColours[] = {"Red", "Green", "Blue"};
 
 static std::optional<double> &
-balance_of (CameraLook &look, int colour)
+balance_of (ImagingParameters &parameters, int colour)
 {
-  return colour == 0   ? look.white_balance_red
-         : colour == 1 ? look.white_balance_green
-                       : look.white_balance_blue;
+  return colour == 0   ? parameters.white_balance_red
+         : colour == 1 ? parameters.white_balance_green
+                       : parameters.white_balance_blue;
 }
 
 static const char *
@@ -498,22 +498,22 @@ balance_feature (CameraControl &control)
 }
 
 CameraStatus
-read_look (CameraControl &control, CameraLook &look)
+read_imaging (CameraControl &control, ImagingParameters &parameters)
 {
-  look = {};
+  parameters = {};
   ArvCamera *camera = control.camera ();
   GError *error = nullptr;
   { /* one feature at a time: triggers wait for the lock */
     const auto guard = control.lock ();
     if (arv_camera_is_exposure_time_available (camera, nullptr))
-      look.exposure_us = arv_camera_get_exposure_time (camera, &error);
+      parameters.exposure_us = arv_camera_get_exposure_time (camera, &error);
   }
   CameraStatus status = control.status ("exposure", error, CameraFault::kFailed);
   error = nullptr;
   if (status.ok ()) {
     const auto guard = control.lock ();
     if (arv_camera_is_gain_available (camera, nullptr))
-      look.gain = arv_camera_get_gain (camera, &error);
+      parameters.gain = arv_camera_get_gain (camera, &error);
   }
   if (status.ok ())
     status = control.status ("gain", error, CameraFault::kFailed);
@@ -523,7 +523,7 @@ read_look (CameraControl &control, CameraLook &look)
     if (control.has_entry ("BalanceRatioSelector", kBalanceColours[colour]) &&
         control.assign ("BalanceRatioSelector", kBalanceColours[colour]).ok () &&
         control.read (ratio, value))
-      balance_of (look, colour) = value;
+      balance_of (parameters, colour) = value;
   }
   return status;
 }
@@ -543,34 +543,35 @@ within (double value, double low, double high)
 }
 
 CameraStatus
-write_look (CameraControl &control, const CameraLook &look, CameraLook &written)
+write_imaging (
+    CameraControl &control, const ImagingParameters &parameters, ImagingParameters &written)
 {
   ArvCamera *camera = control.camera ();
   double low = 0, high = 0;
   GError *error = nullptr;
   CameraStatus status;
-  if (differs (look.exposure_us, written.exposure_us)) {
+  if (differs (parameters.exposure_us, written.exposure_us)) {
     const auto guard = control.lock (); /* one feature at a time: triggers wait for it */
     arv_camera_get_exposure_time_bounds (camera, &low, &high, nullptr);
-    arv_camera_set_exposure_time (camera, within (*look.exposure_us, low, high), &error);
+    arv_camera_set_exposure_time (camera, within (*parameters.exposure_us, low, high), &error);
     status = control.status ("exposure", error, CameraFault::kBadSetting);
     if (!status.ok ())
       return status;
-    written.exposure_us = look.exposure_us;
+    written.exposure_us = parameters.exposure_us;
   }
-  if (differs (look.gain, written.gain)) {
+  if (differs (parameters.gain, written.gain)) {
     const auto guard = control.lock ();
     low = high = 0;
     arv_camera_get_gain_bounds (camera, &low, &high, nullptr);
-    arv_camera_set_gain (camera, within (*look.gain, low, high), &error);
+    arv_camera_set_gain (camera, within (*parameters.gain, low, high), &error);
     status = control.status ("gain", error, CameraFault::kBadSetting);
     if (!status.ok ())
       return status;
-    written.gain = look.gain;
+    written.gain = parameters.gain;
   }
   const char *ratio = balance_feature (control);
   for (int colour = 0; ratio && colour < 3; colour++) {
-    CameraLook wanted = look;
+    ImagingParameters wanted = parameters;
     if (!differs (balance_of (wanted, colour), balance_of (written, colour)))
       continue;
     status = control.assign ("BalanceRatioSelector", kBalanceColours[colour]);

@@ -12,11 +12,13 @@ CameraStatus set_image (CameraControl &control, const CameraSettings &settings);
 CameraStatus read_format (CameraControl &control, CameraFormat &format);
 CameraStatus set_trigger (CameraControl &control, const CameraSettings &settings);
 /** Exposure, gain, white balance, frame rate; `frame_rate` is what the camera then says. */
-CameraStatus set_look (CameraControl &control, const CameraSettings &settings, double &frame_rate);
+CameraStatus set_imaging (
+    CameraControl &control, const CameraSettings &settings, double &frame_rate);
 CameraStatus set_transport (CameraControl &control, const CameraSettings &settings);
 CameraStatus set_features (CameraControl &control, const std::string &features);
 
 /* Selectors are state: one of these at a time. */
-CameraStatus read_look (CameraControl &control, CameraLook &look);
+CameraStatus read_imaging (CameraControl &control, ImagingParameters &parameters);
 /** Sets what differs from `written` by more than a thousandth, and notes it there. */
-CameraStatus write_look (CameraControl &control, const CameraLook &look, CameraLook &written);
+CameraStatus write_imaging (
+    CameraControl &control, const ImagingParameters &parameters, ImagingParameters &written);

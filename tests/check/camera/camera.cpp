@@ -302,10 +302,10 @@ GST_START_TEST (test_features_win_over_settings)
   settings.exposure_us = 2000;
   settings.features = "GainRaw=7 Width=0x20, TestStringReg='two words'";
   configure (*camera, settings);
-  CameraLook look;
-  fail_unless (camera->read_look (look).ok ());
-  assert_equals_float (*look.gain, 7);
-  assert_equals_float (*look.exposure_us, 2000);
+  ImagingParameters parameters;
+  fail_unless (camera->read_imaging (parameters).ok ());
+  assert_equals_float (*parameters.gain, 7);
+  assert_equals_float (*parameters.exposure_us, 2000);
   assert_equals_int (camera->format ().width, 32);
 }
 GST_END_TEST;
