@@ -23,6 +23,16 @@ GST_START_TEST (test_camera_is_found_by_address_serial_and_id)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_camera_is_found_by_its_mac_address)
+{
+  SKIP_WITHOUT_NETWORK ();
+  FakeCamera fake ("127.0.0.1", "GV01");
+  const std::string mac = list_cameras ().front ().physical_id;
+  const auto camera = open_camera (mac.c_str ());
+  assert_equals_string (camera->info ().serial.c_str (), "GV01");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_camera_is_found_by_its_user_defined_name)
 {
   SKIP_WITHOUT_NETWORK ();
@@ -389,6 +399,7 @@ camera_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_camera_is_found_by_address_serial_and_id);
+  tcase_add_test (tc, test_camera_is_found_by_its_mac_address);
   tcase_add_test (tc, test_camera_is_found_by_its_user_defined_name);
   tcase_add_test (tc, test_all_cameras_are_listed);
   tcase_add_test (tc, test_unknown_camera_is_refused_with_what_was_found);
