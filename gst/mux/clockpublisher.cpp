@@ -58,7 +58,7 @@ ClockPublisher::open (GstClock *clock)
   /* Without a clock the port is taken all the same; nobody gets an answer. */
   GstClock *told = clock ? GST_CLOCK (gst_object_ref (clock)) : gst_system_clock_obtain ();
   GError *error = nullptr;
-  const PromptThread prompt; /* that answers: what they take is in the clients' error */
+  const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
   provider_ = GST_NET_TIME_PROVIDER (g_initable_new (GST_TYPE_NET_TIME_PROVIDER, nullptr, &error,
       "clock", told, "port", port, "active", gboolean (clock != nullptr), nullptr));
   gst_object_unref (told);

@@ -23,6 +23,16 @@ GST_START_TEST (test_camera_is_found_by_address_serial_and_id)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_camera_is_found_by_its_mac_address)
+{
+  SKIP_WITHOUT_NETWORK ();
+  FakeCamera fake ("127.0.0.1", "GV01");
+  const std::string mac = list_cameras ().front ().physical_id;
+  const auto camera = open_camera (mac.c_str ());
+  assert_equals_string (camera->info ().serial.c_str (), "GV01");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_camera_is_found_by_its_user_defined_name)
 {
   SKIP_WITHOUT_NETWORK ();
@@ -302,10 +312,10 @@ GST_START_TEST (test_features_win_over_settings)
   settings.exposure_us = 2000;
   settings.features = "GainRaw=7 Width=0x20, TestStringReg='two words'";
   configure (*camera, settings);
-  CameraLook look;
-  fail_unless (camera->read_look (look).ok ());
-  assert_equals_float (*look.gain, 7);
-  assert_equals_float (*look.exposure_us, 2000);
+  ImagingParameters parameters;
+  fail_unless (camera->read_imaging (parameters).ok ());
+  assert_equals_float (*parameters.gain, 7);
+  assert_equals_float (*parameters.exposure_us, 2000);
   assert_equals_int (camera->format ().width, 32);
 }
 GST_END_TEST;
@@ -389,6 +399,7 @@ camera_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_camera_is_found_by_address_serial_and_id);
+  tcase_add_test (tc, test_camera_is_found_by_its_mac_address);
   tcase_add_test (tc, test_camera_is_found_by_its_user_defined_name);
   tcase_add_test (tc, test_all_cameras_are_listed);
   tcase_add_test (tc, test_unknown_camera_is_refused_with_what_was_found);

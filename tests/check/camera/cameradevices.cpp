@@ -427,8 +427,8 @@ GST_END_TEST
 
 GST_START_TEST (test_camera_is_called_by_all_its_names)
 {
-  FoundCamera camera;
-  camera.transport = FoundCamera::Transport::kGigEVision;
+  CameraInfo camera;
+  camera.protocol = "GigEVision";
   camera.id = "Maker-7";
   camera.serial = "7";
   camera.address = "10.0.0.7";
@@ -452,7 +452,7 @@ GST_START_TEST (test_rig_files_are_read_again_only_when_they_have_changed)
   view.right->camera = "SN2";
   rig.views.push_back (view);
   fail_unless (save_rig (file, rig).ok ());
-  FoundCamera left, right;
+  CameraInfo left, right;
   left.serial = "SN1";
   right.serial = "SN2";
   KnownRigs rigs;

@@ -353,8 +353,8 @@ GST_START_TEST (test_usb_camera_without_permission_is_found_once)
   const std::string nodes = std::string (root) + "/nodes";
   const auto found = forbidden_usb_cameras (std::string (root) + "/devices", nodes);
   assert_equals_int (found.size (), 1); /* root may open everything: 004 is not there at all */
-  fail_unless (found[0].node == nodes + "/002/004", "%s", found[0].node.c_str ());
-  assert_equals_string (found[0].product.c_str (), "Eye 5");
+  fail_unless (found[0].address == nodes + "/002/004", "%s", found[0].address.c_str ());
+  assert_equals_string (found[0].model.c_str (), "Eye 5");
   assert_equals_string (found[0].serial.c_str (), "777");
   fail_unless (forbidden_usb_cameras (std::string (root) + "/none", nodes).empty ());
   fs::remove_all (root);

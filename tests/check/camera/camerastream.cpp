@@ -371,9 +371,9 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
   Listener from_leader, from_follower;
   start (*leader, from_leader);
   start (*follower, from_follower);
-  LookFollower look;
+  ExposureSync sync;
   std::atomic<int> n_refusals{0};
-  look.start (leader, {follower}, std::chrono::milliseconds (5),
+  sync.start (leader, {follower}, std::chrono::milliseconds (5),
       [&] (const CameraStatus &) { n_refusals++; });
   for (const guint32 exposure : {3000u, 700u, 12000u}) {
     /* as the camera's own regulator would */
@@ -394,7 +394,7 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
   }
   assert_equals_int (n_refusals, 0);
   (void)from_follower.next_complete ();
-  look.stop ();
+  sync.stop ();
 }
 GST_END_TEST;
 
