@@ -38,6 +38,7 @@
 #include <span>
 #include <vector>
 
+#include "common/codedunits.hpp"
 #include "seek.hpp"
 
 using rangecast::AccessUnitHeader;
@@ -294,25 +295,25 @@ note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
 /* ---- from access units ---- */
 
 /* What the header of an access unit says of its slices. */
-static AccessUnitHeader
-summarise (Bytes access_unit, rangecast::KeyCheck &check)
+static bool
+summarise (GstBuffer *access_unit, rangecast::KeyCheck &check, AccessUnitHeader &summary)
 {
-  AccessUnitHeader summary;
-  check.reset ();
-  UnitReader units (access_unit);
-  UnitHeader header;
-  SliceHeader slice;
   bool first = true;
-  while (const auto unit = units.next (header)) {
-    if (!rangecast::read_slice_header (*unit, slice).ok ())
-      continue;
+  check.reset ();
+  const auto handle = [&] (gsize, Bytes unit, const UnitHeader &) {
+    SliceHeader slice;
+    if (!rangecast::read_slice_header (unit, slice).ok ())
+      return true;
     if (first)
       summary.capture_time_ns = slice.capture_time_ns;
     check.add (slice);
     first = false;
-  }
+    return true;
+  };
+  rangecast::Status damage; /* what follows it is not read */
+  const bool mapped = for_each_unit (access_unit, handle, damage);
   summary.key = check.is_key ();
-  return summary;
+  return mapped;
 }
 
 static void
@@ -388,11 +389,9 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
     return refused (base);
   if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
     return refuse_long_access_unit (base, size);
-  GstMapInfo map;
-  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+  AccessUnitHeader header;
+  if (!summarise (frame->buffer, stream.key_check, header))
     return refuse_unreadable_buffer (base);
-  AccessUnitHeader header = summarise ({map.data, map.size}, stream.key_check);
-  gst_buffer_unmap (frame->buffer, &map);
   /* Upstream knows more: of lost packets, for one. */
   header.key = header.key && !GST_BUFFER_FLAG_IS_SET (frame->buffer, GST_BUFFER_FLAG_DELTA_UNIT);
   frame->buffer = gst_buffer_make_writable (frame->buffer);

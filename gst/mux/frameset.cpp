@@ -9,51 +9,6 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-/* So many are kept: a few are downstream, in queues. What is beyond is given back after use. */
-static constexpr std::size_t kMaxKept = 16;
-
-/* GStreamer's own allocator ends the process where memory is short. */
-static GstMemory *
-try_memory (gsize size)
-{
-  const gsize room = size + size / 2; /* sizes change with what the views show */
-  gpointer data = g_try_malloc (room);
-  return data ? gst_memory_new_wrapped (GstMemoryFlags (0), data, room, 0, size, data, g_free)
-              : nullptr;
-}
-
-GstMemory *
-RecycledMemories::acquire (gsize size)
-{
-  const auto is_free = [] (GstMemory *m) { return GST_MINI_OBJECT_REFCOUNT_VALUE (m) == 1; };
-  auto place = memories_.end ();
-  for (auto it = memories_.begin (); it != memories_.end (); ++it) {
-    if (!is_free (*it))
-      continue;
-    place = it;
-    if ((*it)->maxsize < size)
-      continue; /* replaced, unless there is one that is large enough */
-    gst_memory_resize (*it, -gssize ((*it)->offset), size);
-    return gst_memory_ref (*it);
-  }
-  GstMemory *memory = try_memory (size);
-  if (!memory)
-    return nullptr;
-  if (place != memories_.end ())
-    gst_memory_unref (std::exchange (*place, gst_memory_ref (memory)));
-  else if (memories_.size () < kMaxKept)
-    memories_.push_back (gst_memory_ref (memory));
-  return memory;
-}
-
-void
-RecycledMemories::drop ()
-{
-  for (GstMemory *memory : memories_)
-    gst_memory_unref (memory);
-  memories_.clear ();
-}
-
 void
 FrameSetJoiner::begin (guint memories, bool coded)
 {

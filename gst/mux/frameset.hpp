@@ -6,23 +6,7 @@
 #include <rangecast/base/status.hpp>
 #include <vector>
 
-/** Memories that come back. A GstBufferPool would throw away each that left in another buffer: that
- *  one still has it when its parent, the pool's buffer, goes back. Streaming thread. */
-class RecycledMemories {
-public:
-  RecycledMemories () = default;
-  ~RecycledMemories () { drop (); }
-  RecycledMemories (const RecycledMemories &) = delete;
-  RecycledMemories &operator= (const RecycledMemories &) = delete;
-
-  /** @return transfer full: `size` bytes that nobody else has; nullptr where memory is short */
-  GstMemory *acquire (gsize size);
-  /** Forgets all; those that are out live on. */
-  void drop ();
-
-private:
-  std::vector<GstMemory *> memories_; /* references; one that has no other is free */
-};
+#include "common/recycledmemories.hpp"
 
 /** Puts buffers of several streams together into one, raw ones with their GstRangeMetas.
  *

@@ -30,7 +30,7 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <vector>
 
-#include "common/accessunitassembler.hpp"
+#include "accessunitassembler.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
@@ -62,7 +62,7 @@ struct GstRtpNeighbourCodeDepayPrivate {
   bool have_caps = false;
   std::size_t rig_views = 0;
   guint64 view_bits = 0;              /* of the rig, by view-id; 0: not known yet */
-  UnitGatherer access_unit;           /* slices that arrived so far */
+  AccessUnitAssembler access_unit;    /* slices that arrived so far */
   rangecast::KeyCheck key_check;      /* of them */
   bool has_gap = false;               /* packets were lost before or between them */
   guint32 timestamp = 0;              /* RTP time of them */
@@ -179,7 +179,7 @@ take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
   if (!priv->access_unit.empty ()) {
     std::lock_guard guard (priv->lock);
     if (priv->have_caps) {
-      buffer = priv->access_unit.take ();
+      buffer = priv->access_unit.finish ();
       GST_BUFFER_PTS (buffer) = priv->pts;
       if (!is_key_unit (priv, has_end))
         GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
@@ -381,6 +381,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv->reporter.stop ();
     forget_access_unit (priv);
+    priv->access_unit.reset ();
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;

@@ -131,8 +131,8 @@ struct Packer {
     GstBuffer *packet = gst_rtp_base_payload_allocate_output_buffer (base, 0, 0, 0);
     GST_BUFFER_PTS (packet) = pts;
     GST_BUFFER_DTS (packet) = dts;
-    GstBuffer *payload = gst_buffer_copy_region (units, GST_BUFFER_COPY_MEMORY, offset, size);
-    gst_buffer_list_add (packets, gst_buffer_append (packet, payload));
+    gst_buffer_copy_into (packet, units, GST_BUFFER_COPY_MEMORY, offset, size);
+    gst_buffer_list_add (packets, packet);
   }
 
   /* @return the first unit that is too long for a packet, if there is one */
