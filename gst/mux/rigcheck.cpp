@@ -56,12 +56,12 @@ check_view (const View &view, View expected)
   const rangecast::Pose &p = view.world_from_view, &q = expected.world_from_view;
   if (const double apart = rangecast::norm (p.translation - q.translation);
       !(apart <= kMaxDistance_m))
-    return differs (view, "it stands " + std::to_string (apart) + " m away");
+    return differs (view, "its position is " + std::to_string (apart) + " m off");
   if (!(max_difference (p.rotation, q.rotation) <= kMaxRotation))
-    return differs (view, "its optical axis points elsewhere");
+    return differs (view, "its orientation differs");
   const double scale = view.intrinsics.fx / expected.intrinsics.fx;
   if (!(std::abs (scale - 1) <= max_scale))
-    return differs (view, "its focal length is " + std::to_string (scale) + " times as long");
+    return differs (view, "its focal length is " + std::to_string (scale) + " times that of the rig");
   return {};
 }
 
@@ -74,7 +74,7 @@ check_rig (const Rig &stream, const Rig &expected)
     const View *known = expected.find (view.id);
     if (!known)
       return {StatusCode::kBadValue,
-          "view " + std::to_string (view.id) + " is none of the rig; expected one of its views"};
+          "view " + std::to_string (view.id) + " is not in the rig; expected one of its views"};
     if (Status s = check_view (view, *known); !s.ok ())
       return s;
   }
