@@ -552,15 +552,15 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
       "Decodes neighbour-coded range images", "gst-rangecast");
 
-  transform_class->src_event = gst_neighbour_code_dec_src_event;
-  transform_class->start = gst_neighbour_code_dec_start;
-  transform_class->stop = gst_neighbour_code_dec_stop;
-  transform_class->transform_caps = gst_neighbour_code_dec_transform_caps;
-  transform_class->set_caps = gst_neighbour_code_dec_set_caps;
-  transform_class->sink_event = gst_neighbour_code_dec_sink_event;
-  transform_class->generate_output = gst_neighbour_code_dec_generate_output;
-  transform_class->transform = gst_neighbour_code_dec_transform;
-  transform_class->transform_meta = gst_neighbour_code_dec_transform_meta;
+  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_src_event);
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_sink_event);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_generate_output);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_meta);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_dec_debug, "neighbourcodedec", 0, "Neighbour code decoder");

@@ -560,15 +560,15 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
       "Codec/Encoder/Video",
       "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");
 
-  transform_class->sink_event = gst_neighbour_code_enc_sink_event;
-  transform_class->src_event = gst_neighbour_code_enc_src_event;
-  transform_class->start = gst_neighbour_code_enc_start;
-  transform_class->stop = gst_neighbour_code_enc_stop;
-  transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
-  transform_class->set_caps = gst_neighbour_code_enc_set_caps;
-  transform_class->generate_output = gst_neighbour_code_enc_generate_output;
-  transform_class->transform = gst_neighbour_code_enc_transform;
-  transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_sink_event);
+  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_src_event);
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_set_caps);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_generate_output);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_meta);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");
