@@ -611,6 +611,116 @@ GST_START_TEST (test_one_row_of_a_huge_image_makes_a_small_one)
 }
 GST_END_TEST;
 
+/* A buffer of these bytes in memories that end at each of `ends` and at the end. */
+static GstBuffer *
+in_memories (std::span<const guint8> bytes, std::span<const std::size_t> ends)
+{
+  GstBuffer *buffer = gst_buffer_new ();
+  std::size_t begin = 0;
+  const auto append = [&] (std::size_t end) {
+    GstMemory *memory = gst_allocator_alloc (nullptr, end - begin, nullptr);
+    GstMapInfo map;
+    fail_unless (gst_memory_map (memory, &map, GST_MAP_WRITE));
+    std::ranges::copy (bytes.subspan (begin, end - begin), map.data);
+    gst_memory_unmap (memory, &map);
+    gst_buffer_append_memory (buffer, memory);
+    begin = end;
+  };
+  for (const std::size_t end : ends)
+    append (end);
+  append (bytes.size ());
+  GST_BUFFER_PTS (buffer) = 0;
+  return buffer;
+}
+
+/* All pixels, and the decoder's counters. */
+struct Decoded {
+  std::vector<guint16> depths;
+  guint64 slices, bad_slices, missing_pixels;
+  bool operator== (const Decoded &) const = default;
+};
+
+static Decoded
+decoded (const Rig &rig, GstBuffer *coded)
+{
+  GstHarness *h = harness_of ("neighbourcodedec");
+  gst_harness_set_src_caps (h, coded_caps (rig));
+  GstBuffer *output = gst_harness_push_and_pull (h, coded);
+  fail_unless (output != nullptr);
+  Decoded result = {{}, stat (h, "neighbourcodedec", "slices"),
+      stat (h, "neighbourcodedec", "bad-slices"), stat (h, "neighbourcodedec", "missing-pixels")};
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    for (const RangeImage &image : frame.views ())
+      for (int y = 0; y < image.roi.height; y++)
+        for (int x = 0; x < image.roi.width; x++)
+          result.depths.push_back (image.depth.at (x, y));
+  }
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return result;
+}
+
+GST_START_TEST (test_memory_for_each_view_decodes_as_one_memory)
+{
+  const Rig rig = ring_rig (3);
+  const auto units = encoded_units (rig, make_frame_set (rig));
+  std::vector<guint8> bytes;
+  std::vector<std::size_t> ends;
+  int last_view = 0;
+  for (const auto &unit : units) {
+    if (header_of (unit).view_id != last_view)
+      ends.push_back (bytes.size ());
+    last_view = header_of (unit).view_id;
+    bytes.insert (bytes.end (), unit.begin (), unit.end ());
+  }
+  fail_unless_equals_int (ends.size (), 2);
+  const Decoded whole = decoded (rig, in_memories (bytes, {}));
+  fail_unless_equals_uint64 (whole.slices, units.size ());
+  fail_unless (decoded (rig, in_memories (bytes, ends)) == whole);
+  /* An empty memory between them changes nothing. */
+  ends.push_back (ends.back ());
+  fail_unless (decoded (rig, in_memories (bytes, ends)) == whole);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_slices_across_memories_decode_as_in_one_memory)
+{
+  const Rig rig = ring_rig (2);
+  const auto units = encoded_units (rig, make_frame_set (rig));
+  std::vector<guint8> bytes;
+  for (const auto &unit : units)
+    bytes.insert (bytes.end (), unit.begin (), unit.end ());
+  const Decoded whole = decoded (rig, in_memories (bytes, {}));
+  const std::size_t second = units[0].size ();
+  /* Within a unit header, behind one, within a slice; then two slices that cross three memories. */
+  for (const std::size_t end : {std::size_t{1}, second + 3, second + 4, second + 100})
+    fail_unless (decoded (rig, in_memories (bytes, {{end}})) == whole);
+  fail_unless (
+      decoded (rig, in_memories (bytes, {{second / 3, second / 2, second + 50}})) == whole);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damage_in_memories_costs_what_it_costs_in_one)
+{
+  const Rig rig = ring_rig (2);
+  const auto units = encoded_units (rig, make_frame_set (rig));
+  std::vector<guint8> bytes;
+  for (const auto &unit : units)
+    bytes.insert (bytes.end (), unit.begin (), unit.end ());
+  const std::size_t end = units[0].size () + units[1].size ();
+  const Decoded sound = decoded (rig, in_memories (bytes, {}));
+  for (const guint8 first_byte : {0x21, 0x11}) { /* another version; a size beyond the memory */
+    bytes[units[0].size ()] = first_byte;
+    bytes[units[0].size () + 3] = first_byte == 0x11 ? 0xff : bytes[units[0].size () + 3];
+    const Decoded whole = decoded (rig, in_memories (bytes, {}));
+    fail_unless (whole.slices < sound.slices);
+    fail_unless (whole.bad_slices > 0);
+    fail_unless (decoded (rig, in_memories (bytes, {{end}})) == whole);
+  }
+}
+GST_END_TEST;
+
 static Suite *
 neighbourcodedec_suite ()
 {
@@ -641,6 +751,9 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_64_views_with_other_rois_in_each_frame_set_decode_exactly);
   tcase_add_test (tc, test_rig_beyond_the_limit_is_an_error_that_names_it);
   tcase_add_test (tc, test_one_row_of_a_huge_image_makes_a_small_one);
+  tcase_add_test (tc, test_memory_for_each_view_decodes_as_one_memory);
+  tcase_add_test (tc, test_slices_across_memories_decode_as_in_one_memory);
+  tcase_add_test (tc, test_damage_in_memories_costs_what_it_costs_in_one);
   return suite;
 }
 

@@ -351,6 +351,46 @@ GST_START_TEST (test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_
 }
 GST_END_TEST;
 
+/* Memory is used again, but never while somebody holds a buffer, or a part of one. */
+GST_START_TEST (test_access_units_keep_their_bytes_while_others_follow)
+{
+  const Sent sent (ring_rig (2), 40);
+  GstHarness *h = receiver (gst_caps_ref (sent.caps));
+  std::vector<GstBuffer *> kept, parts;
+  std::vector<gconstpointer> places;
+  for (GstBuffer *packet : sent.packets) {
+    gst_harness_push (h, gst_buffer_ref (packet));
+    while (GstBuffer *received = gst_harness_try_pull (h)) {
+      GstMapInfo map;
+      gst_buffer_map (received, &map, GST_MAP_READ);
+      places.push_back (map.data);
+      gst_buffer_unmap (received, &map);
+      const std::size_t i = places.size () - 1;
+      if (i < 20) {
+        kept.push_back (received);
+      } else if (i == 20) {
+        parts.push_back (gst_buffer_copy_region (received, GST_BUFFER_COPY_MEMORY, 7, 100));
+        gst_buffer_unref (received);
+      } else {
+        gst_buffer_unref (received);
+      }
+    }
+  }
+  fail_unless_equals_int (places.size (), 40);
+  for (std::size_t i = 0; i < kept.size (); i++) {
+    fail_unless (bytes_of (kept[i]) == bytes_of (sent.access_units[i]));
+    gst_buffer_unref (kept[i]);
+  }
+  const auto whole = bytes_of (sent.access_units[20]);
+  fail_unless (bytes_of (parts[0]) == std::vector (whole.begin () + 7, whole.begin () + 107));
+  gst_buffer_unref (parts[0]);
+  /* Those that nobody held lie in one place. */
+  for (std::size_t i = 22; i < places.size (); i++)
+    fail_unless (places[i] == places[i - 1] && places[i] != places[20]);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 rtpneighbourcodedepay_suite ()
 {
@@ -358,6 +398,7 @@ rtpneighbourcodedepay_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_access_units_come_back_byte_for_byte);
+  tcase_add_test (tc, test_access_units_keep_their_bytes_while_others_follow);
   tcase_add_test (tc, test_every_packet_fits_the_mtu_and_holds_whole_units);
   tcase_add_test (tc, test_marker_is_on_the_last_packet_of_each_access_unit);
   tcase_add_test (tc, test_any_one_lost_packet_costs_only_its_own_units);
