@@ -5,7 +5,7 @@
 
 #include "outputschedule.hpp"
 
-static constexpr int kMaxPicturesASecond = PictureGrid::kMaxRate;
+static constexpr int kMaxPicturesASecond = OutputSchedule::kMaxRate;
 
 /* The frame rate of caps that are one structure, else nullptr. */
 static const GValue *

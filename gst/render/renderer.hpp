@@ -11,7 +11,7 @@
 #include "strippainter.hpp"
 
 /** What to draw into one output buffer. */
-struct StripDrawingJob {
+struct RenderJob {
   const StripScene *scene;
   const StripRenderSettings *settings;
   const rangecast::SceneFrame *frame; ///< where the camera's home is
@@ -22,7 +22,7 @@ struct StripDrawingJob {
 
 /** Draws frame sets into buffers of OpenGL memory: both eyes, cameras, statistics. What is OpenGL's
  *  own lives from start() to stop(). */
-class StripDrawing {
+class Renderer {
 public:
   /** @name In the GL thread @{ */
   bool start (GstGLContext *context, GError **error);
@@ -42,7 +42,7 @@ public:
   };
   /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. Exceptions of the
    *  GL thread are thrown here. */
-  Result draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out);
+  Result draw (GstGLContext *context, const RenderJob &job, GstBuffer *out);
 
 private:
   struct Call;
@@ -51,15 +51,15 @@ private:
   bool upload (Call &call);
   void draw_memory (Call &call);
   void draw_memories (Call &call);
-  void draw_eye (Call &call, const EyePlace &place, bool antialiased);
+  void draw_eye (Call &call, const EyeViewport &place, bool antialiased);
   StripPainter::Picture make_picture (
-      const StripDrawingJob &job, const EyePlace &place, Result &result) const;
+      const RenderJob &job, const EyeViewport &place, Result &result) const;
 
   GstGLContext *context_ = nullptr;
   GstGLFramebuffer *framebuffer_ = nullptr;
   int width_ = 0, height_ = 0;
   bool can_blend_ = false;
-  EyePlaces eyes_;
+  MultiviewLayout layout_;
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;
   BackgroundPainter background_painter_;

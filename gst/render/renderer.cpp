@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "drawing.hpp"
+#include "renderer.hpp"
 
 #include <gst/gl/gstglfuncs.h>
 
@@ -11,7 +11,7 @@
 static constexpr GLenum kContextLost = 0x0507; /* of OpenGL 4.5 and ES 3.2 */
 
 bool
-StripDrawing::start (GstGLContext *context, GError **error)
+Renderer::start (GstGLContext *context, GError **error)
 {
   context_ = context;
   can_blend_ = BlendTargets::is_supported (context);
@@ -23,7 +23,7 @@ StripDrawing::start (GstGLContext *context, GError **error)
 }
 
 void
-StripDrawing::stop ()
+Renderer::stop ()
 {
   painter_.stop ();
   background_painter_.stop ();
@@ -36,12 +36,12 @@ StripDrawing::stop ()
 }
 
 bool
-StripDrawing::set_output (GstGLContext *context, const GstVideoInfo &info, GError **error)
+Renderer::set_output (GstGLContext *context, const GstVideoInfo &info, GError **error)
 {
   gst_clear_object (&framebuffer_);
   width_ = GST_VIDEO_INFO_WIDTH (&info);
   height_ = GST_VIDEO_INFO_HEIGHT (&info);
-  eyes_ = EyePlaces (info);
+  layout_ = MultiviewLayout (info);
   gint largest = 0;
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest);
   if (std::max (width_, height_) <= largest)
@@ -61,7 +61,7 @@ background_channel (const StripRenderSettings &settings, int i)
 }
 
 StripPainter::Picture
-StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, Result &result) const
+Renderer::make_picture (const RenderJob &job, const EyeViewport &place, Result &result) const
 {
   const StripRenderSettings &settings = *job.settings;
   const rangecast::SceneFrame &frame = *job.frame;
@@ -103,9 +103,9 @@ StripDrawing::make_picture (const StripDrawingJob &job, const EyePlace &place, R
   return picture;
 }
 
-struct StripDrawing::Call {
-  StripDrawing *self;
-  const StripDrawingJob *job;
+struct Renderer::Call {
+  Renderer *self;
+  const RenderJob *job;
   GstBuffer *out;
   bool panel_changed;
   guint memory = 0; /* that is drawn into now */
@@ -116,7 +116,7 @@ struct StripDrawing::Call {
 
 /* Once for all pictures of a scene: for both eyes, and for as long as it is held. */
 bool
-StripDrawing::upload (Call &call)
+Renderer::upload (Call &call)
 {
   const StripScene &scene = *call.job->scene;
   if (uploaded_ == scene.serial ())
@@ -130,9 +130,9 @@ StripDrawing::upload (Call &call)
 
 /* Scissors keep the painter, which clears and draws whole pictures, to this eye's part. */
 void
-StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
+Renderer::draw_eye (Call &call, const EyeViewport &place, bool antialiased)
 {
-  const StripDrawingJob &job = *call.job;
+  const RenderJob &job = *call.job;
   const GstGLFuncs *gl = context_->gl_vtable;
   StripPainter::Picture picture = make_picture (job, place, call.result);
   if (antialiased && picture.background[3] < 1) /* it comes behind the means of the samples */
@@ -170,13 +170,13 @@ StripDrawing::draw_eye (Call &call, const EyePlace &place, bool antialiased)
 
 /* All that one memory of the buffer shows. */
 void
-StripDrawing::draw_memory (Call &call)
+Renderer::draw_memory (Call &call)
 {
   const StripRenderSettings &settings = *call.job->settings;
   /* mode blend has smooth outlines of its own */
   const int samples = settings.strips.mode == rangecast::StripMode::kBlend ? 0 : settings.samples;
   const bool antialiased = multisampler_.begin (context_, width_, height_, samples);
-  for (const EyePlace &place : eyes_.all ())
+  for (const EyeViewport &place : layout_.eyes ())
     if (place.memory == call.memory)
       draw_eye (call, place, antialiased);
   if (antialiased)
@@ -185,7 +185,7 @@ StripDrawing::draw_memory (Call &call)
 }
 
 gboolean
-StripDrawing::draw_bound (gpointer user_data)
+Renderer::draw_bound (gpointer user_data)
 {
   auto call = static_cast<Call *> (user_data);
   try {
@@ -216,9 +216,9 @@ fatal_error (const GstGLFuncs *gl)
 }
 
 void
-StripDrawing::draw_memories (Call &call)
+Renderer::draw_memories (Call &call)
 {
-  const guint memories = eyes_.all ().back ().memory + 1;
+  const guint memories = layout_.eyes ().back ().memory + 1;
   bool drawn = true;
   if (!upload (call)) {
     call.result.reason = "a view is larger than its textures can be";
@@ -239,7 +239,7 @@ StripDrawing::draw_memories (Call &call)
 }
 
 void
-StripDrawing::draw_in_gl_thread (GstGLContext *, gpointer user_data)
+Renderer::draw_in_gl_thread (GstGLContext *, gpointer user_data)
 {
   auto call = static_cast<Call *> (user_data);
   try {
@@ -249,11 +249,11 @@ StripDrawing::draw_in_gl_thread (GstGLContext *, gpointer user_data)
   }
 }
 
-StripDrawing::Result
-StripDrawing::draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out)
+Renderer::Result
+Renderer::draw (GstGLContext *context, const RenderJob &job, GstBuffer *out)
 {
   Call call = {.self = this, .job = &job, .out = out, .panel_changed = job.panel_changed};
-  const guint memories = eyes_.all ().back ().memory + 1;
+  const guint memories = layout_.eyes ().back ().memory + 1;
   std::array<GstMapInfo, 2> maps; /* tell whoever reads it on the CPU that it has changed */
   guint mapped = 0;
   while (mapped < memories && mapped < gst_buffer_n_memory (out)) {
