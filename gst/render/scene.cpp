@@ -53,7 +53,7 @@ void
 StripScene::surround ()
 {
   hull_.clear ();
-  for (const StripPainter::Layer &layer : layers ())
+  for (const RenderLayer &layer : layers ())
     rangecast::append_hull (layer.image, *layer.view, hull_);
 }
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "picture.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
-#include "strippainter.hpp"
 
 /** A frame set made ready to be painted, and what its rig tells of the scene. Streaming thread.
  *  Memory is kept from one frame set to the next. */
@@ -35,10 +35,7 @@ public:
   /** Another one after each build() that made something else than the one before; never 0. */
   [[nodiscard]] guint64 serial () const { return serial_; }
   /** Of all views that the rig has. */
-  [[nodiscard]] std::span<const StripPainter::Layer> layers () const
-  {
-    return {layers_.data (), count_};
-  }
+  [[nodiscard]] std::span<const RenderLayer> layers () const { return {layers_.data (), count_}; }
   /** World points that surround all points of the frame set. */
   [[nodiscard]] std::span<const rangecast::Vec3> hull () const { return hull_; }
   /** Of the last build(). */
@@ -64,7 +61,7 @@ private:
   std::array<ViewMemory, rangecast::kMaxViews> memory_; /* by number in the buffer */
   std::array<rangecast::StripResult, rangecast::kMaxViews> results_{};
   std::array<rangecast::SurfaceView, rangecast::kMaxViews> views_;
-  std::array<StripPainter::Layer, rangecast::kMaxViews> layers_;
+  std::array<RenderLayer, rangecast::kMaxViews> layers_;
   std::size_t count_ = 0; /* of the layers */
   std::vector<rangecast::Vec3> hull_;
   guint built_with_ = 0;  /* StripRenderSettings::strips_serial */

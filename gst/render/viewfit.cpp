@@ -35,7 +35,7 @@ static std::size_t
 take_points (const StripScene &scene, std::vector<Vec3> &points)
 {
   std::size_t count = 0, views = 0;
-  for (const StripPainter::Layer &layer : scene.layers ()) {
+  for (const RenderLayer &layer : scene.layers ()) {
     const std::size_t of_view = rangecast::count_points (layer.image);
     count += of_view;
     views += of_view > 0;
@@ -44,7 +44,7 @@ take_points (const StripScene &scene, std::vector<Vec3> &points)
     return 0;
   points.clear ();
   points.reserve (kMaxPoints + rangecast::kMaxViews);
-  for (const StripPainter::Layer &layer : scene.layers ())
+  for (const RenderLayer &layer : scene.layers ())
     rangecast::append_points (layer.image, *layer.view, count / kMaxPoints + 1, points);
   return views;
 }
