@@ -116,7 +116,7 @@ draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, boo
   result = priv->renderer.draw (GST_GL_BASE_FILTER (self)->context, job, out);
   if (result.drawn) {
     std::lock_guard guard (priv->lock);
-    priv->settings.camera.shown (result.matrices, home, result.width, result.height);
+    priv->settings.camera.set_shown (result.matrices, home, result.width, result.height);
   }
   return {};
 }

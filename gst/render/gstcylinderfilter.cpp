@@ -5,9 +5,9 @@
  *
  * Removes redundant points: where several views of a frame set see the same surface, the points of
  * the view that faces it most directly stay and the others are cleared. Before that, pose errors
- * are corrected, views and points that contradict others are left out (#GstCylinderFilter:consistency),
- * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with
- * consistency=depth.
+ * are corrected, views and points that contradict others are left out
+ * (#GstCylinderFilter:consistency), and colours are matched (#GstCylinderFilter:colour-balance).
+ * Points move only with consistency=depth.
  *
  * ## Example launch line
  * |[

@@ -292,7 +292,9 @@ gst_strip_render_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta,
 
 /* ---- events from downstream ---- */
 
-static bool
+namespace {
+
+bool
 handle_navigation (GstStripRender *self, GstEvent *event)
 {
   GstStripRenderPrivate *priv = self->priv;
@@ -307,6 +309,8 @@ handle_navigation (GstStripRender *self, GstEvent *event)
   camera_properties ().notify_changes (G_OBJECT (self), before, after);
   return handled;
 }
+
+} // namespace
 
 static gboolean
 gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
@@ -323,7 +327,9 @@ gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- states ---- */
 
-static std::vector<StatsRow>
+namespace {
+
+std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
@@ -334,6 +340,8 @@ collect_stats (GstElement *element)
                .bytes = stats.uploaded_total,
                .late = stats.dropped}}};
 }
+
+} // namespace
 
 static gboolean
 gst_strip_render_start (GstBaseTransform *base)

@@ -46,6 +46,8 @@ Renderer::start (GstGLContext *context, GError **error)
 {
   context_ = context;
   can_blend_ = BlendPainter::is_supported (context);
+  GST_DEBUG_OBJECT (context, "drawing with %s",
+      reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER)));
   if (painter_.start (context, error))
     return true;
   if (error && !*error)

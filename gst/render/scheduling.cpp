@@ -454,8 +454,11 @@ draw_due (GstStripRender *self)
   drop_overdue (self, now);
   push_gap (self, next_pts (self));
   const GstClockTime due = next_due (self);
-  if (!GST_CLOCK_TIME_IS_VALID (due) || due > now)
+  if (!GST_CLOCK_TIME_IS_VALID (due) || due > now) {
+    GST_LOG_OBJECT (
+        self, "next picture is due at running time %" GST_TIME_FORMAT, GST_TIME_ARGS (due));
     return due;
+  }
   GstClockTime limit;
   {
     std::lock_guard guard (priv->lock);
