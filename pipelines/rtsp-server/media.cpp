@@ -3,6 +3,7 @@
 
 #include <gst/video/video.h>
 
+#include "dump-graph.hpp"
 #include "join.hpp"
 #include "tcp-viewer.hpp"
 
@@ -145,6 +146,9 @@ on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
   auto &listener = *static_cast<Listener *> (user_data);
   GError *error = nullptr;
   gchar *details = nullptr;
+  dump_graph (message, "rtsp-server");
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_STATE_CHANGED)
+    return;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
     if (GST_IS_PIPELINE (message->src))
       listener.tell (true, "");
@@ -460,7 +464,8 @@ on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer 
   if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
     GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
     gst_bus_enable_sync_message_emission (bus);
-    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
+    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos",
+             "sync-message::state-changed"})
       g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
           new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
     gst_object_unref (bus);

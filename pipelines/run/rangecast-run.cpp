@@ -14,6 +14,7 @@
 #include <memory>
 #include <string>
 
+#include "dump-graph.hpp"
 #include "latency-trace.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
@@ -46,6 +47,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   auto runner = static_cast<Runner *> (user_data);
   GError *error = nullptr;
   gchar *details = nullptr;
+  dump_graph (message, "rangecast-run");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       gst_message_parse_error (message, &error, &details);

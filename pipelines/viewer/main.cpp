@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <clocale>
 
+#include "dump-graph.hpp"
 #include "viewer.hpp"
 
 void
@@ -107,6 +108,7 @@ static gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
+  dump_graph (message, "rangecast-viewer");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       on_error (viewer, message);

@@ -29,6 +29,18 @@ END
   stop_server
 }
 
+test_graphs_are_dumped () {
+  mkdir dots
+  GST_DEBUG_DUMP_DOT_DIR=dots serve -- "$figure ! identity error-after=30"
+  play 10 "location=$url" protocols=udp || fail "$(tail -n 5 player.log)"
+  until_true 20 grep -q 'Failed after' server.log
+  local event
+  for event in PLAYING ERROR; do
+    grep -q GstIdentity dots/*-rtsp-server."$event".dot || fail "no $event graph: $(ls dots)"
+  done
+  stop_server
+}
+
 test_sdp_alone_is_enough_for_a_player () {
   serve -- "$figure ! rtpneighbourcodepay name=pay0 config-interval=0"
   play 10 "location=$url" protocols=udp || fail "$(tail -n 5 player.log)"

@@ -90,6 +90,23 @@ test_keys_write_pictures_and_point_clouds () {
   [ "${points%% *}" -gt 2000 ] || fail "$points"
 }
 
+dumps_graphs () {
+  mkdir dots
+  export GST_DEBUG_DUMP_DOT_DIR=dots
+  open_viewer still.rcnc --size 320x240
+  quits_with q
+  head -c 1000 /dev/zero >noise.rcnc
+  ! rangecast-viewer noise.rcnc >>log.txt 2>&1
+}
+
+test_graphs_are_dumped_when_it_plays_and_when_it_fails () {
+  need_viewer
+  record_still
+  in_display dumps_graphs
+  grep -q GstStripRender dots/*-rangecast-viewer.PLAYING.dot || fail "$(ls dots)"
+  grep -q GstStripRender dots/*-rangecast-viewer.ERROR.dot || fail "$(ls dots)"
+}
+
 turns_while_paused () {
   open_viewer still.rcnc --size 320x240
   press space
