@@ -11,5 +11,19 @@ struct TransportUnref {
 };
 using TransportRef = std::unique_ptr<GstRTSPStreamTransport, TransportUnref>;
 
-/** The transports of a session's media that go one way, to one viewer. */
-std::vector<TransportRef> transports_of (GstRTSPSessionMedia *media, GstRTSPLowerTrans lower);
+/** The transports of a session's media that have this lower transport. */
+inline std::vector<TransportRef>
+transports_of (GstRTSPSessionMedia *media, GstRTSPLowerTrans lower)
+{
+  std::vector<TransportRef> found;
+  GPtrArray *transports = gst_rtsp_session_media_get_transports (media);
+  for (guint i = 0; i < transports->len; i++) {
+    auto transport = static_cast<GstRTSPStreamTransport *> (g_ptr_array_index (transports, i));
+    const GstRTSPTransport *to =
+        transport ? gst_rtsp_stream_transport_get_transport (transport) : nullptr;
+    if (to && to->lower_transport == lower)
+      found.emplace_back (GST_RTSP_STREAM_TRANSPORT (g_object_ref (transport)));
+  }
+  g_ptr_array_unref (transports);
+  return found;
+}

@@ -15,7 +15,7 @@ vga=video/x-raw,format=RGB,width=640,height=480
 
 test_graphs_of_a_run_that_fails_are_dumped () {
   mkdir dots
-  GST_DEBUG_DUMP_DOT_DIR=dots expect_error "Failed after" run videotestsrc ! identity error-after=3 ! fakesink
+  GST_DEBUG_DUMP_DOT_DIR=dots expect_error "Failed after" run videotestsrc is-live=true ! identity error-after=30 ! fakesink
   local event
   for event in PLAYING ERROR; do
     grep -q GstIdentity dots/*-rangecast-run."$event".dot || fail "no $event graph: $(ls dots)"

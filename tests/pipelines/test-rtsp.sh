@@ -8,6 +8,7 @@ for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name
 
 source "$source_dir/tests/pipelines/netns.sh"
 source "$source_dir/tests/pipelines/rtsp-server.sh"
+side_by_side=4 # they wait for viewers and for timeouts
 
 test_sdp_carries_the_rig_and_the_version () {
   gst-launch-1.0 -q avatartestsrc num-buffers=1 rig-export=rig.yaml ! video/x-range,width=160,height=120 ! fakesink
