@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <functional>
 #include <utility>
 
 namespace {
@@ -70,18 +69,15 @@ are_files_short (GSocket *socket)
   return getrlimit (RLIMIT_NOFILE, &files) == 0 && rlim_t (next + kKeptFiles) >= files.rlim_cur;
 }
 
-/* ---- the threads that serve them ---- */
-
-/* A thread pool that reports which thread a connection gets, before that serves it: called by the
- * main loop, with the server's lock. */
-using OnClient = std::function<void (GstRTSPClient *, GstRTSPThread *)>;
-
 } // namespace
 
+/* ---- the threads that serve them ---- */
+
+/* A thread pool that reports which thread a connection gets, before that serves it. */
 G_BEGIN_DECLS
 struct ConnectionThreads {
   GstRTSPThreadPool parent;
-  OnClient *on_client;
+  Connections *owner;
 };
 struct ConnectionThreadsClass {
   GstRTSPThreadPoolClass parent_class;
@@ -96,27 +92,18 @@ connection_threads_get_thread (
   GstRTSPThread *thread = GST_RTSP_THREAD_POOL_CLASS (connection_threads_parent_class)
                               ->get_thread (pool, type, context);
   if (thread && type == GST_RTSP_THREAD_TYPE_CLIENT && context && context->client)
-    (*reinterpret_cast<ConnectionThreads *> (pool)->on_client) (context->client, thread);
+    reinterpret_cast<ConnectionThreads *> (pool)->owner->record_thread (context->client, thread);
   return thread;
 }
 
 static void
-connection_threads_init (ConnectionThreads *threads)
+connection_threads_init (ConnectionThreads *)
 {
-  threads->on_client = new OnClient;
-}
-
-static void
-connection_threads_finalize (GObject *object)
-{
-  delete reinterpret_cast<ConnectionThreads *> (object)->on_client;
-  G_OBJECT_CLASS (connection_threads_parent_class)->finalize (object);
 }
 
 static void
 connection_threads_class_init (ConnectionThreadsClass *klass)
 {
-  G_OBJECT_CLASS (klass)->finalize = connection_threads_finalize;
   GST_RTSP_THREAD_POOL_CLASS (klass)->get_thread = connection_threads_get_thread;
 }
 
@@ -126,9 +113,7 @@ Connections::Connections (
 {
   auto threads =
       static_cast<ConnectionThreads *> (g_object_new (connection_threads_get_type (), nullptr));
-  *threads->on_client = [this] (GstRTSPClient *client, GstRTSPThread *thread) {
-    record_thread (client, thread);
-  };
+  threads->owner = this;
   gst_rtsp_thread_pool_set_max_threads (GST_RTSP_THREAD_POOL (threads), n_threads);
   gst_rtsp_server_set_thread_pool (server, GST_RTSP_THREAD_POOL (threads));
   g_object_unref (threads);

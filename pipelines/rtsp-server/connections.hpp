@@ -32,6 +32,8 @@ public:
 
   /** Main loop. Removed by itself when the client is finalized. */
   void add (GstRTSPClient *client);
+  /** The connection is served by that thread. Main loop, with the server's lock. */
+  void record_thread (GstRTSPClient *client, GstRTSPThread *thread);
   /** The connection asked for that media, and was not idle. */
   void record_media (GstRTSPClient *client, const GstRTSPMedia *media);
   /** The connection is the viewer of that session from now on. */
@@ -63,7 +65,6 @@ private:
     SocketRef socket = nullptr;          /* with TLS, until it is shut down */
   };
   static void on_gone (gpointer connections, GObject *client);
-  void record_thread (GstRTSPClient *client, GstRTSPThread *thread);
   bool asked_for (GstRTSPClient *client, const GstRTSPMedia *media);
   bool is_viewer (GstRTSPClient *client);
   std::size_t count (bool closing);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "transports.hpp"
+#include "glue.hpp"
 
 namespace {
 
@@ -12,18 +12,6 @@ const char kGateKey[] = "rangecast-join-gate";
 constexpr gsize kRtpHeader = 12; /* bytes */
 
 using Gate = std::shared_ptr<JoinGate>;
-
-void
-delete_gate (gpointer gate)
-{
-  delete static_cast<Gate *> (gate);
-}
-
-void
-delete_gate_of_signal (gpointer gate, GClosure *)
-{
-  delete_gate (gate);
-}
 
 JoinGate &
 gate_of (gpointer gate)
@@ -54,7 +42,7 @@ watch_pad (GstElement *element, const char *name, GstPadProbeCallback callback, 
     return;
   gst_pad_add_probe (pad,
       GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), callback,
-      new Gate (gate), delete_gate);
+      new Gate (gate), delete_data<Gate>);
   gst_object_unref (pad);
 }
 
@@ -104,17 +92,15 @@ ShortPause::wait ()
 
 /* ---- which packets begin a key frame set ---- */
 
-/* RFC 3550, 5.1. False for reports, whose packet types are 192 to 223 (RFC 5761, 4). */
-bool
-JoinGate::read_start (GstBuffer *packet, Start &start)
+std::optional<RtpStart>
+read_rtp_start (GstBuffer *packet)
 {
   guint8 header[kRtpHeader];
   if (!packet || gst_buffer_extract (packet, 0, header, sizeof header) != sizeof header)
-    return false;
+    return std::nullopt;
   if (header[0] >> 6 != 2 || (header[1] >= 192 && header[1] <= 223))
-    return false;
-  start = {GST_READ_UINT32_BE (header + 4), GST_READ_UINT16_BE (header + 2)};
-  return true;
+    return std::nullopt;
+  return RtpStart{GST_READ_UINT32_BE (header + 4), GST_READ_UINT16_BE (header + 2)};
 }
 
 GstPadProbeReturn
@@ -129,32 +115,27 @@ GstPadProbeReturn
 JoinGate::on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   JoinGate &gate = gate_of (user_data);
-  Start start;
-  if (!read_start (first_buffer (info), start))
+  const auto start = read_rtp_start (first_buffer (info));
+  if (!start)
     return GST_PAD_PROBE_OK;
-  const bool begins = !gate.has_last_ || start.timestamp != gate.last_timestamp_;
+  const bool begins = !gate.has_last_ || start->timestamp != gate.last_timestamp_;
   gate.has_last_ = true;
-  gate.last_timestamp_ = start.timestamp;
+  gate.last_timestamp_ = start->timestamp;
   if (begins)
     gate.pause_.wait ();
   if (begins && gate.is_key_) {
     std::lock_guard guard (gate.lock_);
-    gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = start;
+    gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = *start;
   }
   return GST_PAD_PROBE_OK;
 }
 
 bool
-JoinGate::begins_key_frame_set (GstBuffer *packet)
+JoinGate::begins_key_frame_set (const RtpStart &packet)
 {
-  Start start;
-  if (!read_start (packet, start))
-    return false;
   std::lock_guard guard (lock_);
   const auto end = starts_.begin () + gint (std::min (n_starts_, starts_.size ()));
-  return std::any_of (starts_.begin (), end, [&] (const Start &known) {
-    return known.timestamp == start.timestamp && known.sequence == start.sequence;
-  });
+  return std::find (starts_.begin (), end, packet) != end;
 }
 
 /* ---- viewers by UDP ---- */
@@ -208,8 +189,9 @@ JoinGate::before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer user_data
   JoinGate &gate = gate_of (user_data);
   if (gate.waiting_ > 0) {
     GstElement *sink = gst_pad_get_parent_element (pad);
+    const auto start = read_rtp_start (first_buffer (info));
     if (sink)
-      gate.add_waiting (sink, gate.begins_key_frame_set (first_buffer (info)));
+      gate.add_waiting (sink, start && gate.begins_key_frame_set (*start));
     gst_clear_object (&sink);
   }
   return GST_PAD_PROBE_OK;
@@ -241,12 +223,8 @@ JoinGate::on_element (GstBin *, GstElement *element, gpointer user_data)
     return;
   const Gate &gate = *static_cast<Gate *> (user_data);
   g_signal_connect_data (element, "client-added", G_CALLBACK (on_client), new Gate (gate),
-      delete_gate_of_signal, GConnectFlags (0));
-  GstPad *pad = gst_element_get_static_pad (element, "sink");
-  gst_pad_add_probe (pad,
-      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), before_sending,
-      new Gate (gate), delete_gate);
-  gst_object_unref (pad);
+      delete_closure_data<Gate>, GConnectFlags (0));
+  watch_pad (element, "sink", before_sending, gate);
 }
 
 /* ---- requests ---- */
@@ -312,8 +290,8 @@ JoinGate::install (GstRTSPMedia *media, GstElement *pipeline, GstElement *payloa
   watch_pad (payloader, "sink", on_frame_set, gate);
   watch_pad (payloader, "src", on_payload, gate);
   g_signal_connect_data (pipeline, "element-added", G_CALLBACK (on_element), new Gate (gate),
-      delete_gate_of_signal, GConnectFlags (0));
-  g_object_set_data_full (G_OBJECT (media), kGateKey, new Gate (gate), delete_gate);
+      delete_closure_data<Gate>, GConnectFlags (0));
+  g_object_set_data_full (G_OBJECT (media), kGateKey, new Gate (gate), delete_data<Gate>);
 }
 
 std::shared_ptr<JoinGate>

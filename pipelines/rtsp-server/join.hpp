@@ -18,6 +18,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,17 @@ private:
   gint64 until_us_ = 0; /* monotonic */
 };
 
+/** What identifies a packet. */
+struct RtpStart {
+  guint32 timestamp;
+  guint16 sequence;
+
+  bool operator== (const RtpStart &) const = default;
+};
+
+/** RFC 3550, 5.1; nothing for RTCP, whose packet types are 192 to 223 (RFC 5761, 4). */
+std::optional<RtpStart> read_rtp_start (GstBuffer *packet);
+
 /** Of one media with one stream. Any thread. */
 class JoinGate {
 public:
@@ -52,8 +64,8 @@ public:
   /** @return nullptr if the media has none */
   static std::shared_ptr<JoinGate> of (GstRTSPMedia *media);
 
-  /** @param packet  RTP */
-  bool begins_key_frame_set (GstBuffer *packet);
+  /** @param packet  of RTP */
+  bool begins_key_frame_set (const RtpStart &packet);
 
   /** Before PLAY: UDP viewers of the session wait from now on.
    *  @param pauses  the media plays, and TCP viewers of the session have no queues yet */
@@ -65,10 +77,6 @@ public:
   void remove (GstRTSPSessionMedia *media);
 
 private:
-  struct Start {
-    guint32 timestamp; /* RTP */
-    guint16 sequence;
-  };
   struct Joiner {
     std::shared_ptr<GWeakRef> transport;
     std::string host;
@@ -82,7 +90,6 @@ private:
       return port == to.client_port.min && host == to.destination;
     }
   };
-  static bool read_start (GstBuffer *packet, Start &start);
   static GstPadProbeReturn on_frame_set (GstPad *, GstPadProbeInfo *info, gpointer gate);
   static GstPadProbeReturn on_payload (GstPad *, GstPadProbeInfo *info, gpointer gate);
   static GstPadProbeReturn before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer gate);
@@ -100,7 +107,7 @@ private:
   ShortPause pause_;             /* before a frame set begins */
 
   std::mutex lock_; /* guards what follows; no calls with it */
-  std::array<Start, 8> starts_ = {};
+  std::array<RtpStart, 8> starts_ = {};
   std::size_t n_starts_ = 0; /* ever */
   std::vector<Joiner> joiners_;
   std::vector<Joiner> entering_; /* that are being added again */

@@ -4,13 +4,15 @@
 #include <gst/video/video.h>
 
 #include "dump-graph.hpp"
+#include "glue.hpp"
 #include "join.hpp"
 #include "tcp-viewer.hpp"
 
 namespace {
 
 const char kCodedType[] = "application/x-neighbour-code";
-const char kLiveKey[] = "rangecast-live"; /* object data of a media: is live */
+/* Object data of a media: it has its first frame set; it is live. */
+const char kPreparedKey[] = "rangecast-prepared", kLiveKey[] = "rangecast-live";
 /* EOS waits so long for the time of the last frame set, and then for its packets to be sent. */
 constexpr gint64 kMaxEosWait_us = 2 * G_USEC_PER_SEC;
 constexpr GstClockTime kSendTime = 100 * GST_MSECOND;
@@ -135,18 +137,6 @@ private:
 };
 
 void
-delete_listener_of_signal (gpointer listener, GClosure *)
-{
-  delete static_cast<Listener *> (listener);
-}
-
-void
-delete_stage (gpointer stage, GClosure *)
-{
-  delete static_cast<Stage *> (stage);
-}
-
-void
 on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &listener = *static_cast<Listener *> (user_data);
@@ -210,9 +200,6 @@ payload_pad (GstRTSPMedia *media)
   return pad;
 }
 
-const char kPreparedKey[] =
-    "rangecast-prepared"; /* object data of a media: has its first frame set */
-
 bool
 is_live (GstRTSPMedia *media)
 {
@@ -239,22 +226,21 @@ on_prepared (GstRTSPMedia *media, gpointer)
 void
 disable_udp_sync (GstRTSPMedia *media)
 {
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
-    GstIterator *sinks =
-        gst_bin_iterate_elements (GST_BIN (pipeline)); /* without those of the launch string */
-    const auto disable = [] (const GValue *sink, gpointer) {
-      auto element = GST_ELEMENT (g_value_get_object (sink));
-      GstElementFactory *factory = gst_element_get_factory (element);
-      if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
-        g_object_set (element, "sync", FALSE, nullptr);
-    };
-    while (gst_iterator_foreach (sinks, disable, nullptr) == GST_ITERATOR_RESYNC)
-      gst_iterator_resync (sinks);
-    gst_iterator_free (sinks);
-    gst_object_unref (pipeline);
-  }
-  gst_object_unref (bin);
+  GstElement *pipeline = pipeline_of (media);
+  if (!pipeline)
+    return;
+  GstIterator *elements =
+      gst_bin_iterate_elements (GST_BIN (pipeline)); /* not of the launch string */
+  const auto disable = [] (const GValue *value, gpointer) {
+    auto element = GST_ELEMENT (g_value_get_object (value));
+    GstElementFactory *factory = gst_element_get_factory (element);
+    if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
+      g_object_set (element, "sync", FALSE, nullptr);
+  };
+  while (gst_iterator_foreach (elements, disable, nullptr) == GST_ITERATOR_RESYNC)
+    gst_iterator_resync (elements);
+  gst_iterator_free (elements);
+  gst_object_unref (pipeline);
 }
 
 } // namespace
@@ -270,8 +256,8 @@ disable_live_sync (GstRTSPMedia *media)
     GObject *session = gst_rtsp_stream_get_rtpsession (gst_rtsp_media_get_stream (media, i));
     if (!session)
       continue;
-    g_object_set (session, "disable-sr-timestamp", FALSE,
-        nullptr); /* set by gst_rtsp_media_set_rate_control() */
+    /* gst_rtsp_media_set_rate_control() has set it. */
+    g_object_set (session, "disable-sr-timestamp", FALSE, nullptr);
     g_object_unref (session);
   }
 }
@@ -316,12 +302,6 @@ struct EndWatch {
   Listener listener;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* streaming thread */
 };
-
-void
-delete_end_watch (gpointer watch)
-{
-  delete static_cast<EndWatch *> (watch);
-}
 
 /* The clock time of a PTS at a pad; NONE without a segment. */
 GstClockTime
@@ -448,15 +428,13 @@ namespace {
 void
 post_error (GstRTSPMedia *media)
 {
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+  if (GstElement *pipeline = pipeline_of (media)) {
     GError *error = g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server ends");
     gst_element_post_message (
-        GST_ELEMENT (pipeline), gst_message_new_error (pipeline, error, nullptr));
+        pipeline, gst_message_new_error (GST_OBJECT (pipeline), error, nullptr));
     g_error_free (error);
     gst_object_unref (pipeline);
   }
-  gst_object_unref (bin);
 }
 
 } // namespace
@@ -481,31 +459,30 @@ on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer 
 {
   auto stage = static_cast<Stage *> (user_data);
   auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
-  GstElement *bin = gst_rtsp_media_get_element (media);
+  const bool has_one_stream = gst_rtsp_media_n_streams (media) == 1;
   prepare_tcp_queues (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
-    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+  if (GstElement *pipeline = pipeline_of (media)) {
+    GstBus *bus = gst_element_get_bus (pipeline);
     gst_bus_enable_sync_message_emission (bus);
     for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos",
              "sync-message::state-changed"})
       g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
-          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
+          new Listener (media, stage->on_end), delete_closure_data<Listener>, GConnectFlags (0));
     gst_object_unref (bus);
-    GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
-    if (payloader && gst_rtsp_media_n_streams (media) == 1)
-      JoinGate::install (media, GST_ELEMENT (pipeline), payloader);
+    GstElement *payloader = gst_bin_get_by_name (GST_BIN (pipeline), "pay0");
+    if (payloader && has_one_stream)
+      JoinGate::install (media, pipeline, payloader);
     gst_clear_object (&payloader);
     gst_object_unref (pipeline);
   }
-  gst_object_unref (bin);
   if (GstPad *pad = payload_pad (media)) {
     gst_pad_add_probe (pad,
         GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
                          GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
         on_payload, stage->counts, nullptr);
-    if (gst_rtsp_media_n_streams (media) == 1) /* of several streams, others may go on */
+    if (has_one_stream) /* of several streams, others may go on */
       gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, on_payload_end,
-          new EndWatch{{media, stage->on_end}}, delete_end_watch);
+          new EndWatch{{media, stage->on_end}}, delete_data<EndWatch>);
     gst_object_unref (pad);
   }
   g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
@@ -557,6 +534,6 @@ make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end
   gst_rtsp_media_factory_add_role (factory, kViewerRole, "media.factory.access", G_TYPE_BOOLEAN,
       TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
   g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
-      new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
+      new Stage{&counts, std::move (on_end)}, delete_closure_data<Stage>, GConnectFlags (0));
   return factory;
 }

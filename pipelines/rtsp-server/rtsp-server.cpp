@@ -38,6 +38,7 @@
 #include <thread>
 
 #include "connections.hpp"
+#include "glue.hpp"
 #include "join.hpp"
 #include "keep-alive.hpp"
 #include "media.hpp"
@@ -128,12 +129,6 @@ struct Ending {
   GstRTSPMedia *media;
 };
 
-void
-delete_ending (gpointer ending)
-{
-  delete static_cast<Ending *> (ending);
-}
-
 /* Sessions of UDP viewers outlive their connections. */
 GstRTSPFilterResult
 remove_session_of (GstRTSPSessionPool *, GstRTSPSession *session, gpointer user_data)
@@ -163,7 +158,7 @@ void
 start_timer (Server &server, Timers &timers, GstRTSPMedia *media, guint ms, GSourceFunc callback)
 {
   GSource *timer = g_timeout_source_new (ms);
-  g_source_set_callback (timer, callback, new Ending (server, media), delete_ending);
+  g_source_set_callback (timer, callback, new Ending (server, media), delete_data<Ending>);
   g_source_attach (timer, nullptr);
   timers[media].reset (timer);
 }

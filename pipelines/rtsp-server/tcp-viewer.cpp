@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "tcp-viewer.hpp"
 
-#include <gst/rtp/rtp.h>
-
 #include <algorithm>
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
+#include "glue.hpp"
 #include "join.hpp"
-#include "transports.hpp"
 
 namespace {
 
@@ -18,11 +17,20 @@ constexpr std::size_t kMaxFrameSets = 4;
 /* Frame sets of many slices may come as one packet each; reports are few. */
 constexpr std::size_t kMaxMessages = 65536;
 
+struct MiniObjectUnref {
+  void operator() (GstMiniObject *object) const { gst_mini_object_unref (object); }
+};
+
 struct Message {
-  GstBuffer *buffer;   /* or */
-  GstBufferList *list; /* packets */
-  bool is_rtp;
-  guint32 timestamp; /* of RTP */
+  std::unique_ptr<GstMiniObject, MiniObjectUnref> packets; /* GstBuffer or GstBufferList */
+  std::optional<RtpStart> rtp;                             /* of the first packet; RTCP has none */
+
+  [[nodiscard]] GstBuffer *first_packet () const
+  {
+    return GST_IS_BUFFER_LIST (packets.get ())
+               ? gst_buffer_list_get (GST_BUFFER_LIST (packets.get ()), 0)
+               : GST_BUFFER (packets.get ());
+  }
 };
 
 /* The packets that wait for one TCP viewer. Shared with the callbacks of transports, which may run
@@ -34,8 +42,8 @@ public:
   TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
       std::atomic<guint64> &left_out, std::shared_ptr<JoinGate> gate);
   ~TcpQueue ();
-  /** Takes the references of the message. */
-  void push (const Message &message);
+  /** @param packets  a GstBuffer or GstBufferList of packets */
+  void push (GstMiniObject *packets);
   void send_waiting ();
   void handle_sent ();
   void keep_alive ();
@@ -66,69 +74,18 @@ private:
 
 using Handle = std::shared_ptr<TcpQueue>;
 
-void
-delete_handle (gpointer handle)
-{
-  delete static_cast<Handle *> (handle);
-}
-
 TcpQueue &
 queue_of (gpointer handle)
 {
   return **static_cast<Handle *> (handle);
 }
 
-void
-unref (const Message &message)
-{
-  if (message.buffer)
-    gst_buffer_unref (message.buffer);
-  if (message.list)
-    gst_buffer_list_unref (message.list);
-}
-
-guint32
-timestamp_of (GstBuffer *packet)
-{
-  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
-  guint32 timestamp = 0;
-  if (packet && gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp)) {
-    timestamp = gst_rtp_buffer_get_timestamp (&rtp);
-    gst_rtp_buffer_unmap (&rtp);
-  }
-  return timestamp;
-}
-
-/* ---- callbacks of the stream, in its streaming thread ---- */
-
+/* Callback of our transport, for RTP and RTCP; streaming thread. */
+template <typename Packets>
 gboolean
-on_rtp (GstBuffer *packet, guint8, gpointer handle)
+on_packets (Packets *packets, guint8, gpointer handle)
 {
-  queue_of (handle).push ({gst_buffer_ref (packet), nullptr, true, timestamp_of (packet)});
-  return TRUE;
-}
-
-gboolean
-on_rtcp (GstBuffer *packet, guint8, gpointer handle)
-{
-  queue_of (handle).push ({gst_buffer_ref (packet), nullptr, false, 0});
-  return TRUE;
-}
-
-gboolean
-on_rtp_list (GstBufferList *list, guint8, gpointer handle)
-{
-  if (gst_buffer_list_length (list) > 0)
-    queue_of (handle).push (
-        {nullptr, gst_buffer_list_ref (list), true, timestamp_of (gst_buffer_list_get (list, 0))});
-  return TRUE;
-}
-
-gboolean
-on_rtcp_list (GstBufferList *list, guint8, gpointer handle)
-{
-  if (gst_buffer_list_length (list) > 0)
-    queue_of (handle).push ({nullptr, gst_buffer_list_ref (list), false, 0});
+  queue_of (handle).push (GST_MINI_OBJECT (packets));
   return TRUE;
 }
 
@@ -144,8 +101,6 @@ TcpQueue::TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
 
 TcpQueue::~TcpQueue ()
 {
-  for (const Message &message : waiting_)
-    unref (message);
   g_weak_ref_clear (&transport_);
   g_main_context_unref (context_);
 }
@@ -154,10 +109,9 @@ TcpQueue::~TcpQueue ()
 bool
 TcpQueue::is_before_key (const Message &message)
 {
-  if (!gate_ || !message.is_rtp)
+  if (!gate_ || !message.rtp)
     return false;
-  GstBuffer *first = message.list ? gst_buffer_list_get (message.list, 0) : message.buffer;
-  if (!gate_->begins_key_frame_set (first) && g_get_monotonic_time () < until_us_)
+  if (!gate_->begins_key_frame_set (*message.rtp) && g_get_monotonic_time () < until_us_)
     return true;
   gate_ = nullptr;
   return false;
@@ -167,38 +121,31 @@ TcpQueue::is_before_key (const Message &message)
 void
 TcpQueue::drop_frame_sets ()
 {
-  std::deque<Message> reports;
-  for (const Message &message : waiting_)
-    if (message.is_rtp)
-      unref (message);
-    else
-      reports.push_back (message);
-  waiting_.swap (reports);
+  std::erase_if (waiting_, [] (const Message &message) { return message.rtp.has_value (); });
   left_out_ += frame_sets_;
   frame_sets_ = 0;
 }
 
 void
-TcpQueue::push (const Message &message)
+TcpQueue::push (GstMiniObject *packets)
 {
-  std::unique_lock guard (lock_);
-  if (closed_ || waiting_.size () >= kMaxMessages || is_before_key (message)) {
-    guard.unlock ();
-    unref (message);
+  Message message{{gst_mini_object_ref (packets), {}}, {}};
+  if (GST_IS_BUFFER_LIST (packets) && gst_buffer_list_length (GST_BUFFER_LIST (packets)) == 0)
     return;
-  }
-  if (message.is_rtp) {
-    const Message *last = nullptr;
-    for (auto it = waiting_.rbegin (); it != waiting_.rend () && !last; ++it)
-      if (it->is_rtp)
-        last = &*it;
-    if (!last || last->timestamp != message.timestamp) {
+  message.rtp = read_rtp_start (message.first_packet ());
+  std::unique_lock guard (lock_);
+  if (closed_ || waiting_.size () >= kMaxMessages || is_before_key (message))
+    return;
+  if (message.rtp) {
+    const auto last = std::find_if (waiting_.rbegin (), waiting_.rend (),
+        [] (const Message &other) { return other.rtp.has_value (); });
+    if (last == waiting_.rend () || last->rtp->timestamp != message.rtp->timestamp) {
       if (frame_sets_ >= kMaxFrameSets)
         drop_frame_sets ();
       frame_sets_++;
     }
   }
-  waiting_.push_back (message);
+  waiting_.push_back (std::move (message));
   guard.unlock ();
   wake ();
 }
@@ -223,7 +170,7 @@ TcpQueue::wake ()
     queue_of (handle).send_waiting ();
     return G_SOURCE_REMOVE;
   };
-  g_source_set_callback (source, send, new Handle (std::move (handle)), delete_handle);
+  g_source_set_callback (source, send, new Handle (std::move (handle)), delete_data<Handle>);
   g_source_attach (source, context_);
   g_source_unref (source);
 }
@@ -237,13 +184,12 @@ TcpQueue::pop (Message &message)
   draining_ = !busy_ && !closed_ && !waiting_.empty ();
   if (!draining_)
     return false;
-  message = waiting_.front ();
+  message = std::move (waiting_.front ());
   waiting_.pop_front ();
-  if (message.is_rtp) {
-    const auto is_next = [&] (const Message &other) {
-      return other.is_rtp && other.timestamp == message.timestamp;
-    };
-    const bool has_more = std::any_of (waiting_.begin (), waiting_.end (), is_next);
+  if (message.rtp) {
+    const bool has_more = std::ranges::any_of (waiting_, [&] (const Message &other) {
+      return other.rtp && other.rtp->timestamp == message.rtp->timestamp;
+    });
     frame_sets_ -= !has_more && frame_sets_ > 0;
   }
   busy_ = true; /* until handle_sent(), maybe within hand_over() */
@@ -256,13 +202,15 @@ TcpQueue::hand_over (const Message &message)
   auto transport = static_cast<GstRTSPStreamTransport *> (g_weak_ref_get (&transport_));
   if (!transport)
     return false;
+  GstMiniObject *packets = message.packets.get ();
   gboolean sent = FALSE;
-  if (message.is_rtp)
-    sent = message.list ? gst_rtsp_stream_transport_send_rtp_list (transport, message.list)
-                        : gst_rtsp_stream_transport_send_rtp (transport, message.buffer);
+  if (GST_IS_BUFFER_LIST (packets))
+    sent = (message.rtp
+                ? gst_rtsp_stream_transport_send_rtp_list
+                : gst_rtsp_stream_transport_send_rtcp_list) (transport, GST_BUFFER_LIST (packets));
   else
-    sent = message.list ? gst_rtsp_stream_transport_send_rtcp_list (transport, message.list)
-                        : gst_rtsp_stream_transport_send_rtcp (transport, message.buffer);
+    sent = (message.rtp ? gst_rtsp_stream_transport_send_rtp
+                        : gst_rtsp_stream_transport_send_rtcp) (transport, GST_BUFFER (packets));
   g_object_unref (transport);
   return sent;
 }
@@ -275,7 +223,6 @@ TcpQueue::send_waiting ()
   while (pop (message)) {
     if (!hand_over (message))
       handle_sent (); /* the connection is closing: there is no callback */
-    unref (message);
   }
 }
 
@@ -295,8 +242,6 @@ TcpQueue::close ()
   std::lock_guard sending (sending_); /* after what is being sent */
   std::lock_guard guard (lock_);
   closed_ = true;
-  for (const Message &message : waiting_)
-    unref (message);
   waiting_.clear ();
 }
 
@@ -386,15 +331,6 @@ delete_replacement (gpointer user_data)
 
 /* ---- RTCP of the stream ---- */
 
-/* By packet type: RFC 3550, 6.1; RFC 5761, 4. */
-bool
-is_rtcp (GstBuffer *packet)
-{
-  guint8 header[2];
-  return gst_buffer_extract (packet, 0, header, sizeof header) == sizeof header &&
-         header[0] >> 6 == 2 && header[1] >= 192 && header[1] <= 223;
-}
-
 /* gst-rtsp-server 1.22 has an appsink of one buffer each for RTP and for RTCP, and one thread that
  * sends from both. Where both have a buffer, the thread sends RTCP and then sleeps until the next
  * buffer comes; but RTP cannot come while its appsink is full, so the stream stops for all TCP
@@ -403,17 +339,11 @@ GstPadProbeReturn
 on_appsink_buffer (GstPad *, GstPadProbeInfo *info, gpointer queues)
 {
   GstBuffer *packet = GST_PAD_PROBE_INFO_BUFFER (info);
-  if (!is_rtcp (packet))
+  if (read_rtp_start (packet))
     return GST_PAD_PROBE_OK;
   for (const Handle &queue : (*static_cast<QueuesHandle *> (queues))->queues ())
-    queue->push ({gst_buffer_ref (packet), nullptr, false, 0});
+    queue->push (GST_MINI_OBJECT (packet));
   return GST_PAD_PROBE_DROP;
-}
-
-void
-delete_replacements (gpointer queues)
-{
-  delete static_cast<QueuesHandle *> (queues);
 }
 
 void
@@ -424,7 +354,7 @@ on_element (GstBin *, GstElement *element, gpointer queues)
     return;
   GstPad *pad = gst_element_get_static_pad (element, "sink");
   gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, on_appsink_buffer,
-      new QueuesHandle (*static_cast<QueuesHandle *> (queues)), delete_replacements);
+      new QueuesHandle (*static_cast<QueuesHandle *> (queues)), delete_data<QueuesHandle>);
   gst_object_unref (pad);
 }
 
@@ -442,16 +372,13 @@ void
 prepare_tcp_queues (GstRTSPMedia *media)
 {
   auto queues = new QueuesHandle (std::make_shared<MediaQueues> ());
-  g_object_set_data_full (G_OBJECT (media), kQueuesKey, queues, delete_replacements);
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
+  g_object_set_data_full (G_OBJECT (media), kQueuesKey, queues, delete_data<QueuesHandle>);
+  GstElement *pipeline = pipeline_of (media);
   if (pipeline &&
       gst_rtsp_media_n_streams (media) == 1) /* of several streams, each has its own viewers */
-    g_signal_connect_data (
-        pipeline, "element-added", G_CALLBACK (on_element), new QueuesHandle (*queues),
-        [] (gpointer own, GClosure *) { delete_replacements (own); }, GConnectFlags (0));
+    g_signal_connect_data (pipeline, "element-added", G_CALLBACK (on_element),
+        new QueuesHandle (*queues), delete_closure_data<QueuesHandle>, GConnectFlags (0));
   gst_clear_object (&pipeline);
-  gst_object_unref (bin);
   g_signal_connect (media, "target-state", G_CALLBACK (on_target_state), nullptr);
 }
 
@@ -479,15 +406,16 @@ make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
   GstRTSPStreamTransport *ours =
       gst_rtsp_stream_transport_new (gst_rtsp_stream_transport_get_stream (transport), copy);
   gst_rtsp_stream_transport_set_callbacks (
-      ours, on_rtp, on_rtcp, new Handle (queue), delete_handle);
+      ours, on_packets<GstBuffer>, on_packets<GstBuffer>, new Handle (queue), delete_data<Handle>);
   /* gst-rtsp-server 1.22 never calls the destroy notify of list callbacks, hence the object data.
    */
   auto handle = new Handle (queue);
-  g_object_set_data_full (G_OBJECT (ours), kHandleKey, handle, delete_handle);
-  gst_rtsp_stream_transport_set_list_callbacks (ours, on_rtp_list, on_rtcp_list, handle, nullptr);
+  g_object_set_data_full (G_OBJECT (ours), kHandleKey, handle, delete_data<Handle>);
+  gst_rtsp_stream_transport_set_list_callbacks (
+      ours, on_packets<GstBufferList>, on_packets<GstBufferList>, handle, nullptr);
   gst_rtsp_stream_transport_set_keepalive (
       ours, [] (gpointer handle) { queue_of (handle).keep_alive (); }, new Handle (queue),
-      delete_handle);
+      delete_data<Handle>);
   return ours;
 }
 
@@ -507,7 +435,7 @@ replace_transport (GstRTSPStreamTransport *transport, GstRTSPMedia *media, GMain
   }
   gst_rtsp_stream_transport_set_message_sent (
       transport, [] (gpointer handle) { queue_of (handle).handle_sent (); }, new Handle (queue),
-      delete_handle);
+      delete_data<Handle>);
   g_object_set_data_full (G_OBJECT (transport), kReplacementKey, replacement, delete_replacement);
 }
 

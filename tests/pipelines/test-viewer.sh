@@ -4,6 +4,7 @@
 # Its helpers, not its tests.
 source "$source_dir/tests/pipelines/test-window.sh"
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
+side_by_side=2 # they wait for pictures
 
 need_program () { command -v rangecast-viewer >/dev/null || skip "no rangecast-viewer (Debian package libcairo2-dev)"; }
 need_viewer () {

@@ -1,10 +1,37 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Small things between C++ and gst-rtsp-server. */
 #pragma once
 
 #include <gst/rtsp-server/rtsp-server.h>
 
 #include <memory>
 #include <vector>
+
+/** GDestroyNotify for what `new` made. */
+template <typename T>
+void
+delete_data (gpointer data)
+{
+  delete static_cast<T *> (data);
+}
+
+/** GClosureNotify for what `new` made. */
+template <typename T>
+void
+delete_closure_data (gpointer data, GClosure *)
+{
+  delete static_cast<T *> (data);
+}
+
+/** Transfer full; nullptr once the media has none. */
+inline GstElement *
+pipeline_of (GstRTSPMedia *media)
+{
+  GstElement *bin = gst_rtsp_media_get_element (media);
+  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
+  gst_object_unref (bin);
+  return pipeline ? GST_ELEMENT (pipeline) : nullptr;
+}
 
 struct TransportUnref {
   void operator() (GstRTSPStreamTransport *transport) const { g_object_unref (transport); }
