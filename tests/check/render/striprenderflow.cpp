@@ -314,7 +314,7 @@ GST_START_TEST (test_drain_gives_all_buffers_back_and_the_picture_stays)
     gst_query_unref (query);
     fail_unless_equals_int (gone, 3);
     const RenderedPicture after = next ();
-    fail_unless (after.rgba == before.rgba);
+    fail_unless_cmp (after.rgba, ==, before.rgba);
     fail_unless_equals_uint64 (after.shows, before.shows);
     if (is_live) {
       fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), uploads);
@@ -629,7 +629,7 @@ GST_START_TEST (test_statistics_count_pictures_and_points)
   gst_structure_get_uint64 (stats, "points", &counted);
   gst_structure_get_uint64 (stats, "late", &late);
   fail_unless_equals_uint64 (frames, 3);
-  fail_unless (points > 0);
+  ck_assert_uint_gt (points, 0);
   fail_unless_equals_uint64 (counted, points);
   fail_unless_equals_uint64 (late, 0);
   gst_message_unref (message);
