@@ -3,7 +3,7 @@
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
 # Quick when nothing changed. Everything it prints beyond a line goes to build/setup.log.
 # usage: setup.sh [--demo | --tests]
-#   --demo   plugins and programs of the demo only, without calibration, cameras, RTSP server, tests and benchmarks
+#   --demo   plugins and programs of the demo only, without calibration, cameras, RTSP server, language bindings, tests and benchmarks
 #   --tests  everything, as without an option
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -29,6 +29,8 @@ packages=(
 [ "${targets[0]}" != all ] || packages+=(
   # calibration, cameras, RTSP server
   libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
+  # language bindings of libgstrange
+  libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks
   libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev
   # tests

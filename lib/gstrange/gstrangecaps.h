@@ -12,17 +12,29 @@ G_BEGIN_DECLS
   "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "                                      \
   "framerate = (fraction) [ 0/1, 2147483647/1 ], views = (int) [ 1, 64 ]"
 
-/** Raw frame sets. Fixed caps also have rig = (buffer), the binary form of the rig, with one range
- *  view for each view-id that can occur. */
+/**
+ * GST_RANGE_CAPS:
+ *
+ * Raw frame sets. Fixed caps also have rig = (buffer), the binary form of the rig, with one range
+ * view for each view-id that can occur.
+ */
 #define GST_RANGE_CAPS GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, " GST_RANGE_SIZE_CAPS_
 
-/** Coded frame sets between elements. Fixed caps also have rig = (buffer). */
+/**
+ * GST_NEIGHBOUR_CODE_CAPS:
+ *
+ * Coded frame sets between elements. Fixed caps also have rig = (buffer).
+ */
 #define GST_NEIGHBOUR_CODE_CAPS                                                                    \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
   ", version = (int) 1, "                                                                          \
   "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS_
 
-/** Coded frame sets in files: an unframed byte stream that contains the rig. */
+/**
+ * GST_NEIGHBOUR_CODE_STREAM_CAPS:
+ *
+ * Coded frame sets in files: an unframed byte stream that contains the rig.
+ */
 #define GST_NEIGHBOUR_CODE_STREAM_CAPS                                                             \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 1, alignment = (string) byte-stream"
 
