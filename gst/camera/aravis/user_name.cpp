@@ -3,11 +3,15 @@
 
 #include <gio/gio.h>
 
+namespace {
+
 /* GigE Vision, chapter GVCP and table of bootstrap registers */
-static constexpr std::uint16_t kPort = 3956;
-static constexpr std::uint8_t kUserNameRegister = 0xe8;
-static constexpr std::size_t kHeaderSize = 8, kAnswerSize = kHeaderSize + 4 + kUserNameSize;
-static constexpr std::uint16_t kReadAnswer = 0x0085;
+constexpr std::uint16_t kPort = 3956;
+constexpr std::uint8_t kUserNameRegister = 0xe8;
+constexpr std::size_t kHeaderSize = 8, kAnswerSize = kHeaderSize + 4 + kUserNameSize;
+constexpr std::uint16_t kReadAnswer = 0x0085;
+
+} // namespace
 
 std::array<std::uint8_t, 16>
 user_name_request (std::uint16_t request_id)
@@ -63,7 +67,7 @@ read_user_name (const std::string &address)
   std::optional<std::string> name;
   if (socket) {
     g_socket_set_blocking (socket, FALSE);
-    if (g_socket_connect (socket, camera, nullptr, nullptr)) /* hears the camera alone */
+    if (g_socket_connect (socket, camera, nullptr, nullptr)) /* receives from the camera alone */
       name = ask (socket);
     g_object_unref (socket);
   }

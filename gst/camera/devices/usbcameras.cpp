@@ -10,8 +10,6 @@
 
 #include <libusb.h>
 
-namespace rangecast {
-
 namespace {
 
 constexpr int kControlClass = 0xEF, kControlSubClass = 0x05, kControlProtocol = 0x00;
@@ -98,23 +96,15 @@ opening_problem (int error, const std::string &node)
   if (error == LIBUSB_SUCCESS)
     return {};
   if (error == LIBUSB_ERROR_ACCESS)
-    return "no permission to open " + node +
-           ": copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
+    return permission_problem (node);
   return "cannot open " + node + ": " + libusb_strerror (libusb_error (error));
 }
 
-/** What Aravis calls a USB camera: the vendor and the serial number. */
-std::string
-aravis_id (const FoundCamera &camera)
-{
-  return camera.vendor + "-" + camera.serial;
-}
-
-FoundCamera
+CameraInfo
 describe (libusb_device *device, const libusb_device_descriptor &descriptor)
 {
-  FoundCamera camera;
-  camera.transport = FoundCamera::Transport::kUsb3Vision;
+  CameraInfo camera;
+  camera.protocol = "USB3Vision";
   camera.address = device_node (device);
   libusb_device_handle *handle = nullptr;
   camera.problem = opening_problem (libusb_open (device, &handle), camera.address);
@@ -127,7 +117,7 @@ describe (libusb_device *device, const libusb_device_descriptor &descriptor)
   camera.vendor = read ("manufacturer", descriptor.iManufacturer);
   camera.model = read ("product", descriptor.iProduct);
   camera.serial = read ("serial", descriptor.iSerialNumber);
-  camera.id = aravis_id (camera);
+  camera.id = camera.vendor + "-" + camera.serial; /* as Aravis names it */
   if (handle)
     libusb_close (handle);
   return camera;
@@ -187,10 +177,10 @@ UsbCameras::~UsbCameras ()
   libusb_exit (priv_->context);
 }
 
-FoundCameras
+std::vector<CameraInfo>
 UsbCameras::list ()
 {
-  FoundCameras found;
+  std::vector<CameraInfo> found;
   libusb_device **devices = nullptr;
   const auto count = libusb_get_device_list (priv_->context, &devices);
   for (ssize_t i = 0; i < count; ++i) {
@@ -224,5 +214,3 @@ UsbCameras::watch (std::function<void ()> on_change)
   priv_->is_watched = true;
   return true;
 }
-
-} // namespace rangecast

@@ -16,7 +16,7 @@ GST_START_TEST (test_depth_is_that_of_the_disparity)
   {
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
     const RangeImage &image = frame.views ()[0];
-    fail_unless (image.roi == (Roi{0, 0, 160, 120}));
+    fail_unless_cmp (image.roi, ==, (Roi{0, 0, 160, 120}));
     int right = 0;
     for (int y = 10; y < 110; y++)
       for (int x = 40; x < 150; x++)
@@ -249,11 +249,11 @@ GST_START_TEST (test_rig_without_the_view_or_of_another_shape_is_one_error)
   const char *square = "video/x-raw,format=RGBx,width=160,height=160,framerate=25/1";
   RigFile rig;
   const std::string missing = error_of (rig.property () + " view-id=7", same);
-  fail_unless (missing.find ("no view with view-id 7") != std::string::npos, missing.c_str ());
+  fail_unless_contains (missing, "no view with view-id 7");
   const std::string shape = error_of (rig.property (), square, square);
-  fail_unless (shape.find (rig.path) != std::string::npos, shape.c_str ());
-  fail_unless (shape.find ("320x240") != std::string::npos, shape.c_str ());
-  fail_unless (shape.find ("160x160") != std::string::npos, shape.c_str ());
+  fail_unless_contains (shape, rig.path);
+  fail_unless_contains (shape, "320x240");
+  fail_unless_contains (shape, "160x160");
 }
 GST_END_TEST;
 
@@ -267,7 +267,7 @@ GST_START_TEST (test_rig_of_another_size_is_scaled_to_the_pictures)
   fail_unless (output != nullptr, "%s", next_message_text (s.bus, GST_MESSAGE_ERROR).c_str ());
   GstCaps *caps = gst_pad_get_current_caps (s.left->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   const View &view = info.rig.views[0];
   fail_unless_equals_int (view.width, 160);
   fail_unless_equals_int (view.height, 120);
@@ -275,7 +275,7 @@ GST_START_TEST (test_rig_of_another_size_is_scaled_to_the_pictures)
   fail_unless_equals_float (view.intrinsics.cx, 79.5); /* (159.5 + 0.5) / 2 - 0.5 */
   {
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-    fail_unless (std::abs (frame.views ()[0].depth.at (100, 60) - 8000) < 100);
+    ck_assert_int_lt (std::abs (frame.views ()[0].depth.at (100, 60) - 8000), 100);
   }
   gst_caps_unref (caps);
   gst_buffer_unref (output);
@@ -286,13 +286,11 @@ GST_START_TEST (test_bad_settings_are_one_error_that_names_them)
 {
   const char *same = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
   const char *larger = "video/x-raw,format=RGBx,width=80,height=240,framerate=25/1";
-  fail_unless (error_of (kProperties, larger).find ("pad right is 80x240") != std::string::npos);
-  fail_unless (error_of ("", same).find ("focal-length") != std::string::npos);
-  fail_unless (error_of ("rig=/no/rig.yaml", same).find ("/no/rig.yaml") != std::string::npos);
-  fail_unless (error_of ("focal-length=160 baseline=0.1 near=0.05", same).find ("near") !=
-               std::string::npos);
-  fail_unless (error_of (std::string (kProperties) + " block-size=4", same).find ("block size") !=
-               std::string::npos);
+  fail_unless_contains (error_of (kProperties, larger), "pad right is 80x240");
+  fail_unless_contains (error_of ("", same), "focal-length");
+  fail_unless_contains (error_of ("rig=/no/rig.yaml", same), "/no/rig.yaml");
+  fail_unless_contains (error_of ("focal-length=160 baseline=0.1 near=0.05", same), "near");
+  fail_unless_contains (error_of (std::string (kProperties) + " block-size=4", same), "block size");
 }
 GST_END_TEST;
 
@@ -434,7 +432,7 @@ GST_START_TEST (test_late_frames_are_dropped_before_matching_and_said)
     gst_buffer_unref (output);
     fail_unless_equals_uint64 (s.stat ("dropped-late"), qos ? 2 : 0);
     GstMessage *message = gst_bus_pop_filtered (s.bus, GST_MESSAGE_QOS);
-    fail_unless ((message != nullptr) == qos);
+    ck_assert_int_eq ((message != nullptr), qos);
     gst_clear_message (&message);
   }
 }
