@@ -201,6 +201,13 @@ log_waiting (GstDebugCategory *category, GstAggregatorPad *pad)
         gst_pad_has_current_caps (GST_PAD (pad)) ? "a frame" : "caps and a frame");
 }
 
+GstClockTime
+frame_duration (const std::optional<GstVideoInfo> &info)
+{
+  return info && info->fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info->fps_d, info->fps_n)
+                                 : GST_CLOCK_TIME_NONE;
+}
+
 GstAggregatorPad *
 add_sink_pad (GstElement *aggregator, const char *name)
 {

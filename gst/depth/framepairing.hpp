@@ -2,8 +2,10 @@
 #pragma once
 
 #include <gst/base/gstaggregator.h>
+#include <gst/video/video.h>
 
 #include <atomic>
+#include <optional>
 
 /** Pairs the buffers of two sink pads of an aggregator by running time, and announces downstream
  * the times without pairs. Streaming thread. All times are running times in ns; each dropped buffer
@@ -78,6 +80,10 @@ GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
 /** Logs that a pad has no frame; for get_next_time(), which GstAggregator calls before it waits.
  *  aggregate() is not called without a frame on every pad, unless live. */
 void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
+
+/** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
+ * unknown. */
+GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);
 
 /** Adds the always pad of this name from its template; for instance_init.
  *  @return transfer none */

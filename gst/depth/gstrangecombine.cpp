@@ -128,13 +128,6 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
   return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
 }
 
-static GstClockTime
-frame_duration (const std::optional<GstVideoInfo> &info)
-{
-  return info && info->fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info->fps_d, info->fps_n)
-                                 : GST_CLOCK_TIME_NONE;
-}
-
 /* ---- negotiation ---- */
 
 /* The view of the depth camera. */
@@ -175,10 +168,10 @@ make_colour_view (
   const Status scaled = rangecast::scale_view (view, width, height);
   if (scaled.ok ())
     return scaled;
-  return {scaled.code (), "pad depth is " + size_text (depth.width, depth.height) +
-                              " but pad colour is " + size_text (width, height) +
-                              "; expected the same shape, or property colour-view-id for a colour "
-                              "camera of its own"};
+  return {scaled.code (),
+      "pad depth is " + size_text (depth.width, depth.height) + " but pad colour is " +
+          size_text (width, height) +
+          "; expected the same shape, or property colour-view-id for a colour camera of its own"};
 }
 
 /* Sets up the views of both cameras and of the output, and the registration between them. */

@@ -153,14 +153,6 @@ is_live (GstStereoDepth *self)
   return gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
 }
 
-static GstClockTime
-frame_duration (GstStereoDepthPrivate *priv)
-{
-  const auto &info = priv->inputs[kLeft].info;
-  return info && info->fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info->fps_d, info->fps_n)
-                                 : GST_CLOCK_TIME_NONE;
-}
-
 /* ---- sink caps ---- */
 
 static void
@@ -240,7 +232,8 @@ take_pair (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
   WaitingPair &pair = priv->pair;
-  const GstFlowReturn flow = priv->matcher->take (frame_duration (priv), pair.buffers);
+  const GstFlowReturn flow =
+      priv->matcher->take (frame_duration (priv->inputs[kLeft].info), pair.buffers);
   warn_if_unpaired (self, flow == GST_FLOW_OK);
   if (flow == GST_FLOW_OK) {
     pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
@@ -310,9 +303,9 @@ take_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
   if (!pad)
     return GST_FLOW_OK;
   guint64 dropped = 0;
-  const GstFlowReturn flow =
-      take_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT, priv->pair.running,
-          gstrange::pairing_tolerance (frame_duration (priv)), timeout, dropped, third);
+  const GstFlowReturn flow = take_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT,
+      priv->pair.running, gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)),
+      timeout, dropped, third);
   gst_object_unref (pad);
   if (*third && !priv->inputs[kThird].info) /* the pad was released meanwhile */
     gst_clear_buffer (third);
@@ -509,8 +502,9 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
          "right"),
         ("hardly anything matches; with the images exchanged, much does"));
   }
-  const GstClockTime duration =
-      GST_BUFFER_DURATION_IS_VALID (left) ? GST_BUFFER_DURATION (left) : frame_duration (priv);
+  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (left)
+                                    ? GST_BUFFER_DURATION (left)
+                                    : frame_duration (priv->inputs[kLeft].info);
   gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
   if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);

@@ -46,8 +46,7 @@ stereo_properties ()
           1e6, kMutableReady),
       P::number<&S::principal_offset> ("principal-offset", "Principal point offset",
           "Horizontal principal point of the right camera minus that of the left in pixels, "
-          "without "
-          "a rig (Middlebury's doffs)",
+          "without a rig (Middlebury's doffs)",
           -1e5, 1e5, kMutableReady),
       P::number<&S::view, &V::near> ("near", "Near",
           "Minimum depth to match in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
@@ -55,8 +54,7 @@ stereo_properties ()
           "Maximum depth to output in metres (0 = from the rig, or 3)", 0, 1e4, kMutableReady),
       P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
           "Metres per depth unit of the output (0 = from the rig, or 0.0001, larger if far "
-          "requires "
-          "it)",
+          "requires it)",
           0, 1, kMutableReady),
       P::number<&S::core, &Core::flying_pixel_step> ("flying-pixel-step", "Flying pixel step",
           "Clear points that fewer than 4 of their 8 neighbours support within this fraction of "
@@ -86,8 +84,7 @@ stereo_properties ()
       P::number<&S::core, &Core::match, &Match::speckle_window_size> ("speckle-window-size",
           "Speckle window size",
           "Minimum size in pixels of a region of similar disparity; smaller regions are cleared (0 "
-          "= "
-          "off)",
+          "= off)",
           0, 100000, kMutableReady),
       P::number<&S::core, &Core::match, &Match::speckle_range> ("speckle-range", "Speckle range",
           "Maximum disparity difference within a region in pixels, for speckle-window-size", 0,
@@ -95,13 +92,11 @@ stereo_properties ()
       P::number<&S::core, &Core::match, &Match::left_right_max_difference> (
           "left-right-max-difference", "Left-right check",
           "Maximum difference in pixels between left-to-right and right-to-left disparities (-1 = "
-          "no "
-          "check)",
+          "no check)",
           -1, 1000, kMutableReady),
       P::number<&S::core, &Core::silhouette_radius> ("silhouette-radius", "Silhouette radius",
           "Radius in pixels around depth edges in which points with the colour of the surface "
-          "behind "
-          "are cleared (0 = off)",
+          "behind are cleared (0 = off)",
           0, 64, kMutableReady),
       P::number<&S::core, &Core::gap_width> ("gap-width", "Gap width",
           "Maximum width in pixels of gaps within one surface that are filled (0 = off)", 0, 1000,
@@ -113,8 +108,7 @@ stereo_properties ()
           kMutableReady),
       P::number<&S::refresh_interval> ("refresh-interval", "Refresh interval",
           "Interval in frames between full images when downstream requests only a region (0 = "
-          "always "
-          "match full images)",
+          "always match full images)",
           0, 100000, kMutableReady),
       P::number<&S::core, &Core::n_threads> ("n-threads", "Threads",
           "Number of matching threads (0 = one per CPU core)", 0, 64, kMutableReady),
@@ -138,8 +132,7 @@ make_stereo_view (const StereoDepthSettings &settings, int width, int height, Vi
       return s;
   } else if (v.focal_length <= 0 || settings.baseline <= 0) {
     return {StatusCode::kNotFound,
-        "no calibration: expected property rig, or focal-length and baseline for rectified "
-        "images"};
+        "no calibration: expected property rig, or focal-length and baseline for rectified images"};
   } else {
     view = make_pinhole_view (v, v.focal_length, width, height);
     view.right.emplace ();
