@@ -113,6 +113,7 @@ CameraSession::run ()
     stop_cameras ();
     if (!retry)
       break;
+    GST_DEBUG_OBJECT (element_, "cameras closed; opening them again in a second");
     wait_before_retry ();
   }
   stop_cameras ();
@@ -124,6 +125,7 @@ CameraSession::run_cameras ()
 {
   End end = End::kRenegotiate;
   try {
+    GST_DEBUG_OBJECT (element_, "opening cameras");
     CameraStatus status = open_cameras ();
     if (status.ok ())
       status = wait_for_clock ();
@@ -135,6 +137,7 @@ CameraSession::run_cameras ()
         reconnects_++;
         post_element_message ("stereocamsrc-back", "left", cameras_.cameras ()[0]->label ());
       }
+      GST_DEBUG_OBJECT (element_, "streaming");
       end = stream ();
       if (end == End::kFault)
         (void)report_fault (); /* stopping may have to wait for a camera that does not answer */
