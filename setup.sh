@@ -67,7 +67,13 @@ build () {
   if [ -n "$installed" ] && [ -f build/build.ninja ]; then
     { meson configure build --clearcache && meson setup build --reconfigure; } >"$log" 2>&1 || { cat "$log" >&2; return 1; }
   fi
-  [ -f build/build.ninja ] || { echo "setup.sh: configuring"; meson setup build >"$log" 2>&1 || { cat "$log" >&2; return 1; }; }
+  if ! [ -f build/build.ninja ]; then
+    echo "setup.sh: configuring"
+    # -g1: backtraces have names and lines; no local variables, in three quarters of the time to compile.
+    # ccache does not cache files that use a precompiled header.
+    meson setup build -Ddebug=false -Dc_args=-g1 -Dcpp_args=-g1 -Db_pch="$(command -v ccache >/dev/null && echo false || echo true)" >"$log" 2>&1 ||
+      { cat "$log" >&2; return 1; }
+  fi
   ninja -C build "${targets[@]}" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
 }
 

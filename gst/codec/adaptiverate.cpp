@@ -7,23 +7,16 @@
 using rangecast::PacketReport;
 using rangecast::ReceiverReport;
 
-static guint64
+namespace {
+
+guint64
 now_ns ()
 {
   return guint64 (g_get_monotonic_time ()) * 1000;
 }
 
-void
-AdaptiveRate::reset ()
-{
-  std::lock_guard guard (lock_);
-  control_.reset ();
-  sent_bits_per_s_ = 0;
-  reports_ = 0;
-}
-
-/* One RTPTWCCPacket of rtpsession; false where it lacks what counts. */
-static bool
+/* One RTPTWCCPacket of rtpsession. @return false if a field that is needed is missing */
+bool
 read_packet (const GstStructure *structure, PacketReport &packet)
 {
   guint sequence = 0, size = 0;
@@ -41,8 +34,19 @@ read_packet (const GstStructure *structure, PacketReport &packet)
   return true;
 }
 
+} // namespace
+
 void
-AdaptiveRate::note_packets (const GstStructure *structure)
+AdaptiveRate::reset ()
+{
+  std::lock_guard guard (lock_);
+  control_.reset ();
+  sent_bits_per_s_ = 0;
+  reports_ = 0;
+}
+
+void
+AdaptiveRate::handle_packets (const GstStructure *structure)
 {
   const GType array_type = g_type_from_name ("GValueArray");
   const GValue *packets = gst_structure_get_value (structure, "packets");
@@ -64,7 +68,7 @@ AdaptiveRate::note_packets (const GstStructure *structure)
 }
 
 void
-AdaptiveRate::note_report (const GstStructure *structure)
+AdaptiveRate::handle_report (const GstStructure *structure)
 {
   guint ssrc = 0, packets = 0;
   guint64 jitter = 0, round_trip = 0;
@@ -86,7 +90,7 @@ AdaptiveRate::note_report (const GstStructure *structure)
 }
 
 bool
-AdaptiveRate::note (GstEvent *event)
+AdaptiveRate::handle_event (GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) != GST_EVENT_CUSTOM_UPSTREAM)
     return false;
@@ -94,20 +98,20 @@ AdaptiveRate::note (GstEvent *event)
   if (!structure)
     return false;
   if (gst_structure_has_name (structure, "RTPTWCCPackets"))
-    note_packets (structure);
+    handle_packets (structure);
   else if (gst_structure_has_name (structure, "RangecastReceiverReport"))
-    note_report (structure);
+    handle_report (structure);
   else
     return false;
   return true;
 }
 
 double
-AdaptiveRate::next (const AdaptiveRateLimits &limits, double sent_bits_per_s)
+AdaptiveRate::update (const AdaptiveRateLimits &limits, double sent_bits_per_s)
 {
   std::lock_guard guard (lock_);
   sent_bits_per_s_ = sent_bits_per_s;
-  control_.configure ({limits.least_bits_per_s, limits.most_bits_per_s});
+  control_.configure ({limits.min_bits_per_s, limits.max_bits_per_s});
   control_.tick (sent_bits_per_s, now_ns ());
   return control_.bits_per_s ();
 }
@@ -120,7 +124,7 @@ AdaptiveRate::bits_per_s () const
 }
 
 void
-AdaptiveRate::describe (GstStructure *structure) const
+AdaptiveRate::add_stats (GstStructure *structure) const
 {
   std::lock_guard guard (lock_);
   gst_structure_set (structure, "estimated-bitrate", G_TYPE_UINT64,

@@ -7,37 +7,37 @@
 #include <rangecast/neighbourcode/rate/congestion_control.hpp>
 #include <vector>
 
-/** Within which limits the bit rate follows receivers. */
+/** Limits of an adaptive bit rate, bits/s; a maximum of 0 is none. */
 struct AdaptiveRateLimits {
-  double least_bits_per_s = 0, most_bits_per_s = 0; ///< most: 0: none
+  double min_bits_per_s = 0, max_bits_per_s = 0;
 };
 
-/** The bit rate that receivers let an encoder have, from the events that they send upstream:
- *  RTPTWCCPackets (rtpsession, of transport-wide feedback) and RangecastReceiverReport (rtcpreports
- *  or an application, of RTCP receiver reports). Any thread. */
+/** Estimates the bit rate that the network allows from two upstream events: RTPTWCCPackets
+ *  (transport-wide feedback, from rtpsession) and RangecastReceiverReport (RTCP receiver reports,
+ *  from rtcpreports or an application). Any thread. */
 class AdaptiveRate {
 public:
   void reset ();
 
-  /** Takes note of an event, whatever it holds. @return false if it is another one */
-  bool note (GstEvent *event);
+  /** Handles either event, whatever it holds. @return false if it is another one */
+  bool handle_event (GstEvent *event);
 
-  /** Before each frame set.
-   *  @param sent_bits_per_s  of what was sent of late
+  /** Call it before each frame set.
+   *  @param sent_bits_per_s  the encoder's recent bit rate
    *  @return bits/s; 0: no limit is known */
-  double next (const AdaptiveRateLimits &limits, double sent_bits_per_s);
+  double update (const AdaptiveRateLimits &limits, double sent_bits_per_s);
 
-  /** Adds what receivers say to statistics. */
-  void describe (GstStructure *structure) const;
+  /** Adds estimated-bitrate, receiver-reports, receiver-loss and receiver-queue. */
+  void add_stats (GstStructure *structure) const;
   [[nodiscard]] double bits_per_s () const;
 
 private:
-  void note_packets (const GstStructure *structure);
-  void note_report (const GstStructure *structure);
+  void handle_packets (const GstStructure *structure);
+  void handle_report (const GstStructure *structure);
 
   mutable std::mutex lock_;
   rangecast::CongestionControl control_;
   double sent_bits_per_s_ = 0;
   guint64 reports_ = 0;
-  std::vector<rangecast::PacketReport> packets_; /* of the event at hand; keeps its memory */
+  std::vector<rangecast::PacketReport> packets_; /* of the current event; kept for its memory */
 };

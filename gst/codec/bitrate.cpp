@@ -8,22 +8,11 @@
 using rangecast::EncoderSettings;
 using rangecast::Profile;
 
-void
-NeighbourCodeRate::reset ()
-{
-  control_.reset ();
-  meter_.reset ();
-  thinning_.reset ();
-  receivers.reset ();
-  is_on_ = false;
-  time_ = interval_ = 0;
-  told_bits_per_s_ = -1;
-  told_one_of_ = 1;
-}
+namespace {
 
-/* What a point of noisy cameras comes to, about, at a colour threshold of 10, and how that falls
- * with the threshold. The first frame set then tells. */
-static double
+/* Initial guess, until the first frame set is coded: bits per point of noisy cameras at a colour
+ * threshold of 10, and how they fall with the threshold (measured). */
+double
 usual_bits_per_point (Profile profile, int colour_threshold)
 {
   const double finer = 10.5 / (colour_threshold + 0.5);
@@ -35,6 +24,21 @@ usual_bits_per_point (Profile profile, int colour_threshold)
     default:
       return 2.5 * std::sqrt (finer);
   }
+}
+
+} // namespace
+
+void
+NeighbourCodeRate::reset ()
+{
+  control_.reset ();
+  meter_.reset ();
+  thinning_.reset ();
+  receivers.reset ();
+  is_on_ = false;
+  time_ = interval_ = 0;
+  reported_bits_per_s_ = -1;
+  reported_one_of_ = 1;
 }
 
 bool
@@ -50,7 +54,7 @@ NeighbourCodeRate::begin (
     thinning_.reset ();
     return true;
   }
-  const double bits_per_s = receivers.next (
+  const double bits_per_s = receivers.update (
       {double (rate.min_bitrate), double (rate.target_bitrate)}, meter_.bits_per_s (interval));
   rate_.target_bitrate = guint (std::min (bits_per_s, double (G_MAXUINT)));
   return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.least_bits () : 0,
@@ -58,7 +62,7 @@ NeighbourCodeRate::begin (
 }
 
 EncoderSettings
-NeighbourCodeRate::next (const EncoderSettings &configured, guint64 pixels)
+NeighbourCodeRate::settings_for (const EncoderSettings &configured, guint64 pixels)
 {
   if (rate_.target_bitrate == 0) {
     if (is_on_)
@@ -80,27 +84,27 @@ NeighbourCodeRate::next (const EncoderSettings &configured, guint64 pixels)
 }
 
 void
-NeighbourCodeRate::coded (const rangecast::CodedFrame &frame)
+NeighbourCodeRate::record (const rangecast::CodedFrame &frame)
 {
   meter_.add (time_, frame.bytes);
   if (is_on_)
     control_.coded (frame);
 }
 
-/* A tenth of the bit rate is what an application may want to know of. */
 GstMessage *
-NeighbourCodeRate::take_news (GstObject *source)
+NeighbourCodeRate::make_message (GstObject *source)
 {
-  constexpr double kMuch = 0.1;
+  constexpr double kMinChange = 0.1;
   const double now = rate_.adaptive ? receivers.bits_per_s () : 0;
-  if (told_bits_per_s_ < 0)
-    told_bits_per_s_ = now;
-  if (std::abs (now - told_bits_per_s_) <= kMuch * told_bits_per_s_ && one_of () == told_one_of_)
+  if (reported_bits_per_s_ < 0)
+    reported_bits_per_s_ = now;
+  if (std::abs (now - reported_bits_per_s_) <= kMinChange * reported_bits_per_s_ &&
+      thinning_.one_of () == reported_one_of_)
     return nullptr;
-  told_bits_per_s_ = now;
-  told_one_of_ = one_of ();
-  GstStructure *news = gst_structure_new (
-      "neighbourcodeenc-adaptive-bitrate", "one-of", G_TYPE_INT, told_one_of_, nullptr);
-  receivers.describe (news);
-  return gst_message_new_element (source, news);
+  reported_bits_per_s_ = now;
+  reported_one_of_ = thinning_.one_of ();
+  GstStructure *structure = gst_structure_new (
+      "neighbourcodeenc-adaptive-bitrate", "one-of", G_TYPE_INT, reported_one_of_, nullptr);
+  receivers.add_stats (structure);
+  return gst_message_new_element (source, structure);
 }

@@ -9,50 +9,51 @@
 
 #include "adaptiverate.hpp"
 
-/** What an application wants of neighbourcodeenc's bit rate. Any thread, under the element's lock.
- */
+/** Settings of neighbourcodeenc's bit rate. Any thread, under the element's lock. */
 struct NeighbourCodeRateSettings {
   guint target_bitrate = 0; ///< bits/s; 0: thresholds are as configured
   int max_depth_threshold = 32, max_colour_threshold = 32; ///< codes
-  bool adaptive = false;                                   ///< the rate follows receivers
-  guint min_bitrate = 200000;                              ///< bits/s, then
-  int min_fps_n = 5, min_fps_d = 1;                        ///< frame sets a second, then
+  bool adaptive = false;            ///< the rate follows the network, up to target_bitrate
+  guint min_bitrate = 200000;       ///< bits/s; if adaptive
+  int min_fps_n = 5, min_fps_d = 1; ///< frame sets/s; if adaptive
 };
 
-/** Steers the thresholds of an encoder frame set by frame set, and leaves some out where that does
- *  not do. Streaming thread only, but for `receivers`. */
+/** Rate control: chooses the thresholds of each frame set and leaves frame sets out where that is
+ *  not enough. Streaming thread only, except `receivers`. */
 class NeighbourCodeRate {
 public:
   void reset ();
 
-  /** A frame set comes. With `adaptive` its target is what receivers let it have.
-   *  @param input  gives the time, capture time or else PTS
-   *  @param interval  of frame sets that have no time, and as a guess
-   *  @return false: it is to be left out, and what follows is not called for it */
+  /** Begins a frame set.
+   *  @param input  its time is the capture time, or else the PTS
+   *  @param interval  frame period, ns; used for frame sets without a time
+   *  @return false if the frame set is to be left out; settings_for() and record() are not called
+   *  for it then */
   bool begin (const NeighbourCodeRateSettings &rate, GstBuffer *input, GstClockTime interval);
 
-  /** The settings for the frame set: those configured, with other thresholds if there is a target.
+  /** The settings of the frame set: those configured, with other thresholds if there is a target.
    *  @param pixels  of all ROIs */
-  rangecast::EncoderSettings next (const rangecast::EncoderSettings &configured, guint64 pixels);
-  void coded (const rangecast::CodedFrame &frame);
+  rangecast::EncoderSettings settings_for (
+      const rangecast::EncoderSettings &configured, guint64 pixels);
+  /** Records the size of the frame set. */
+  void record (const rangecast::CodedFrame &frame);
 
-  /** Bits/s over the last two seconds of frame sets. */
+  /** Bits/s over the last 2 s. */
   [[nodiscard]] double bits_per_s () const { return meter_.bits_per_s (interval_); }
-  /** One of so many frame sets is coded. */
-  [[nodiscard]] int one_of () const { return thinning_.one_of (); }
-  /** If bit rate or frame rate of an adaptive stream have changed by much since it was asked last:
-   *  the message that says so, for the caller to post; else nullptr. */
-  GstMessage *take_news (GstObject *source);
+  /** @return the element message neighbourcodeenc-adaptive-bitrate, for the caller to post, if the
+   *  estimated bit rate has changed by more than a tenth, or the frame rate, since the last one;
+   *  else nullptr */
+  GstMessage *make_message (GstObject *source);
 
   AdaptiveRate receivers; ///< any thread
 
 private:
-  NeighbourCodeRateSettings rate_; /* of the frame set at hand, with the target that it has */
+  NeighbourCodeRateSettings rate_; /* of the current frame set, with its target */
   rangecast::RateControl control_;
   rangecast::RateMeter meter_;
   rangecast::FrameThinning thinning_;
-  bool is_on_ = false;
-  GstClockTime time_ = 0, interval_ = 0; /* of the frame set at hand */
-  double told_bits_per_s_ = -1;          /* by the last message */
-  int told_one_of_ = 1;
+  bool is_on_ = false;                   /* there is a target */
+  GstClockTime time_ = 0, interval_ = 0; /* of the current frame set */
+  double reported_bits_per_s_ = -1;      /* by the last message */
+  int reported_one_of_ = 1;              /* one of so many frame sets is coded */
 };

@@ -7,8 +7,28 @@ using rangecast::AccessUnitPlace;
 using rangecast::kNoTime;
 using rangecast::StreamFile;
 
-/* The rig views of an access unit are in its first bytes: 64 units of at most 500 bytes. */
-static constexpr gsize kMaxRigBytes = 32000;
+namespace {
+
+/* The rig views are the first units of an access unit: 64 of at most 500 bytes. */
+constexpr gsize kMaxRigBytes = 32000;
+
+/* The access unit that the seek's flags select; not after `last_pts`, where the segment ends. */
+std::optional<AccessUnitPlace>
+choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags flags)
+{
+  if (target.after && target.after->header.pts_ns > last_pts && target.before)
+    target.after.reset ();
+  const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
+  const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
+  const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
+  if (!target.before || !target.after || !snap || !after)
+    return target.before ? target.before : target.after;
+  if (nearest && pts - target.before->header.pts_ns <= target.after->header.pts_ns - pts)
+    return target.before;
+  return target.after;
+}
+
+} // namespace
 
 void
 NeighbourCodeFile::read (guint64 offset, gsize size, std::vector<guint8> &to)
@@ -42,28 +62,12 @@ NeighbourCodeFile::last_time ()
   return last->header.pts_ns - first_pts_;
 }
 
-/* A time of the stream as the file tells it. */
+/* The time in the file of a stream time. */
 guint64
 NeighbourCodeFile::pts_at (GstClockTime time) const
 {
   const guint64 latest = kNoTime - 1;
   return time < latest - std::min (first_pts_, latest) ? first_pts_ + time : latest;
-}
-
-/* The one that the seek's flags ask for; none behind `last_pts`, where the segment ends. */
-static std::optional<AccessUnitPlace>
-choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags flags)
-{
-  if (target.after && target.after->header.pts_ns > last_pts && target.before)
-    target.after.reset ();
-  const bool snap = flags & GST_SEEK_FLAG_KEY_UNIT;
-  const bool nearest = (flags & GST_SEEK_FLAG_SNAP_NEAREST) == GST_SEEK_FLAG_SNAP_NEAREST;
-  const bool after = flags & GST_SEEK_FLAG_SNAP_AFTER;
-  if (!target.before || !target.after || !snap || !after)
-    return target.before ? target.before : target.after;
-  if (nearest && pts - target.before->header.pts_ns <= target.after->header.pts_ns - pts)
-    return target.before;
-  return target.after;
 }
 
 std::optional<NeighbourCodeFile::Place>

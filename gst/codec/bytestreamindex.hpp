@@ -7,23 +7,23 @@
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <vector>
 
-/** A file of coded frame sets in front of a pad in pull mode. Any thread. Times are of the stream:
- *  they begin at 0, where the file says `first_pts`. */
+/** Finds access units in a file of coded frame sets, through a pad in pull mode. Any thread. Times
+ *  are stream times, which begin at 0; `first_pts` is the time in the file there. */
 class NeighbourCodeFile {
 public:
   NeighbourCodeFile (GstPad *pad, GstClockTime first_pts) : pad_ (pad), first_pts_ (first_pts) {}
 
-  /** Time of the last access unit; none if it has none. */
+  /** Time of the last access unit; GST_CLOCK_TIME_NONE if it has none. */
   GstClockTime last_time ();
 
-  /** Where decoding begins. */
+  /** Where decoding can begin. */
   struct Place {
     guint64 offset; ///< bytes
     GstClockTime time;
-    std::vector<guint8> rig_units; ///< the rig that the file had last there
+    std::vector<guint8> rig_units; ///< the last rig up to there
   };
-  /** The key access unit that a seek to `start` with these flags means. None behind `stop`, unless
-   *  it is the first one; nothing if there are no times. */
+  /** The key access unit for a seek to `start` with these flags; not after `stop`, unless it is the
+   *  first one. Nothing if the file has no times. */
   std::optional<Place> find (GstClockTime start, GstClockTime stop, GstSeekFlags flags);
 
 private:

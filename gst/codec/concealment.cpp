@@ -11,70 +11,26 @@ using rangecast::Roi;
 using rangecast::Status;
 using rangecast::View;
 
-/* Pixels from before a jump in time are not shown after it, nor views longer than that after they
- * came. */
-static constexpr GstClockTime kMaxAge = GST_SECOND;
+namespace {
 
-static bool
+/* Pixels are not repeated across a longer jump in time, nor views for longer. */
+constexpr GstClockTime kMaxAge = GST_SECOND;
+
+bool
 is_soon_after (GstClockTime now, GstClockTime then)
 {
   return GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (then) && now >= then &&
          now - then <= kMaxAge;
 }
 
-void
-Concealment::forget ()
-{
-  gst_clear_buffer (&last_);
-  skips_ = false;
-  jump_ = GST_CLOCK_TIME_NONE;
-}
-
-/* The views of a recording come again and again; damaged, they make another rig for a while. */
-void
-Concealment::change_rig (const Rig &before, const Rig &now)
-{
-  const auto shows_alike = [] (const View &a, const View &b) {
-    return a.id == b.id && a.width == b.width && a.height == b.height &&
-           a.depth_unit_m == b.depth_unit_m;
-  };
-  if (!std::ranges::equal (before.views, now.views, shows_alike))
-    forget ();
-}
-
-/* DISCONT comes with every lost packet, when the last pixels are needed most; they are too old only
- * where the time jumps. Where the next frame set does not go on from there, a time was damaged. */
-GstBuffer *
-Concealment::begin (GstBuffer *input)
-{
-  now_ = GST_BUFFER_PTS (input);
-  skips_ = false;
-  if (!GST_CLOCK_TIME_IS_VALID (now_) && GST_BUFFER_IS_DISCONT (input))
-    forget ();
-  if (!last_)
-    return nullptr;
-  const bool goes_on = is_soon_after (now_, GST_BUFFER_PTS (last_));
-  if (goes_on || (!GST_BUFFER_IS_DISCONT (input) && !GST_CLOCK_TIME_IS_VALID (jump_))) {
-    jump_ = GST_CLOCK_TIME_NONE;
-    return last_;
-  }
-  if (is_soon_after (now_, jump_)) {
-    forget ();
-    return nullptr;
-  }
-  skips_ = true;
-  jump_ = now_;
-  return nullptr;
-}
-
-static const RangeImage *
+const RangeImage *
 find (std::span<const RangeImage> images, int view_id)
 {
   const auto found = std::ranges::find (images, view_id, &RangeImage::view_id);
   return found == images.end () ? nullptr : &*found;
 }
 
-static Roi
+Roi
 united (const Roi &a, const Roi &b)
 {
   if (a.empty () || b.empty ())
@@ -84,39 +40,8 @@ united (const Roi &a, const Roi &b)
       std::max (a.y + a.height, b.y + b.height) - y};
 }
 
-/* Where most of a ROI did not come the ROI itself may be damage, or of a stray slice. */
-static bool
-is_mostly_missing (const AccessUnitDecoder &decoder, std::size_t view)
-{
-  return 2 * decoder.missing_pixels (view) > decoder.views ()[view].coded_pixels;
-}
-
-Status
-Concealment::lay_out (
-    const AccessUnitDecoder &decoder, std::span<const RangeImage> older, GstBuffer *buffer)
-{
-  std::uint64_t there = 0;
-  for (std::size_t i = 0; i < decoder.views ().size (); i++) {
-    const auto &view = decoder.views ()[i];
-    const RangeImage *shown = find (older, view.view_id);
-    const bool adds = shown && is_mostly_missing (decoder, i);
-    const Roi roi = adds ? united (view.roi, shown->roi) : view.roi;
-    if (Status s = gstrange::add_view (buffer, view.view_id, roi, view.capture_time_ns); !s.ok ())
-      return s;
-    there |= std::uint64_t{1} << view.view_id;
-    if (!skips_) /* or its time is that of a jump, which may be damage */
-      came_[std::size_t (view.view_id)] = now_;
-  }
-  for (const RangeImage &image : older)
-    if (!(there >> image.view_id & 1) && is_soon_after (now_, came_[std::size_t (image.view_id)]))
-      if (Status s = gstrange::add_view (buffer, image.view_id, image.roi, image.capture_time_ns);
-          !s.ok ())
-        return s;
-  return {};
-}
-
 /* The part of an image that is a ROI inside its own. */
-static RangeImage
+RangeImage
 part_of (const RangeImage &image, const Roi &roi)
 {
   RangeImage part = image;
@@ -127,6 +52,80 @@ part_of (const RangeImage &image, const Roi &roi)
   part.depth = image.depth.crop (x, y, roi.width, roi.height);
   part.colour = image.colour.crop (x, y, roi.width, roi.height);
   return part;
+}
+
+} // namespace
+
+void
+Concealment::reset ()
+{
+  gst_clear_buffer (&last_);
+  skips_ = false;
+  jump_ = GST_CLOCK_TIME_NONE;
+}
+
+/* Recordings repeat their rig; a damaged copy makes another rig for a while. */
+void
+Concealment::set_rig (const Rig &before, const Rig &now)
+{
+  const auto shows_alike = [] (const View &a, const View &b) {
+    return a.id == b.id && a.width == b.width && a.height == b.height &&
+           a.depth_unit_m == b.depth_unit_m;
+  };
+  if (!std::ranges::equal (before.views, now.views, shows_alike))
+    reset ();
+}
+
+/* DISCONT comes with every lost packet, when the last pixels are needed most; they are too old only
+ * where the time jumps. If the next frame set does not continue from the jump, that time was
+ * damaged. */
+GstBuffer *
+Concealment::begin (GstBuffer *input)
+{
+  now_ = GST_BUFFER_PTS (input);
+  skips_ = false;
+  if (!GST_CLOCK_TIME_IS_VALID (now_) && GST_BUFFER_IS_DISCONT (input))
+    reset ();
+  if (!last_)
+    return nullptr;
+  const bool goes_on = is_soon_after (now_, GST_BUFFER_PTS (last_));
+  if (goes_on || (!GST_BUFFER_IS_DISCONT (input) && !GST_CLOCK_TIME_IS_VALID (jump_))) {
+    jump_ = GST_CLOCK_TIME_NONE;
+    return last_;
+  }
+  if (is_soon_after (now_, jump_)) {
+    reset ();
+    return nullptr;
+  }
+  skips_ = true;
+  jump_ = now_;
+  return nullptr;
+}
+
+Status
+Concealment::add_views (
+    const AccessUnitDecoder &decoder, std::span<const RangeImage> older, GstBuffer *buffer)
+{
+  std::uint64_t there = 0;
+  for (std::size_t i = 0; i < decoder.views ().size (); i++) {
+    const auto &view = decoder.views ()[i];
+    const RangeImage *shown = find (older, view.view_id);
+    /* A ROI of which most is missing may itself be damaged, or that of a stray slice. */
+    const bool adds = shown && 2 * decoder.missing_pixels (i) > view.coded_pixels;
+    const Roi roi = adds ? united (view.roi, shown->roi) : view.roi;
+    if (Status s = gstrange::add_view (buffer, view.view_id, roi, view.capture_time_ns); !s.ok ())
+      return s;
+    there |= std::uint64_t{1} << view.view_id;
+    if (!skips_) /* or its time is that of a jump, which may be damage */
+      last_seen_[std::size_t (view.view_id)] = now_;
+  }
+  for (const RangeImage &image : older)
+    if (!(there >> image.view_id & 1) &&
+        is_soon_after (now_, last_seen_[std::size_t (image.view_id)]))
+      if (Status s = gstrange::add_view (buffer, image.view_id, image.roi, image.capture_time_ns);
+          !s.ok ())
+        return s;
+  return {};
 }
 
 Status
@@ -146,7 +145,7 @@ Concealment::decode (AccessUnitDecoder &decoder, std::span<const RangeImage> ima
   return decoder.decode (std::span (parts).first (planned.size ()), threads, result, older);
 }
 
-/* Whoever writes to the output from here on gets a copy of what we hold. */
+/* Our reference makes the buffer unwritable: downstream copies it before it writes. */
 void
 Concealment::keep (GstBuffer *output)
 {

@@ -6,14 +6,13 @@
 #include "bitrate.hpp"
 #include "common/properties.hpp"
 
-/** What an application wants of neighbourcodeenc. Any thread, under the element's lock. */
+/** Settings of neighbourcodeenc. Any thread, under the element's lock. */
 struct NeighbourCodeEncSettings {
-  rangecast::EncoderSettings coding; ///< frame_interval_ns: of the frame set at hand
+  rangecast::EncoderSettings coding; ///< frame_interval_ns is set for each frame set
   NeighbourCodeRateSettings rate;
-  int n_threads = 0;                        ///< 0: one a core
-  guint key_interval_ms = 0;                ///< at most between two key frame sets; 0: no limit
-  GstClockTime min_forced_key_interval = 0; ///< at least before one on request
+  int n_threads = 0;                        ///< 0: one per core
+  guint key_interval_ms = 0;                ///< maximum time between key frame sets; 0: none
+  GstClockTime min_forced_key_interval = 0; ///< minimum time before one on request
 };
 
-/** Their properties. */
 PropertyTable<NeighbourCodeEncSettings> &encoder_properties ();

@@ -35,8 +35,11 @@
 #include <mutex>
 #include <optional>
 #include <rangecast/neighbourcode/access_unit.hpp>
+#include <span>
+#include <vector>
 
 #include "common/bufferpools.hpp"
+#include "common/codedunits.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
@@ -50,37 +53,41 @@ GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
-/* Upstream is asked for a key frame set no more often. */
-static constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
-
 enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
 namespace {
+
+using Bytes = std::span<const guint8>;
+
+/* Minimum time between two requests for key frame sets. */
+constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
+
 struct Settings {
   GstNeighbourCodeConceal conceal = CONCEAL_INVALID;
   bool request_key_units = true;
   int n_threads = 0;
 };
+
 } // namespace
 
 struct GstNeighbourCodeDecPrivate {
-  std::mutex lock; /* guards what follows; never held across a push or message */
+  std::mutex lock; /* guards settings and counters; never held across a push or message */
   Settings settings;
   guint64 frames = 0, coded_bytes = 0;
   DecoderResult totals;
 
-  StatsReporter reporter; /* has locks of its own */
+  StatsReporter reporter; /* any thread; has locks of its own */
 
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
-  Concealment shown;                    /* what conceal=last takes pixels from */
-  std::atomic<bool> by_slices{false};   /* alignment of the input */
-  std::atomic<bool> is_temporal{false}; /* the latest frame set is a reference of later ones */
-  GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that made us ask */
-  std::vector<guint8> slices;
-  GstBuffer *first = nullptr; /* of slices: gives times and flags */
-  bool complete = false;      /* nothing more comes to slices */
+  Concealment concealment;
+  std::atomic<bool> by_slices{false};   /* alignment of the input; also read by src_event() */
+  std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest; as above */
+  GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that caused it */
+  std::vector<guint8> slices;                      /* alignment=slice: of the frame set so far */
+  GstBuffer *first = nullptr; /* its first slice, which gives times and flags */
+  bool complete = false;      /* its last slice has come */
 };
 
 struct _GstNeighbourCodeDec {
@@ -120,7 +127,7 @@ gst_neighbour_code_dec_transform_caps (
 }
 
 static void
-forget_slices (GstNeighbourCodeDecPrivate *priv)
+reset_slices (GstNeighbourCodeDecPrivate *priv)
 {
   priv->slices.clear ();
   gst_clear_buffer (&priv->first);
@@ -128,7 +135,7 @@ forget_slices (GstNeighbourCodeDecPrivate *priv)
 }
 
 static void
-forget_references (GstNeighbourCodeDecPrivate *priv)
+reset_references (GstNeighbourCodeDecPrivate *priv)
 {
   priv->decoder.reset_references ();
   priv->is_temporal = false;
@@ -136,11 +143,11 @@ forget_references (GstNeighbourCodeDecPrivate *priv)
 }
 
 static void
-forget_stream (GstNeighbourCodeDecPrivate *priv)
+reset_stream (GstNeighbourCodeDecPrivate *priv)
 {
-  forget_slices (priv);
-  forget_references (priv);
-  priv->shown.forget ();
+  reset_slices (priv);
+  reset_references (priv);
+  priv->concealment.reset ();
 }
 
 static gboolean
@@ -151,14 +158,15 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   gstrange::RangeInfo info;
   Status status = gstrange::parse_caps (in, info);
   if (status.ok ())
-    priv->shown.change_rig (priv->decoder.rig (), info.rig);
+    priv->concealment.set_rig (priv->decoder.rig (), info.rig);
   if (status.ok ())
     status = priv->decoder.set_rig (info.rig);
   priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
-  forget_slices (priv);
-  forget_references (priv);
+  GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
+  reset_slices (priv);
+  reset_references (priv);
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   drop_pool (priv->pool);
@@ -166,8 +174,8 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* The base class does not learn of late frames where it would drop single slices (alignment=slice),
- * or what later frame sets refer to. */
+/* QoS is hidden from the base class where it would drop single slices (alignment=slice), or frame
+ * sets that later ones refer to. */
 static gboolean
 gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 {
@@ -177,19 +185,19 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->src_event (base, event);
 }
 
-/* ---- data ---- */
+/* ---- a frame set ---- */
 
-/* Makes room for views and decodes them; those of the rig that did not come are left out, or shown
- * as they were. `older` may be nullptr. */
+/* Adds the views to `output` and decodes them. Views of the rig that did not come are left out, or
+ * repeated from `older`, which may be nullptr. */
 static Status
 decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, GstBuffer *older, int n_threads,
     DecoderResult &result)
 {
-  std::optional<gstrange::RangeFrameMap> shown;
+  std::optional<gstrange::RangeFrameMap> last;
   std::span<const rangecast::RangeImage> older_views;
   if (older)
-    older_views = shown.emplace (older, GST_MAP_READ).views ();
-  if (Status s = priv->shown.lay_out (priv->decoder, older_views, output); !s.ok ())
+    older_views = last.emplace (older, GST_MAP_READ).views ();
+  if (Status s = priv->concealment.add_views (priv->decoder, older_views, output); !s.ok ())
     return s;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
@@ -197,123 +205,118 @@ decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, GstBuffer *old
   return Concealment::decode (priv->decoder, frame.views (), older_views, n_threads, result);
 }
 
+/* Damage persists where frame sets refer to earlier ones, so a key frame set is requested. */
 static void
-count_frame (GstNeighbourCodeDecPrivate *priv, const DecoderResult &result, gsize size)
-{
-  std::lock_guard guard (priv->lock);
-  priv->frames++;
-  priv->coded_bytes += size;
-  priv->totals += result;
-}
-
-/* Losses linger where frame sets refer to one another, so upstream is asked for a new beginning. */
-static void
-request_key_unit (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResult &result)
+request_key_unit (
+    GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResult &result, bool enabled)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  const GstClockTime now = GST_BUFFER_PTS (input), then = priv->last_request;
-  const bool is_lossy = result.unknown_pixels + result.missing_pixels > 0;
-  if (!priv->is_temporal || !is_lossy)
+  const GstClockTime now = GST_BUFFER_PTS (input), last = priv->last_request;
+  if (!enabled || !priv->is_temporal || result.unknown_pixels + result.missing_pixels == 0)
     return;
-  if (GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (then) && now >= then &&
-      now - then < kRequestInterval)
+  if (GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last) && now >= last &&
+      now - last < kRequestInterval)
     return;
-  {
-    std::lock_guard guard (priv->lock);
-    if (!priv->settings.request_key_units)
-      return;
-  }
   priv->last_request = now;
-  GST_DEBUG_OBJECT (self, "asking for a key frame set");
+  GST_DEBUG_OBJECT (self, "requesting a key frame set: %" G_GUINT64_FORMAT " pixels are missing",
+      guint64{result.unknown_pixels + result.missing_pixels});
   gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
       gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, FALSE, 0));
 }
 
-/* A view without pixels says nothing of it. */
+/* A frame set of views without pixels does not show whether later ones will refer to it. */
 static void
-note_references (GstNeighbourCodeDecPrivate *priv)
+update_is_temporal (GstNeighbourCodeDecPrivate *priv)
 {
   const auto views = priv->decoder.views ();
-  const auto refers = [] (const auto &view) { return view.reference.reference; };
+  const auto is_reference = [] (const auto &view) { return view.reference.reference; };
   const auto has_pixels = [] (const auto &view) { return view.coded_pixels > 0; };
   if (std::ranges::any_of (views, has_pixels))
-    priv->is_temporal = std::ranges::any_of (views, refers);
+    priv->is_temporal = std::ranges::any_of (views, is_reference);
 }
 
-/* Settings of one frame set. */
-struct FrameSettings {
-  bool conceal;
-  int n_threads;
-};
+/* Times, flags and capture time of the output. */
+static void
+copy_metadata (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer *output)
+{
+  const auto views = self->priv->decoder.views ();
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, output);
+  GstClockTime capture = gst_range_buffer_get_capture_time (input);
+  if (!GST_CLOCK_TIME_IS_VALID (capture) && !views.empty ())
+    capture = views[0].capture_time_ns;
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (output, capture);
+  GST_BUFFER_FLAG_UNSET (output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
+}
 
+/* Times and flags are those of `input`; the units are its own, or also those of later slices. */
 static GstFlowReturn
-decode_bytes (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes,
-    const FrameSettings &settings, GstBuffer **output)
+decode_frame_set (
+    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  GstBuffer *older = priv->shown.begin (input);
-  if (!settings.conceal)
+  Settings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  GstBuffer *older = priv->concealment.begin (input);
+  if (settings.conceal == CONCEAL_INVALID)
     older = nullptr;
   DecoderResult result;
-  priv->decoder.plan (bytes, result, older);
+  priv->decoder.plan (units, result, older);
   GstBuffer *buffer = nullptr;
-  const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
-  if (flow != GST_FLOW_OK)
+  if (const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
+      flow != GST_FLOW_OK)
     return flow;
   const Status status = decode_into (priv, buffer, older, settings.n_threads, result);
-  count_frame (priv, result, bytes.size ());
-  note_references (priv);
-  request_key_unit (self, input, result);
-  if (result.bad_slices)
-    GST_WARNING_OBJECT (self, "%" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
+  {
+    std::lock_guard guard (priv->lock);
+    priv->frames++;
+    for (const Bytes piece : units)
+      priv->coded_bytes += piece.size ();
+    priv->totals += result;
+  }
+  update_is_temporal (priv);
+  request_key_unit (self, input, result, settings.request_key_units);
+  if (result.bad_slices > 0)
+    GST_WARNING_OBJECT (
+        self, "dropping %" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
+  if (result.missing_pixels + result.unknown_pixels > 0)
+    GST_DEBUG_OBJECT (self,
+        "%" G_GUINT64_FORMAT " pixels were not received, %" G_GUINT64_FORMAT
+        " refer to pixels that were not",
+        guint64{result.missing_pixels}, guint64{result.unknown_pixels});
   if (!status.ok ()) {
     gst_buffer_unref (buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
   }
+  GST_LOG_OBJECT (self, "decoded %" G_GUINT64_FORMAT " slices of %zu views to %" GST_PTR_FORMAT,
+      guint64{result.slices}, priv->decoder.views ().size (), buffer);
+  copy_metadata (self, input, buffer);
+  if (settings.conceal == CONCEAL_LAST)
+    priv->concealment.keep (buffer);
+  else
+    priv->concealment.reset ();
+  priv->reporter.passed (GST_ELEMENT (self), buffer);
   *output = buffer;
   return GST_FLOW_OK;
 }
 
-/* `input` gives times and flags; bytes are its own, or also those of slices that came later. */
-static GstFlowReturn
-decode_frame_set (
-    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const guint8> bytes, GstBuffer **output)
-{
-  GstNeighbourCodeDecPrivate *priv = self->priv;
-  FrameSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = {priv->settings.conceal == CONCEAL_LAST, priv->settings.n_threads};
-  }
-  const GstFlowReturn flow = decode_bytes (self, input, bytes, settings, output);
-  if (flow != GST_FLOW_OK)
-    return flow;
-  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, *output);
-  GstClockTime capture = gst_range_buffer_get_capture_time (input);
-  if (!GST_CLOCK_TIME_IS_VALID (capture) && !priv->decoder.views ().empty ())
-    capture = priv->decoder.views ()[0].capture_time_ns;
-  if (GST_CLOCK_TIME_IS_VALID (capture))
-    gst_range_buffer_set_capture_time (*output, capture);
-  GST_BUFFER_FLAG_UNSET (*output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
-  if (settings.conceal)
-    priv->shown.keep (*output);
-  else
-    priv->shown.forget ();
-  priv->reporter.passed (GST_ELEMENT (self), *output);
-  return GST_FLOW_OK;
-}
+/* ---- input: access units, or slices of which frame sets are assembled ---- */
 
 static GstFlowReturn
 decode_slices (GstNeighbourCodeDec *self, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  const GstFlowReturn flow = decode_frame_set (self, priv->first, priv->slices, output);
-  forget_slices (priv);
+  const Bytes units (priv->slices);
+  const GstFlowReturn flow = decode_frame_set (self, priv->first, std::span (&units, 1), output);
+  reset_slices (priv);
   return flow;
 }
 
 static bool
-same_frame_set (GstBuffer *a, GstBuffer *b)
+is_same_frame_set (GstBuffer *a, GstBuffer *b)
 {
   const GstClockTime time_a = gst_range_buffer_get_capture_time (a);
   const GstClockTime time_b = gst_range_buffer_get_capture_time (b);
@@ -322,40 +325,40 @@ same_frame_set (GstBuffer *a, GstBuffer *b)
   return GST_BUFFER_PTS (a) == GST_BUFFER_PTS (b);
 }
 
-/* What would make an access unit too long is lost. */
 static void
-append_slice (GstNeighbourCodeDecPrivate *priv, GstBuffer *input, std::span<const guint8> bytes)
+append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units)
 {
+  GstNeighbourCodeDecPrivate *priv = self->priv;
   if (!priv->first)
     priv->first = gst_buffer_ref (input);
-  if (priv->slices.size () + bytes.size () <= rangecast::kMaxAccessUnitSize)
-    priv->slices.insert (priv->slices.end (), bytes.begin (), bytes.end ());
+  for (const Bytes piece : units)
+    if (priv->slices.size () + piece.size () <= rangecast::kMaxAccessUnitSize)
+      priv->slices.insert (priv->slices.end (), piece.begin (), piece.end ());
+    else
+      GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
   priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
 }
 
 static GstFlowReturn
-take_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
+handle_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  GstMapInfo map;
-  if (!gst_buffer_map (input, &map, GST_MAP_READ)) {
+  const CodedUnitsMap map (input);
+  if (map.pieces ().empty ()) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
     return GST_FLOW_ERROR;
   }
+  if (!priv->by_slices)
+    return decode_frame_set (self, input, map.pieces (), output);
   GstFlowReturn flow = GST_FLOW_OK;
-  if (priv->by_slices) {
-    if (priv->first && !same_frame_set (priv->first, input))
-      flow = decode_slices (self, output);
-    append_slice (priv, input, {map.data, map.size});
-  } else {
-    flow = decode_frame_set (self, input, {map.data, map.size}, output);
-  }
-  gst_buffer_unmap (input, &map);
+  if (priv->first && !is_same_frame_set (priv->first, input))
+    flow = decode_slices (self, output);
+  append_slice (self, input, map.pieces ());
   return flow;
 }
 
-/* Called until it has no more to give: one slice may end two frame sets, the one before and its
- * own. */
+/* The base class calls this until there is no output: one slice may end two frame sets, the one
+ * before it and its own. */
 static GstFlowReturn
 gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **output)
 {
@@ -366,7 +369,7 @@ gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **outp
     return GST_FLOW_NOT_NEGOTIATED;
   }
   if (GstBuffer *input = g_steal_pointer (&base->queued_buf)) {
-    const GstFlowReturn flow = take_input (self, input, output);
+    const GstFlowReturn flow = handle_input (self, input, output);
     gst_buffer_unref (input);
     if (flow != GST_FLOW_OK || *output)
       return flow;
@@ -374,7 +377,7 @@ gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **outp
   return priv->complete ? decode_slices (self, output) : GST_FLOW_OK;
 }
 
-/* Never called, but without it GstBaseTransform would be passthrough. */
+/* Never called, but without it GstBaseTransform would operate in passthrough mode. */
 static GstFlowReturn
 gst_neighbour_code_dec_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
 {
@@ -387,7 +390,7 @@ gst_neighbour_code_dec_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta 
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
-/* Pushes the frame set whose end did not come. */
+/* Pushes a frame set whose last slice did not come. */
 static void
 drain (GstNeighbourCodeDec *self)
 {
@@ -402,7 +405,7 @@ gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
   auto self = GST_NEIGHBOUR_CODE_DEC (base);
   switch (GST_EVENT_TYPE (event)) {
     case GST_EVENT_FLUSH_STOP:
-      forget_stream (self->priv);
+      reset_stream (self->priv);
       break;
     case GST_EVENT_EOS:
     case GST_EVENT_CAPS:
@@ -450,7 +453,7 @@ gst_neighbour_code_dec_stop (GstBaseTransform *base)
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   priv->reporter.stop ();
   const StreamLock lock (base);
-  forget_stream (priv);
+  reset_stream (priv);
   drop_pool (priv->pool);
   return TRUE;
 }
@@ -478,7 +481,7 @@ gst_neighbour_code_dec_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
     return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
   if (!decoder_properties ().set (priv->settings, id, value))
@@ -514,7 +517,7 @@ static void
 gst_neighbour_code_dec_finalize (GObject *object)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
-  forget_stream (priv);
+  reset_stream (priv);
   drop_pool (priv->pool);
   delete priv;
   G_OBJECT_CLASS (gst_neighbour_code_dec_parent_class)->finalize (object);
@@ -549,15 +552,15 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
       "Decodes neighbour-coded range images", "gst-rangecast");
 
-  transform_class->src_event = gst_neighbour_code_dec_src_event;
-  transform_class->start = gst_neighbour_code_dec_start;
-  transform_class->stop = gst_neighbour_code_dec_stop;
-  transform_class->transform_caps = gst_neighbour_code_dec_transform_caps;
-  transform_class->set_caps = gst_neighbour_code_dec_set_caps;
-  transform_class->sink_event = gst_neighbour_code_dec_sink_event;
-  transform_class->generate_output = gst_neighbour_code_dec_generate_output;
-  transform_class->transform = gst_neighbour_code_dec_transform;
-  transform_class->transform_meta = gst_neighbour_code_dec_transform_meta;
+  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_src_event);
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_sink_event);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_generate_output);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_meta);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_dec_debug, "neighbourcodedec", 0, "Neighbour code decoder");

@@ -26,15 +26,17 @@
 
 #include <gst/base/base.h>
 
+#include <algorithm>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <rangecast/neighbourcode/access_unit.hpp>
+#include <span>
 
 #include "bitrate.hpp"
-#include "common/bufferpools.hpp"
 #include "common/controlledvalues.hpp"
+#include "common/recycledmemories.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
 #include "encsettings.hpp"
@@ -64,24 +66,25 @@ struct GstNeighbourCodeEncPrivate {
   EncoderSettings latest; /* of the latest frame set */
   double bits_per_s = 0;
 
+  /* any thread; have locks of their own */
   KeyUnitRequests key_requests;
-  StatsReporter reporter; /* has locks of its own */
+  StatsReporter reporter;
 
   /* streaming thread only */
   gstrange::RangeInfo info;
+  NeighbourCodeRate rate; /* but for its member `receivers`: any thread */
   rangecast::AccessUnitEncoder encoder;
-  EncoderSettings configured;
+  EncoderSettings configured; /* of encoder */
   bool is_configured = false;
-  NeighbourCodeRate rate; /* what its receivers say: any thread */
   std::uint32_t frame_number = 0;
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
-  RecycledBytes buffers;
-  bool by_slices = false;     /* alignment of the output */
-  GstBuffer *input = nullptr; /* what encoder holds is of this one, and not yet all pushed */
-  std::size_t part = 0;
+  RecycledMemories memories;
+  bool by_slices = false;          /* alignment of the output */
+  GstBuffer *input = nullptr;      /* the frame set in encoder, until all of it is pushed */
+  std::size_t part = 0;            /* the next one of encoder; for by_slices, as the two below */
   rangecast::UnitReader units{{}}; /* of the part before */
-  std::span<const guint8> slice;   /* the next one; before the first: empty */
+  std::span<const guint8> slice;   /* the next one; empty before the first */
 };
 
 struct _GstNeighbourCodeEnc {
@@ -107,12 +110,6 @@ gst_neighbour_code_enc_transform_caps (
   return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
 }
 
-static void
-forget_input (GstNeighbourCodeEncPrivate *priv)
-{
-  gst_clear_buffer (&priv->input);
-}
-
 static gboolean
 gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
@@ -121,18 +118,62 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
   priv->reporter.set_views (priv->info.rig);
-  priv->encoder.request_key (); /* decoders begin anew with new caps */
+  priv->encoder.request_key (); /* decoders reset their references at new caps */
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
-  forget_input (priv);
+  gst_clear_buffer (&priv->input);
+  GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
 }
 
-/* ---- data ---- */
+/* ---- a frame set: rate, key frame sets, encoding ---- */
 
-/* Takes over settings that changed. Thresholds may with every frame set: they cost nothing. */
-static Status
-configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
+static GstClockTime
+running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
+  return gst_segment_to_running_time (
+      &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
+}
+
+/* A GAP tells downstream that this frame set is left out. */
+static void
+leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
+{
+  GST_DEBUG_OBJECT (self, "leaving out a frame set for the bit rate: %" GST_PTR_FORMAT, input);
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->left_out++;
+  }
+  if (GST_BUFFER_PTS_IS_VALID (input))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
+        gst_event_new_gap (GST_BUFFER_PTS (input), GST_BUFFER_DURATION (input)));
+}
+
+/* Requests a key frame set from the encoder if one is due: key-interval would pass before the next
+ * frame set, or someone has asked. Requests too soon after a key frame set wait, as with
+ * GstVideoEncoder. */
+static void
+request_key_if_due (
+    GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
+  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
+  const GstClockTime next = now + settings.coding.frame_interval_ns;
+  const bool is_old = settings.key_interval_ms > 0 && has_times &&
+                      (now < last || next - last > settings.key_interval_ms * GST_MSECOND);
+  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
+                       now >= last && now - last < settings.min_forced_key_interval;
+  if (!is_old && (is_soon || !priv->key_requests.is_due (now)))
+    return;
+  GST_DEBUG_OBJECT (self, "key frame set: %s", is_old ? "key-interval has passed" : "requested");
+  priv->encoder.request_key ();
+}
+
+/* Applies settings that changed. Thresholds may change with every frame set, at no cost. */
+static Status
+configure (GstNeighbourCodeEnc *self, const EncoderSettings &settings)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
   if (priv->is_configured && settings == priv->configured)
     return {};
   EncoderSettings same = priv->configured;
@@ -142,6 +183,8 @@ configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
     priv->encoder.set_thresholds (settings.depth_threshold, settings.colour_threshold);
   else if (Status s = priv->encoder.configure (priv->info.rig, settings); !s.ok ())
     return s;
+  GST_DEBUG_OBJECT (self, "depth-threshold %d, colour-threshold %d", settings.depth_threshold,
+      settings.colour_threshold);
   priv->configured = settings;
   priv->is_configured = true;
   std::lock_guard guard (priv->lock);
@@ -149,113 +192,45 @@ configure (GstNeighbourCodeEncPrivate *priv, const EncoderSettings &settings)
   return {};
 }
 
-static GstClockTime
-frame_interval (const gstrange::RangeInfo &info)
-{
-  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
-                        : GST_SECOND / 30;
-}
-
 static Status
-encode_frame (GstNeighbourCodeEncPrivate *priv, GstBuffer *input,
-    const NeighbourCodeEncSettings &settings, EncoderResult &result)
+encode_frame (GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings,
+    EncoderResult &result)
 {
+  GstNeighbourCodeEncPrivate *priv = self->priv;
   gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
   guint64 pixels = 0;
   for (const rangecast::RangeImage &image : frame.views ())
     pixels += guint64 (image.roi.width) * guint64 (image.roi.height);
-  /* So that nobody takes the frame sets of two encoders, one after the other, for those of one. */
+  /* Random, so that frame sets of two encoders, one after the other, are not taken for those of
+   * one. */
   if (settings.coding.temporal && !(priv->is_configured && priv->configured.temporal))
     priv->frame_number = g_random_int ();
-  if (Status s = configure (priv, priv->rate.next (settings.coding, pixels)); !s.ok ())
+  if (Status s = configure (self, priv->rate.settings_for (settings.coding, pixels)); !s.ok ())
     return s;
   const Status status =
       priv->encoder.encode (frame.views (), priv->frame_number++, settings.n_threads, result);
   if (status.ok ())
-    priv->rate.coded (
+    priv->rate.record (
         {priv->encoder.size (), result.points, pixels, result.delta_slices == 0 && !priv->is_key});
   return status;
 }
 
+/* A key frame set answers all requests that are due; the answer is an event downstream. */
 static void
-count_frame (GstNeighbourCodeEncPrivate *priv, const EncoderResult &result, gsize size)
-{
-  std::lock_guard guard (priv->lock);
-  priv->latest = priv->configured;
-  priv->bits_per_s = priv->rate.bits_per_s ();
-  priv->frames++;
-  priv->coded_bytes += size;
-  priv->totals += result;
-}
-
-static GstClockTime
-running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
-{
-  return gst_segment_to_running_time (
-      &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
-}
-
-/* Asks the encoder for a key frame set where one is due. Requests that come too soon after one
- * wait, as with GstVideoEncoder. */
-static void
-prepare_key (GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
+answer_key_requests (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
-  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
-  /* The next frame set would come too late. */
-  const GstClockTime until = now + frame_interval (priv->info);
-  const bool is_old = settings.key_interval_ms > 0 && has_times &&
-                      (now < last || until - last > settings.key_interval_ms * GST_MSECOND);
-  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
-                       now >= last && now - last < settings.min_forced_key_interval;
-  if (is_old || (!is_soon && priv->key_requests.is_due (now)))
-    priv->encoder.request_key ();
-}
-
-/* Any key frame set answers those who asked for one, and is announced to them. */
-static void
-note_key (GstNeighbourCodeEnc *self, GstBuffer *input, const EncoderResult &result)
-{
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  const GstClockTime pts = GST_BUFFER_PTS (input), now = running_time_of (self, input);
-  priv->is_key = result.delta_slices == 0;
-  if (!priv->is_key)
-    return;
-  priv->last_key = now;
+  const GstClockTime pts = GST_BUFFER_PTS (input), running_time = running_time_of (self, input);
   const GstClockTime stream_time =
       gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
-  if (GstEvent *announcement = priv->key_requests.answer (pts, stream_time, now))
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), announcement);
+  priv->last_key = running_time;
+  if (GstEvent *answer = priv->key_requests.answer (pts, stream_time, running_time))
+    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), answer);
 }
 
-/* Downstream learns that nothing comes for this time. */
-static void
-leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
-{
-  {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->left_out++;
-  }
-  const GstClockTime pts = GST_BUFFER_PTS (input), duration = GST_BUFFER_DURATION (input);
-  forget_input (self->priv);
-  if (GST_CLOCK_TIME_IS_VALID (pts))
-    gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), gst_event_new_gap (pts, duration));
-}
-
-static void
-tell_news (GstNeighbourCodeEnc *self)
-{
-  GstMessage *news = self->priv->rate.take_news (GST_OBJECT (self));
-  if (!news)
-    return;
-  gst_element_post_message (GST_ELEMENT (self), news);
-  g_object_notify (G_OBJECT (self), "estimated-bitrate");
-}
-
-/* The frame set in `input`; forgets it if it is left out. */
+/* Encodes the frame set in priv->input, or clears that if the rate leaves it out. */
 static GstFlowReturn
 encode_input (GstNeighbourCodeEnc *self)
 {
@@ -267,32 +242,65 @@ encode_input (GstNeighbourCodeEnc *self)
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
-  settings.coding.frame_interval_ns = frame_interval (priv->info);
+  settings.coding.frame_interval_ns = priv->info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND,
+                                                                 priv->info.fps_d, priv->info.fps_n)
+                                                           : GST_SECOND / 30;
   const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
-  tell_news (self);
+  if (GstMessage *message = priv->rate.make_message (GST_OBJECT (self))) {
+    gst_element_post_message (GST_ELEMENT (self), message);
+    g_object_notify (G_OBJECT (self), "estimated-bitrate");
+  }
   if (!keeps) {
     leave_out (self, input);
+    gst_clear_buffer (&priv->input);
     return GST_FLOW_OK;
   }
-  prepare_key (self, input, settings);
+  request_key_if_due (self, input, settings);
   EncoderResult result;
-  const Status status = encode_frame (priv, input, settings, result);
+  const Status status = encode_frame (self, input, settings, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
-  note_key (self, input, result);
-  count_frame (priv, result, priv->encoder.size ());
+  priv->is_key = result.delta_slices == 0;
+  if (priv->is_key)
+    answer_key_requests (self, input);
+  GST_LOG_OBJECT (self, "%s frame set: %zu bytes, %" G_GUINT64_FORMAT " points of %" GST_PTR_FORMAT,
+      priv->is_key ? "key" : "delta", priv->encoder.size (), guint64{result.points}, input);
+  {
+    std::lock_guard guard (priv->lock);
+    priv->latest = priv->configured;
+    priv->bits_per_s = priv->rate.bits_per_s ();
+    priv->frames++;
+    priv->coded_bytes += priv->encoder.size ();
+    priv->totals += result;
+  }
   priv->reporter.passed (GST_ELEMENT (self), input);
   return GST_FLOW_OK;
 }
 
-/* A buffer with times and flags of the input. */
+/* ---- output: an access unit, or slice by slice ---- */
+
+/* A buffer of these bytes with the times and flags of the input; nullptr after an error. */
 static GstBuffer *
-make_output (GstNeighbourCodeEnc *self, gsize size)
+make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>> parts)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  GstBuffer *buffer = priv->buffers.acquire (GST_ELEMENT (self), size, "a coded frame set");
-  if (!buffer)
+  gsize size = 0;
+  for (const auto part : parts)
+    size += part.size ();
+  GstMemory *memory = priv->memories.acquire (size);
+  GstMapInfo map;
+  if (!memory || !gst_memory_map (memory, &map, GST_MAP_WRITE)) {
+    g_clear_pointer (&memory, gst_memory_unref);
+    gst_range_flow_return (GST_ELEMENT (self),
+        {rangecast::StatusCode::kNoSpace, "out of memory for a coded frame set"});
     return nullptr;
+  }
+  guint8 *end = map.data;
+  for (const auto part : parts)
+    end = std::copy (part.begin (), part.end (), end);
+  gst_memory_unmap (memory, &map);
+  GstBuffer *buffer = gst_buffer_new ();
+  gst_buffer_append_memory (buffer, memory);
   GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
       GST_BASE_TRANSFORM (self), priv->input, buffer);
   const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
@@ -305,21 +313,7 @@ make_output (GstNeighbourCodeEnc *self, gsize size)
   return buffer;
 }
 
-static GstBuffer *
-take_access_unit (GstNeighbourCodeEnc *self)
-{
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  GstBuffer *buffer = make_output (self, priv->encoder.size ());
-  gsize offset = 0;
-  for (std::size_t i = 0; buffer && i < priv->encoder.parts (); i++) {
-    const auto part = priv->encoder.part (i);
-    offset += gst_buffer_fill (buffer, offset, part.data (), part.size ());
-  }
-  forget_input (priv);
-  return buffer;
-}
-
-/* The encoder's next slice; nothing after the last one. */
+/* The encoder's next slice; empty after the last one. */
 static std::span<const guint8>
 next_slice (GstNeighbourCodeEncPrivate *priv)
 {
@@ -327,48 +321,47 @@ next_slice (GstNeighbourCodeEncPrivate *priv)
   while (true) {
     if (const auto unit = priv->units.next (header))
       return *unit;
-    if (priv->part == priv->encoder.parts ())
+    if (priv->part == priv->encoder.parts ().size ())
       return {};
-    priv->units = rangecast::UnitReader (priv->encoder.part (priv->part++));
+    priv->units = rangecast::UnitReader (priv->encoder.parts ()[priv->part++]);
   }
 }
 
 static GstBuffer *
-take_slice (GstNeighbourCodeEnc *self)
+make_slice (GstNeighbourCodeEnc *self)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
   const bool is_first = priv->slice.empty ();
   if (is_first)
     priv->slice = next_slice (priv);
-  GstBuffer *buffer = make_output (self, priv->slice.size ());
+  GstBuffer *buffer = make_output (self, std::span (&priv->slice, 1));
   if (!buffer)
     return nullptr;
-  gst_buffer_fill (buffer, 0, priv->slice.data (), priv->slice.size ());
   if (!is_first)
     GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT | GST_BUFFER_FLAG_RESYNC);
   priv->slice = next_slice (priv);
   if (priv->slice.empty ()) {
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_MARKER);
-    forget_input (priv);
+    gst_clear_buffer (&priv->input);
   } else {
     GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_MARKER);
   }
   return buffer;
 }
 
-/* Called until it has no more to give; a new input comes where the rest of the last one failed to
- * be pushed, too. */
+/* The base class calls this until there is no output. A new input may come before all slices of the
+ * last one are out, if pushing one of them failed. */
 static GstFlowReturn
 gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **output)
 {
   auto self = GST_NEIGHBOUR_CODE_ENC (base);
   GstNeighbourCodeEncPrivate *priv = self->priv;
   if (base->queued_buf) {
-    forget_input (priv);
+    gst_clear_buffer (&priv->input);
     priv->input = g_steal_pointer (&base->queued_buf);
     const GstFlowReturn flow = encode_input (self);
     if (flow != GST_FLOW_OK) {
-      forget_input (priv);
+      gst_clear_buffer (&priv->input);
       return flow;
     }
     priv->part = 0;
@@ -377,11 +370,16 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
   }
   if (!priv->input)
     return GST_FLOW_OK;
-  *output = priv->by_slices ? take_slice (self) : take_access_unit (self);
+  if (priv->by_slices) {
+    *output = make_slice (self);
+  } else {
+    *output = make_output (self, priv->encoder.parts ());
+    gst_clear_buffer (&priv->input);
+  }
   return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/* Never called, but without it GstBaseTransform would be passthrough. */
+/* Never called, but without it GstBaseTransform would operate in passthrough mode. */
 static GstFlowReturn
 gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
 {
@@ -400,13 +398,13 @@ static gboolean
 gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
-  if (priv->key_requests.note (event)) { /* goes on with the frame set that answers it */
+  if (priv->key_requests.handle_event (event)) { /* the answer follows with the key frame set */
     gst_event_unref (event);
     return TRUE;
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->encoder.request_key ();
-    priv->key_requests.forget ();
+    priv->key_requests.reset ();
   } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
     priv->reporter.finish ();
   }
@@ -417,7 +415,7 @@ static gboolean
 gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
-  if (priv->key_requests.note (event) || priv->rate.receivers.note (event)) {
+  if (priv->key_requests.handle_event (event) || priv->rate.receivers.handle_event (event)) {
     gst_event_unref (event);
     return TRUE;
   }
@@ -442,7 +440,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   priv->rate.reset ();
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
-  priv->key_requests.forget ();
+  priv->key_requests.reset ();
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frame_number = 0;
@@ -459,8 +457,8 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
   priv->reporter.stop ();
   const StreamLock lock (base);
   priv->is_configured = false;
-  forget_input (priv);
-  priv->buffers.drop ();
+  gst_clear_buffer (&priv->input);
+  priv->memories.drop ();
   return TRUE;
 }
 
@@ -469,7 +467,7 @@ gst_neighbour_code_enc_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
     return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
   if (!encoder_properties ().set (priv->settings, id, value))
@@ -488,7 +486,7 @@ make_stats (const GstNeighbourCodeEncPrivate *priv)
       "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
       priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
       nullptr);
-  priv->rate.receivers.describe (stats);
+  priv->rate.receivers.add_stats (stats);
   return stats;
 }
 
@@ -562,15 +560,15 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
       "Codec/Encoder/Video",
       "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");
 
-  transform_class->sink_event = gst_neighbour_code_enc_sink_event;
-  transform_class->src_event = gst_neighbour_code_enc_src_event;
-  transform_class->start = gst_neighbour_code_enc_start;
-  transform_class->stop = gst_neighbour_code_enc_stop;
-  transform_class->transform_caps = gst_neighbour_code_enc_transform_caps;
-  transform_class->set_caps = gst_neighbour_code_enc_set_caps;
-  transform_class->generate_output = gst_neighbour_code_enc_generate_output;
-  transform_class->transform = gst_neighbour_code_enc_transform;
-  transform_class->transform_meta = gst_neighbour_code_enc_transform_meta;
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_sink_event);
+  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_src_event);
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_set_caps);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_generate_output);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_meta);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");

@@ -38,6 +38,7 @@
 #include <span>
 #include <vector>
 
+#include "common/codedunits.hpp"
 #include "seek.hpp"
 
 using rangecast::AccessUnitHeader;
@@ -53,14 +54,17 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_parse_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_parse_debug
 
+namespace {
+
 using Bytes = std::span<const guint8>;
 
-/* The rig is written again after so much time. */
-static constexpr GstClockTime kRigInterval = GST_SECOND;
-/* A stream that begins with more rubbish is taken for something else. */
-static constexpr gsize kMaxLeadingRubbish = 2 << 20;
+/* The rig is repeated in the byte stream at this interval. */
+constexpr GstClockTime kRigInterval = GST_SECOND;
+/* Maximum bytes in front of the first access unit; a stream that begins with more is another type.
+ */
+constexpr gsize kMaxLeadingGarbage = 2 << 20;
 
-/* What a stream has shown so far: what to complain of at its end. */
+/* What was found in the stream so far; selects the error text at its end. */
 enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
 
 /* Some bytes of the input. */
@@ -74,18 +78,20 @@ struct Stream {               /* streaming thread only */
   bool src_caps_set = false;
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
-  bool ending = false;  /* pushed: EOS has come */
-  gsize leading_rubbish = 0;
-  rangecast::RigCollector collector;
-  std::string too_large; /* why a rig was refused */
-  unsigned used_generation = 0;
-  gstrange::RangeInfo info; /* of the source caps */
-  std::vector<Range> output;
+  bool ending = false;  /* push mode: EOS has arrived */
+  gsize leading_garbage = 0;
+  rangecast::RigCollector collector; /* of the byte stream */
+  std::string too_large;             /* why a rig was refused */
+  unsigned used_generation = 0;      /* of collector: the rig of the source caps */
+  gstrange::RangeInfo info;          /* of the source caps */
+  std::vector<Range> output;         /* units of the current access unit but rig views */
 
   rangecast::KeyCheck key_check;
-  std::vector<guint8> rig_units; /* of access units to be written */
+  std::vector<guint8> rig_units; /* of the sink caps, for the byte stream */
   GstClockTime last_rig = GST_CLOCK_TIME_NONE;
 };
+
+} // namespace
 
 struct GstNeighbourCodeParsePrivate {
   NeighbourCodeSeek seek;
@@ -140,8 +146,8 @@ GST_ELEMENT_REGISTER_DEFINE_CUSTOM (neighbourcodeparse, register_with_typefinder
 
 /* ---- caps ---- */
 
-/* Access units unless downstream takes only the byte stream. Its peer is asked, not the pad: the
- * base class makes the pad answer with the caps that it already has. */
+/* Access units are preferred. Queries the peer, because the base class makes the pad answer with
+ * its current caps. */
 static bool
 downstream_wants_stream (GstBaseParse *base)
 {
@@ -157,41 +163,35 @@ downstream_wants_stream (GstBaseParse *base)
   return wants;
 }
 
-/* Buffers that do not fill an access unit were left behind: begin small again. */
+/* After a frame or a discontinuity: requests no more than a header, until the size is known. */
 static void
-ask_for_the_least (GstBaseParse *base)
+reset_min_frame_size (GstBaseParse *base)
 {
   const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kStreamPrefixSize) : 1);
-}
-
-/* For those who ask what a file holds, gst-discoverer-1.0 among them. */
-static void
-name_the_code (GstBaseParse *base)
-{
-  GstTagList *tags = gst_tag_list_new (GST_TAG_VIDEO_CODEC, "Neighbour code", nullptr);
-  gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);
-  gst_tag_list_unref (tags);
 }
 
 static bool
 set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
-  gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* done with this */
+  gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
   stream.writes_stream = downstream_wants_stream (base);
   GstCaps *caps = gstrange::make_neighbour_code_caps (
       stream.info, stream.writes_stream ? "byte-stream" : "access-unit");
+  GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
   gst_base_parse_set_frame_rate (base, guint (stream.info.fps_n), guint (stream.info.fps_d), 0, 0);
-  name_the_code (base);
+  GstTagList *tags = gst_tag_list_new (GST_TAG_VIDEO_CODEC, "Neighbour code", nullptr);
+  gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);
+  gst_tag_list_unref (tags);
   return stream.src_caps_set;
 }
 
-/* What to return where downstream did not take the caps. */
+/* Flow return after downstream has refused the caps. */
 static GstFlowReturn
-refused (GstBaseParse *base)
+caps_refused_flow (GstBaseParse *base)
 {
   return GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)) ? GST_FLOW_FLUSHING
                                                              : GST_FLOW_NOT_NEGOTIATED;
@@ -203,7 +203,7 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   const gchar *alignment = gst_structure_get_string (gst_caps_get_structure (caps, 0), "alignment");
   stream.reads_stream = g_strcmp0 (alignment, "access-unit") != 0;
-  ask_for_the_least (base);
+  reset_min_frame_size (base);
   if (stream.reads_stream)
     return TRUE;
   const rangecast::Status status = gstrange::parse_caps (caps, stream.info);
@@ -219,13 +219,12 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 /* ---- errors ---- */
 
 static std::string
-what_is_missing (const GstNeighbourCodeParsePrivate *priv)
+missing_data_text (const GstNeighbourCodeParsePrivate *priv)
 {
   switch (priv->seen) {
     case Seen::kNothing:
       return "No access unit found: expected a neighbour code byte stream of version 1, which "
-             "begins "
-             "with the start code 00 52 43 55";
+             "begins with the start code 00 52 43 55";
     case Seen::kAccessUnit:
       if (!priv->stream.too_large.empty ())
         return "The rig is too large: " + priv->stream.too_large;
@@ -237,15 +236,15 @@ what_is_missing (const GstNeighbourCodeParsePrivate *priv)
 }
 
 static void
-post_what_is_missing (GstBaseParse *base)
+post_missing_data (GstBaseParse *base)
 {
-  const std::string text = what_is_missing (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  const std::string text = missing_data_text (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   GST_ELEMENT_ERROR (base, STREAM, WRONG_TYPE, ("%s", text.c_str ()), (nullptr));
 }
 
-/* Where the base class says "No valid frames found" we know what is missing. */
+/* Replaces the base class's text "No valid frames found" by what is missing. */
 static GstMessage *
-say_what_is_missing (GstElement *element, GstMessage *message)
+replace_error_text (GstElement *element, GstMessage *message)
 {
   GError *error = nullptr;
   gchar *debug = nullptr;
@@ -254,20 +253,21 @@ say_what_is_missing (GstElement *element, GstMessage *message)
   gst_message_parse_error_details (message, &details);
   if (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_WRONG_TYPE)) {
     g_free (error->message);
-    error->message = g_strdup (what_is_missing (GST_NEIGHBOUR_CODE_PARSE (element)->priv).c_str ());
-    GstMessage *told = gst_message_new_error_with_details (
+    error->message =
+        g_strdup (missing_data_text (GST_NEIGHBOUR_CODE_PARSE (element)->priv).c_str ());
+    GstMessage *replaced = gst_message_new_error_with_details (
         GST_MESSAGE_SRC (message), error, debug, details ? gst_structure_copy (details) : nullptr);
-    gst_message_set_seqnum (told, gst_message_get_seqnum (message));
+    gst_message_set_seqnum (replaced, gst_message_get_seqnum (message));
     gst_message_unref (message);
-    message = told;
+    message = replaced;
   }
   g_clear_error (&error);
   g_free (debug);
   return message;
 }
 
-/* In pull mode the base class adds "Internal data stream error" to any error: one that tells is
- * enough. */
+/* In pull mode the base class posts "Internal data stream error" after any other error: only the
+ * first error is posted. */
 static gboolean
 gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
 {
@@ -276,15 +276,15 @@ gst_neighbour_code_parse_post_message (GstElement *element, GstMessage *message)
       gst_message_unref (message);
       return TRUE;
     }
-    message = say_what_is_missing (element, message);
+    message = replace_error_text (element, message);
   }
   return GST_ELEMENT_CLASS (gst_neighbour_code_parse_parent_class)->post_message (element, message);
 }
 
-/* Errors after a flush are news again. Asked at the source pad: there alone the flushes of upstream
- * and those of seeks in files are both seen, and while no data flow. */
+/* After a flush errors are posted again. A probe of the source pad sees both the flushes from
+ * upstream and those of seeks in files, and no data flow meanwhile. */
 static GstPadProbeReturn
-note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
+handle_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
 {
   if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
     static_cast<GstNeighbourCodeParsePrivate *> (data)->failed = false;
@@ -293,26 +293,27 @@ note_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
 
 /* ---- from access units ---- */
 
-/* What the header of an access unit says of its slices. */
-static AccessUnitHeader
-summarise (Bytes access_unit, rangecast::KeyCheck &check)
+/* Fills capture time and key of the access unit's header from its slices. @return false if the
+ * buffer cannot be mapped */
+static bool
+summarise (GstBuffer *access_unit, rangecast::KeyCheck &check, AccessUnitHeader &summary)
 {
-  AccessUnitHeader summary;
-  check.reset ();
-  UnitReader units (access_unit);
-  UnitHeader header;
-  SliceHeader slice;
   bool first = true;
-  while (const auto unit = units.next (header)) {
-    if (!rangecast::read_slice_header (*unit, slice).ok ())
-      continue;
+  check.reset ();
+  const auto handle = [&] (gsize, Bytes unit, const UnitHeader &) {
+    SliceHeader slice;
+    if (!rangecast::read_slice_header (unit, slice).ok ())
+      return true;
     if (first)
       summary.capture_time_ns = slice.capture_time_ns;
     check.add (slice);
     first = false;
-  }
+    return true;
+  };
+  rangecast::Status damage; /* what follows it is not read */
+  const bool mapped = for_each_unit (access_unit, handle, damage);
   summary.key = check.is_key ();
-  return summary;
+  return mapped;
 }
 
 static void
@@ -335,7 +336,7 @@ rig_is_due (Stream &stream, GstClockTime pts)
   return due;
 }
 
-/* Start code, header, the rig where it is due. */
+/* Start code, header, and the rig if it is due. */
 static GstMemory *
 make_stream_prefix (AccessUnitHeader &header, Bytes rig, gsize access_unit_size)
 {
@@ -385,15 +386,13 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   const gsize size = gst_buffer_get_size (frame->buffer);
   if (gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)) && !set_source_caps (base))
-    return refused (base);
+    return caps_refused_flow (base);
   if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
     return refuse_long_access_unit (base, size);
-  GstMapInfo map;
-  if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
+  AccessUnitHeader header;
+  if (!summarise (frame->buffer, stream.key_check, header))
     return refuse_unreadable_buffer (base);
-  AccessUnitHeader header = summarise ({map.data, map.size}, stream.key_check);
-  gst_buffer_unmap (frame->buffer, &map);
-  /* Upstream knows more: of lost packets, for one. */
+  /* Upstream may know about lost packets. */
   header.key = header.key && !GST_BUFFER_FLAG_IS_SET (frame->buffer, GST_BUFFER_FLAG_DELTA_UNIT);
   frame->buffer = gst_buffer_make_writable (frame->buffer);
   set_key (frame->buffer, header.key);
@@ -407,23 +406,25 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
 static GstFlowReturn
 drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
+  GST_DEBUG_OBJECT (base, "dropping %" G_GSIZE_FORMAT " bytes", size);
   GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.discont = true;
   frame->flags |= GST_BASE_PARSE_FRAME_FLAG_DROP;
   return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
-/* Not by skipping: the base class gives up after 2 MiB, and one access unit can be longer. */
+/* Drops frames instead of skipping bytes, because the base class gives up after 2 MiB, and a
+ * damaged access unit can be longer. */
 static GstFlowReturn
-drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
+drop_garbage (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   GST_WARNING_OBJECT (base,
       "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
       guint64 (frame->offset));
   if (priv->seen == Seen::kNothing) {
-    priv->stream.leading_rubbish += size;
-    if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
-      post_what_is_missing (base);
+    priv->stream.leading_garbage += size;
+    if (priv->stream.leading_garbage > kMaxLeadingGarbage) {
+      post_missing_data (base);
       return GST_FLOW_ERROR;
     }
   }
@@ -438,14 +439,14 @@ add_rig_view (GstBaseParse *base, Bytes unit)
   if (status.code () == rangecast::StatusCode::kBadSize)
     stream.too_large = status.message ();
   if (!status.ok ())
-    GST_DEBUG_OBJECT (base, "a bad rig view: %s", status.message ().c_str ());
+    GST_DEBUG_OBJECT (base, "dropping a rig view: %s", status.message ().c_str ());
 }
 
-/* After a seek: the rig that the file had last there. */
+/* After a seek: the last rig of the file before the target. */
 static void
 use_rig_of_seek (GstBaseParse *base, guint64 offset)
 {
-  const std::vector<guint8> units = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.take_rig (offset);
+  const std::vector<guint8> units = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.rig_at (offset);
   UnitReader reader (units);
   UnitHeader header;
   while (const auto unit = reader.next (header))
@@ -453,9 +454,9 @@ use_rig_of_seek (GstBaseParse *base, guint64 offset)
       add_rig_view (base, *unit);
 }
 
-/* Takes the rig of an access unit, and notes where its other units are. */
+/* Collects the rig of an access unit, and records where its other units are. */
 static void
-take_units (GstBaseParse *base, Bytes units)
+handle_units (GstBaseParse *base, Bytes units)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   stream.output.clear ();
@@ -474,7 +475,7 @@ take_units (GstBaseParse *base, Bytes units)
   }
 }
 
-/* New caps where the rig is another, or downstream wants others. */
+/* Sets new caps if the rig has changed, or downstream reconfigures. */
 static bool
 update_caps (GstBaseParse *base)
 {
@@ -510,8 +511,8 @@ copy_ranges (GstBuffer *input, const std::vector<Range> &ranges)
   return memory;
 }
 
-/* The units that go on, sharing the input's memory where a buffer can hold that many pieces: with
- * each one more it would copy all that it has. */
+/* The units of the output share the input's memory, unless they are more pieces than a buffer has
+ * memories: GStreamer would copy all memories with each further one. */
 static GstBuffer *
 make_output (Stream &stream, GstBuffer *input, gsize length)
 {
@@ -537,7 +538,7 @@ finish_access_unit (
   Stream &stream = priv->stream;
   GstBuffer *output = make_output (stream, frame->buffer, length);
   const GstClockTime pts = priv->seek.time_of (base, header.pts_ns, stream.info.frame_duration ());
-  /* Where there is none, the base class goes on from the one before, or from where it sought. */
+  /* Without a time the base class interpolates. */
   if (GST_CLOCK_TIME_IS_VALID (pts))
     GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = pts;
   GST_BUFFER_DURATION (output) = stream.info.frame_duration ();
@@ -551,7 +552,7 @@ finish_access_unit (
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
 
-/* Whose recorder was killed hears of it: what is left of the last access unit may be shown. */
+/* Of a recording that was cut off, the rest of the last access unit is still output. */
 static void
 warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
 {
@@ -571,11 +572,11 @@ handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, cons
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   const Stream &stream = priv->stream;
-  ask_for_the_least (base);
+  reset_min_frame_size (base);
   if (!update_caps (base))
-    return refused (base);
+    return caps_refused_flow (base);
   priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
-  if (!stream.src_caps_set || stream.output.empty ()) /* of no use without its rig, or empty */
+  if (!stream.src_caps_set || stream.output.empty ()) /* the rig is unknown, or it is empty */
     return drop (base, frame, part.length);
   return finish_access_unit (base, frame, part.header, part.length);
 }
@@ -590,11 +591,11 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
   const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
   if (part.length) {
     use_rig_of_seek (base, guint64 (frame->offset));
-    take_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+    handle_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
   gst_buffer_unmap (frame->buffer, &map);
   if (part.rubbish)
-    return drop_rubbish (base, frame, part.rubbish);
+    return drop_garbage (base, frame, part.rubbish);
   if (part.length) {
     warn_if_cut_off (base, part);
     return handle_access_unit_of_stream (base, frame, part);
@@ -612,8 +613,8 @@ gst_neighbour_code_parse_handle_frame (GstBaseParse *base, GstBaseParseFrame *fr
   return handle_access_unit (base, frame);
 }
 
-/* What lies before a segment may be needed to decode what lies in it: the seek began at the last
- * key access unit. Sinks clip it. */
+/* Access units before the segment are not clipped: those from the last key access unit on are
+ * needed for decoding. Sinks clip them. */
 static GstFlowReturn
 gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *frame)
 {
@@ -629,7 +630,7 @@ static gboolean
 gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && NeighbourCodeSeek::reads_file (base))
-    event = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.aim (base, event);
+    event = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.handle_seek (base, event);
   if (!event)
     return FALSE;
   return GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->src_event (base, event);
@@ -644,12 +645,13 @@ finish_stream (GstBaseParse *base)
     gst_base_parse_drain (base);
   priv->stream.ending = false;
   if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
-    post_what_is_missing (base);
+    post_missing_data (base);
 }
 
-/* With the key access unit that the event announces the rig is written again. */
+/* The rig is written again with the key access unit that the event announces, if it asks for
+ * headers. */
 static void
-note_wanted_headers (GstBaseParse *base, GstEvent *event)
+handle_key_unit_event (GstBaseParse *base, GstEvent *event)
 {
   gboolean all_headers = FALSE;
   if (gst_video_event_is_force_key_unit (event) &&
@@ -663,7 +665,7 @@ static gboolean
 gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 {
   const GstEventType type = GST_EVENT_TYPE (event);
-  note_wanted_headers (base, event);
+  handle_key_unit_event (base, event);
   if (type == GST_EVENT_EOS)
     finish_stream (base);
   else if (type == GST_EVENT_GAP)
@@ -671,14 +673,14 @@ gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
   const gboolean done =
       GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->sink_event (base, event);
   if (type == GST_EVENT_FLUSH_STOP || type == GST_EVENT_SEGMENT)
-    ask_for_the_least (base);
+    reset_min_frame_size (base);
   return done;
 }
 
 /* ---- life ---- */
 
 static void
-forget_stream (GstNeighbourCodeParsePrivate *priv)
+reset_stream (GstNeighbourCodeParsePrivate *priv)
 {
   priv->stream = {};
   priv->seek.reset ();
@@ -689,15 +691,15 @@ forget_stream (GstNeighbourCodeParsePrivate *priv)
 static gboolean
 gst_neighbour_code_parse_start (GstBaseParse *base)
 {
-  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
-  ask_for_the_least (base);
+  reset_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  reset_min_frame_size (base);
   return TRUE;
 }
 
 static gboolean
 gst_neighbour_code_parse_stop (GstBaseParse *base)
 {
-  forget_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
+  reset_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   return TRUE;
 }
 
@@ -714,8 +716,8 @@ gst_neighbour_code_parse_init (GstNeighbourCodeParse *self)
   self->priv = new GstNeighbourCodeParsePrivate;
   GST_PAD_SET_ACCEPT_INTERSECT (GST_BASE_PARSE_SINK_PAD (self));
   GST_PAD_SET_ACCEPT_TEMPLATE (GST_BASE_PARSE_SINK_PAD (self));
-  gst_pad_add_probe (GST_BASE_PARSE_SRC_PAD (self), GST_PAD_PROBE_TYPE_EVENT_FLUSH, note_flush,
-      self->priv, nullptr);
+  gst_pad_add_probe (GST_BASE_PARSE_SRC_PAD (self), GST_PAD_PROBE_TYPE_EVENT_FLUSH,
+      GST_DEBUG_FUNCPTR (handle_flush), self->priv, nullptr);
 }
 
 static void
@@ -725,20 +727,20 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   auto parse_class = GST_BASE_PARSE_CLASS (klass);
 
   G_OBJECT_CLASS (klass)->finalize = gst_neighbour_code_parse_finalize;
-  element_class->post_message = gst_neighbour_code_parse_post_message;
+  element_class->post_message = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_post_message);
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
       "Codec/Parser/Video", "Converts between neighbour code byte streams and access units",
       "gst-rangecast");
 
-  parse_class->start = gst_neighbour_code_parse_start;
-  parse_class->stop = gst_neighbour_code_parse_stop;
-  parse_class->set_sink_caps = gst_neighbour_code_parse_set_sink_caps;
-  parse_class->sink_event = gst_neighbour_code_parse_sink_event;
-  parse_class->src_event = gst_neighbour_code_parse_src_event;
-  parse_class->handle_frame = gst_neighbour_code_parse_handle_frame;
-  parse_class->pre_push_frame = gst_neighbour_code_parse_pre_push_frame;
+  parse_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_start);
+  parse_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_stop);
+  parse_class->set_sink_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_set_sink_caps);
+  parse_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_sink_event);
+  parse_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_src_event);
+  parse_class->handle_frame = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_handle_frame);
+  parse_class->pre_push_frame = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_pre_push_frame);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_parse_debug, "neighbourcodeparse", 0, "Neighbour code parser");

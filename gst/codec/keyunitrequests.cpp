@@ -6,7 +6,7 @@
 #include <algorithm>
 
 bool
-KeyUnitRequests::note (GstEvent *event)
+KeyUnitRequests::handle_event (GstEvent *event)
 {
   if (!gst_video_event_is_force_key_unit (event))
     return false;
@@ -25,7 +25,7 @@ KeyUnitRequests::note (GstEvent *event)
   const Request request = {running_time, all_headers != FALSE, count};
   if (waiting_.size () < kMax)
     waiting_.push_back (request);
-  else if (!GST_CLOCK_TIME_IS_VALID (running_time)) /* "at once" is never forgotten */
+  else if (!GST_CLOCK_TIME_IS_VALID (running_time)) /* "at once" is never dropped */
     waiting_.back () = request;
   return true;
 }
@@ -60,7 +60,7 @@ KeyUnitRequests::answer (
 }
 
 void
-KeyUnitRequests::forget ()
+KeyUnitRequests::reset ()
 {
   std::lock_guard guard (lock_);
   waiting_.clear ();

@@ -9,22 +9,22 @@
 /** Requests for key frame sets (GstForceKeyUnit) that wait for their time. Any thread. */
 class KeyUnitRequests {
 public:
-  /** Takes note of an event from upstream or downstream. Of too many that wait for
-   *  their time the latest are forgotten. @return false if it is another event */
-  bool note (GstEvent *event);
+  /** Handles an event from upstream or downstream. If too many requests wait, the latest are
+   *  dropped. @return false if the event is another one */
+  bool handle_event (GstEvent *event);
 
-  /** Whether somebody asked for the frame set of this running time to be a key one. */
+  /** Whether a request is due at this running time. */
   bool is_due (GstClockTime running_time);
 
-  /** The frame set of this running time is a key one; forgets the requests that it answers.
-   *  @return the event that announces it downstream, for the caller to push; nullptr: none was
-   *  asked for */
+  /** Removes the requests that a key frame set of this running time answers.
+   *  @return the GstForceKeyUnit event for downstream, for the caller to push; nullptr if there was
+   *  no request */
   GstEvent *answer (GstClockTime timestamp, GstClockTime stream_time, GstClockTime running_time);
-  void forget ();
+  void reset ();
 
 private:
   struct Request {
-    GstClockTime running_time; /* none: at once */
+    GstClockTime running_time; /* GST_CLOCK_TIME_NONE: at once */
     bool all_headers;
     guint count;
 

@@ -20,19 +20,32 @@ NeighbourCodeSeek::reset ()
   rig_units_ = {};
 }
 
+namespace {
+
 /* From the first time of a file to the end of its last access unit. */
-static void
+void
 find_duration (GstBaseParse *base, GstClockTime first_pts, GstClockTime frame_duration)
 {
   GstClockTime duration =
       NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
   if (!GST_CLOCK_TIME_IS_VALID (duration))
-    return; /* the base class goes on estimating */
+    return; /* the base class estimates it */
   if (GST_CLOCK_TIME_IS_VALID (frame_duration))
     duration += frame_duration;
   if (duration <= G_MAXINT64)
     gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
 }
+
+/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
+GstClockTime
+end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
+{
+  const GstClockTime end =
+      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
+  return std::min<GstClockTime> (end, G_MAXINT64);
+}
+
+} // namespace
 
 GstClockTime
 NeighbourCodeSeek::time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime frame_duration)
@@ -54,7 +67,7 @@ NeighbourCodeSeek::time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime fra
 }
 
 std::vector<guint8>
-NeighbourCodeSeek::take_rig (guint64 offset)
+NeighbourCodeSeek::rig_at (guint64 offset)
 {
   std::lock_guard guard (lock_);
   if (rig_offset_ != offset)
@@ -63,20 +76,17 @@ NeighbourCodeSeek::take_rig (guint64 offset)
   return std::move (rig_units_);
 }
 
-GstClockTime
-NeighbourCodeSeek::first_pts ()
-{
-  std::lock_guard guard (lock_);
-  return first_pts_;
-}
-
-/* Where in the file a seek shall begin; tells the base class, whose own index only holds what was
- * played. Returns: the time there; none if it could not be found. */
+/* Finds the key access unit for a seek and adds it to the index of the base class, which has only
+ * what was played. @return its time; none if there is none */
 GstClockTime
 NeighbourCodeSeek::find_place (
     GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
 {
-  const GstClockTime first = first_pts ();
+  GstClockTime first = GST_CLOCK_TIME_NONE;
+  {
+    std::lock_guard guard (lock_);
+    first = first_pts_;
+  }
   if (!GST_CLOCK_TIME_IS_VALID (first))
     return GST_CLOCK_TIME_NONE;
   NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first);
@@ -84,7 +94,7 @@ NeighbourCodeSeek::find_place (
   if (!place)
     return GST_CLOCK_TIME_NONE;
   {
-    /* The rig is not with each access unit: keep it until the streaming thread is there. */
+    /* Not each access unit has the rig: it is kept for the streaming thread. */
     std::lock_guard guard (lock_);
     rig_offset_ = place->offset;
     rig_units_ = std::move (place->rig_units);
@@ -93,17 +103,8 @@ NeighbourCodeSeek::find_place (
   return place->time;
 }
 
-/* Where the segment of a seek will end: G_MAXINT64 if it is open. */
-static GstClockTime
-end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
-{
-  const GstClockTime end =
-      stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
-  return std::min<GstClockTime> (end, G_MAXINT64);
-}
-
 GstEvent *
-NeighbourCodeSeek::aim (GstBaseParse *base, GstEvent *event)
+NeighbourCodeSeek::handle_seek (GstBaseParse *base, GstEvent *event)
 {
   gdouble rate;
   GstFormat format;
@@ -111,7 +112,7 @@ NeighbourCodeSeek::aim (GstBaseParse *base, GstEvent *event)
   GstSeekType start_type, stop_type;
   gint64 start, stop;
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  if (rate < 0) { /* nothing here reads backwards */
+  if (rate < 0) { /* reverse playback is not supported */
     gst_event_unref (event);
     return nullptr;
   }
@@ -123,10 +124,10 @@ NeighbourCodeSeek::aim (GstBaseParse *base, GstEvent *event)
     return event;
   if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
     start = gint64 (found);
-  /* The base class uses the place only where it shall be accurate. */
+  /* The base class uses its index only for accurate seeks. */
   flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
-  GstEvent *aimed = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
-  gst_event_set_seqnum (aimed, gst_event_get_seqnum (event));
+  GstEvent *result = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
+  gst_event_set_seqnum (result, gst_event_get_seqnum (event));
   gst_event_unref (event);
-  return aimed;
+  return result;
 }

@@ -6,34 +6,32 @@
 #include <mutex>
 #include <vector>
 
-/** Seeks by time in the file in front of a parser, and the times of its stream, which begin at 0.
- *  Any thread: what a seek, in the application's thread, shares with the streaming thread is behind
- *  a lock that is never held while pulling, pushing, querying or posting. */
+/** Seeking by time in a file, and the times of its stream, which begin at 0. Any thread: the lock
+ * is never held while pulling, pushing, querying or posting. */
 class NeighbourCodeSeek {
 public:
-  /** Whether the parser pulls from a file, rather than being pushed to. */
+  /** Whether the parser is in pull mode. */
   static bool reads_file (GstBaseParse *base);
 
-  /** Forgets the file. */
   void reset ();
-  /** The time of the stream for a time that the file tells, none for none. At the first one of a
-   *  file the parser learns the duration. `frame_duration` in ns, or none. */
+  /** The stream time, ns, of a time in the file; none for none. At the first time of a file it also
+   *  sets the parser's duration.
+   *  @param frame_duration  ns, or none */
   GstClockTime time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime frame_duration);
-  /** The rig units that the file had last at the place that a seek chose; empty if `offset` (bytes)
-   *  is no such place. Gives them once. */
-  std::vector<guint8> take_rig (guint64 offset);
+  /** The rig units that apply at `offset`, bytes, if a seek has chosen it; else empty. Only the
+   * first call returns them. */
+  std::vector<guint8> rig_at (guint64 offset);
   /** @param event (transfer full): a seek.
-   *  @return (transfer full): the seek that the base class shall do; null if it is refused. */
-  GstEvent *aim (GstBaseParse *base, GstEvent *event);
+   *  @return (transfer full): the seek for the base class, to a key access unit; null if refused */
+  GstEvent *handle_seek (GstBaseParse *base, GstEvent *event);
 
 private:
   GstClockTime find_place (
       GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags);
-  GstClockTime first_pts ();
 
   std::mutex lock_; /* guards all below */
   GstClockTime first_pts_ = GST_CLOCK_TIME_NONE;
-  /* The rig of the access unit at that offset, which may not have one of its own. */
+  /* The rig at the target of the last seek, whose access unit may not contain one. */
   guint64 rig_offset_ = G_MAXUINT64;
   std::vector<guint8> rig_units_;
 };

@@ -3,9 +3,8 @@
 
 #include <gst/base/gstbasetransform.h>
 
-/** Gives controlled properties their values of the buffer's time. A buffer without PTS or outside
- *  the segment, as the first after a seek to between two frames, has no stream time: values stay.
- */
+/** Updates controlled properties to the buffer's stream time. A buffer without PTS or outside the
+ *  segment (the first one after a seek between two frames) has none: values stay as they are. */
 inline void
 sync_controlled_values (GstBaseTransform *base, GstBuffer *buffer)
 {

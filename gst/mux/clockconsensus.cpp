@@ -5,8 +5,24 @@
 #include <compare>
 #include <cstdlib>
 
+namespace {
+
+bool
+together (GstClockTimeDiff a, GstClockTimeDiff b)
+{
+  return std::llabs (a - b) <= ClockConsensus::kMaxDifference;
+}
+
+bool
+is_pipeline_clock (GstClockTimeDiff offset)
+{
+  return offset >= -ClockConsensus::kMaxDifference && offset <= ClockConsensus::kMaxAhead;
+}
+
+} // namespace
+
 GstClockTimeDiff
-MuxSteps::offset_of (GstClockTime capture, GstClockTime arrival)
+ClockConsensus::offset_of (GstClockTime capture, GstClockTime arrival)
 {
   constexpr GstClockTimeDiff kMax = G_MAXINT64 / 4;
   const GstClockTimeDiff offset = GstClockTimeDiff (std::min<GstClockTime> (capture, G_MAXINT64)) -
@@ -14,34 +30,22 @@ MuxSteps::offset_of (GstClockTime capture, GstClockTime arrival)
   return std::clamp (offset, -kMax, kMax);
 }
 
-static bool
-together (GstClockTimeDiff a, GstClockTimeDiff b)
-{
-  return std::llabs (a - b) <= MuxSteps::kOutOfStep;
-}
-
-static bool
-is_pipelines_clock (GstClockTimeDiff offset)
-{
-  return offset >= -MuxSteps::kOutOfStep && offset <= MuxSteps::kFuture;
-}
-
-/* Of two candidates the greater one wins. */
-struct MuxSteps::Rank {
+/* The candidate of the highest rank wins. */
+struct ClockConsensus::Rank {
   std::ptrdiff_t streams = 0;
-  bool pipelines = false, before = false;
+  bool is_pipeline_clock = false, won_before = false;
   auto operator<=> (const Rank &) const = default;
 };
 
 GstClockTimeDiff
-MuxSteps::most_frequent (std::span<const Stream> streams) const
+ClockConsensus::most_frequent (std::span<const Stream> streams) const
 {
   Rank best;
   GstClockTimeDiff winner = 0;
   for (const Stream &candidate : streams) {
     const Rank rank = {std::ranges::count_if (streams,
                            [&] (const Stream &s) { return together (s.offset, candidate.offset); }),
-        is_pipelines_clock (candidate.offset), known_ && together (candidate.offset, reference_)};
+        is_pipeline_clock (candidate.offset), known_ && together (candidate.offset, reference_)};
     if (rank > best) {
       best = rank;
       winner = candidate.offset;
@@ -51,13 +55,13 @@ MuxSteps::most_frequent (std::span<const Stream> streams) const
 }
 
 bool
-MuxSteps::judge (std::span<Stream> streams)
+ClockConsensus::update (std::span<Stream> streams)
 {
   if (streams.empty ())
     return false;
-  const auto [least, most] = std::ranges::minmax_element (streams, {}, &Stream::offset);
-  const bool all = together (least->offset, most->offset);
-  const GstClockTimeDiff centre = all ? least->offset : most_frequent (streams);
+  const auto [min, max] = std::ranges::minmax_element (streams, {}, &Stream::offset);
+  const bool all = together (min->offset, max->offset);
+  const GstClockTimeDiff centre = all ? min->offset : most_frequent (streams);
   members_.clear ();
   for (const Stream &s : streams)
     if (all || together (s.offset, centre))
@@ -68,7 +72,7 @@ MuxSteps::judge (std::span<Stream> streams)
   reference_ = *middle;
   known_ = true;
   for (Stream &s : streams)
-    s.in_step =
-        together (s.offset, reference_) && !(is_pipelines_clock (reference_) && s.offset > kFuture);
+    s.in_sync = together (s.offset, reference_) &&
+                !(is_pipeline_clock (reference_) && s.offset > kMaxAhead);
   return moved;
 }

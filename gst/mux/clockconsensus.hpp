@@ -6,33 +6,33 @@
 #include <span>
 #include <vector>
 
-/** Finds which live streams have capture times of one clock: that of most of them. A stream is
- * known by its offset, how much its capture times are ahead of the pipeline's clock when they come:
- * minus the time that pictures are under way if the host's clock is the pipeline's, anything else
- * if not. Streaming thread only. */
-class MuxSteps {
+/** Finds which live streams have capture times of the same clock: the clock of most streams. A
+ *  stream is characterised by its offset, how far its capture times are ahead of the pipeline clock
+ *  when its buffers arrive: minus the transmission delay if its host's clock is the pipeline clock,
+ *  anything else if not. Streaming thread only. */
+class ClockConsensus {
 public:
-  /** Offsets further apart than this are of different clocks, ns. */
-  static constexpr GstClockTimeDiff kOutOfStep = 2 * GST_SECOND;
-  /** Where the pipeline's clock is that of most hosts, no picture comes before it was taken; ns. */
-  static constexpr GstClockTimeDiff kFuture = 100 * GST_MSECOND;
+  /** Offsets further apart than this belong to different clocks, ns. */
+  static constexpr GstClockTimeDiff kMaxDifference = 2 * GST_SECOND;
+  /** If the pipeline clock is that of most hosts, capture times may be ahead of it by this, ns. */
+  static constexpr GstClockTimeDiff kMaxAhead = 100 * GST_MSECOND;
 
   struct Stream {
-    GstClockTimeDiff offset; ///< ns; of its last buffer
-    bool in_step = true;     ///< what judge() finds
+    GstClockTimeDiff offset; ///< of its last buffer, ns
+    bool in_sync = true;     ///< set by update()
   };
 
-  /** The offset of a buffer. Foreign capture times may be any number: it is kept within a quarter
-   *  of what fits, so that differences of two do not overflow.
-   *  @param capture, arrival  ns, of the hosts' clock and of the pipeline's */
+  /** The offset of a buffer. Capture times from the network may be any number: the offset is
+   *  clamped to a quarter of its range, so that differences of two do not overflow.
+   *  @param capture, arrival  ns, of the host's clock and of the pipeline clock */
   static GstClockTimeDiff offset_of (GstClockTime capture, GstClockTime arrival);
 
   void reset () { known_ = false; }
-  /** Sets `in_step` of each. Of two clocks that equally many have, the pipeline's wins, then the
-   * one that won before, then that of the stream that comes first.
-   *  @return whether it is another clock than before */
-  bool judge (std::span<Stream> streams);
-  /** The middle offset of the streams in step, ns; after judge(). */
+  /** Sets `in_sync` of each stream. Between two clocks with as many streams the pipeline clock
+   *  wins, then the clock that won before, then that of the first stream.
+   *  @return whether another clock has won than before */
+  bool update (std::span<Stream> streams);
+  /** The median offset of the streams in sync, ns; after update(). */
   [[nodiscard]] GstClockTimeDiff reference () const { return reference_; }
 
 private:

@@ -10,23 +10,10 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-void
-ClockPublisher::set_port (int port)
-{
-  std::lock_guard guard (lock_);
-  wanted_ = port;
-}
+namespace {
 
-int
-ClockPublisher::port ()
-{
-  std::lock_guard guard (lock_);
-  return actual_ != kOff ? actual_ : wanted_;
-}
-
-/* GstNetTimeProvider shares its port with whoever shares it, and clients would then ask one or the
- * other. */
-static Status
+/* GstNetTimeProvider binds with SO_REUSEADDR: two on one port would split the requests. */
+Status
 check_free (int port)
 {
   GError *error = nullptr;
@@ -48,20 +35,21 @@ check_free (int port)
       "clock-port: expected a free UDP port, got " + std::to_string (port) + " (" + why + ")"};
 }
 
+} // namespace
+
 Status
-ClockPublisher::open (GstClock *clock)
+ClockPublisher::open (int port, GstClock *clock)
 {
-  const int port = this->port ();
   if (port != kAnyPort)
     if (Status s = check_free (port); !s.ok ())
       return s;
-  /* Without a clock the port is taken all the same; nobody gets an answer. */
-  GstClock *told = clock ? GST_CLOCK (gst_object_ref (clock)) : gst_system_clock_obtain ();
+  /* A provider needs a clock: without one it is inactive, but has the port. */
+  GstClock *provided = clock ? GST_CLOCK (gst_object_ref (clock)) : gst_system_clock_obtain ();
   GError *error = nullptr;
   const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
   provider_ = GST_NET_TIME_PROVIDER (g_initable_new (GST_TYPE_NET_TIME_PROVIDER, nullptr, &error,
-      "clock", told, "port", port, "active", gboolean (clock != nullptr), nullptr));
-  gst_object_unref (told);
+      "clock", provided, "port", port, "active", gboolean (clock != nullptr), nullptr));
+  gst_object_unref (provided);
   if (!provider_) {
     const std::string why = error ? error->message : "no socket";
     g_clear_error (&error);
@@ -71,48 +59,43 @@ ClockPublisher::open (GstClock *clock)
   gint actual = 0;
   g_object_get (provider_, "port", &actual, nullptr);
   gst_object_replace (reinterpret_cast<GstObject **> (&clock_), GST_OBJECT_CAST (clock));
-  std::lock_guard guard (lock_);
-  actual_ = actual;
+  port_ = actual;
   return {};
 }
 
 void
 ClockPublisher::close ()
 {
-  gst_clear_object (&provider_); /* its thread ends, the port is free */
+  gst_clear_object (&provider_); /* ends its thread and closes the port */
   gst_clear_object (&clock_);
 }
 
 Status
-ClockPublisher::start (GstClock *clock)
+ClockPublisher::start (int port, GstClock *clock)
 {
-  std::lock_guard guard (calls_);
-  {
-    std::lock_guard settings (lock_);
-    if (wanted_ == kOff)
-      return {};
-  }
-  const Status status = open (clock);
+  std::lock_guard guard (lock_);
+  if (port == kOff)
+    return {};
+  const Status status = open (port, clock);
   started_ = status.ok ();
   return status;
 }
 
 Status
-ClockPublisher::use (GstClock *clock)
+ClockPublisher::set_clock (GstClock *clock)
 {
-  std::lock_guard guard (calls_);
+  std::lock_guard guard (lock_);
   if (!started_ || clock == clock_)
     return {};
-  close (); /* a provider keeps the clock that it was made for; the port stays the same */
-  return open (clock);
+  close (); /* a provider keeps the clock that it was made with; the port stays the same */
+  return open (port_, clock);
 }
 
 void
 ClockPublisher::stop ()
 {
-  std::lock_guard guard (calls_);
+  std::lock_guard guard (lock_);
   close ();
   started_ = false;
-  std::lock_guard settings (lock_);
-  actual_ = kOff;
+  port_ = kOff;
 }

@@ -3,12 +3,12 @@
 
 #include <gst/net/gstnet.h>
 
+#include <atomic>
 #include <mutex>
 #include <rangecast/base/status.hpp>
 
-/** Gives an element's clock to other hosts, as GstNetClientClock asks for it (UDP), from READY ->
- *  PAUSED to PAUSED -> READY. Any thread; calls one after the other where the caller's state lock
- *  does not see to it. */
+/** Publishes an element's clock over UDP, for GstNetClientClock of other hosts, between start() and
+ *  stop(). Any thread. */
 class ClockPublisher {
 public:
   static constexpr int kOff = -1, kAnyPort = 0;
@@ -18,28 +18,24 @@ public:
   ClockPublisher (const ClockPublisher &) = delete;
   ClockPublisher &operator= (const ClockPublisher &) = delete;
 
-  /** For the next start. @param port  kOff, kAnyPort, or 1 .. 65535 */
-  void set_port (int port);
-  /** The one in use, else the one that was set. */
-  int port ();
-
-  /** Takes the port, and answers as soon as there is a clock.
+  /** Binds the port. Requests are answered as soon as there is a clock.
+   *  @param port  1 .. 65535 or kAnyPort; kOff: nothing happens
    *  @param clock  may be null
-   *  @return kBadValue naming the port, if another program has it */
-  rangecast::Status start (GstClock *clock);
-  /** From now on the answers are this clock's; null: none. Nothing happens before start(). */
-  rangecast::Status use (GstClock *clock);
+   *  @return kBadValue naming the port if another program has it */
+  rangecast::Status start (int port, GstClock *clock);
+  /** Answers with this clock from now on; null: does not answer. Does nothing before start(). */
+  rangecast::Status set_clock (GstClock *clock);
   void stop ();
+  /** The port in use, else kOff. */
+  [[nodiscard]] int port () const { return port_; }
 
 private:
-  rangecast::Status open (GstClock *clock);
+  rangecast::Status open (int port, GstClock *clock);
   void close ();
 
-  std::mutex calls_; /* one of start(), use() and stop() at a time */
+  std::mutex lock_; /* guards what follows: one of start(), set_clock() and stop() at a time */
   GstNetTimeProvider *provider_ = nullptr;
-  GstClock *clock_ = nullptr; /* that it tells; null: it does not answer */
+  GstClock *clock_ = nullptr; /* of provider_; null: it does not answer */
   bool started_ = false;
-
-  std::mutex lock_; /* guards the two below; taken last */
-  int wanted_ = kOff, actual_ = kOff;
+  std::atomic<int> port_ = kOff; /* written under the lock */
 };

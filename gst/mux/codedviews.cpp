@@ -32,12 +32,12 @@ CodedViews::read (GstBuffer *frame_set)
   }
   dropped_ = 0;
   Status end;
-  const auto take = [this] (
-                        gsize offset, std::span<const guint8> unit, const rangecast::UnitHeader &) {
+  const auto handle = [this] (gsize offset, std::span<const guint8> unit,
+                          const rangecast::UnitHeader &) {
     dropped_ += !add_unit (offset, unit);
     return true;
   };
-  if (!for_each_unit (frame_set, take, end))
+  if (!for_each_unit (frame_set, handle, end))
     return {StatusCode::kBadData, "cannot map a coded frame set"};
   dropped_ += !end.ok ();
   return {};
@@ -60,10 +60,10 @@ CodedViews::copy_view (GstBuffer *frame_set, int id) const
   if (pieces <= gst_buffer_get_max_memory ()) {
     for (const Range &range : ranges)
       gst_buffer_copy_into (view, frame_set, GST_BUFFER_COPY_MEMORY, range.offset, range.size);
-    gst_buffer_add_parent_buffer_meta (view, frame_set); /* its pool gets it back after us */
+    gst_buffer_add_parent_buffer_meta (view, frame_set); /* keeps the memory in its pool */
     return view;
   }
-  /* With each piece more than a buffer can hold GStreamer would copy all those before it. */
+  /* GStreamer would copy all memories with each one that is too many. */
   GstMemory *memory = gst_allocator_alloc (nullptr, size, nullptr);
   GstMapInfo map;
   if (gst_memory_map (memory, &map, GST_MAP_WRITE)) {

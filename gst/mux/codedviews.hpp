@@ -10,28 +10,28 @@
 #include <span>
 #include <vector>
 
-/** Which units of a coded frame set belong to which view. For the streaming thread; keeps its
- *  memory from one frame set to the next. */
+/** Finds the units of each view in a coded frame set. Streaming thread; keeps its memory from one
+ *  frame set to the next. */
 class CodedViews {
 public:
-  /** Reads all headers of a buffer of whole units.
-   *  @return kBadData if the buffer cannot be mapped; damaged units are no error, see dropped() */
+  /** Reads the headers of all units.
+   *  @return kBadData if the buffer cannot be mapped; damaged units are counted, see dropped() */
   rangecast::Status read (GstBuffer *frame_set);
 
-  /** Units of the last frame set that say no view, or whose header is damaged. */
+  /** Units of the frame set without a view, or with a damaged header. */
   [[nodiscard]] guint64 dropped () const { return dropped_; }
-  /** Whether view `id`, 0 to 63, has slices in it. */
+  /** Whether view `id`, 0 to 63, has slices in the frame set. */
   [[nodiscard]] bool has (int id) const { return !views_[std::size_t (id)].ranges.empty (); }
   /** Of the view's first slice, ns. */
   [[nodiscard]] GstClockTime capture_time (int id) const
   {
     return views_[std::size_t (id)].capture_time;
   }
-  /** Whether a decoder can begin at what there is of the view. */
+  /** Whether a decoder can begin with the view's slices. */
   [[nodiscard]] bool is_key (int id) { return views_[std::size_t (id)].check.is_key (); }
-  /** The units of one view. Bytes are shared, unless they lie in more pieces than a buffer can
-   * hold.
-   *  @param frame_set  what read() had
+  /** The units of one view. Memory is shared, unless the units are in more pieces than a buffer has
+   *  memories.
+   *  @param frame_set  that of read()
    *  @return transfer full; without times and flags */
   [[nodiscard]] GstBuffer *copy_view (GstBuffer *frame_set, int id) const;
 

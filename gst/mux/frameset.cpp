@@ -9,59 +9,14 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-/* So many are kept: a few are downstream, in queues. What is beyond is given back after use. */
-static constexpr std::size_t kMaxKept = 16;
-
-/* GStreamer's own allocator ends the process where memory is short. */
-static GstMemory *
-try_memory (gsize size)
-{
-  const gsize room = size + size / 2; /* sizes change with what the views show */
-  gpointer data = g_try_malloc (room);
-  return data ? gst_memory_new_wrapped (GstMemoryFlags (0), data, room, 0, size, data, g_free)
-              : nullptr;
-}
-
-GstMemory *
-RecycledMemories::acquire (gsize size)
-{
-  const auto is_free = [] (GstMemory *m) { return GST_MINI_OBJECT_REFCOUNT_VALUE (m) == 1; };
-  auto place = memories_.end ();
-  for (auto it = memories_.begin (); it != memories_.end (); ++it) {
-    if (!is_free (*it))
-      continue;
-    place = it;
-    if ((*it)->maxsize < size)
-      continue; /* replaced, unless there is one that is large enough */
-    gst_memory_resize (*it, -gssize ((*it)->offset), size);
-    return gst_memory_ref (*it);
-  }
-  GstMemory *memory = try_memory (size);
-  if (!memory)
-    return nullptr;
-  if (place != memories_.end ())
-    gst_memory_unref (std::exchange (*place, gst_memory_ref (memory)));
-  else if (memories_.size () < kMaxKept)
-    memories_.push_back (gst_memory_ref (memory));
-  return memory;
-}
-
-void
-RecycledMemories::drop ()
-{
-  for (GstMemory *memory : memories_)
-    gst_memory_unref (memory);
-  memories_.clear ();
-}
-
 void
 FrameSetJoiner::begin (guint memories, bool coded)
 {
   gst_clear_buffer (&frame_set_);
   frame_set_ = gst_buffer_new ();
   coded_ = coded;
-  const guint most = gst_buffer_get_max_memory ();
-  most_shared_ = memories <= most ? most : most - 1; /* the last one is for the others */
+  const guint max = gst_buffer_get_max_memory ();
+  max_shared_ = memories <= max ? max : max - 1; /* the last one is for the copy */
   size_ = rest_size_ = 0;
   rest_.clear ();
 }
@@ -75,11 +30,11 @@ FrameSetJoiner::add (GstBuffer *buffer)
     GST_BUFFER_FLAG_SET (frame_set_, GST_BUFFER_FLAG_DELTA_UNIT);
   const gsize size = gst_buffer_get_size (buffer);
   size_ += size;
-  /* Their order stays: what follows one that is copied is, too. */
+  /* After the first one that is copied all are, to keep their order. */
   if (rest_.empty () &&
-      gst_buffer_n_memory (frame_set_) + gst_buffer_n_memory (buffer) <= most_shared_) {
+      gst_buffer_n_memory (frame_set_) + gst_buffer_n_memory (buffer) <= max_shared_) {
     gst_buffer_copy_into (frame_set_, buffer, GST_BUFFER_COPY_MEMORY, 0, gsize (-1));
-    gst_buffer_add_parent_buffer_meta (frame_set_, buffer); /* its pool gets it back after us */
+    gst_buffer_add_parent_buffer_meta (frame_set_, buffer); /* keeps the memory in its pool */
   } else {
     rest_.push_back (buffer);
     rest_size_ += size;
@@ -87,7 +42,7 @@ FrameSetJoiner::add (GstBuffer *buffer)
   return true;
 }
 
-/* Not gst_buffer_extract(): of a buffer that cannot be mapped GStreamer 1.22 loses the memory. */
+/* Not gst_buffer_extract(): GStreamer 1.22 leaks memory of buffers that cannot be mapped. */
 static bool
 copy_bytes (GstBuffer *buffer, guint8 *&end)
 {

@@ -6,32 +6,14 @@
 #include <rangecast/base/status.hpp>
 #include <vector>
 
-/** Memories that come back. A GstBufferPool would throw away each that left in another buffer: that
- *  one still has it when its parent, the pool's buffer, goes back. Streaming thread. */
-class RecycledMemories {
-public:
-  RecycledMemories () = default;
-  ~RecycledMemories () { drop (); }
-  RecycledMemories (const RecycledMemories &) = delete;
-  RecycledMemories &operator= (const RecycledMemories &) = delete;
+#include "common/recycledmemories.hpp"
 
-  /** @return transfer full: `size` bytes that nobody else has; nullptr where memory is short */
-  GstMemory *acquire (gsize size);
-  /** Forgets all; those that are out live on. */
-  void drop ();
-
-private:
-  std::vector<GstMemory *> memories_; /* references; one that has no other is free */
-};
-
-/** Puts buffers of several streams together into one, raw ones with their GstRangeMetas.
+/** Joins buffers of several streams into one, raw ones with their GstRangeMetas.
  *
- *  A GstBuffer holds gst_buffer_get_max_memory() memories. Where all that come are no more, they
- * are shared and nothing is copied. GStreamer would make room for more by copying all that are
- * there into one memory, again with each 16th more. Here the first ones are shared, all but one of
- * what a buffer holds, and the others are copied once, into one memory that is used again.
- * Streaming thread.
- */
+ *  A GstBuffer holds gst_buffer_get_max_memory() memories. Up to that number they are shared and
+ *  nothing is copied. For more, GStreamer would copy all of them into one memory, and again with
+ *  each 16th one. Here all but one of the memories that fit are shared, and the others are copied
+ *  once, into a recycled memory. Streaming thread. */
 class FrameSetJoiner {
 public:
   FrameSetJoiner () = default;
@@ -39,17 +21,17 @@ public:
   FrameSetJoiner (const FrameSetJoiner &) = delete;
   FrameSetJoiner &operator= (const FrameSetJoiner &) = delete;
 
-  /** @param memories  of all buffers that add() will be given, for this frame set */
+  /** @param memories  number of memories of all buffers of the frame set */
   void begin (guint memories, bool coded);
-  /** Adds the views of a buffer behind those that there are.
-   *  @param buffer  transfer none: the caller keeps it until finish()
-   *  @return false, and nothing is added, if a raw one has a view that is there already */
+  /** Appends the views of a buffer.
+   *  @param buffer  transfer none; must live until finish()
+   *  @return false, and nothing is added, if it is raw and has a view-id that was added before */
   bool add (GstBuffer *buffer);
-  /** @param[out] frame_set  transfer full: without times; nullptr if it fails
-   *  @return kNoSpace where memory is short, kBadData if a buffer to be copied cannot be read */
+  /** @param[out] frame_set  transfer full, without times; nullptr on error
+   *  @return kNoSpace if memory is short, kBadData if a buffer cannot be mapped */
   rangecast::Status finish (GstBuffer *&frame_set);
 
-  /** Gives back the memory that is kept. */
+  /** Frees the recycled memories. */
   void drop () { copies_.drop (); }
 
 private:
@@ -57,9 +39,9 @@ private:
 
   GstBuffer *frame_set_ = nullptr;
   bool coded_ = false;
-  guint most_shared_ = 0;         /* memories */
-  gsize size_ = 0;                /* of all that was added, bytes */
-  gsize rest_size_ = 0;           /* of those in rest_ */
+  guint max_shared_ = 0;          /* memories */
+  gsize size_ = 0;                /* bytes of all buffers */
+  gsize rest_size_ = 0;           /* bytes of rest_ */
   std::vector<GstBuffer *> rest_; /* to be copied; kept for its memory */
   RecycledMemories copies_;
 };

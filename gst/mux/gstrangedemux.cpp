@@ -46,20 +46,25 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
 
 enum { PROP_0, PROP_STATS, PROP_STATS_INTERVAL };
 
+namespace {
+
 struct DemuxPad {
   GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
   GstCaps *caps = nullptr;
-  bool fresh = true; /* has sent no buffer yet */
+  bool fresh = true; /* no buffer was pushed yet */
 };
 
+/* Since start. */
 struct DemuxCounters {
   std::atomic<guint64> frames, buffers, gaps, dropped;
 };
 
+} // namespace
+
 struct GstRangeDemuxPrivate {
   DemuxCounters counters{};
   StatsReporter reporter; /* has locks of its own */
-  /* A bin sends a seek to all of its sinks, which all come here: once is enough. */
+  /* A bin sends a seek to each of its sinks, and all of them arrive here: one is forwarded. */
   std::atomic<guint32> last_seek = GST_SEQNUM_INVALID;
 
   /* streaming thread only */
@@ -67,9 +72,9 @@ struct GstRangeDemuxPrivate {
   GstFlowCombiner *combiner = gst_flow_combiner_new ();
   RangeInfo info;
   bool coded = false;
-  bool any_pad = false;       /* there was one since start */
-  CodedViews units;           /* of coded frame sets */
-  GstCaps *refused = nullptr; /* those that the last error was about; they come again with data */
+  bool had_pads = false;      /* since start */
+  CodedViews units;           /* of the current frame set, if coded */
+  GstCaps *refused = nullptr; /* of the last error; the caps event is repeated with data */
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
@@ -94,26 +99,26 @@ GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, GST_TYPE_R
 
 /* ---- data ---- */
 
-/* What the frame set says of all of its views: times, flags, reference times of others. */
+/* Times, flags and reference timestamps; the capture time is the view's own. */
 static void
-take_over (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
+copy_metadata (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
 {
   gst_buffer_copy_into (view, frame_set,
       GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0, gsize (-1));
   gpointer state = nullptr;
   while (GstMeta *meta = gst_buffer_iterate_meta_filtered (
              frame_set, &state, GST_REFERENCE_TIMESTAMP_META_API_TYPE)) {
-    auto told = reinterpret_cast<GstReferenceTimestampMeta *> (meta);
+    auto time = reinterpret_cast<GstReferenceTimestampMeta *> (meta);
     gst_buffer_add_reference_timestamp_meta (
-        view, told->reference, told->timestamp, told->duration);
+        view, time->reference, time->timestamp, time->duration);
   }
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (view, capture);
 }
 
-/* One view of the frame set, or nullptr if that lacks it. */
+/* One view of the frame set, or nullptr if it is missing. */
 static GstBuffer *
-view_of (GstRangeDemux *self, GstBuffer *frame_set, int id)
+make_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
 {
   GstRangeDemuxPrivate *priv = self->priv;
   GstBuffer *view = nullptr;
@@ -126,18 +131,20 @@ view_of (GstRangeDemux *self, GstBuffer *frame_set, int id)
   } else if (const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id))) {
     view = gst_range_buffer_copy_view (frame_set, meta);
     capture = meta->capture_time;
-    if (!view)
-      priv->counters.dropped++; /* its planes do not lie in the buffer */
+    if (!view) {
+      GST_DEBUG_OBJECT (self, "dropping view %d: its planes are not within the buffer", id);
+      priv->counters.dropped++;
+    }
   }
   if (!view)
     return nullptr;
-  take_over (view, frame_set, capture);
+  copy_metadata (view, frame_set, capture);
   if (priv->coded && priv->units.is_key (id))
     GST_BUFFER_FLAG_UNSET (view, GST_BUFFER_FLAG_DELTA_UNIT);
   return view;
 }
 
-/* Downstream need not wait for what will not come. */
+/* Tells downstream not to wait for the view. */
 static GstFlowReturn
 push_gap (GstRangeDemux *self, GstPad *pad, GstBuffer *frame_set)
 {
@@ -146,29 +153,32 @@ push_gap (GstRangeDemux *self, GstPad *pad, GstBuffer *frame_set)
                                     ? GST_BUFFER_DURATION (frame_set)
                                     : self->priv->info.frame_duration ();
   self->priv->counters.gaps++;
+  GST_LOG_OBJECT (
+      pad, "the frame set of %" GST_TIME_FORMAT " lacks the view", GST_TIME_ARGS (time));
   if (GST_CLOCK_TIME_IS_VALID (time))
     gst_pad_push_event (pad, gst_event_new_gap (time, duration));
   if (!gst_pad_is_linked (pad))
     return GST_FLOW_NOT_LINKED;
   const GstFlowReturn last = GST_PAD_LAST_FLOW_RETURN (pad);
-  return last == GST_FLOW_NOT_LINKED ? GST_FLOW_OK : last; /* it was not, then */
+  return last == GST_FLOW_NOT_LINKED ? GST_FLOW_OK : last; /* linked since then */
 }
 
 static GstFlowReturn
 push_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
 {
   DemuxPad &entry = self->priv->pads[id];
-  GstBuffer *view = view_of (self, frame_set, id);
+  GstBuffer *view = make_view (self, frame_set, id);
   if (!view)
     return push_gap (self, entry.pad, frame_set);
   if (entry.fresh)
     GST_BUFFER_FLAG_SET (view, GST_BUFFER_FLAG_DISCONT);
   entry.fresh = false;
   self->priv->counters.buffers++;
+  GST_LOG_OBJECT (entry.pad, "%" GST_PTR_FORMAT, view);
   return gst_pad_push (entry.pad, view);
 }
 
-/* Views that the rig does not name: nobody gets them. */
+/* Views that are not in the rig; they are dropped. */
 static guint64
 count_views_without_pad (const GstRangeDemuxPrivate *priv, GstBuffer *frame_set)
 {
@@ -188,6 +198,11 @@ static GstFlowReturn
 push_views (GstRangeDemux *self, GstBuffer *frame_set)
 {
   GstRangeDemuxPrivate *priv = self->priv;
+  const guint64 without_pad = count_views_without_pad (priv, frame_set);
+  if (without_pad > 0)
+    GST_DEBUG_OBJECT (
+        self, "dropping %" G_GUINT64_FORMAT " views that are not in the rig", without_pad);
+  priv->counters.dropped += without_pad;
   GstFlowReturn flow = GST_FLOW_OK;
   for (int id = 0; id < kMaxViews; id++) {
     if (!priv->pads[id].pad)
@@ -208,11 +223,13 @@ gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
   if (flow == GST_FLOW_OK && priv->coded) {
     flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
+    if (priv->units.dropped () > 0)
+      GST_DEBUG_OBJECT (
+          self, "dropping %" G_GUINT64_FORMAT " damaged units", priv->units.dropped ());
     priv->counters.dropped += priv->units.dropped ();
   }
   if (flow == GST_FLOW_OK) {
     priv->counters.frames++;
-    priv->counters.dropped += count_views_without_pad (priv, buffer);
     priv->reporter.passed (GST_ELEMENT (self), buffer);
     flow = push_views (self, buffer);
   }
@@ -235,7 +252,7 @@ push_stream_start (GstRangeDemux *self, GstPad *pad, int id)
   g_free (name);
 }
 
-/* Caps with the rig of one view alone; its size is the view's own. */
+/* Caps with the size and rig of one view. */
 static void
 push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
 {
@@ -243,15 +260,16 @@ push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
   const RangeInfo info = gstrange::make_info ({{view}}, all.fps_n, all.fps_d);
   GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
                                     : gstrange::make_range_caps (info);
+  GST_INFO_OBJECT (entry.pad, "%" GST_PTR_FORMAT, caps);
   if (!entry.caps || !gst_caps_is_equal (caps, entry.caps))
     gst_pad_push_event (entry.pad, gst_event_new_caps (caps));
   gst_caps_replace (&entry.caps, caps);
   gst_caps_unref (caps);
 }
 
-/* What came before this pad was there: segment, tags and others that stick. */
+/* Segment, tags and other sticky events from before the pad was added. */
 static gboolean
-hand_on (GstPad *, GstEvent **event, gpointer pad)
+forward_sticky_event (GstPad *, GstEvent **event, gpointer pad)
 {
   const GstEventType type = GST_EVENT_TYPE (*event);
   if (type != GST_EVENT_STREAM_START && type != GST_EVENT_CAPS && type != GST_EVENT_EOS)
@@ -280,14 +298,14 @@ add_pad (GstRangeDemux *self, const View &view, GstPad *sink)
   entry.fresh = true;
   g_free (name);
   gst_pad_use_fixed_caps (entry.pad);
-  gst_pad_set_event_function (entry.pad, gst_range_demux_src_event);
+  gst_pad_set_event_function (entry.pad, GST_DEBUG_FUNCPTR (gst_range_demux_src_event));
   gst_pad_set_active (entry.pad, TRUE);
   push_stream_start (self, entry.pad, view.id);
   push_caps (self, entry, view);
-  gst_pad_sticky_events_foreach (sink, hand_on, entry.pad);
+  gst_pad_sticky_events_foreach (sink, forward_sticky_event, entry.pad);
   gst_flow_combiner_add_pad (self->priv->combiner, entry.pad);
   gst_element_add_pad (GST_ELEMENT (self), entry.pad);
-  self->priv->any_pad = true;
+  self->priv->had_pads = true;
 }
 
 static void
@@ -300,9 +318,9 @@ remove_pad (GstRangeDemux *self, DemuxPad &entry)
   gst_caps_replace (&entry.caps, nullptr);
 }
 
-/* New pads come before old ones go, so that an application always has one to show. */
+/* New pads are added before old ones are removed, so that an application always has one to show. */
 static void
-follow_rig (GstRangeDemux *self, GstPad *sink)
+update_pads (GstRangeDemux *self, GstPad *sink)
 {
   GstRangeDemuxPrivate *priv = self->priv;
   bool changed = false;
@@ -326,7 +344,7 @@ follow_rig (GstRangeDemux *self, GstPad *sink)
 /* ---- events ---- */
 
 static gboolean
-take_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
+handle_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
 {
   GstRangeDemuxPrivate *priv = self->priv;
   GstCaps *caps;
@@ -334,19 +352,19 @@ take_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
   const bool coded =
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   const Status status = gstrange::parse_caps (caps, priv->info);
-  const bool told = !status.ok () && priv->refused && gst_caps_is_equal (priv->refused, caps);
+  const bool reported = !status.ok () && priv->refused && gst_caps_is_equal (priv->refused, caps);
   gst_caps_replace (&priv->refused, status.ok () ? nullptr : caps);
   gst_event_unref (event);
-  if (told || gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+  if (reported || gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   priv->coded = coded;
   priv->reporter.set_views (priv->info.rig);
-  follow_rig (self, sink);
+  update_pads (self, sink);
   return TRUE;
 }
 
 static gboolean
-take_stream_start (GstRangeDemux *self, GstEvent *event)
+handle_stream_start (GstRangeDemux *self, GstEvent *event)
 {
   GstRangeDemuxPrivate *priv = self->priv;
   if (!gst_event_parse_group_id (event, &priv->group_id))
@@ -360,29 +378,22 @@ take_stream_start (GstRangeDemux *self, GstEvent *event)
   return TRUE;
 }
 
-/* Sinks without a pad would wait for the end for ever. */
-static void
-complain_without_pads (GstRangeDemux *self)
-{
-  if (!self->priv->any_pad)
-    GST_ELEMENT_ERROR (self, STREAM, DEMUX,
-        ("The stream ended before caps with a rig, which names the views"), (nullptr));
-}
-
 static gboolean
 gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RANGE_DEMUX (parent);
   switch (GST_EVENT_TYPE (event)) {
     case GST_EVENT_CAPS:
-      return take_caps (self, sink, event);
+      return handle_caps (self, sink, event);
     case GST_EVENT_STREAM_START:
-      return take_stream_start (self, event);
+      return handle_stream_start (self, event);
     case GST_EVENT_FLUSH_STOP:
       gst_flow_combiner_reset (self->priv->combiner);
       break;
     case GST_EVENT_EOS:
-      complain_without_pads (self);
+      if (!self->priv->had_pads) /* sinks behind it would wait for EOS for ever */
+        GST_ELEMENT_ERROR (self, STREAM, DEMUX,
+            ("The stream ended before caps with a rig, which names the views"), (nullptr));
       self->priv->reporter.finish ();
       break;
     default:
@@ -413,7 +424,7 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
   }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_range_demux_parent_class)->change_state (element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* pads are inactive: nobody streams */
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* no streaming thread runs any more */
     priv->reporter.stop ();
     for (DemuxPad &entry : priv->pads)
       if (entry.pad)
@@ -421,7 +432,7 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
     gst_flow_combiner_reset (priv->combiner);
     priv->info = {};
     gst_caps_replace (&priv->refused, nullptr);
-    priv->any_pad = false;
+    priv->had_pads = false;
     priv->group_id = GST_GROUP_ID_INVALID;
     priv->last_seek = GST_SEQNUM_INVALID;
   }
@@ -469,8 +480,8 @@ gst_range_demux_init (GstRangeDemux *self)
 {
   self->priv = new GstRangeDemuxPrivate;
   GstPad *sink = gst_pad_new_from_static_template (&sink_template, "sink");
-  gst_pad_set_chain_function (sink, gst_range_demux_chain);
-  gst_pad_set_event_function (sink, gst_range_demux_sink_event);
+  gst_pad_set_chain_function (sink, GST_DEBUG_FUNCPTR (gst_range_demux_chain));
+  gst_pad_set_event_function (sink, GST_DEBUG_FUNCPTR (gst_range_demux_sink_event));
   gst_element_add_pad (GST_ELEMENT (self), sink);
 }
 
@@ -494,7 +505,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   gst_element_class_set_static_metadata (element_class, "Range demultiplexer", "Demuxer/Video",
       "Splits a stream of range frame sets into one stream per view", "gst-rangecast");
 
-  element_class->change_state = gst_range_demux_change_state;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_demux_change_state);
 
   GST_DEBUG_CATEGORY_INIT (gst_range_demux_debug, "rangedemux", 0, "Range demultiplexer");
 }

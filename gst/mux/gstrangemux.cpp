@@ -21,24 +21,115 @@
  *
  * Since: 0.1
  */
+/* What happens to a buffer, in the order of this file; all of it in aggregate(), in the streaming
+ * thread:
+ *  1. It waits at its pad: WaitingBuffers.
+ *  2. Its stream is chosen for frame sets, or left out: update_streams(), negotiate().
+ *  3. Its capture time is compared with those of the other streams: compare_clocks() if live,
+ *     compare_recordings() if not.
+ *  4. It is dropped if no frame set can contain it, because it is late, out of sync or of a stream
+ *     that is left out: drop_unusable().
+ *  5. It waits for buffers of the other streams, until the deadline; then it is joined with those
+ *     within max-skew of the oldest one, and pushed: join_matching(), push_frame_set().
+ * make_frame_set() does these steps in order, and decides whether to wait.
+ *
+ * Locking: the private lock guards what application threads read; it is never held across a push,
+ * message or call into GstAggregator. The clock publisher and the statistics have their own. */
 #include "gstrangemux.h"
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <mutex>
 #include <rangecast/rigfile/rig_file.hpp>
+#include <string>
+#include <vector>
 
+#include "clockconsensus.hpp"
+#include "clockpublisher.hpp"
 #include "common/properties.hpp"
-#include "rangemuxprivate.hpp"
+#include "common/statsreporter.hpp"
+#include "frameset.hpp"
+#include "recordings.hpp"
+#include "rigcheck.hpp"
+#include "streams.hpp"
 
 using rangecast::Status;
+using rangecast::StatusCode;
 
-GST_DEBUG_CATEGORY (gst_range_mux_debug);
+GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
-enum { PROP_0, PROP_MAX_SKEW, PROP_CLOCK_PORT, PROP_RIG, PROP_STATS, PROP_STATS_INTERVAL };
+enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+
+namespace {
+
+/* States that last as long are reported; the backlog of a host that paused is not. */
+constexpr GstClockTime kMinReportTime = GST_SECOND;
+/* Of the capture times in a frame set, if the frame rate is unknown. */
+constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
+
+struct Settings {
+  GstClockTime max_skew = 0; /* 0: half a frame period */
+  int clock_port = ClockPublisher::kOff;
+  std::string rig_file;
+};
+
+/* Frame sets since start: pushed, and of these with a buffer of every pad. */
+struct Counters {
+  guint64 frames = 0, complete = 0;
+};
+
+/* 1. The buffers at the pads. Keeps its memory from one frame set to the next. */
+class WaitingBuffers {
+public:
+  WaitingBuffers () = default;
+  ~WaitingBuffers () { release (); }
+  WaitingBuffers (const WaitingBuffers &) = delete;
+
+  void collect (const MuxStreams &streams, bool live);
+  void release ();
+
+  std::vector<WaitingBuffer> list, gaps;
+  int missing = 0, ended = 0; /* pads without a buffer */
+};
+
+} // namespace
+
+struct GstRangeMuxPrivate {
+  std::mutex lock; /* guards what follows, and members of MuxStream */
+  Settings settings;
+  MuxStreams streams; /* by time of request */
+  Counters counters;
+
+  /* any thread; have locks of their own */
+  ClockPublisher clock;
+  StatsReporter reporter;
+  std::atomic<bool> caps_dirty = true; /* choose_streams() is to run again */
+
+  /* streaming thread only; vectors are kept for their memory */
+  bool live = false;
+  rangecast::Rig rig;         /* of settings.rig_file; empty: any */
+  MuxStreams current_streams; /* see CurrentStreams */
+  WaitingBuffers waiting;
+  ClockConsensus consensus;
+  std::vector<ClockConsensus::Stream> votes;
+  std::vector<MuxStream *> voters; /* whose votes they are */
+  Recordings recordings;
+  FrameSetJoiner joiner;
+  GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
+  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
+  FrameTimes last; /* of the last frame set */
+};
+
+struct _GstRangeMux {
+  GstAggregator parent;
+  GstRangeMuxPrivate *priv;
+};
 
 #define MUX_CAPS                                                                                   \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
@@ -52,48 +143,141 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRangeMux, gst_range_mux, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (rangemux, "rangemux", GST_RANK_NONE, GST_TYPE_RANGE_MUX)
 
-static MuxPads
-current_pads (GstRangeMux *self)
-{
-  std::lock_guard guard (self->priv->lock);
-  return self->priv->pads;
-}
+/* ---- 1. buffers at the pads ---- */
 
-/* The pads that there are, while it lives. For the streaming thread: allocates nothing. */
-class PadsNow {
+namespace {
+
+/* References to the streams of all pads. For the streaming thread: allocates nothing. */
+class CurrentStreams {
 public:
-  explicit PadsNow (GstRangeMux *self) : pads_ (self->priv->pads_now)
+  explicit CurrentStreams (GstRangeMuxPrivate *priv) : streams_ (priv->current_streams)
   {
-    std::lock_guard guard (self->priv->lock);
-    pads_ = self->priv->pads;
+    std::lock_guard guard (priv->lock);
+    streams_ = priv->streams;
   }
-  ~PadsNow () { pads_.clear (); } /* those that were released may go */
-  PadsNow (const PadsNow &) = delete;
-  const MuxPads &operator* () const { return pads_; }
+  ~CurrentStreams () { streams_.clear (); } /* frees those whose pads were released */
+  CurrentStreams (const CurrentStreams &) = delete;
+  const MuxStreams &operator* () const { return streams_; }
 
 private:
-  MuxPads &pads_;
+  MuxStreams &streams_;
 };
 
-/* ---- caps: the union of the rigs of the streams that go together ---- */
+void
+WaitingBuffers::collect (const MuxStreams &streams, bool live)
+{
+  release ();
+  for (const auto &stream : streams) {
+    GstAggregatorPad *pad = stream->pad;
+    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
+    if (!buffer) {
+      (gst_aggregator_pad_is_eos (pad) ? ended : missing)++;
+      continue;
+    }
+    /* Capture times from the network may be any number; sums of this one and a few seconds do not
+     * overflow. */
+    const GstClockTime capture =
+        std::min<GstClockTime> (gstrange::capture_time_of (pad, buffer, live), G_MAXINT64);
+    const GstClockTime running = gstrange::running_time_of (pad, buffer);
+    const bool gap = gstrange::is_gap (buffer);
+    (gap ? gaps : list).push_back ({stream.get (), buffer, capture, running});
+    if (!gap && GST_CLOCK_TIME_IS_VALID (running)) {
+      stream->shift = GST_CLOCK_DIFF (running, capture);
+      stream->shift_known = true;
+    }
+  }
+}
+
+void
+WaitingBuffers::release ()
+{
+  for (auto *buffers : {&list, &gaps}) {
+    for (const WaitingBuffer &w : *buffers)
+      gst_buffer_unref (w.buffer);
+    buffers->clear ();
+  }
+  missing = ended = 0;
+}
+
+} // namespace
+
+/* ---- 2. which streams make up frame sets; caps with the union of their rigs ---- */
+
+/* Sets a stream's state, and reports it if it is news that lasts.
+ * @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
+static void
+set_state (GstRangeMux *self, MuxStream &stream, StreamState state, GstClockTime running)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  if (state != stream.state) {
+    std::lock_guard guard (priv->lock);
+    stream.state = state;
+    stream.since = running;
+  }
+  if (state == stream.reported)
+    return;
+  const bool lasts = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (stream.since) &&
+                     running >= stream.since + kMinReportTime;
+  if (!lasts && (state == StreamState::kLate || state == StreamState::kOutOfSync))
+    return;
+  GST_INFO_OBJECT (self, "%s is %s", stream.title ().c_str (), name_of (state));
+  GstClockTimeDiff offset = stream.ahead;
+  if (priv->live)
+    offset = stream.offset_known ? stream.offset - priv->consensus.reference () : 0;
+  report_state (GST_ELEMENT (self), stream, state, offset);
+}
+
+/* Finds which streams are silent: those without a buffer whose last one is much older than the
+ * oldest buffer that waits, so that a stream whose times jump silences no other. The streams are
+ * chosen again when one becomes silent or returns: one that clashed with it may take its place. */
+static void
+update_streams (GstRangeMux *self, const MuxStreams &streams)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  GstClockTime now = GST_CLOCK_TIME_NONE; /* the greatest number there is */
+  for (const auto &stream : streams)
+    stream->waits = false;
+  for (const auto *buffers : {&priv->waiting.list, &priv->waiting.gaps})
+    for (const WaitingBuffer &w : *buffers) {
+      w.stream->waits = true;
+      if (!GST_CLOCK_TIME_IS_VALID (w.running))
+        continue;
+      w.stream->seen = w.running;
+      now = std::min (now, w.running);
+    }
+  priv->now = now;
+  if (!GST_CLOCK_TIME_IS_VALID (now))
+    return;
+  for (const auto &stream : streams) {
+    if (!GST_CLOCK_TIME_IS_VALID (stream->seen))
+      stream->seen = now; /* it has not begun yet */
+    const bool alive = stream->waits || now <= stream->seen || now - stream->seen <= kSilentAfter;
+    if (alive != stream->alive)
+      priv->caps_dirty = true;
+    stream->alive = alive;
+    if (!alive && priv->live && !gst_aggregator_pad_is_eos (stream->pad))
+      set_state (self, *stream, StreamState::kSilent, now);
+  }
+}
 
 static GstFlowReturn
-negotiate (GstRangeMux *self, const MuxPads &pads)
+negotiate (GstRangeMux *self, const MuxStreams &streams)
 {
   GstRangeMuxPrivate *priv = self->priv;
   MuxFormat format;
-  const Status status = choose_streams (pads, !priv->live, format);
+  const Status status = choose_streams (streams, !priv->live, format);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  for (const auto &entry : pads)
-    if (entry->alive && (!entry->other_rig.ok () || !entry->clash.ok ()))
-      set_state (
-          self, *entry, entry->clash.ok () ? MuxState::kOtherRig : MuxState::kClash, priv->now);
+  for (const auto &stream : streams)
+    if (stream->alive && (!stream->other_rig.ok () || !stream->clash.ok ()))
+      set_state (self, *stream, stream->clash.ok () ? StreamState::kOtherRig : StreamState::kClash,
+          priv->now);
   if (format.info.views () == 0)
-    return GST_FLOW_OK; /* nobody is left */
+    return GST_FLOW_OK; /* no stream is left */
   GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
                                : gstrange::make_range_caps (format.info);
+  GST_INFO_OBJECT (self, "%d views: %" GST_PTR_FORMAT, format.info.views (), caps);
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   priv->frame_duration = format.info.frame_duration ();
@@ -101,33 +285,353 @@ negotiate (GstRangeMux *self, const MuxPads &pads)
   return GST_FLOW_OK;
 }
 
-static GstFlowReturn
-gst_range_mux_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+/* ---- 3. streams with capture times of the same clock, recordings of the same time ---- */
+
+/* Live: compares offsets of capture times from the pipeline clock, which takes no buffers of other
+ * streams to wait for. */
+static void
+compare_clocks (GstRangeMux *self, const MuxStreams &streams)
 {
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set before a frame set, see negotiate() */
+  GstRangeMuxPrivate *priv = self->priv;
+  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
+  for (const WaitingBuffer &w : priv->waiting.list)
+    if (GST_CLOCK_TIME_IS_VALID (w.running)) {
+      std::lock_guard guard (priv->lock);
+      w.stream->offset = ClockConsensus::offset_of (w.capture, base + w.running);
+      w.stream->offset_known = true;
+    }
+  priv->votes.clear ();
+  priv->voters.clear ();
+  for (const auto &stream : streams)
+    if (stream->chosen && stream->alive && stream->offset_known) {
+      priv->votes.push_back ({stream->offset});
+      priv->voters.push_back (stream.get ());
+    }
+  if (priv->consensus.update (priv->votes)) {
+    GST_DEBUG_OBJECT (self, "most streams have another clock now: its offset is %" GST_STIME_FORMAT,
+        GST_STIME_ARGS (priv->consensus.reference ()));
+    priv->last.capture = GST_CLOCK_TIME_NONE; /* a time of the other clock */
+  }
+  for (std::size_t i = 0; i < priv->voters.size (); i++)
+    priv->voters[i]->in_sync = priv->votes[i].in_sync;
 }
 
+/* Not live: compares capture times. */
+static void
+compare_recordings (GstRangeMux *self)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  if (priv->recordings.compare (priv->waiting.list, priv->last.capture)) {
+    GST_DEBUG_OBJECT (self, "the recordings have begun again");
+    priv->last.capture = GST_CLOCK_TIME_NONE;
+  }
+  if (const WaitingBuffer *apart = Recordings::find_apart (priv->waiting.list);
+      apart && !apart->stream->apart_reported) {
+    apart->stream->apart_reported = true;
+    set_state (self, *apart->stream, StreamState::kApart, apart->running);
+  }
+}
+
+/* Not live: reports recordings that have ended without a frame set in common with another. */
+static void
+report_unmatched (GstRangeMux *self, const MuxStreams &streams)
+{
+  while (MuxStream *unmatched = Recordings::find_unmatched (streams)) {
+    unmatched->apart_reported = true;
+    unmatched->ahead = 0;
+    set_state (self, *unmatched, StreamState::kApart, GST_CLOCK_TIME_NONE);
+  }
+}
+
+/* ---- 4. buffers that no frame set can contain ---- */
+
+/* Maximum difference of the capture times of a frame set, ns. */
+static GstClockTime
+matching_tolerance (GstRangeMuxPrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  if (priv->settings.max_skew > 0)
+    return priv->settings.max_skew;
+  return GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration / 2
+                                                        : kDefaultTolerance;
+}
+
+/* Drops gaps that end before the other streams' buffers; until then their streams are not waited
+ * for. Without the running times of live streams the end of a gap in capture time is computed from
+ * the stream's last buffer.
+ * @return whether any was dropped */
+static bool
+drop_past_gaps (GstRangeMux *self, GstClockTime tolerance, bool timeout)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  const WaitingBuffers &waiting = priv->waiting;
+  if (waiting.list.empty () && waiting.missing > 0 && !timeout)
+    return false;
+  GstClockTime running = GST_CLOCK_TIME_NONE, capture = GST_CLOCK_TIME_NONE;
+  for (const WaitingBuffer &w : waiting.list) {
+    running = std::min (running, w.running);
+    capture = std::min (capture, w.capture);
+  }
+  bool any = false;
+  for (const WaitingBuffer &gap : waiting.gaps) {
+    const GstClockTime end = gstrange::gap_end (gap.running, gap.buffer, tolerance);
+    const bool by_capture = !priv->live && gap.stream->shift_known && GST_CLOCK_TIME_IS_VALID (end);
+    const bool past =
+        by_capture ? GST_CLOCK_DIFF (end, capture) > gap.stream->shift : running > end;
+    if (!waiting.list.empty () && !past)
+      continue;
+    GST_LOG_OBJECT (gap.stream->pad, "gap until %" GST_TIME_FORMAT, GST_TIME_ARGS (end));
+    gst_aggregator_pad_drop_buffer (gap.stream->pad);
+    any = true;
+  }
+  return any;
+}
+
+/* Whether a frame set can contain a buffer, and why not. */
+static StreamState
+classify_buffer (const GstRangeMuxPrivate *priv, const WaitingBuffer &w, GstClockTime tolerance)
+{
+  if (!w.stream->chosen)
+    return w.stream->other_rig.ok () ? StreamState::kClash : StreamState::kOtherRig;
+  if (!w.stream->in_sync)
+    return StreamState::kOutOfSync;
+  const bool late =
+      GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
+  return late ? StreamState::kLate : StreamState::kIn;
+}
+
+/* Here late views are dropped. @return whether any was dropped */
+static bool
+drop_unusable (GstRangeMux *self, GstClockTime tolerance)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  bool any = false;
+  for (const WaitingBuffer &w : priv->waiting.list) {
+    MuxStream &stream = *w.stream;
+    const StreamState state = classify_buffer (priv, w, tolerance);
+    if (state == StreamState::kIn)
+      continue;
+    GST_DEBUG_OBJECT (stream.pad,
+        "dropping a buffer: %s; capture time %" GST_TIME_FORMAT
+        ", last frame set %" GST_TIME_FORMAT,
+        name_of (state), GST_TIME_ARGS (w.capture), GST_TIME_ARGS (priv->last.capture));
+    any = true;
+    gst_aggregator_pad_drop_buffer (stream.pad);
+    {
+      std::lock_guard guard (priv->lock);
+      stream.received++;
+      (state == StreamState::kLate           ? stream.late
+          : state == StreamState::kOutOfSync ? stream.out_of_sync
+                                             : stream.left_out)++;
+    }
+    set_state (self, stream, state, w.running);
+  }
+  return any;
+}
+
+/* ---- 5. one frame set: buffers are joined and pushed ---- */
+
+namespace {
+/* The buffers of one frame set. */
+struct Match {
+  std::size_t streams = 0;
+  FrameTimes times; /* running time: of the oldest buffer by that */
+  double speed = 1; /* of that one, see speed_of() */
+};
+} // namespace
+
+/* How much faster than it was captured a buffer is played; not 0. */
+static double
+speed_of (const WaitingBuffer &w)
+{
+  GST_OBJECT_LOCK (w.stream->pad);
+  const double rate = std::abs (w.stream->pad->segment.rate);
+  GST_OBJECT_UNLOCK (w.stream->pad);
+  /* Without a capture time, its running time takes its place, which is in playback time already. */
+  const bool has_capture_time =
+      rate == 1 || GST_CLOCK_TIME_IS_VALID (gst_range_buffer_get_capture_time (w.buffer));
+  return has_capture_time ? rate : 1;
+}
+
+/* Takes the buffers from their pads whose capture time is within the tolerance of the oldest one,
+ * `first`, and gives them to the joiner. */
+static Match
+join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  const auto matches = [&] (const WaitingBuffer &w) { return w.capture <= first + tolerance; };
+  guint memories = 0;
+  Match match;
+  match.times.capture = first;
+  for (const WaitingBuffer &w : priv->waiting.list)
+    if (matches (w)) {
+      memories += gst_buffer_n_memory (w.buffer);
+      match.streams++;
+    }
+  priv->joiner.begin (memories, priv->waiting.list.front ().stream->coded);
+  for (const WaitingBuffer &w : priv->waiting.list) {
+    if (!matches (w))
+      continue;
+    MuxStream &stream = *w.stream;
+    if (w.running < match.times.running) { /* NONE is the greatest number there is */
+      match.times.running = w.running;
+      match.speed = speed_of (w);
+    }
+    gst_aggregator_pad_drop_buffer (stream.pad); /* priv->waiting has a reference */
+    if (!priv->joiner.add (w.buffer)) {
+      GST_DEBUG_OBJECT (stream.pad, "dropping a buffer with the view-id of another pad");
+      if (!stream.clash_reported)
+        gst_range_post_warning (GST_ELEMENT (self),
+            {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (stream.pad)) +
+                                        ": its buffers have view-ids of another pad; dropped"});
+      stream.clash_reported = true;
+    }
+    stream.matched_others = stream.matched_others || match.streams > 1;
+    set_state (self, stream, StreamState::kIn, w.running);
+    std::lock_guard guard (priv->lock);
+    stream.received++;
+    stream.matched++;
+    stream.last_skew = GST_CLOCK_DIFF (first, w.capture);
+  }
+  return match;
+}
+
+/* Running times of live streams can be compared; those of recordings follow the capture times. */
+static GstClockTime
+running_time_of (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
+{
+  if (!priv->live)
+    return running_time_after (priv->last, match.times, match.speed,
+        GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
+  if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
+    return std::max (match.times.running, priv->last.running); /* never backwards */
+  return match.times.running;
+}
+
+/* @param streams  of a complete frame set */
+static GstFlowReturn
+push_frame_set (GstRangeMux *self, std::size_t streams, GstClockTime tolerance)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  GstClockTime first = GST_CLOCK_TIME_NONE; /* the greatest number there is */
+  for (const WaitingBuffer &w : priv->waiting.list)
+    first = std::min (first, w.capture);
+  const Match match = join_matching (self, first, tolerance);
+  GstBuffer *frame_set = nullptr;
+  const Status status = priv->joiner.finish (frame_set);
+  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
+      flow != GST_FLOW_OK)
+    return flow;
+  priv->last = {first, running_time_of (priv, match, tolerance)};
+  gstrange::stamp (
+      GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
+  GST_LOG_OBJECT (
+      self, "frame set of %zu of %zu streams: %" GST_PTR_FORMAT, match.streams, streams, frame_set);
+  {
+    std::lock_guard guard (priv->lock);
+    priv->counters.frames++;
+    priv->counters.complete += match.streams == streams;
+  }
+  priv->reporter.passed (GST_ELEMENT (self), frame_set);
+  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
+}
+
+/* ---- all steps in order; wait or go ---- */
+
+static GstFlowReturn
+make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  const WaitingBuffers &waiting = priv->waiting;
+  if (!priv->live && waiting.ended > 0)
+    report_unmatched (self, streams);
+  if (waiting.list.empty () && waiting.gaps.empty ()) {
+    if (waiting.missing > 0 || waiting.ended == 0)
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    priv->reporter.finish ();
+    return GST_FLOW_EOS;
+  }
+  update_streams (self, streams);
+  if (priv->caps_dirty.exchange (false))
+    if (const GstFlowReturn flow = negotiate (self, streams); flow != GST_FLOW_OK)
+      return flow;
+  if (priv->live)
+    compare_clocks (self, streams);
+  else
+    compare_recordings (self);
+  const GstClockTime tolerance = matching_tolerance (priv);
+  if (drop_past_gaps (self, tolerance, timeout) || drop_unusable (self, tolerance))
+    return GST_AGGREGATOR_FLOW_NEED_DATA; /* the buffers behind them may be at their pads already */
+  if (waiting.list.empty () || (waiting.missing > 0 && !timeout)) {
+    GST_LOG_OBJECT (self, "waiting for %d streams", waiting.missing);
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  return push_frame_set (self, streams.size (), tolerance);
+}
+
+static GstFlowReturn
+gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
+{
+  auto self = GST_RANGE_MUX (aggregator);
+  GstRangeMuxPrivate *priv = self->priv;
+  const CurrentStreams streams (priv);
+  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  priv->waiting.collect (*streams, priv->live);
+  const GstFlowReturn flow = make_frame_set (self, *streams, timeout);
+  priv->waiting.release ();
+  return flow;
+}
+
+/* The deadline counts from the oldest buffer that waits; without one there is no deadline. */
+static GstClockTime
+gst_range_mux_get_next_time (GstAggregator *aggregator)
+{
+  GstClockTime oldest = GST_CLOCK_TIME_NONE;
+  const CurrentStreams streams (GST_RANGE_MUX (aggregator)->priv);
+  for (const auto &stream : *streams) {
+    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (stream->pad);
+    if (!buffer)
+      continue;
+    if (!gstrange::is_gap (buffer))
+      oldest = std::min (oldest, gstrange::running_time_of (stream->pad, buffer));
+    gst_buffer_unref (buffer);
+  }
+  return oldest;
+}
+
+/* ---- caps of the streams, flush ---- */
+
 static gboolean
-take_caps (GstRangeMux *self, MuxPad &entry, GstCaps *caps)
+handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
 {
   gstrange::RangeInfo info;
   Status status = gstrange::parse_caps (caps, info);
   if (!status.ok ())
-    status = {
-        status.code (), "pad " + std::string (GST_PAD_NAME (entry.pad)) + ": " + status.message ()};
+    status = {status.code (),
+        "pad " + std::string (GST_PAD_NAME (stream.pad)) + ": " + status.message ()};
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
+  GST_INFO_OBJECT (stream.pad, "%" GST_PTR_FORMAT, caps);
   const rangecast::Rig &expected = self->priv->rig;
-  entry.other_rig = expected.views.empty () ? Status{} : check_rig (info.rig, expected);
-  entry.clash = {};
-  entry.coded =
+  stream.other_rig = expected.views.empty () ? Status{} : check_rig (info.rig, expected);
+  stream.clash = {};
+  stream.coded =
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
-  entry.info = std::move (info);
-  entry.has_caps = true;
+  stream.info = std::move (info);
+  stream.has_caps = true;
   self->priv->caps_dirty = true;
   std::lock_guard guard (self->priv->lock);
-  entry.views = view_bits (entry.info.rig);
+  stream.views = view_bits (stream.info.rig);
   return TRUE;
+}
+
+static std::shared_ptr<MuxStream>
+find_stream (GstRangeMuxPrivate *priv, GstAggregatorPad *pad)
+{
+  std::lock_guard guard (priv->lock);
+  const auto found =
+      std::ranges::find (priv->streams, pad, [] (const auto &stream) { return stream->pad; });
+  return found == priv->streams.end () ? nullptr : *found;
 }
 
 static gboolean
@@ -137,81 +641,19 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
-    for (const auto &entry : current_pads (self))
-      if (entry->pad == pad && !take_caps (self, *entry, caps)) {
-        gst_event_unref (event);
-        return FALSE;
-      }
+    const auto stream = find_stream (self->priv, pad);
+    if (stream && !handle_caps (self, *stream, caps)) {
+      gst_event_unref (event);
+      return FALSE;
+    }
   }
   return GST_AGGREGATOR_CLASS (gst_range_mux_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* ---- frame sets ---- */
-
 static GstFlowReturn
-aggregate_waiting (
-    GstRangeMux *self, const MuxPads &pads, const WaitingBuffers &waiting, bool timeout)
+gst_range_mux_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 {
-  GstRangeMuxPrivate *priv = self->priv;
-  if (!priv->live && waiting.ended > 0)
-    tell_strangers (self, pads);
-  if (waiting.list.empty () && waiting.gaps.empty ()) {
-    if (waiting.missing > 0 || waiting.ended == 0)
-      return GST_AGGREGATOR_FLOW_NEED_DATA;
-    priv->reporter.finish ();
-    return GST_FLOW_EOS;
-  }
-  note_arrivals (self, pads, waiting);
-  if (priv->caps_dirty.exchange (false)) {
-    const GstFlowReturn flow = negotiate (self, pads);
-    if (flow != GST_FLOW_OK)
-      return flow;
-  }
-  if (priv->live)
-    judge_steps (self, pads, waiting);
-  else
-    judge_recordings (self, waiting);
-  const GstClockTime tolerance = matching_tolerance (priv);
-  if (waiting.drop_past_gaps (priv->live, tolerance, timeout) ||
-      drop_useless (self, waiting, tolerance))
-    return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
-  if (waiting.list.empty () || (waiting.missing > 0 && !timeout))
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
-  GstClockTime first = GST_CLOCK_TIME_NONE;
-  for (const Waiting &w : waiting.list)
-    first = std::min (first, w.capture); /* NONE is the greatest number there is */
-  return push_frame_set (self, waiting, first, tolerance, pads.size ());
-}
-
-static GstFlowReturn
-gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
-{
-  auto self = GST_RANGE_MUX (aggregator);
-  GstRangeMuxPrivate *priv = self->priv;
-  const PadsNow pads (self);
-  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  priv->waiting.take (*pads, priv->live);
-  const GstFlowReturn flow = aggregate_waiting (self, *pads, priv->waiting, timeout);
-  priv->waiting.release ();
-  return flow;
-}
-
-/* The deadline counts from the oldest buffer that waits. Without one there is nothing to wait for,
- * and so no deadline. */
-static GstClockTime
-gst_range_mux_get_next_time (GstAggregator *aggregator)
-{
-  GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  const PadsNow pads (GST_RANGE_MUX (aggregator));
-  for (const auto &entry : *pads) {
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (entry->pad);
-    if (!buffer)
-      continue;
-    if (!gstrange::is_gap (buffer))
-      oldest = std::min (oldest, gstrange::running_time_of (entry->pad, buffer));
-    gst_buffer_unref (buffer);
-  }
-  return oldest;
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets them */
 }
 
 static GstFlowReturn
@@ -220,10 +662,11 @@ gst_range_mux_flush (GstAggregator *aggregator)
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->last = {};
   priv->now = GST_CLOCK_TIME_NONE;
-  priv->steps.reset ();
-  for (const auto &entry : current_pads (GST_RANGE_MUX (aggregator))) {
-    entry->offset_known = entry->shift_known = false;
-    entry->seen = GST_CLOCK_TIME_NONE;
+  priv->consensus.reset ();
+  std::lock_guard guard (priv->lock);
+  for (const auto &stream : priv->streams) {
+    stream->offset_known = stream->shift_known = false;
+    stream->seen = GST_CLOCK_TIME_NONE;
   }
   return GST_FLOW_OK;
 }
@@ -239,7 +682,7 @@ gst_range_mux_request_new_pad (
                     ->request_new_pad (element, pad_template, name, caps);
   if (pad) {
     std::lock_guard guard (self->priv->lock);
-    self->priv->pads.push_back (std::make_shared<MuxPad> (GST_AGGREGATOR_PAD (pad)));
+    self->priv->streams.push_back (std::make_shared<MuxStream> (GST_AGGREGATOR_PAD (pad)));
   }
   return pad;
 }
@@ -251,114 +694,163 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
   {
     std::lock_guard guard (self->priv->lock);
     std::erase_if (
-        self->priv->pads, [&] (const auto &entry) { return GST_PAD (entry->pad) == pad; });
+        self->priv->streams, [&] (const auto &stream) { return GST_PAD (stream->pad) == pad; });
   }
-  self->priv->caps_dirty = true; /* one less; one that clashed with it may have its place */
+  self->priv->caps_dirty = true; /* a stream that clashed with it may take its place */
   GST_ELEMENT_CLASS (gst_range_mux_parent_class)->release_pad (element, pad);
 }
 
-/* ---- the clock, for other hosts ---- */
+/* ---- the clock for other hosts ---- */
 
-/* Posts its error itself. */
 static bool
-report_clock (GstRangeMux *self, const Status &status)
+report_clock_error (GstRangeMux *self, const Status &status)
 {
-  if (status.ok ())
-    return true;
-  GST_ELEMENT_ERROR (self, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
-  return false;
+  if (!status.ok ())
+    GST_ELEMENT_ERROR (self, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
+  return status.ok ();
 }
 
 static bool
-publish_clock (GstRangeMux *self)
+publish_clock (GstRangeMux *self, int port)
 {
   GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
-  const Status status = self->priv->clock.start (clock);
+  const Status status = self->priv->clock.start (port, clock);
   gst_clear_object (&clock);
   if (self->priv->clock.port () != ClockPublisher::kOff)
     g_object_notify (G_OBJECT (self), "clock-port"); /* 0 has become a number */
-  return report_clock (self, status);
+  return report_clock_error (self, status);
 }
 
-/* The pipeline chooses its clock on the way to PLAYING, and perhaps another one later. */
+/* The pipeline selects its clock on the way to PLAYING, and may select another one later. */
 static gboolean
 gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 {
   auto self = GST_RANGE_MUX (element);
-  report_clock (self, self->priv->clock.use (clock));
+  report_clock_error (self, self->priv->clock.set_clock (clock));
   return GST_ELEMENT_CLASS (gst_range_mux_parent_class)->set_clock (element, clock);
 }
 
-/* ---- life ---- */
+/* ---- statistics, under the lock ---- */
 
+static GstStructure *
+make_stats (const GstRangeMuxPrivate *priv)
+{
+  const Counters &counters = priv->counters;
+  guint64 late = 0, out_of_sync = 0, left_out = 0;
+  for (const auto &stream : priv->streams) {
+    late += stream->late;
+    left_out += stream->left_out;
+    out_of_sync += stream->out_of_sync;
+  }
+  GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
+      counters.frames, "complete", G_TYPE_UINT64, counters.complete, "incomplete", G_TYPE_UINT64,
+      counters.frames - counters.complete, "dropped-late", G_TYPE_UINT64, late, "out-of-step",
+      G_TYPE_UINT64, out_of_sync, "left-out", G_TYPE_UINT64, left_out, nullptr);
+  for (const auto &s : priv->streams) {
+    GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, s->received,
+        "matched", G_TYPE_UINT64, s->matched, "late", G_TYPE_UINT64, s->late, "out-of-step",
+        G_TYPE_UINT64, s->out_of_sync, "left-out", G_TYPE_UINT64, s->left_out, "skew", G_TYPE_INT64,
+        gint64 (s->last_skew), "state", G_TYPE_STRING, name_of (s->state), "offset", G_TYPE_INT64,
+        gint64 (s->offset), nullptr);
+    gst_structure_set (stats, GST_PAD_NAME (s->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
+    gst_structure_free (of_pad);
+  }
+  return stats;
+}
+
+/* Of a pad, frame sets without its stream are lost, also those before its first buffer. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (element)->priv;
   std::lock_guard guard (priv->lock);
-  return rows_of (priv->pads, priv->sent);
+  const Counters &counters = priv->counters;
+  std::vector<StatsRow> rows (1);
+  guint64 late = 0;
+  for (const auto &stream : priv->streams) {
+    late += stream->late + stream->out_of_sync;
+    rows.push_back ({.pad = GST_PAD_NAME (stream->pad),
+        .counters = {.frames = stream->received,
+            .lost = counters.frames - std::min (counters.frames, stream->matched),
+            .late = stream->late + stream->out_of_sync},
+        .views = stream->views});
+  }
+  rows[0].counters = {
+      .frames = counters.frames, .lost = counters.frames - counters.complete, .late = late};
+  return rows;
+}
+
+/* ---- states, properties ---- */
+
+static gboolean
+gst_range_mux_start (GstAggregator *aggregator)
+{
+  auto self = GST_RANGE_MUX (aggregator);
+  GstRangeMuxPrivate *priv = self->priv;
+  Settings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  priv->caps_dirty = true;
+  priv->frame_duration = priv->now = GST_CLOCK_TIME_NONE;
+  priv->last = {};
+  priv->consensus.reset ();
+  priv->rig = {};
+  if (!settings.rig_file.empty ())
+    if (Status s = rangecast::load_rig (settings.rig_file, priv->rig);
+        gst_range_flow_return (GST_ELEMENT (self), s) != GST_FLOW_OK)
+      return FALSE;
+  if (!publish_clock (self, settings.clock_port))
+    return FALSE;
+  priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
+  std::lock_guard guard (priv->lock);
+  priv->counters = {};
+  for (const auto &stream : priv->streams)
+    stream->reset ();
+  return TRUE;
 }
 
 static gboolean
 gst_range_mux_stop (GstAggregator *aggregator)
 {
-  GST_RANGE_MUX (aggregator)->priv->reporter.stop ();
-  GST_RANGE_MUX (aggregator)->priv->clock.stop ();
-  GST_RANGE_MUX (aggregator)->priv->joiner.drop ();
-  return TRUE;
-}
-
-static bool
-load_rig_file (GstRangeMux *self)
-{
-  std::string file;
-  {
-    std::lock_guard guard (self->priv->lock);
-    file = self->priv->rig_file;
-  }
-  self->priv->rig = {};
-  const Status status = file.empty () ? Status{} : rangecast::load_rig (file, self->priv->rig);
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
-}
-
-static gboolean
-gst_range_mux_start (GstAggregator *aggregator)
-{
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->caps_dirty = true;
-  priv->frame_duration = priv->now = GST_CLOCK_TIME_NONE;
-  priv->last = {};
-  priv->steps.reset ();
-  if (!load_rig_file (GST_RANGE_MUX (aggregator)) || !publish_clock (GST_RANGE_MUX (aggregator)))
-    return FALSE;
-  priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
-  std::lock_guard guard (priv->lock);
-  priv->sent = {};
-  for (const auto &entry : priv->pads)
-    entry->reset ();
+  priv->reporter.stop ();
+  priv->clock.stop ();
+  priv->joiner.drop ();
   return TRUE;
+}
+
+static PropertyTable<Settings> &
+mux_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::number<&Settings::max_skew> ("max-skew", "Maximum skew",
+          "Maximum difference of the capture times within a frame set in nanoseconds (0 = half a "
+          "frame period, or 5 ms if the frame rate is unknown)",
+          0, G_MAXINT64, kMutablePlaying),
+      P::number<&Settings::clock_port> ("clock-port", "Clock port",
+          "UDP port on which to publish the pipeline clock for GstNetClientClock (-1 = do not "
+          "publish, 0 = any free port, readable once published)",
+          -1, 65535, kMutableReady),
+      P::text<&Settings::rig_file> ("rig", "Rig",
+          "Rig file that all streams must agree with; a stream with other cameras is left out when "
+          "live, else it is an error (unset = no check)",
+          kMutableReady),
+  };
+  return table;
 }
 
 static void
 gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
+  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
     return priv->reporter.set_interval (g_value_get_uint (value));
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_MAX_SKEW:
-      priv->max_skew = g_value_get_uint64 (value);
-      break;
-    case PROP_CLOCK_PORT:
-      priv->clock.set_port (g_value_get_int (value));
-      break;
-    case PROP_RIG:
-      priv->rig_file = g_value_get_string (value) ? g_value_get_string (value) : "";
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (!mux_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -366,25 +858,15 @@ gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_MAX_SKEW:
-      g_value_set_uint64 (value, priv->max_skew);
-      break;
-    case PROP_CLOCK_PORT:
-      g_value_set_int (value, priv->clock.port ());
-      break;
-    case PROP_RIG:
-      g_value_set_string (value, priv->rig_file.empty () ? nullptr : priv->rig_file.c_str ());
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv->pads, priv->sent));
-      break;
-    case PROP_STATS_INTERVAL:
-      g_value_set_uint (value, priv->reporter.interval ());
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    return g_value_take_boxed (value, make_stats (priv));
+  if (id == PROP_STATS_INTERVAL)
+    return g_value_set_uint (value, priv->reporter.interval ());
+  Settings settings = priv->settings;
+  if (priv->clock.port () != ClockPublisher::kOff)
+    settings.clock_port = priv->clock.port ();
+  if (!mux_properties ().get (settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -411,21 +893,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   object_class->get_property = gst_range_mux_get_property;
   object_class->finalize = gst_range_mux_finalize;
 
-  g_object_class_install_property (object_class, PROP_MAX_SKEW,
-      g_param_spec_uint64 ("max-skew", "Maximum skew",
-          "Maximum difference of the capture times within a frame set in nanoseconds (0 = half a "
-          "frame period, or 5 ms if the frame rate is unknown)",
-          0, G_MAXINT64, 0, kMutablePlaying));
-  g_object_class_install_property (object_class, PROP_CLOCK_PORT,
-      g_param_spec_int ("clock-port", "Clock port",
-          "UDP port on which to publish the pipeline clock for GstNetClientClock (-1 = do not "
-          "publish, 0 = any free port, readable once published)",
-          -1, 65535, ClockPublisher::kOff, kMutableReady));
-  g_object_class_install_property (object_class, PROP_RIG,
-      g_param_spec_string ("rig", "Rig",
-          "Rig file that all streams must agree with; a stream with other cameras is left out when "
-          "live, else it is an error (unset = no check)",
-          nullptr, kMutableReady));
+  mux_properties ().install (object_class, PROP_SETTINGS);
   install_stats (object_class, PROP_STATS,
       "Counters since the element was started: frames, complete, incomplete, dropped-late, "
       "out-of-step, left-out, and a structure for each sink pad");
@@ -439,18 +907,18 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
       "Combines the views of several range streams into frame sets by capture time",
       "gst-rangecast");
 
-  element_class->request_new_pad = gst_range_mux_request_new_pad;
-  element_class->release_pad = gst_range_mux_release_pad;
-  element_class->set_clock = gst_range_mux_set_clock;
+  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_range_mux_request_new_pad);
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_mux_release_pad);
+  element_class->set_clock = GST_DEBUG_FUNCPTR (gst_range_mux_set_clock);
 
-  aggregator_class->start = gst_range_mux_start;
-  aggregator_class->stop = gst_range_mux_stop;
-  aggregator_class->flush = gst_range_mux_flush;
-  aggregator_class->sink_event = gst_range_mux_sink_event;
-  aggregator_class->update_src_caps = gst_range_mux_update_src_caps;
-  aggregator_class->get_next_time = gst_range_mux_get_next_time;
-  aggregator_class->clip = gstrange::clip_to_segment;
-  aggregator_class->aggregate = gst_range_mux_aggregate;
+  aggregator_class->start = GST_DEBUG_FUNCPTR (gst_range_mux_start);
+  aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_range_mux_stop);
+  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_mux_flush);
+  aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_mux_sink_event);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_mux_update_src_caps);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_mux_get_next_time);
+  aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
+  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_mux_aggregate);
 
   GST_DEBUG_CATEGORY_INIT (gst_range_mux_debug, "rangemux", 0, "Range multiplexer");
 }

@@ -3,57 +3,54 @@
 
 #include <algorithm>
 
-#include "clockconsensus.hpp"
-#include "waiting.hpp"
-
 bool
-MuxRecordings::judge (std::span<const Waiting> waiting, GstClockTime last_capture)
+Recordings::compare (std::span<const WaitingBuffer> waiting, GstClockTime last_capture)
 {
   if (waiting.empty ())
     return false;
   captures_.clear ();
-  for (const Waiting &w : waiting)
+  for (const WaitingBuffer &w : waiting)
     captures_.push_back (w.capture);
   const auto middle = captures_.begin () + std::ptrdiff_t (captures_.size () / 2);
   std::ranges::nth_element (captures_, middle);
   const bool can_vote = captures_.size () >= 3;
   const GstClockTime others = can_vote ? *middle : std::ranges::min (captures_);
-  for (const Waiting &w : waiting) {
-    w.entry->ahead = GST_CLOCK_DIFF (others, w.capture);
-    w.entry->in_step = !can_vote || GstClockTime (ABS (w.entry->ahead)) <= kOtherRecording;
+  for (const WaitingBuffer &w : waiting) {
+    w.stream->ahead = GST_CLOCK_DIFF (others, w.capture);
+    w.stream->in_sync = !can_vote || GstClockTime (ABS (w.stream->ahead)) <= kMaxLater;
   }
-  return GST_CLOCK_TIME_IS_VALID (last_capture) && *middle + MuxSteps::kOutOfStep < last_capture;
+  return GST_CLOCK_TIME_IS_VALID (last_capture) && *middle + kMaxBack < last_capture;
 }
 
-const Waiting *
-MuxRecordings::find_apart (std::span<const Waiting> waiting)
+const WaitingBuffer *
+Recordings::find_apart (std::span<const WaitingBuffer> waiting)
 {
   if (waiting.size () == 2)
-    for (const Waiting &w : waiting)
-      if (w.entry->ahead > GstClockTimeDiff (kOtherRecording))
+    for (const WaitingBuffer &w : waiting)
+      if (w.stream->ahead > GstClockTimeDiff (kMaxLater))
         return &w;
   return nullptr;
 }
 
-MuxPad *
-MuxRecordings::find_stranger (const MuxPads &pads)
+MuxStream *
+Recordings::find_unmatched (const MuxStreams &streams)
 {
-  int streams = 0, told = 0, untold = 0;
-  MuxPad *ended = nullptr;
-  for (const auto &entry : pads) {
-    streams += entry->received > 0;
-    if (entry->received == 0 || entry->met)
+  int received = 0, reported = 0, unreported = 0;
+  MuxStream *ended = nullptr;
+  for (const auto &stream : streams) {
+    received += stream->received > 0;
+    if (stream->received == 0 || stream->matched_others)
       continue;
-    if (entry->told_apart || entry->said != MuxState::kIn) {
-      told++;
+    if (stream->apart_reported || stream->reported != StreamState::kIn) {
+      reported++;
       continue;
     }
-    untold++;
-    if (gst_aggregator_pad_is_eos (entry->pad))
-      ended = entry.get ();
+    unreported++;
+    if (gst_aggregator_pad_is_eos (stream->pad))
+      ended = stream.get ();
   }
-  const bool all_others_told = told > 0 && untold == 1;
-  return streams > 1 && !all_others_told ? ended : nullptr;
+  const bool all_others_reported = reported > 0 && unreported == 1;
+  return received > 1 && !all_others_reported ? ended : nullptr;
 }
 
 GstClockTime
@@ -63,7 +60,7 @@ running_time_after (
   if (!GST_CLOCK_TIME_IS_VALID (last.running))
     return next.running;
   const bool follows = GST_CLOCK_TIME_IS_VALID (last.capture) && next.capture > last.capture &&
-                       next.capture - last.capture <= MuxRecordings::kOtherRecording;
+                       next.capture - last.capture <= Recordings::kMaxLater;
   const GstClockTime distance = follows ? next.capture - last.capture : period;
   const GstClockTime running = last.running + GstClockTime (double (distance) / speed);
   return follows || !GST_CLOCK_TIME_IS_VALID (next.running) ? running

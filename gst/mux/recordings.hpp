@@ -8,43 +8,43 @@
 
 #include "streams.hpp"
 
-struct Waiting;
-
-/** Of a frame set, ns; either may be GST_CLOCK_TIME_NONE. */
+/** Times of a frame set, ns; either may be GST_CLOCK_TIME_NONE. */
 struct FrameTimes {
   GstClockTime capture = GST_CLOCK_TIME_NONE;
   GstClockTime running = GST_CLOCK_TIME_NONE;
 };
 
-/** Compares the capture times of recordings: of pipelines that are not live, where every stream
- *  that has not ended has a buffer that waits, and PTS may begin anywhere. Streaming thread. */
-class MuxRecordings {
+/** Compares the capture times of recordings, in pipelines that are not live: there each stream that
+ *  has not ended has a buffer at its pad, and PTS may begin anywhere. Streaming thread. */
+class Recordings {
 public:
-  /** A recording may begin or pause so much later than most: it waits, and the others go without
-   *  it. What is further away has another clock, or was taken on another occasion; ns. */
-  static constexpr GstClockTime kOtherRecording = 60 * GST_SECOND;
+  /** A recording may begin, or continue after a pause, so much later than most; the others continue
+   *  without it until then. Greater differences are another clock or another occasion, ns. */
+  static constexpr GstClockTime kMaxLater = 60 * GST_SECOND;
+  /** If most capture times go back by more than this, all recordings have begun again, ns. */
+  static constexpr GstClockTime kMaxBack = 2 * GST_SECOND;
 
-  /** Sets `in_step` and `ahead` of each. Of two that are apart nobody knows which one is wrong: the
-   *  earlier one goes alone, the other one waits.
+  /** Sets `in_sync` and `ahead` of each stream. Between two streams there is no majority: the
+   *  earlier one continues alone, and the other one waits.
    *  @return whether all of them have begun again */
-  bool judge (std::span<const Waiting> waiting, GstClockTime last_capture);
+  bool compare (std::span<const WaitingBuffer> waiting, GstClockTime last_capture);
 
-  /** Of two that wait, the one that waits for more than kOtherRecording; nullptr: none. After
-   *  judge(). */
-  static const Waiting *find_apart (std::span<const Waiting> waiting);
-  /** A stream that has ended and never met another, and was not told yet. Of those that did not
-   *  meet each other the last one need not be. */
-  static MuxPad *find_stranger (const MuxPads &pads);
+  /** Of two streams the one that would wait for more than kMaxLater, or nullptr. After compare().
+   */
+  static const WaitingBuffer *find_apart (std::span<const WaitingBuffer> waiting);
+  /** A stream that has ended without being matched with another one and was not yet reported, or
+   *  nullptr. Once all others are reported, the last one need not be. */
+  static MuxStream *find_unmatched (const MuxStreams &streams);
 
 private:
   std::vector<GstClockTime> captures_; /* kept for its memory */
 };
 
 /** The running time of a frame set of recordings: as far from that of the last one as their capture
- *  times are. Where those go back, or on by more than kOtherRecording, it is that of the stream
- *  itself, if later, or else one frame period on.
- *  @param next    what its oldest buffer says
- *  @param speed   how much faster than it was captured it is played, > 0
- *  @param period  ns */
+ *  times are. If these go back, or forward by more than Recordings::kMaxLater, it is the buffer's
+ *  own running time, or one frame period after the last one if that is later.
+ *  @param next    of its oldest buffer
+ *  @param speed   playback speed, see speed_of(); > 0
+ *  @param period  frame period, ns */
 GstClockTime running_time_after (
     const FrameTimes &last, const FrameTimes &next, double speed, GstClockTime period);

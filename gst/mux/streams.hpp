@@ -8,55 +8,69 @@
 #include <string>
 #include <vector>
 
-#include "states.hpp"
+/** Whether a stream's buffers become part of frame sets, and why not. */
+enum class StreamState {
+  kIn,
+  kSilent,    ///< no buffers for kSilentAfter
+  kLate,      ///< its buffers arrive after their frame sets were pushed
+  kOutOfSync, ///< its capture times are of another clock
+  kApart,     ///< a recording of another time, or with another clock, than the others
+  kClash,     ///< other streams have its view-id, or another format
+  kOtherRig,  ///< its cameras are not those of the property `rig`
+};
 
-/** A stream of which nothing came for so long is silent: it has no say any more. */
+/** A stream without buffers for so long is silent: frame sets and caps are made without it. */
 inline constexpr GstClockTime kSilentAfter = 2 * GST_SECOND;
 
-/** A sink pad of rangemux and what is known of its stream. */
-struct MuxPad {
-  explicit MuxPad (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
-  ~MuxPad () { gst_object_unref (pad); }
-  MuxPad (const MuxPad &) = delete;
+/** A sink pad of rangemux and its stream. */
+struct MuxStream {
+  explicit MuxStream (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
+  ~MuxStream () { gst_object_unref (pad); }
+  MuxStream (const MuxStream &) = delete;
 
-  /** Forgets the stream. */
+  /** Resets everything but the pad. */
   void reset ();
   /** "pad sink_1 (view 1)" */
   [[nodiscard]] std::string title () const;
-  /** Of its first view, or -1 if it has no caps yet. */
-  [[nodiscard]] int view_id () const { return has_caps ? info.rig.views.front ().id : -1; }
 
   GstAggregatorPad *pad; ///< a reference
 
   /* streaming thread */
   bool has_caps = false, coded = false;
   gstrange::RangeInfo info;
-  rangecast::Status other_rig;              ///< what differs from the rig that was asked for
+  rangecast::Status other_rig;              ///< how it differs from the property `rig`
   rangecast::Status clash;                  ///< why it is not chosen
   bool chosen = false;                      ///< by choose_streams()
-  bool alive = false;                       ///< something came lately
-  bool waits = false;                       ///< a buffer of it waits
-  bool clash_reported = false;              ///< of buffers
-  bool offset_known = false;                ///< `offset` is of its last buffer
-  bool in_step = true;                      ///< its capture times are of the clock that most have
-  bool shift_known = false;                 ///< `shift` is of its last buffer
-  bool met = false;                         ///< was in a frame set with another stream
-  bool told_apart = false;                  ///< state `kApart` was told
-  GstClockTimeDiff shift = 0;               ///< from running time to capture time, ns
-  GstClockTimeDiff ahead = 0;               ///< of its capture times, of the others'; not live; ns
+  bool alive = false;                       ///< not silent
+  bool waits = false;                       ///< has a buffer at its pad
+  bool clash_reported = false;              ///< of view-ids of buffers
+  bool offset_known = false;                ///< `offset` is valid
+  bool in_sync = true;                      ///< its capture times are of the clock of most streams
+  bool shift_known = false;                 ///< `shift` is valid
+  bool matched_others = false;              ///< was in a frame set with another stream
+  bool apart_reported = false;              ///< state kApart was reported
+  GstClockTimeDiff shift = 0;               ///< capture time - running time of its last buffer, ns
+  GstClockTimeDiff ahead = 0;               ///< recordings: capture time - that of the others, ns
   GstClockTime seen = GST_CLOCK_TIME_NONE;  ///< running time of its last buffer
-  GstClockTime since = GST_CLOCK_TIME_NONE; ///< running time from which it has its state
-  MuxState said = MuxState::kIn;            ///< the state that was told last
+  GstClockTime since = GST_CLOCK_TIME_NONE; ///< running time at which it got its state
+  StreamState reported = StreamState::kIn;  ///< the state that was reported last
 
   /* the element's lock */
-  MuxState state = MuxState::kIn;
+  StreamState state = StreamState::kIn;
   guint64 views = 0; ///< bits by view-id, for statistics
-  guint64 received = 0, late = 0, out_of_step = 0, left_out = 0, matched = 0;
-  GstClockTimeDiff last_skew = 0; ///< ns behind the oldest of its frame set
-  GstClockTimeDiff offset = 0;    ///< ns, capture time ahead of the pipeline's clock as it came
+  guint64 received = 0, late = 0, out_of_sync = 0, left_out = 0, matched = 0;
+  GstClockTimeDiff last_skew = 0; ///< capture time - the oldest of its frame set, ns
+  GstClockTimeDiff offset = 0;    ///< capture time - pipeline clock as its buffer arrived, ns
 };
 
-using MuxPads = std::vector<std::shared_ptr<MuxPad>>;
+using MuxStreams = std::vector<std::shared_ptr<MuxStream>>;
+
+/** A buffer at a sink pad. */
+struct WaitingBuffer {
+  MuxStream *stream;
+  GstBuffer *buffer; ///< a reference
+  GstClockTime capture, running;
+};
 
 /** What the frame sets of the chosen streams are. */
 struct MuxFormat {
@@ -65,12 +79,17 @@ struct MuxFormat {
 };
 
 /** Chooses the streams that make up frame sets: as many as agree on raw or coded, with each view-id
- *  once and no more pixels than a rig may have. Those that were chosen before and still come go
- *  first, so that two hosts with one view-id do not take turns. Sets `chosen` and `clash` of each.
- *  @param strict  the first stream that has to be left out is an error, which is returned */
-rangecast::Status choose_streams (const MuxPads &pads, bool strict, MuxFormat &format);
+ *  once and at most kMaxRigPixels. Streams that were chosen before and are alive have priority, so
+ *  that two hosts with the same view-id do not alternate. Sets `chosen` and `clash` of each.
+ *  @param strict  return an error for the first stream that has to be left out */
+rangecast::Status choose_streams (const MuxStreams &streams, bool strict, MuxFormat &format);
 
-/** Whether the views of a stream are cameras of this rig, in the same places. The rig may hold
- * range views or stereo pairs, of other sizes of the same shape, too.
- *  @return kBadValue that says what differs */
-rangecast::Status check_rig (const rangecast::Rig &stream, const rangecast::Rig &expected);
+/** Nick for statistics and messages: "in", "silent", "late", "out-of-step", "apart", "clash",
+ *  "other-rig". */
+const char *name_of (StreamState state);
+
+/** Posts a warning for the user, and an element message `rangemux-stream` for the application. Call
+ *  it without locks.
+ *  @param offset  of its capture times to the others', ns */
+void report_state (
+    GstElement *element, MuxStream &stream, StreamState state, GstClockTimeDiff offset);

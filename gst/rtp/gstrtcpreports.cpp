@@ -36,15 +36,21 @@
 GST_DEBUG_CATEGORY_STATIC (gst_rtcp_reports_debug);
 #define GST_CAT_DEFAULT gst_rtcp_reports_debug
 
-enum { PROP_0, PROP_MAX_RECEIVERS, PROP_STATS };
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
+
+namespace {
+struct Settings {
+  guint max_receivers = RtcpReceivers::kDefaultMax;
+};
+} // namespace
 
 struct GstRtcpReportsPrivate {
   std::mutex lock; /* guards what follows; never held across a push */
-  guint max_receivers = RtcpReceivers::kDefaultMost;
-  std::optional<guint32> ssrc;
+  Settings settings;
+  std::optional<guint32> ssrc; /* of the stream */
   int clock_rate = 90000;
-  guint receivers = 0;                /* now */
-  guint64 refused = 0, malformed = 0; /* packets of RTCP since start */
+  guint receivers = 0;                /* current number */
+  guint64 refused = 0, malformed = 0; /* RTCP packets since start */
 
   /* streaming thread of rtcp_sink only */
   RtcpReceivers known;
@@ -68,31 +74,35 @@ static GstStaticPadTemplate rtcp_src_template = GST_STATIC_PAD_TEMPLATE (
 G_DEFINE_TYPE (GstRtcpReports, gst_rtcp_reports, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (rtcpreports, "rtcpreports", GST_RANK_NONE, GST_TYPE_RTCP_REPORTS)
 
-/* ---- who speaks ---- */
+/* ---- who sends an RTCP packet ---- */
 
-/* The stream, as it is when a packet of RTCP comes. */
+namespace {
+
+/* The stream at the time of an RTCP packet. */
 struct Stream {
   guint32 ssrc;
   guint clock_rate;
 };
 
-/* What a compound packet is looked at for before anybody believes it. */
+/* What decides whether a compound packet is accepted. */
 struct Compound {
-  std::optional<guint32> speaker; /* that all of it is from, but for feedback */
-  std::optional<guint32> asker;   /* of feedback */
-  bool of_several = false;        /* as mixers send it: one packet would make many sources */
-  bool reports = false;           /* on our stream */
+  std::optional<guint32> source;          /* of all its packets but feedback */
+  std::optional<guint32> feedback_source; /* of feedback packets */
+  bool of_several = false; /* sources, as from mixers: one packet could add many sources */
+  bool reports = false;    /* says something about the stream */
 
-  void speaks (guint32 ssrc)
+  void add_source (guint32 ssrc)
   {
-    of_several |= speaker.value_or (ssrc) != ssrc;
-    speaker = ssrc;
+    of_several |= source.value_or (ssrc) != ssrc;
+    source = ssrc;
   }
 };
 
-/* RFC 5104, 4.3.1: full intra requests name their streams apart. */
+} // namespace
+
+/* RFC 5104, 4.3.1: full intra requests list their streams in the body. */
 static bool
-asks_full_picture (const RtcpPacket &packet, guint32 ssrc)
+requests_intra (const RtcpPacket &packet, guint32 ssrc)
 {
   if (packet.type != GST_RTCP_TYPE_PSFB || packet.count != GST_RTCP_PSFB_TYPE_FIR)
     return false;
@@ -103,29 +113,29 @@ asks_full_picture (const RtcpPacket &packet, guint32 ssrc)
 }
 
 static void
-read_speaker (const RtcpPacket &packet, guint32 ssrc, Compound &compound)
+read_source (const RtcpPacket &packet, guint32 ssrc, Compound &compound)
 {
   std::span<const guint8> chunks = packet.body;
-  guint32 speaker = 0;
+  guint32 source = 0;
   switch (packet.type) {
     case GST_RTCP_TYPE_RR:
     case GST_RTCP_TYPE_SR:
-      compound.speaks (packet.word (0));
+      compound.add_source (packet.word (0));
       for (guint i = 0; i < count_report_blocks (packet); i++)
         compound.reports |= read_report_block (packet, i).stream == ssrc;
       return;
     case GST_RTCP_TYPE_SDES:
-      for (guint i = 0; i < packet.count && take_sdes_chunk (chunks, speaker); i++)
-        compound.speaks (speaker);
+      for (guint i = 0; i < packet.count && take_sdes_chunk (chunks, source); i++)
+        compound.add_source (source);
       return;
     case GST_RTCP_TYPE_BYE:
       for (guint i = 0; i < packet.count; i++)
-        compound.speaks (packet.word (i));
+        compound.add_source (packet.word (i));
       return;
     case GST_RTCP_TYPE_RTPFB:
     case GST_RTCP_TYPE_PSFB:
-      compound.asker = packet.word (0);
-      compound.reports |= packet.word (1) == ssrc || asks_full_picture (packet, ssrc);
+      compound.feedback_source = packet.word (0);
+      compound.reports |= packet.word (1) == ssrc || requests_intra (packet, ssrc);
       return;
     default:
       return;
@@ -138,20 +148,20 @@ read_compound (std::span<const guint8> rtcp, guint32 ssrc)
   Compound compound;
   RtcpReader reader (rtcp);
   for (RtcpPacket packet; reader.next (packet);)
-    read_speaker (packet, ssrc, compound);
+    read_source (packet, ssrc, compound);
   return compound;
 }
 
-/* @return nullptr: it is no receiver of ours */
+/* @return the receiver that sent it; nullptr if it is refused */
 static RtcpReceivers::Receiver *
-admit (GstRtcpReports *self, GstBuffer *buffer, const Compound &compound, guint32 ssrc, guint most)
+admit (GstRtcpReports *self, GstBuffer *buffer, const Compound &compound, guint32 ssrc, guint max)
 {
-  const auto speaker = compound.speaker ? compound.speaker : compound.asker;
-  if (!speaker || compound.of_several || *speaker == ssrc) /* our own: looped, or forged */
+  const auto source = compound.source ? compound.source : compound.feedback_source;
+  if (!source || compound.of_several || *source == ssrc) /* our own SSRC: looped, or forged */
     return nullptr;
   const GstNetAddressMeta *meta = gst_buffer_get_net_address_meta (buffer);
-  return self->priv->known.admit (*speaker, meta ? meta->addr : nullptr, compound.reports,
-      arrival_time (GST_ELEMENT (self), buffer), most);
+  return self->priv->known.admit (*source, meta ? meta->addr : nullptr, compound.reports,
+      arrival_time (GST_ELEMENT (self), buffer), max);
 }
 
 /* ---- reports ---- */
@@ -168,9 +178,9 @@ count_packets (RtcpReceivers::Receiver &receiver, const RtcpReportBlock &block)
   return packets < (1u << 24) ? packets : 0;
 }
 
-/* RFC 3550, 6.4.1: when the report came, less what the receiver waited, less when the sender's
- * report went, all in units of 1/65536 s of NTP time, which rtpsession takes from the clock of the
- * day (ntp-time-source=ntp). 0 where that makes no sense. */
+/* RFC 3550, 6.4.1: arrival of the report - delay at the receiver - time of the sender report, in
+ * units of 1/65536 s of NTP time, which rtpsession takes from the wall clock (ntp-time-source=ntp).
+ * 0 if the result is impossible. */
 static GstClockTime
 round_trip_time (const RtcpReportBlock &block)
 {
@@ -215,10 +225,10 @@ gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   auto self = GST_RTCP_REPORTS (parent);
   GstRtcpReportsPrivate *priv = self->priv;
   std::optional<Stream> stream;
-  guint most = 0;
+  guint max = 0;
   {
     std::lock_guard guard (priv->lock);
-    most = priv->max_receivers;
+    max = priv->settings.max_receivers;
     if (priv->ssrc)
       stream = {*priv->ssrc, guint (priv->clock_rate)};
   }
@@ -228,7 +238,7 @@ gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   const bool sound = RtcpReader::is_sound (rtcp);
   RtcpReceivers::Receiver *receiver = nullptr;
   if (sound && stream)
-    receiver = admit (self, buffer, read_compound (rtcp, stream->ssrc), stream->ssrc, most);
+    receiver = admit (self, buffer, read_compound (rtcp, stream->ssrc), stream->ssrc, max);
   if (receiver)
     send_reports (self, rtcp, *receiver, *stream);
   if (mapped)
@@ -241,6 +251,10 @@ gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   }
   if (receiver)
     return gst_pad_push (self->rtcp_src, buffer);
+  GST_DEBUG_OBJECT (self, "dropping RTCP: %s",
+      !sound    ? "malformed"
+      : !stream ? "there is no stream yet"
+                : "not of a receiver of the stream, or too many");
   gst_buffer_unref (buffer);
   return GST_FLOW_OK;
 }
@@ -248,7 +262,7 @@ gst_rtcp_reports_rtcp_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 /* ---- the stream itself ---- */
 
 static void
-note_packet (GstRtcpReports *self, GstBuffer *buffer)
+record_ssrc (GstRtcpReports *self, GstBuffer *buffer)
 {
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
   if (!gst_rtp_buffer_map (buffer, GST_MAP_READ, &rtp))
@@ -263,7 +277,7 @@ static GstFlowReturn
 gst_rtcp_reports_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RTCP_REPORTS (parent);
-  note_packet (self, buffer);
+  record_ssrc (self, buffer);
   return gst_pad_push (self->src, buffer);
 }
 
@@ -272,7 +286,7 @@ gst_rtcp_reports_chain_list (GstPad *, GstObject *parent, GstBufferList *list)
 {
   auto self = GST_RTCP_REPORTS (parent);
   if (gst_buffer_list_length (list) > 0)
-    note_packet (self, gst_buffer_list_get (list, 0));
+    record_ssrc (self, gst_buffer_list_get (list, 0));
   return gst_pad_push_list (self->src, list);
 }
 
@@ -292,7 +306,7 @@ gst_rtcp_reports_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
   return gst_pad_event_default (pad, parent, event);
 }
 
-/* Each stream goes through on its own: events and queries of one are not for the other. */
+/* RTP and RTCP pass separately: events and queries of one are not forwarded to the other. */
 static GstIterator *
 gst_rtcp_reports_links (GstPad *pad, GstObject *parent)
 {
@@ -327,16 +341,26 @@ gst_rtcp_reports_change_state (GstElement *element, GstStateChange transition)
   return result;
 }
 
+static PropertyTable<Settings> &
+reports_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::number<&Settings::max_receivers> ("max-receivers", "Maximum receivers",
+          "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
+          "quarter of it",
+          1, RtcpReceivers::kMax, kMutablePlaying),
+  };
+  return table;
+}
+
 static void
 gst_rtcp_reports_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
-  if (id != PROP_MAX_RECEIVERS) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
   std::lock_guard guard (priv->lock);
-  priv->max_receivers = g_value_get_uint (value);
+  if (!reports_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -344,19 +368,13 @@ gst_rtcp_reports_get_property (GObject *object, guint id, GValue *value, GParamS
 {
   GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_MAX_RECEIVERS:
-      g_value_set_uint (value, priv->max_receivers);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (
-          value, gst_structure_new ("application/x-rtcpreports-stats", "receivers", G_TYPE_UINT64,
-                     guint64 (priv->receivers), "refused", G_TYPE_UINT64, priv->refused,
-                     "malformed", G_TYPE_UINT64, priv->malformed, nullptr));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    g_value_take_boxed (
+        value, gst_structure_new ("application/x-rtcpreports-stats", "receivers", G_TYPE_UINT64,
+                   guint64 (priv->receivers), "refused", G_TYPE_UINT64, priv->refused, "malformed",
+                   G_TYPE_UINT64, priv->malformed, nullptr));
+  else if (!reports_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -370,7 +388,7 @@ static GstPad *
 add_pad (GstRtcpReports *self, GstStaticPadTemplate *pad_template)
 {
   GstPad *pad = gst_pad_new_from_static_template (pad_template, pad_template->name_template);
-  gst_pad_set_iterate_internal_links_function (pad, gst_rtcp_reports_links);
+  gst_pad_set_iterate_internal_links_function (pad, GST_DEBUG_FUNCPTR (gst_rtcp_reports_links));
   GST_PAD_SET_PROXY_CAPS (pad);
   GST_PAD_SET_PROXY_ALLOCATION (pad);
   gst_element_add_pad (GST_ELEMENT (self), pad);
@@ -385,9 +403,9 @@ gst_rtcp_reports_init (GstRtcpReports *self)
   self->src = add_pad (self, &src_template);
   self->rtcp_sink = add_pad (self, &rtcp_sink_template);
   self->rtcp_src = add_pad (self, &rtcp_src_template);
-  gst_pad_set_chain_function (self->sink, gst_rtcp_reports_chain);
-  gst_pad_set_chain_list_function (self->sink, gst_rtcp_reports_chain_list);
-  gst_pad_set_event_function (self->sink, gst_rtcp_reports_sink_event);
+  gst_pad_set_chain_function (self->sink, GST_DEBUG_FUNCPTR (gst_rtcp_reports_chain));
+  gst_pad_set_chain_list_function (self->sink, GST_DEBUG_FUNCPTR (gst_rtcp_reports_chain_list));
+  gst_pad_set_event_function (self->sink, GST_DEBUG_FUNCPTR (gst_rtcp_reports_sink_event));
   gst_pad_set_chain_function (self->rtcp_sink, gst_rtcp_reports_rtcp_chain);
 }
 
@@ -401,16 +419,12 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
   object_class->get_property = gst_rtcp_reports_get_property;
   object_class->finalize = gst_rtcp_reports_finalize;
 
-  g_object_class_install_property (object_class, PROP_MAX_RECEIVERS,
-      g_param_spec_uint ("max-receivers", "Maximum receivers",
-          "Maximum number of receivers whose RTCP is accepted at a time; one address may have a "
-          "quarter of it",
-          1, RtcpReceivers::kMax, RtcpReceivers::kDefaultMost, kMutablePlaying));
+  reports_properties ().install (object_class, PROP_SETTINGS);
   install_stats (object_class, PROP_STATS,
       "Current number of receivers, and the RTCP packets refused and malformed since the "
       "element was started");
 
-  element_class->change_state = gst_rtcp_reports_change_state;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_rtcp_reports_change_state);
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_add_static_pad_template (element_class, &rtcp_sink_template);

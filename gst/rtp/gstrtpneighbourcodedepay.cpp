@@ -30,7 +30,7 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <vector>
 
-#include "common/accessunitassembler.hpp"
+#include "accessunitassembler.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
@@ -45,29 +45,32 @@ GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
 
 enum { PROP_0, PROP_UNIT_STATS, PROP_STATS_INTERVAL };
 
-struct DepayCounters {
+namespace {
+/* Since start; units without rig views. */
+struct Counters {
   guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
           lost_packets = 0, bytes = 0;
 };
+} // namespace
 
 struct GstRtpNeighbourCodeDepayPrivate {
   std::mutex lock; /* guards counters */
-  DepayCounters counters;
-  StatsReporter reporter; /* has locks of its own */
+  Counters counters;
+  StatsReporter reporter; /* any thread; has locks of its own */
 
   /* streaming thread only */
-  rangecast::RigCollector collector;
-  bool warned_of_size = false;
-  unsigned used_generation = 0;
+  rangecast::RigCollector collector; /* of rig units in band */
+  unsigned used_generation = 0;      /* of collector: the rig of the source caps */
+  bool warned_of_size = false;       /* of a rig that is too large */
   bool have_caps = false;
   std::size_t rig_views = 0;
   guint64 view_bits = 0;              /* of the rig, by view-id; 0: not known yet */
-  UnitGatherer access_unit;           /* slices that arrived so far */
-  rangecast::KeyCheck key_check;      /* of them */
-  bool has_gap = false;               /* packets were lost before or between them */
-  guint32 timestamp = 0;              /* RTP time of them */
   std::optional<guint16> sequence;    /* of the last packet */
-  std::optional<guint8> payload_type; /* of the last packet that was sound */
+  std::optional<guint8> payload_type; /* of the last undamaged packet */
+  AccessUnitAssembler access_unit;    /* the units so far */
+  rangecast::KeyCheck key_check;      /* of them, as the four below */
+  bool has_gap = false;               /* packets were lost before or between them */
+  guint32 timestamp = 0;              /* RTP time */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
@@ -90,7 +93,7 @@ GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST
     GST_TYPE_RTP_NEIGHBOUR_CODE_DEPAY)
 
 static void
-forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
+reset_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
 {
   priv->access_unit.clear ();
   priv->key_check.reset ();
@@ -103,14 +106,16 @@ forget_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
 static void
 set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
 {
+  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv;
   const auto info = gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d);
   GstCaps *caps = gstrange::make_neighbour_code_caps (info, "access-unit");
+  GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   gst_pad_set_caps (GST_RTP_BASE_DEPAYLOAD_SRCPAD (base), caps);
   gst_caps_unref (caps);
-  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->have_caps = true;
-  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->rig_views = stream.rig.views.size ();
-  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->view_bits = view_bits (stream.rig);
-  GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.set_views (stream.rig);
+  priv->have_caps = true;
+  priv->rig_views = stream.rig.views.size ();
+  priv->view_bits = view_bits (stream.rig);
+  priv->reporter.set_views (stream.rig);
 }
 
 static Status
@@ -142,14 +147,14 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
   const GstStructure *structure = gst_caps_get_structure (caps, 0);
   const gchar *version = gst_structure_get_string (structure, "version");
   base->clock_rate = 90000;
-  forget_access_unit (priv);
+  reset_access_unit (priv);
   if (version && g_strcmp0 (version, "1") != 0) {
     gst_range_flow_return (GST_ELEMENT (base),
         {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 1"});
     return FALSE;
   }
   if (!gst_structure_has_field_typed (structure, "rig", G_TYPE_STRING))
-    return TRUE; /* it will come in band */
+    return TRUE; /* the rig comes in band */
   rangecast::StreamInfo stream;
   const Status status = rig_from_caps (structure, stream);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
@@ -158,74 +163,26 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
   return TRUE;
 }
 
-/* ---- packets ---- */
+/* ---- a packet arrives ---- */
 
-/* Nobody can begin at an access unit in which key slices are missing, or where all those of a view
- * may be.
- * @param has_end  its last packet came */
+/* Counts the packets missing before this one. @return whether there are any */
 static bool
-is_key_unit (GstRtpNeighbourCodeDepayPrivate *priv, bool has_end)
-{
-  const bool is_whole = has_end && !priv->has_gap;
-  return priv->key_check.is_key () && (is_whole || priv->key_check.views () == priv->rig_views);
-}
-
-/* The access unit as a buffer; nullptr if there is none or its rig is not known. */
-static GstBuffer *
-take_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
+count_lost (GstRtpNeighbourCodeDepay *self, guint16 sequence)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
-  GstBuffer *buffer = nullptr;
-  if (!priv->access_unit.empty ()) {
+  const std::optional<guint16> last = std::exchange (priv->sequence, sequence);
+  const guint16 missing = last ? guint16 (sequence - *last - 1) : 0;
+  if (missing > 0 && missing < 0x8000) { /* else it goes back: another sender, or too late */
+    GST_DEBUG_OBJECT (self, "%u packets are missing before number %u", missing, sequence);
     std::lock_guard guard (priv->lock);
-    if (priv->have_caps) {
-      buffer = priv->access_unit.take ();
-      GST_BUFFER_PTS (buffer) = priv->pts;
-      if (!is_key_unit (priv, has_end))
-        GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
-      priv->counters.access_units++;
-      priv->counters.bytes += gst_buffer_get_size (buffer);
-    } else {
-      priv->counters.without_rig++;
-    }
+    priv->counters.lost_packets += missing;
   }
-  if (buffer && GST_CLOCK_TIME_IS_VALID (priv->capture_time))
-    gst_range_buffer_set_capture_time (buffer, priv->capture_time);
-  if (buffer)
-    priv->reporter.passed (GST_ELEMENT (self), buffer);
-  forget_access_unit (priv);
-  return buffer;
+  return missing > 0;
 }
 
-/* The earliest capture time of its slices, because views of one frame set may differ by parts of a
- * frame; and what makes a key unit. */
-static void
-note_slice (GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
-{
-  rangecast::SliceHeader slice;
-  if (!rangecast::read_slice_header (unit, slice).ok ())
-    return;
-  priv->key_check.add (slice);
-  if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
-    priv->capture_time = slice.capture_time_ns;
-}
-
-/* Without a rig nothing can be decoded, so one that is too large is worth telling, once. */
+/* Whether it is a FEC packet: rtpulpfecdec passes them, with a payload type of their own. */
 static bool
-take_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
-{
-  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
-  const Status status = priv->collector.add (unit);
-  if (status.code () == rangecast::StatusCode::kBadSize && !priv->warned_of_size) {
-    priv->warned_of_size = true;
-    gst_range_post_warning (GST_ELEMENT (self), status);
-  }
-  return status.ok ();
-}
-
-/* Packets of FEC, which rtpulpfecdec lets pass under a payload type of their own. */
-static bool
-is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
+has_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
 {
   const guint8 type = gst_rtp_buffer_get_payload_type (rtp);
   if (priv->payload_type == type)
@@ -240,8 +197,23 @@ is_of_other_payload (GstRtpNeighbourCodeDepayPrivate *priv, GstRTPBuffer *rtp)
   return priv->payload_type && priv->payload_type != type;
 }
 
-/* A slice of a view that the rig of this stream has not: behind a rangemux it would be drawn over
- * the one that another host sends. */
+/* ---- its units ---- */
+
+/* @return false if the unit is damaged */
+static bool
+handle_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  const Status status = priv->collector.add (unit);
+  if (status.code () == StatusCode::kBadSize && !priv->warned_of_size) {
+    priv->warned_of_size = true; /* once: nothing can be decoded without the rig */
+    gst_range_post_warning (GST_ELEMENT (self), status);
+  }
+  return status.ok ();
+}
+
+/* Whether a slice is of a view that is not in the rig of this stream: behind rangemux it would be
+ * drawn over the view of another host. */
 static bool
 is_foreign (const GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
 {
@@ -250,60 +222,113 @@ is_foreign (const GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8>
          !(priv->view_bits >> unit[kViewId] & 1);
 }
 
+/* Adds a unit to the access unit. @return false if it is dropped */
+static bool
+add_unit (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit, bool is_slice)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  if (is_slice && is_foreign (priv, unit)) {
+    GST_DEBUG_OBJECT (self, "dropping a slice of a view that is not in the rig");
+    return false;
+  }
+  if (!priv->access_unit.add (unit)) {
+    GST_DEBUG_OBJECT (self, "dropping a unit: the access unit is too long");
+    return false;
+  }
+  rangecast::SliceHeader slice;
+  if (!is_slice || !rangecast::read_slice_header (unit, slice).ok ())
+    return true;
+  priv->key_check.add (slice);
+  /* The earliest, because the views of a frame set may differ by parts of a frame. */
+  if (!GST_CLOCK_TIME_IS_VALID (priv->capture_time) || slice.capture_time_ns < priv->capture_time)
+    priv->capture_time = slice.capture_time_ns;
+  return true;
+}
+
 static void
-take_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
+handle_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   UnitReader reader (payload);
   UnitHeader header;
   guint64 good = 0, bad = 0;
   while (const auto unit = reader.next (header)) {
-    if (header.type == static_cast<guint8> (UnitType::kRigView)) {
-      bad += !take_rig_view (self, *unit);
-    } else if (header.type == static_cast<guint8> (UnitType::kSlice) && is_foreign (priv, *unit)) {
-      bad++;
-    } else if (!priv->access_unit.add (*unit)) {
-      bad++; /* it is hostile */
-    } else {
+    if (header.type == static_cast<guint8> (UnitType::kRigView))
+      bad += !handle_rig_view (self, *unit);
+    else if (add_unit (self, *unit, header.type == static_cast<guint8> (UnitType::kSlice)))
       good++;
-      if (header.type == static_cast<guint8> (UnitType::kSlice))
-        note_slice (priv, *unit);
-    }
+    else
+      bad++;
   }
   bad += !reader.status ().ok ();
-  if (bad)
-    GST_DEBUG_OBJECT (self, "%" G_GUINT64_FORMAT " damaged units", bad);
-  std::lock_guard guard (priv->lock);
-  priv->counters.packets++;
-  priv->counters.units += good;
-  priv->counters.bad_units += bad;
-}
-
-/* @return whether packets before this one are missing */
-static bool
-count_lost (GstRtpNeighbourCodeDepayPrivate *priv, guint16 sequence)
-{
-  const std::optional<guint16> last = std::exchange (priv->sequence, sequence);
-  const guint16 missing = last ? guint16 (sequence - *last - 1) : 0;
-  if (missing > 0 && missing < 0x8000) { /* else it goes back: another sender, or too late */
+  if (bad > 0)
+    GST_DEBUG_OBJECT (self, "dropping %" G_GUINT64_FORMAT " units: damaged, or see above", bad);
+  {
     std::lock_guard guard (priv->lock);
-    priv->counters.lost_packets += missing;
+    priv->counters.packets++;
+    priv->counters.units += good;
+    priv->counters.bad_units += bad;
   }
-  return missing > 0;
+  if (priv->collector.generation () != priv->used_generation) {
+    priv->used_generation = priv->collector.generation ();
+    set_source_caps (GST_RTP_BASE_DEPAYLOAD (self), priv->collector.info ());
+  }
 }
 
-/* The packet with the marker was lost: what came of the frame set goes out. */
+/* ---- the access unit goes out ---- */
+
+/* Whether a decoder can begin here: no slice refers to earlier frame sets, and none is missing that
+ * might, or at least no view. */
+static bool
+is_key_unit (GstRtpNeighbourCodeDepayPrivate *priv, bool has_end)
+{
+  const bool is_whole = has_end && !priv->has_gap;
+  return priv->key_check.is_key () && (is_whole || priv->key_check.views () == priv->rig_views);
+}
+
+/* @param has_end  its last packet has come
+ * @return the access unit; nullptr if it is empty or its rig is not known */
+static GstBuffer *
+finish_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
+{
+  GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
+  GstBuffer *buffer = nullptr;
+  if (!priv->access_unit.empty () && !priv->have_caps) {
+    GST_DEBUG_OBJECT (self, "dropping an access unit: the rig is not known yet");
+    std::lock_guard guard (priv->lock);
+    priv->counters.without_rig++;
+  } else if (!priv->access_unit.empty ()) {
+    buffer = priv->access_unit.finish ();
+    GST_BUFFER_PTS (buffer) = priv->pts;
+    if (!is_key_unit (priv, has_end))
+      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+    if (GST_CLOCK_TIME_IS_VALID (priv->capture_time))
+      gst_range_buffer_set_capture_time (buffer, priv->capture_time);
+    GST_LOG_OBJECT (self, "%s%" GST_PTR_FORMAT, priv->has_gap ? "incomplete: " : "", buffer);
+    {
+      std::lock_guard guard (priv->lock);
+      priv->counters.access_units++;
+      priv->counters.bytes += gst_buffer_get_size (buffer);
+    }
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
+  }
+  reset_access_unit (priv);
+  return buffer;
+}
+
+/* Pushes an access unit whose last packet, with the marker, is lost. */
 static void
 push_unmarked (GstRtpNeighbourCodeDepay *self)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   if (priv->access_unit.empty ())
     return;
+  GST_DEBUG_OBJECT (self, "the last packet of an access unit is missing");
   {
     std::lock_guard guard (priv->lock);
     priv->counters.unmarked++;
   }
-  if (GstBuffer *buffer = take_access_unit (self, false))
+  if (GstBuffer *buffer = finish_access_unit (self, false))
     gst_rtp_base_depayload_push (GST_RTP_BASE_DEPAYLOAD (self), buffer);
 }
 
@@ -313,9 +338,9 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const guint32 timestamp = gst_rtp_buffer_get_timestamp (rtp);
-  const auto sequence = static_cast<guint16> (gst_rtp_buffer_get_seq (rtp));
-  const bool after_gap = count_lost (priv, sequence);
-  if (is_of_other_payload (priv, rtp)) {
+  const bool after_gap = count_lost (self, gst_rtp_buffer_get_seq (rtp));
+  if (has_other_payload (priv, rtp)) {
+    GST_LOG_OBJECT (self, "dropping a packet of another payload type");
     priv->has_gap = priv->has_gap || after_gap;
     return nullptr;
   }
@@ -326,16 +351,12 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
     priv->timestamp = timestamp;
     priv->pts = GST_BUFFER_PTS (rtp->buffer);
   }
-  take_units (self, {static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
-                        gst_rtp_buffer_get_payload_len (rtp)});
-  if (priv->collector.generation () != priv->used_generation) {
-    priv->used_generation = priv->collector.generation ();
-    set_source_caps (base, priv->collector.info ());
-  }
-  return gst_rtp_buffer_get_marker (rtp) ? take_access_unit (self, true) : nullptr;
+  handle_units (self, {static_cast<const guint8 *> (gst_rtp_buffer_get_payload (rtp)),
+                          gst_rtp_buffer_get_payload_len (rtp)});
+  return gst_rtp_buffer_get_marker (rtp) ? finish_access_unit (self, true) : nullptr;
 }
 
-/* A packet that is lost is no gap in time: what came of its frame set goes out all the same. */
+/* No GAP for a lost packet: the rest of its frame set is pushed. */
 static gboolean
 gst_rtp_neighbour_code_depay_packet_lost (GstRTPBaseDepayload *, GstEvent *)
 {
@@ -345,12 +366,13 @@ gst_rtp_neighbour_code_depay_packet_lost (GstRTPBaseDepayload *, GstEvent *)
 static gboolean
 gst_rtp_neighbour_code_depay_handle_event (GstRTPBaseDepayload *base, GstEvent *event)
 {
+  auto self = GST_RTP_NEIGHBOUR_CODE_DEPAY (base);
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
-    forget_access_unit (GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv);
-    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->sequence.reset ();
+    reset_access_unit (self->priv);
+    self->priv->sequence.reset ();
   } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
-    push_unmarked (GST_RTP_NEIGHBOUR_CODE_DEPAY (base));
-    GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv->reporter.finish ();
+    push_unmarked (self);
+    self->priv->reporter.finish ();
   }
   return GST_RTP_BASE_DEPAYLOAD_CLASS (gst_rtp_neighbour_code_depay_parent_class)
       ->handle_event (base, event);
@@ -363,7 +385,7 @@ collect_stats (GstElement *element)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (element)->priv;
   std::lock_guard guard (priv->lock);
-  const DepayCounters &c = priv->counters;
+  const Counters &c = priv->counters;
   return {{.counters = {.frames = c.access_units,
                .bytes = c.bytes,
                .packets = c.packets,
@@ -380,7 +402,8 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
                                           ->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv->reporter.stop ();
-    forget_access_unit (priv);
+    reset_access_unit (priv);
+    priv->access_unit.reset ();
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
@@ -408,16 +431,14 @@ gst_rtp_neighbour_code_depay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
-  if (id == PROP_STATS_INTERVAL) {
-    g_value_set_uint (value, priv->reporter.interval ());
-    return;
-  }
+  if (id == PROP_STATS_INTERVAL)
+    return g_value_set_uint (value, priv->reporter.interval ());
   if (id != PROP_UNIT_STATS) {
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     return;
   }
   std::lock_guard guard (priv->lock);
-  const DepayCounters &c = priv->counters;
+  const Counters &c = priv->counters;
   g_value_take_boxed (value,
       gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
           c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
@@ -463,11 +484,11 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
       "Codec/Depayloader/Network/RTP", "Extracts neighbour-coded frame sets from RTP packets",
       "gst-rangecast");
 
-  element_class->change_state = gst_rtp_neighbour_code_depay_change_state;
-  depayload_class->set_caps = gst_rtp_neighbour_code_depay_set_caps;
-  depayload_class->process_rtp_packet = gst_rtp_neighbour_code_depay_process;
-  depayload_class->packet_lost = gst_rtp_neighbour_code_depay_packet_lost;
-  depayload_class->handle_event = gst_rtp_neighbour_code_depay_handle_event;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_depay_change_state);
+  depayload_class->set_caps = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_depay_set_caps);
+  depayload_class->process_rtp_packet = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_depay_process);
+  depayload_class->packet_lost = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_depay_packet_lost);
+  depayload_class->handle_event = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_depay_handle_event);
 
   GST_DEBUG_CATEGORY_INIT (gst_rtp_neighbour_code_depay_debug, "rtpneighbourcodedepay", 0,
       "RTP neighbour code depayloader");

@@ -39,40 +39,48 @@
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
 
-enum { PROP_0, PROP_TIMEOUT, PROP_STATS };
+enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 
-static constexpr GstClockTime kDefaultTimeout = 500 * GST_MSECOND;
-/* Of two streams from one address and port the second waits so long: it may be a program that began
- * again, but also two that share a socket or a relay. */
-static constexpr GstClockTime kBeginsAgain = 250 * GST_MSECOND;
-/* Without a sender, so many packets that are not sound, the first of them so long ago. */
-static constexpr guint kUnsoundPackets = 20;
-static constexpr GstClockTime kUnsoundTime = 3 * GST_SECOND;
-static constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
+namespace {
 
-struct GuardCounters {
+/* Of two streams from one address and port the second waits for this silence of the first: it may
+ * be a sender that was restarted, but also two senders behind one socket or relay. */
+constexpr GstClockTime kRestartTimeout = 250 * GST_MSECOND;
+/* Minimum number and duration of invalid packets, without a sender, for a warning. */
+constexpr guint kMinInvalidPackets = 20;
+constexpr GstClockTime kMinInvalidTime = 3 * GST_SECOND;
+constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
+
+struct Settings {
+  GstClockTime timeout = 500 * GST_MSECOND; /* silence after which another sender is accepted */
+};
+
+/* Since start. */
+struct Counters {
   guint64 passed = 0, foreign = 0, senders = 0;
 };
 
+} // namespace
+
 struct GstRtpNeighbourCodeGuardPrivate {
   std::mutex lock; /* guards what follows; never held while pushing or posting */
-  GstClockTime timeout = kDefaultTimeout;
-  GuardCounters counters;
-  std::optional<guint32> ssrc; /* of the sender whose packets pass */
+  Settings settings;
+  Counters counters;
+  std::optional<guint32> ssrc; /* of the accepted sender */
   guint8 payload_type = 0;     /* of its packets of slices */
 
   /* streaming thread only */
-  GstClockTime last_time = 0;        /* of its last packet */
-  std::optional<guint32> rtx_ssrc;   /* under which its packets come again */
-  GSocketAddress *address = nullptr; /* of the sender; null: packets do not say */
-  SenderProbation probation;
-  SenderRivals rivals, other_versions; /* while it sends */
-  guint64 unsound = 0;                 /* packets since the last one that passed */
-  GstClockTime unsound_since = 0;
-  bool warned_of_version = false, warned_of_unsound = false;
-  GSocket *filtered = nullptr; /* udpsrc's, while the kernel filters for us */
-  bool filter_rests = false;   /* while the sender is silent */
-  GstCaps *caps = nullptr;     /* as they came */
+  GstClockTime last_time = 0;          /* of the sender's last packet */
+  std::optional<guint32> rtx_ssrc;     /* of its retransmissions */
+  GSocketAddress *address = nullptr;   /* of the sender; null: unknown */
+  SenderProbation probation;           /* of sources, before one is accepted */
+  SenderRivals rivals, other_versions; /* while the sender sends */
+  guint64 invalid = 0;                 /* packets since the last one that passed */
+  GstClockTime invalid_since = 0;
+  bool warned_of_version = false, warned_of_invalid = false;
+  GSocket *filtered = nullptr; /* udpsrc's socket, if it has a filter */
+  bool filter_paused = false;  /* while the sender is silent */
+  GstCaps *caps = nullptr;     /* of the sink pad */
 };
 
 struct _GstRtpNeighbourCodeGuard {
@@ -92,7 +100,7 @@ GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST
 
 /* ---- packets ---- */
 
-/* As version_of_units(), but that there may be no memory for what is wrong. */
+/* As version_of_units(); may throw std::bad_alloc. */
 static int
 read_units (std::span<const guint8> payload)
 {
@@ -111,7 +119,7 @@ read_units (std::span<const guint8> payload)
   }
   if (reader.status ().ok ())
     return any ? kBitstreamVersion : 0;
-  /* Of another version only the sizes are known: they lead to the end. */
+  /* Of other versions only the sizes of units are known: they must lead to the end. */
   const int version = payload.empty () ? 0 : payload[0] >> 4;
   if (version == kBitstreamVersion)
     return 0;
@@ -124,29 +132,32 @@ read_units (std::span<const guint8> payload)
   return payload.empty () ? version : 0;
 }
 
-/* The version of the neighbour code if the bytes are its units from the first to the last, with a
- * slice or a view of the rig among them: what no other codec's are, nor a FEC packet's. 0 if they
- * are not. */
+/* The version of the neighbour code if all bytes are its units, with a slice or a rig view among
+ * them, which distinguishes them from other codecs and FEC; else 0. */
 static int
 version_of_units (std::span<const guint8> payload) noexcept
 {
   try {
     return read_units (payload);
-  } catch (const std::bad_alloc &) { /* the text of a Status */
+  } catch (const std::bad_alloc &) { /* for the text of a Status */
     return 0;
   }
 }
 
-/* What of a packet the guard looks at. */
+namespace {
+
+/* What decides about a packet. */
 struct Packet {
-  bool is_rtp = false; /* else only its address is known */
+  bool is_rtp = false; /* else only its address is set */
   guint32 ssrc = 0;
   guint16 sequence = 0;
   guint8 payload_type = 0;
-  int version = 0; /* of its units; 0: it is none of the neighbour code */
+  int version = 0; /* of the neighbour code; 0: another payload */
   bool units = false, repeated_units = false;
-  GSocketAddress *address = nullptr; /* the buffer's */
+  GSocketAddress *address = nullptr; /* of the buffer */
 };
+
+} // namespace
 
 static Packet
 read_packet (GstBuffer *buffer)
@@ -173,7 +184,7 @@ read_packet (GstBuffer *buffer)
   return packet;
 }
 
-/* ---- the kernel's help ---- */
+/* ---- the socket filter ---- */
 
 /* The socket of the udpsrc that is linked to the sink pad, or nullptr. */
 static GSocket *
@@ -192,20 +203,20 @@ find_socket (GstRtpNeighbourCodeGuard *self)
 static void
 stop_filter (GstRtpNeighbourCodeGuardPrivate *priv)
 {
-  if (priv->filtered && !priv->filter_rests)
+  if (priv->filtered && !priv->filter_paused)
     SenderFilter::detach (priv->filtered);
   g_clear_object (&priv->filtered);
-  priv->filter_rests = false;
+  priv->filter_paused = false;
 }
 
-/* The next sender may be among those that it keeps out; or this one comes back. */
+/* While the sender is silent all packets are let in: the next sender may be among them. */
 static void
-rest_filter (GstRtpNeighbourCodeGuardPrivate *priv, bool rests)
+pause_filter (GstRtpNeighbourCodeGuardPrivate *priv, bool paused)
 {
-  if (!priv->filtered || priv->filter_rests == rests)
+  if (!priv->filtered || priv->filter_paused == paused)
     return;
-  priv->filter_rests = rests;
-  if (rests)
+  priv->filter_paused = paused;
+  if (paused)
     SenderFilter::detach (priv->filtered);
   else
     SenderFilter::attach (priv->filtered, priv->address);
@@ -222,8 +233,8 @@ start_filter (GstRtpNeighbourCodeGuard *self)
   g_clear_object (&socket);
 }
 
-/* Downstream learns whose packets these are; a payload type, which would keep FEC packets from the
- * jitter buffer, is left out. */
+/* Adds the sender's SSRC to the caps, and removes the payload type, because of which the jitter
+ * buffer would drop FEC packets. */
 static void
 push_caps (GstRtpNeighbourCodeGuard *self)
 {
@@ -234,16 +245,28 @@ push_caps (GstRtpNeighbourCodeGuard *self)
   gst_structure_remove_field (gst_caps_get_structure (caps, 0), "payload");
   if (priv->ssrc)
     gst_caps_set_simple (caps, "ssrc", G_TYPE_UINT, *priv->ssrc, nullptr);
+  GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, caps);
   gst_pad_push_event (self->srcpad, gst_event_new_caps (caps));
   gst_caps_unref (caps);
 }
 
-enum class Verdict { kPasses, kPassesAsFirst, kForeign, kUnsound, kRival, kOtherVersion };
+/* ---- classification of packets, under the lock ---- */
 
-/* Under the lock: a packet of the sender, or one that was lost and comes again.
+namespace {
+enum class Verdict {
+  kPasses,
+  kPassesAsFirst, /* a new sender is accepted */
+  kForeign,       /* dropped */
+  kInvalid,       /* dropped, and a warning is due; as the two below */
+  kRival,
+  kOtherVersion
+};
+} // namespace
+
+/* Whether it is a packet of the sender, or a retransmission.
  * @param here  it comes from the sender's address and port */
 static bool
-is_senders (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
+is_of_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
 {
   if (!priv->ssrc || !here || !packet.is_rtp)
     return false;
@@ -256,9 +279,8 @@ is_senders (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool he
   return true;
 }
 
-/* Under the lock. */
 static void
-take_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
+accept_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
 {
   priv->ssrc = packet.ssrc;
   priv->payload_type = packet.payload_type;
@@ -267,29 +289,29 @@ take_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
   priv->probation.clear ();
   priv->rivals.clear ();
   priv->other_versions.clear ();
-  priv->warned_of_unsound = false;
+  priv->warned_of_invalid = false;
   priv->counters.senders++;
 }
 
-/* Under the lock: a packet that nobody can use, while nobody sends what we can. */
+/* An invalid packet while there is no sender, or it is silent. */
 static Verdict
-judge_unsound (GstRtpNeighbourCodeGuardPrivate *priv, GstClockTime now)
+classify_invalid (GstRtpNeighbourCodeGuardPrivate *priv, GstClockTime now)
 {
-  if (priv->unsound++ == 0)
-    priv->unsound_since = now;
-  const bool tell = !priv->warned_of_unsound && priv->unsound >= kUnsoundPackets &&
-                    now >= priv->unsound_since && now - priv->unsound_since >= kUnsoundTime;
-  priv->warned_of_unsound |= tell;
-  return tell ? Verdict::kUnsound : Verdict::kForeign;
+  if (priv->invalid++ == 0)
+    priv->invalid_since = now;
+  const bool report = !priv->warned_of_invalid && priv->invalid >= kMinInvalidPackets &&
+                      now >= priv->invalid_since && now - priv->invalid_since >= kMinInvalidTime;
+  priv->warned_of_invalid |= report;
+  return report ? Verdict::kInvalid : Verdict::kForeign;
 }
 
-/* Under the lock: a sound packet of somebody else while the sender sends. */
+/* A valid packet of another source while the sender sends. */
 static Verdict
-judge_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packet &packet)
+classify_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packet &packet)
 {
   if (packet.version == rangecast::kBitstreamVersion)
     return priv->rivals.add (packet, priv->last_time) ? Verdict::kRival : Verdict::kForeign;
-  /* Who sends packets of our version as well sends damaged copies. */
+  /* A source that sends this version, too, sends damaged copies. */
   if (packet.ssrc == *priv->ssrc || priv->rivals.comes_from (packet.address) ||
       priv->warned_of_version || !priv->other_versions.add (packet, priv->last_time))
     return Verdict::kForeign;
@@ -297,30 +319,31 @@ judge_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packe
   return Verdict::kOtherVersion;
 }
 
-/* Under the lock. @param[out] stream  the packets that pass with kPassesAsFirst */
+/* @param[out] stream  the packets that pass with kPassesAsFirst */
 static Verdict
-judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
+classify_packet (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
     GstBuffer *buffer, SenderProbation::Stream &stream)
 {
-  /* What rtprtxreceive put together again has no address; what comes from the network has. */
+  /* Packets that rtprtxreceive has restored have no address; those from the network have one. */
   const bool here = !packet.address || same_sender (packet.address, priv->address);
-  if (is_senders (priv, packet, here)) {
+  if (is_of_sender (priv, packet, here)) {
     if (packet.ssrc == *priv->ssrc)
       priv->last_time = now;
-    priv->unsound = 0;
-    rest_filter (priv, false);
+    priv->invalid = 0;
+    pause_filter (priv, false);
     return Verdict::kPasses;
   }
   const GstClockTime waited = now > priv->last_time ? now - priv->last_time : 0;
-  const bool silent = !priv->ssrc || waited >= priv->timeout || (here && waited >= kBeginsAgain);
-  if (!priv->ssrc || waited >= priv->timeout)
-    rest_filter (priv, true);
+  const bool silent =
+      !priv->ssrc || waited >= priv->settings.timeout || (here && waited >= kRestartTimeout);
+  if (!priv->ssrc || waited >= priv->settings.timeout)
+    pause_filter (priv, true);
   if (packet.version == 0)
-    return silent ? judge_unsound (priv, now) : Verdict::kForeign;
+    return silent ? classify_invalid (priv, now) : Verdict::kForeign;
   const SenderProbation::Packet known = {
       packet.address, packet.ssrc, packet.sequence, packet.version, now};
   if (!silent)
-    return judge_rival (priv, known);
+    return classify_rival (priv, known);
   if (!packet.units && priv->warned_of_version)
     return Verdict::kForeign;
   if (!priv->probation.add (known, buffer, stream))
@@ -329,17 +352,19 @@ judge (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime
     priv->warned_of_version = true;
     return Verdict::kOtherVersion;
   }
-  take_sender (priv, packet);
+  accept_sender (priv, packet);
   priv->last_time = now;
-  priv->unsound = 0;
+  priv->invalid = 0;
   return Verdict::kPassesAsFirst;
 }
 
-/* What came of the sender so far, in order; `stream` is empty afterwards. */
+/* ---- output ---- */
+
+/* Pushes the packets that a new sender sent during probation; `stream` is empty afterwards. */
 static GstFlowReturn
 push_first (GstRtpNeighbourCodeGuard *self, SenderProbation::Stream &stream)
 {
-  GST_INFO_OBJECT (self, "SSRC %08x passes", *self->priv->ssrc);
+  GST_INFO_OBJECT (self, "accepting packets of SSRC %08x", *self->priv->ssrc);
   start_filter (self);
   push_caps (self);
   GstFlowReturn flow = GST_FLOW_OK;
@@ -356,7 +381,7 @@ push_first (GstRtpNeighbourCodeGuard *self, SenderProbation::Stream &stream)
     first = false;
     flow = gst_pad_push (self->srcpad, buffer);
   }
-  stream.forget ();
+  stream.release ();
   return flow;
 }
 
@@ -383,13 +408,13 @@ warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
 }
 
 static void
-warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 unsound)
+warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 invalid)
 {
-  if (verdict == Verdict::kUnsound)
+  if (verdict == Verdict::kInvalid)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
         ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
          "version %d; they belong to another codec, or are encrypted (--key)",
-            unsound, rangecast::kBitstreamVersion),
+            invalid, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)
     warn_of_rival (self, packet);
@@ -407,28 +432,32 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
   const Packet packet = read_packet (buffer);
   Verdict verdict = Verdict::kForeign;
-  SenderProbation::Stream stream; /* empty but when a sender begins */
+  SenderProbation::Stream stream;
   const GstClockTime now = arrival_time (GST_ELEMENT (self), buffer);
-  guint64 unsound = 0;
+  guint64 invalid = 0;
   {
     std::lock_guard guard (priv->lock);
-    verdict = judge (priv, packet, now, buffer, stream);
-    unsound = priv->unsound;
+    verdict = classify_packet (priv, packet, now, buffer, stream);
+    invalid = priv->invalid;
     priv->counters.passed += verdict == Verdict::kPasses          ? 1
                              : verdict == Verdict::kPassesAsFirst ? stream.size ()
                                                                   : 0;
     if (verdict == Verdict::kPassesAsFirst)
-      priv->counters.foreign -= stream.size () - 1; /* they were, on probation */
+      priv->counters.foreign -= stream.size () - 1; /* counted during probation */
     else
       priv->counters.foreign += verdict != Verdict::kPasses;
   }
   if (verdict == Verdict::kPasses)
     return gst_pad_push (self->srcpad, buffer);
   if (verdict == Verdict::kPassesAsFirst) {
-    gst_buffer_unref (buffer); /* the stream has it */
+    gst_buffer_unref (buffer); /* the stream has a reference */
     return push_first (self, stream);
   }
-  warn_of (self, verdict, packet, unsound);
+  GST_DEBUG_OBJECT (self, "dropping a packet: SSRC %08x, %s", packet.ssrc,
+      !packet.is_rtp        ? "not RTP"
+      : packet.version == 0 ? "not the neighbour code"
+                            : "not of the sender");
+  warn_of (self, verdict, packet, invalid);
   stream.unref ();
   gst_buffer_unref (buffer);
   return GST_FLOW_OK;
@@ -436,7 +465,7 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
 
 /* Under the lock. */
 static void
-forget_sender (GstRtpNeighbourCodeGuardPrivate *priv)
+reset_sender (GstRtpNeighbourCodeGuardPrivate *priv)
 {
   stop_filter (priv);
   priv->ssrc.reset ();
@@ -444,7 +473,7 @@ forget_sender (GstRtpNeighbourCodeGuardPrivate *priv)
   priv->probation.clear ();
   priv->rivals.clear ();
   priv->other_versions.clear ();
-  priv->unsound = 0;
+  priv->invalid = 0;
   g_clear_object (&priv->address);
 }
 
@@ -454,9 +483,9 @@ static gboolean
 gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may begin anew */
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may start again */
     std::lock_guard guard (self->priv->lock);
-    forget_sender (self->priv);
+    reset_sender (self->priv);
   }
   if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
     return gst_pad_event_default (pad, parent, event);
@@ -468,9 +497,9 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
   return TRUE;
 }
 
-/* Requests for a key frame set and for a lost packet say which stream they are about, as rtpbin's
- * demultiplexers do it: rtpsession makes a PLI or a NACK of such ones. A request that a viewer sent
- * to a parent names the parent's own stream, so whatever it names is replaced. */
+/* Sets SSRC and payload type of requests for key frame sets and lost packets, as rtpbin's
+ * demultiplexers do: rtpsession turns them into PLI and NACK. A request of a viewer to a parent
+ * names the parent's own stream, so existing values are replaced. */
 static gboolean
 gst_rtp_neighbour_code_guard_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
@@ -500,11 +529,24 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     gst_caps_replace (&self->priv->caps, nullptr);
     std::lock_guard guard (self->priv->lock);
-    forget_sender (self->priv);
-    self->priv->warned_of_version = self->priv->warned_of_unsound = false;
+    reset_sender (self->priv);
+    self->priv->warned_of_version = self->priv->warned_of_invalid = false;
     self->priv->counters = {};
   }
   return result;
+}
+
+static PropertyTable<Settings> &
+guard_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::number<&Settings::timeout> ("timeout", "Timeout",
+          "Silence of the current sender in nanoseconds after which another sender is accepted "
+          "(G_MAXUINT64 = never)",
+          0, G_MAXUINT64, kMutablePlaying),
+  };
+  return table;
 }
 
 static void
@@ -512,12 +554,9 @@ gst_rtp_neighbour_code_guard_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
-  if (id != PROP_TIMEOUT) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
   std::lock_guard guard (priv->lock);
-  priv->timeout = g_value_get_uint64 (value);
+  if (!guard_properties ().set (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -526,19 +565,13 @@ gst_rtp_neighbour_code_guard_get_property (
 {
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
   std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_TIMEOUT:
-      g_value_set_uint64 (value, priv->timeout);
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value,
-          gst_structure_new ("application/x-rtpneighbourcodeguard-stats", "passed", G_TYPE_UINT64,
-              priv->counters.passed, "foreign", G_TYPE_UINT64, priv->counters.foreign, "senders",
-              G_TYPE_UINT64, priv->counters.senders, nullptr));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  if (id == PROP_STATS)
+    g_value_take_boxed (value,
+        gst_structure_new ("application/x-rtpneighbourcodeguard-stats", "passed", G_TYPE_UINT64,
+            priv->counters.passed, "foreign", G_TYPE_UINT64, priv->counters.foreign, "senders",
+            G_TYPE_UINT64, priv->counters.senders, nullptr));
+  else if (!guard_properties ().get (priv->settings, id, value))
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -546,7 +579,7 @@ gst_rtp_neighbour_code_guard_finalize (GObject *object)
 {
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
   gst_caps_replace (&priv->caps, nullptr);
-  forget_sender (priv);
+  reset_sender (priv);
   delete priv;
   G_OBJECT_CLASS (gst_rtp_neighbour_code_guard_parent_class)->finalize (object);
 }
@@ -556,12 +589,15 @@ gst_rtp_neighbour_code_guard_init (GstRtpNeighbourCodeGuard *self)
 {
   self->priv = new GstRtpNeighbourCodeGuardPrivate;
   self->sinkpad = gst_pad_new_from_static_template (&sink_template, "sink");
-  gst_pad_set_chain_function (self->sinkpad, gst_rtp_neighbour_code_guard_chain);
-  gst_pad_set_event_function (self->sinkpad, gst_rtp_neighbour_code_guard_sink_event);
+  gst_pad_set_chain_function (
+      self->sinkpad, GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_guard_chain));
+  gst_pad_set_event_function (
+      self->sinkpad, GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_guard_sink_event));
   GST_PAD_SET_PROXY_ALLOCATION (self->sinkpad);
   gst_element_add_pad (GST_ELEMENT (self), self->sinkpad);
   self->srcpad = gst_pad_new_from_static_template (&src_template, "src");
-  gst_pad_set_event_function (self->srcpad, gst_rtp_neighbour_code_guard_src_event);
+  gst_pad_set_event_function (
+      self->srcpad, GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_guard_src_event));
   gst_element_add_pad (GST_ELEMENT (self), self->srcpad);
 }
 
@@ -575,11 +611,7 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
   object_class->get_property = gst_rtp_neighbour_code_guard_get_property;
   object_class->finalize = gst_rtp_neighbour_code_guard_finalize;
 
-  g_object_class_install_property (object_class, PROP_TIMEOUT,
-      g_param_spec_uint64 ("timeout", "Timeout",
-          "Silence of the current sender in nanoseconds after which another sender is accepted "
-          "(G_MAXUINT64 = never)",
-          0, G_MAXUINT64, kDefaultTimeout, kMutablePlaying));
+  guard_properties ().install (object_class, PROP_SETTINGS);
   install_stats (object_class, PROP_STATS,
       "Counters since the element was started: passed and foreign packets, and senders");
 
@@ -588,7 +620,7 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code guard",
       "Filter/Network/RTP", "Passes the RTP packets of one sender and drops those of all others",
       "gst-rangecast");
-  element_class->change_state = gst_rtp_neighbour_code_guard_change_state;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_guard_change_state);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_rtp_neighbour_code_guard_debug, "rtpneighbourcodeguard", 0, "RTP neighbour code guard");

@@ -23,6 +23,7 @@
 #include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <mutex>
 #include <optional>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <string>
@@ -39,25 +40,33 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
 
-enum { PROP_0, PROP_CONFIG_INTERVAL, PROP_STATS_INTERVAL };
+enum : guint { PROP_STATS_INTERVAL = 1, PROP_SETTINGS };
 
-static constexpr int kDefaultConfigInterval = 1;
-/* The least max-slice-size of neighbourcodeenc. */
-static constexpr gsize kSmallestSliceLimit = 256;
+namespace {
+
+/* The minimum of neighbourcodeenc's max-slice-size. */
+constexpr gsize kMinSliceLimit = 256;
+
+struct Settings {
+  int config_interval = 1; /* s; 0: never, -1: with every frame set */
+};
+
+} // namespace
 
 struct GstRtpNeighbourCodePayPrivate {
-  std::atomic<int> config_interval{kDefaultConfigInterval};
+  std::mutex lock; /* guards settings */
+  Settings settings;
   std::atomic<guint64> frame_sets{0}, packets{0}, bytes{0}; /* since start */
-  StatsReporter reporter;
+  StatsReporter reporter;                                   /* any thread; has locks of its own */
 
   /* streaming thread only */
   std::vector<guint8> rig_units;
   GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
   bool by_slices = false;                         /* alignment of the input */
-  bool within_frame_set = false;                  /* slices of this one came before */
+  bool within_frame_set = false;                  /* more slices of it may follow */
   GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
   gsize header_size = 0;                          /* of a packet, bytes */
-  GstCaps *header_caps = nullptr;                 /* for which that holds */
+  GstCaps *header_caps = nullptr;                 /* source caps for which that is the size */
 };
 
 struct _GstRtpNeighbourCodePay {
@@ -79,8 +88,8 @@ GST_ELEMENT_REGISTER_DEFINE (
 
 /* ---- caps ---- */
 
-/* What goes into SDP: fmtp parameters, all of which are strings there, and as rtcp-fb attributes
- * the requests for key frame sets (PLI, FIR) that an encoder before us answers. */
+/* For SDP: fmtp parameters, which are strings there, and rtcp-fb attributes for requests of key
+ * frame sets (PLI, FIR), which an encoder upstream answers. */
 static gboolean
 set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
 {
@@ -113,35 +122,38 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   const GstStructure *structure = gst_caps_get_structure (caps, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   priv->within_frame_set = false;
+  GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   return set_output_caps (base, info);
 }
 
 /* ---- packets ---- */
 
-/* Packets of one access unit that share its bytes. */
+namespace {
+
+/* Makes packets of an access unit that share its memory. */
 struct Packer {
   GstRTPBasePayload *base;
   GstBufferList *packets;
   gsize room; /* payload bytes of a packet */
   GstClockTime pts, dts;
-  bool unreadable = false; /* memory that could not be mapped */
+  bool unreadable = false; /* an input buffer could not be mapped */
 
   void add (GstBuffer *units, gsize offset, gsize size)
   {
     GstBuffer *packet = gst_rtp_base_payload_allocate_output_buffer (base, 0, 0, 0);
     GST_BUFFER_PTS (packet) = pts;
     GST_BUFFER_DTS (packet) = dts;
-    GstBuffer *payload = gst_buffer_copy_region (units, GST_BUFFER_COPY_MEMORY, offset, size);
-    gst_buffer_list_add (packets, gst_buffer_append (packet, payload));
+    gst_buffer_copy_into (packet, units, GST_BUFFER_COPY_MEMORY, offset, size);
+    gst_buffer_list_add (packets, packet);
   }
 
-  /* @return the first unit that is too long for a packet, if there is one */
+  /* @return the first unit that is too long for a packet, if any */
   std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
     gsize begin = 0, end = 0;
     std::optional<UnitHeader> too_long;
-    Status damage; /* what is behind it is left out */
-    const auto take = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+    Status damage; /* what follows it is left out */
+    const auto handle = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
       if (unit.size () > room) {
         too_long = header;
         return false;
@@ -153,18 +165,23 @@ struct Packer {
       end = offset + unit.size ();
       return true;
     };
-    if (!for_each_unit (buffer, take, damage)) {
+    if (!for_each_unit (buffer, handle, damage)) {
       unreadable = true;
       return {};
     }
+    if (!damage.ok ())
+      GST_DEBUG_OBJECT (
+          base, "dropping the rest of an access unit: %s", damage.message ().c_str ());
     if (!too_long && end > begin)
       add (buffer, begin, end - begin);
     return too_long;
   }
 };
 
-/* Bytes that an extension takes in the header at most; 0: the base class does not make it either.
- */
+} // namespace
+
+/* Maximum size of an extension in the header, bytes; 0 if there is no element for it, so that the
+ * base class does not write it either. */
 static gsize
 extension_size (const char *uri, const GstBuffer *buffer)
 {
@@ -176,8 +193,8 @@ extension_size (const char *uri, const GstBuffer *buffer)
   return size;
 }
 
-/* The fixed header, and the extensions that were agreed on: the base class writes them into packets
- * that are made already. */
+/* The size of the fixed header and of the negotiated extensions, which the base class adds to the
+ * packets later. */
 static gsize
 find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
 {
@@ -203,8 +220,8 @@ find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
   return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + (extensions + 3) / 4 * 4 : 0);
 }
 
-/* Notes where frame sets begin and end. The end of one without MARKER is known only afterwards; its
- * packets have no marker, and receivers go by the next timestamp. */
+/* Whether a buffer begins a frame set. The end of one without MARKER is known only afterwards; its
+ * packets have no marker, and receivers recognise the end by the next timestamp. */
 static bool
 begins_frame_set (GstRtpNeighbourCodePayPrivate *priv, GstBuffer *buffer, bool is_last)
 {
@@ -218,7 +235,11 @@ static bool
 config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
 {
   GstRtpNeighbourCodePayPrivate *priv = self->priv;
-  const int interval = priv->config_interval;
+  int interval = 0;
+  {
+    std::lock_guard guard (priv->lock);
+    interval = priv->settings.config_interval;
+  }
   if (interval == 0)
     return false;
   const bool due = interval < 0 || !GST_CLOCK_TIME_IS_VALID (priv->last_config) ||
@@ -241,14 +262,14 @@ set_marker (GstBufferList *packets)
   GST_BUFFER_FLAG_SET (last, GST_BUFFER_FLAG_MARKER);
 }
 
-/* What to change so that a unit fits. */
+/* Settings with which the unit would fit. */
 static std::string
 advice (const UnitHeader &unit, gsize room, gsize mtu_needed)
 {
   const std::string larger_mtu = "mtu=" + std::to_string (mtu_needed) + " at least";
   if (unit.type == guint8 (UnitType::kRigView))
     return larger_mtu + ", or config-interval=0 where receivers have the rig from caps or SDP";
-  if (unit.type == guint8 (UnitType::kSlice) && room >= kSmallestSliceLimit)
+  if (unit.type == guint8 (UnitType::kSlice) && room >= kMinSliceLimit)
     return "max-slice-size=" + std::to_string (room) + " of neighbourcodeenc at most, or " +
            larger_mtu;
   return larger_mtu;
@@ -268,7 +289,7 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
   return GST_FLOW_ERROR;
 }
 
-/* Makes packets of a frame set, or of some of its slices, and of the rig where that is due. */
+/* Makes packets of the rig, if it is due, and of a frame set or some of its slices. */
 static std::optional<UnitHeader>
 pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool with_rig)
 {
@@ -314,6 +335,8 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
   }
   if (is_last)
     set_marker (packer.packets);
+  GST_LOG_OBJECT (self, "%u packets of %" GST_TIME_FORMAT, gst_buffer_list_length (packer.packets),
+      GST_TIME_ARGS (packer.pts));
   self->priv->packets += gst_buffer_list_length (packer.packets);
   self->priv->bytes += gst_buffer_list_calculate_size (packer.packets);
   return gst_rtp_base_payload_push_list (base, packer.packets);
@@ -321,7 +344,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
 
 /* ---- events ---- */
 
-/* With the key frame set that the event announces the rig is sent again. */
+/* The rig is sent again with the key frame set that the event announces, if it asks for headers. */
 static gboolean
 gst_rtp_neighbour_code_pay_sink_event (GstRTPBasePayload *base, GstEvent *event)
 {
@@ -362,16 +385,28 @@ gst_rtp_neighbour_code_pay_change_state (GstElement *element, GstStateChange tra
   return result;
 }
 
+static PropertyTable<Settings> &
+pay_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::number<&Settings::config_interval> ("config-interval", "Config interval",
+          "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
+          "frame set)",
+          -1, 3600, kMutablePlaying),
+  };
+  return table;
+}
+
 static void
 gst_rtp_neighbour_code_pay_set_property (
     GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
-  if (id == PROP_CONFIG_INTERVAL)
-    priv->config_interval = g_value_get_int (value);
-  else if (id == PROP_STATS_INTERVAL)
-    priv->reporter.set_interval (g_value_get_uint (value));
-  else
+  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
+    return priv->reporter.set_interval (g_value_get_uint (value));
+  std::lock_guard guard (priv->lock);
+  if (!pay_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -380,11 +415,10 @@ gst_rtp_neighbour_code_pay_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
-  if (id == PROP_CONFIG_INTERVAL)
-    g_value_set_int (value, priv->config_interval);
-  else if (id == PROP_STATS_INTERVAL)
+  std::lock_guard guard (priv->lock);
+  if (id == PROP_STATS_INTERVAL)
     g_value_set_uint (value, priv->reporter.interval ());
-  else
+  else if (!pay_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -413,11 +447,7 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
   object_class->get_property = gst_rtp_neighbour_code_pay_get_property;
   object_class->finalize = gst_rtp_neighbour_code_pay_finalize;
 
-  g_object_class_install_property (object_class, PROP_CONFIG_INTERVAL,
-      g_param_spec_int ("config-interval", "Config interval",
-          "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
-          "frame set)",
-          -1, 3600, kDefaultConfigInterval, kMutablePlaying));
+  pay_properties ().install (object_class, PROP_SETTINGS);
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
@@ -426,10 +456,10 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
       "Codec/Payloader/Network/RTP", "Packs neighbour-coded frame sets into RTP packets",
       "gst-rangecast");
 
-  element_class->change_state = gst_rtp_neighbour_code_pay_change_state;
-  payload_class->set_caps = gst_rtp_neighbour_code_pay_set_caps;
-  payload_class->sink_event = gst_rtp_neighbour_code_pay_sink_event;
-  payload_class->handle_buffer = gst_rtp_neighbour_code_pay_handle_buffer;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_pay_change_state);
+  payload_class->set_caps = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_pay_set_caps);
+  payload_class->sink_event = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_pay_sink_event);
+  payload_class->handle_buffer = GST_DEBUG_FUNCPTR (gst_rtp_neighbour_code_pay_handle_buffer);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_rtp_neighbour_code_pay_debug, "rtpneighbourcodepay", 0, "RTP neighbour code payloader");

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* When a packet came, and from which host. */
+/* Arrival time and host of packets. */
 #pragma once
 
 #include <gio/gio.h>
 #include <gst/gst.h>
 
-/** The running time at which udpsrc got a packet; for one that says none, the pipeline's. Only
- * where there is no clock, and so no other time either that packets could have, is it the system's.
- */
+/** The running time at which udpsrc received a packet, or the current one if the buffer has no
+ * time. Without a pipeline clock, when no packet can have a time, it is the monotonic time. */
 inline GstClockTime
 arrival_time (GstElement *element, GstBuffer *buffer)
 {
@@ -17,7 +16,7 @@ arrival_time (GstElement *element, GstBuffer *buffer)
   return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
 }
 
-/** The host of an address, whatever its port: (transfer none), or null. */
+/** The host of an address: (transfer none), or null. */
 inline GInetAddress *
 host_of (GSocketAddress *address)
 {
@@ -26,7 +25,7 @@ host_of (GSocketAddress *address)
              : nullptr;
 }
 
-/** Whether both are the same host; two that are not known (null) are. */
+/** Whether both are the same host; two unknown ones (null) are. */
 inline bool
 same_host (GInetAddress *a, GInetAddress *b)
 {

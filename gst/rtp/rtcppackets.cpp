@@ -8,17 +8,18 @@
 
 using Bytes = std::span<const guint8>;
 
-static constexpr std::size_t kHeader = 4;
-static constexpr std::size_t kReporter = 4, kSender = 24, kBlock = 24; /* RR, SR, of both */
+namespace {
 
-/* What stands before the report blocks. */
-static std::size_t
+/* Bytes: packet header; in front of the report blocks of RR and of SR; report block. */
+constexpr std::size_t kHeader = 4, kReporter = 4, kSender = 24, kBlock = 24;
+
+std::size_t
 size_before_blocks (const RtcpPacket &packet)
 {
   return packet.type == GST_RTCP_TYPE_SR ? kSender : kReporter;
 }
 
-static bool
+bool
 has_chunks (const RtcpPacket &packet)
 {
   Bytes chunks = packet.body;
@@ -29,9 +30,9 @@ has_chunks (const RtcpPacket &packet)
   return true;
 }
 
-/* Whether what the header announces is there; of types that are not known nothing is. */
-static bool
-is_whole (const RtcpPacket &packet)
+/* Whether the body holds everything that the header announces; true for unknown types. */
+bool
+is_complete (const RtcpPacket &packet)
 {
   const std::size_t size = packet.body.size ();
   switch (packet.type) {
@@ -53,9 +54,9 @@ is_whole (const RtcpPacket &packet)
   }
 }
 
-/* RFC 3550, A.2: only the last one is padded, and not if it is the first.
- * @return bytes of padding at the end, which counts itself; none where it is none */
-static std::optional<std::size_t>
+/* RFC 3550, A.2: only the last packet may have padding, and not if it is also the first.
+ * @return bytes of padding, of which the last one is the number; nothing if it is invalid */
+std::optional<std::size_t>
 read_padding (Bytes body, bool padded, bool allowed)
 {
   if (!padded)
@@ -66,6 +67,8 @@ read_padding (Bytes body, bool padded, bool allowed)
   return padding > 0 && padding % 4 == 0 && padding <= body.size () ? std::optional (padding)
                                                                     : std::nullopt;
 }
+
+} // namespace
 
 bool
 RtcpReader::next (RtcpPacket &packet)
@@ -84,7 +87,7 @@ RtcpReader::next (RtcpPacket &packet)
   if (!padding)
     return false;
   packet.body = packet.body.first (packet.body.size () - *padding);
-  if (!is_whole (packet))
+  if (!is_complete (packet))
     return false;
   rest_ = rest_.subspan (size);
   first_ = false;
@@ -101,8 +104,8 @@ RtcpReader::is_sound (Bytes bytes)
   return !bytes.empty () && reader.rest_.empty ();
 }
 
-/* A chunk is an SSRC and items of type, size and text, up to a zero and the next multiple of 32
- * bits. Some senders leave the zero out at the packet's end. */
+/* A chunk is an SSRC and items of type, size and text, with a zero and padding to 32 bits behind
+ * them. Some senders omit the zero at the end of the packet. */
 bool
 take_sdes_chunk (Bytes &chunks, guint32 &ssrc)
 {

@@ -11,19 +11,20 @@ RtcpReceivers::clear ()
   for (Receiver &receiver : receivers_)
     g_clear_object (&receiver.host);
   receivers_.clear ();
-  forgot_ = 0;
+  checked_ = 0;
 }
 
-/* Once a second: a flood of such who want to come in does not make us look at all of them. */
+/* At most once a second, so that a flood of new receivers does not cost an iteration each. */
 void
-RtcpReceivers::forget (GstClockTime now)
+RtcpReceivers::remove_silent (GstClockTime now)
 {
-  if (now >= forgot_ && now - forgot_ < GST_SECOND)
+  if (now >= checked_ && now - checked_ < GST_SECOND)
     return;
-  forgot_ = now;
+  checked_ = now;
   std::erase_if (receivers_, [now] (Receiver &receiver) {
-    /* Of two sources the one may be a little ahead; far ahead it is a clock that began anew. */
-    if (now + GST_SECOND >= receiver.heard && now < receiver.heard + kForgotten)
+    /* Times of two sources may differ a little; one far in the future is from before a clock reset.
+     */
+    if (now + GST_SECOND >= receiver.heard && now < receiver.heard + kTimeout)
       return false;
     g_clear_object (&receiver.host);
     return true;
@@ -31,18 +32,17 @@ RtcpReceivers::forget (GstClockTime now)
 }
 
 bool
-RtcpReceivers::has_room (GInetAddress *host, guint most) const
+RtcpReceivers::has_room (GInetAddress *host, guint max) const
 {
-  if (size () >= std::min (most, kMax))
+  if (size () >= std::min (max, kMax))
     return false;
   const auto neighbours = std::ranges::count_if (
       receivers_, [host] (const Receiver &receiver) { return same_host (receiver.host, host); });
-  return !host || neighbours < std::max (1, int (most / 4));
+  return !host || neighbours < std::max (1, int (max / 4));
 }
 
 RtcpReceivers::Receiver *
-RtcpReceivers::admit (
-    guint32 ssrc, GSocketAddress *from, bool reports, GstClockTime now, guint most)
+RtcpReceivers::admit (guint32 ssrc, GSocketAddress *from, bool reports, GstClockTime now, guint max)
 {
   GInetAddress *host = host_of (from);
   const auto known = std::ranges::find (receivers_, ssrc, &Receiver::ssrc);
@@ -52,9 +52,9 @@ RtcpReceivers::admit (
   }
   if (!reports)
     return nullptr;
-  forget (now);
+  remove_silent (now);
   if (std::ranges::find (receivers_, ssrc, &Receiver::ssrc) != receivers_.end () ||
-      !has_room (host, most))
+      !has_room (host, max))
     return nullptr;
   if (host)
     g_object_ref (host);

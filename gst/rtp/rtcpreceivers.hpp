@@ -6,44 +6,45 @@
 
 #include <vector>
 
-/** The receivers of a stream that a sender listens to, so many and no more: rtpsession keeps a
- *  source for every SSRC that RTCP names, and looks through all of them with every packet.
+/** The receivers whose RTCP is accepted. Their number is limited because rtpsession keeps a source
+ *  for every SSRC in RTCP, and iterates over all of them with every packet.
  *
- *  Who reports on the stream (its SSRC is not to be guessed) is taken, while there is room; one
- *  address has a quarter of it, so that a host that floods does not keep the others out. Who was
- *  silent for kForgotten makes room. */
+ *  A receiver is admitted if it reports on the stream, whose SSRC cannot be guessed, and there is
+ *  room; one address has a quarter of it, so that a flood from one host does not exclude others.
+ *  Receivers that were silent for kTimeout are removed. */
 class RtcpReceivers {
 public:
-  static constexpr guint kMax = 4096, kDefaultMost = 256;
-  static constexpr GstClockTime kForgotten = 30 * GST_SECOND;
+  static constexpr guint kMax = 4096, kDefaultMax = 256;
+  static constexpr GstClockTime kTimeout = 30 * GST_SECOND;
 
   struct Receiver {
     guint32 ssrc = 0;
-    GInetAddress *host = nullptr; ///< a reference; null: packets do not say
-    GstClockTime heard = 0;       ///< last
-    guint32 stream = 0;           ///< that it reported on last
-    guint32 highest = 0;          ///< sequence number of that stream then
+    GInetAddress *host = nullptr; ///< a reference; null: unknown
+    GstClockTime heard = 0;       ///< time of the last packet
+    guint32 stream = 0;           ///< SSRC of its last report
+    guint32 highest = 0;          ///< sequence number in that report
     bool has_reported = false;
   };
 
-  /** Takes memory for kMax; none is taken later, while packets come. */
+  /** Reserves memory for kMax; none is allocated later, while packets arrive. */
   RtcpReceivers () { receivers_.reserve (kMax); }
   ~RtcpReceivers () { clear (); }
   RtcpReceivers (const RtcpReceivers &) = delete;
 
   void clear ();
-  /** The one who speaks in a packet of RTCP.
-   *  @param from  where the packet comes from, or null
-   *  @param reports  it says something about the stream
-   *  @return nullptr: there is no room, or it comes from elsewhere than before, or it is not
-   *          known and says nothing about the stream. Valid until the next call. */
-  Receiver *admit (guint32 ssrc, GSocketAddress *from, bool reports, GstClockTime now, guint most);
+  /** The receiver that sent an RTCP packet.
+   *  @param from  the packet's address, or null
+   *  @param reports  the packet says something about the stream
+   *  @param max  receivers at a time
+   *  @return valid until the next call; nullptr if there is no room, if the address has changed, or
+   *  if the receiver is new and says nothing about the stream */
+  Receiver *admit (guint32 ssrc, GSocketAddress *from, bool reports, GstClockTime now, guint max);
   [[nodiscard]] guint size () const { return guint (receivers_.size ()); }
 
 private:
-  [[nodiscard]] bool has_room (GInetAddress *host, guint most) const;
-  void forget (GstClockTime now);
+  [[nodiscard]] bool has_room (GInetAddress *host, guint max) const;
+  void remove_silent (GstClockTime now);
 
   std::vector<Receiver> receivers_;
-  GstClockTime forgot_ = 0; /* when room was made last */
+  GstClockTime checked_ = 0; /* when remove_silent() ran last */
 };

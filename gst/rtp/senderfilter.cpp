@@ -11,16 +11,16 @@
 
 namespace {
 
-/* Offsets in the headers: of IP they count from kIp, of UDP from 0. */
+/* Offsets: those of the IP header count from kIp, of the UDP header from 0. */
 constexpr std::uint32_t kIp = std::uint32_t (SKF_NET_OFF);
 constexpr std::uint32_t kRandom = std::uint32_t (SKF_AD_OFF + SKF_AD_RANDOM);
 constexpr std::uint32_t kAll = 0xffffffff;
 
-/* A list of comparisons that all have to hold, and the sample of what they do not hold for. */
+/* A filter that passes packets for which all comparisons hold, and a sample of the others. */
 class Program {
 public:
-  /* Jumps in classic BPF go forward and count from the next instruction; the sample's place is not
-   * known yet, finish() fills it in. */
+  /* Jumps in classic BPF are relative to the next instruction; finish() fills in the distance to
+   * the sampling. */
   void expect (std::uint16_t size, std::uint32_t offset, std::uint32_t value)
   {
     code_.push_back (BPF_STMT (std::uint16_t (BPF_LD | size | BPF_ABS), offset));

@@ -6,12 +6,16 @@
 
 #include "netarrival.hpp"
 
-/* Whatever the ports. Unknown ones are nobody's. */
-static bool
+namespace {
+
+/* Whether two addresses are known and differ at most in their ports. */
+bool
 share_host (GSocketAddress *a, GSocketAddress *b)
 {
   return host_of (a) && same_host (host_of (a), host_of (b));
 }
+
+} // namespace
 
 bool
 same_sender (GSocketAddress *a, GSocketAddress *b)
@@ -27,7 +31,7 @@ SenderProbation::Stream::unref ()
 {
   for (GstBuffer *packet : *this)
     gst_buffer_unref (packet);
-  forget ();
+  release ();
 }
 
 void
@@ -48,13 +52,13 @@ SenderProbation::clear ()
 SenderProbation::Candidate &
 SenderProbation::make_room (const Packet &packet)
 {
-  const auto theirs = [&] (const Candidate &c) {
+  const auto of_same_host = [&] (const Candidate &c) {
     return c.used > 0 && share_host (c.address, packet.address);
   };
-  const bool only_theirs = std::ranges::count_if (candidates_, theirs) >= kPerHost;
+  const bool host_is_full = std::ranges::count_if (candidates_, of_same_host) >= kPerHost;
   return *std::ranges::min_element (candidates_, {}, [&] (const Candidate &c) {
     const bool stale = c.used == 0 || packet.time < c.heard || packet.time - c.heard >= kStale;
-    const bool spared = !stale && only_theirs && !theirs (c);
+    const bool spared = !stale && host_is_full && !of_same_host (c);
     return std::tuple (spared, stale ? 0 : c.packets.size (), c.used);
   });
 }
@@ -83,7 +87,7 @@ SenderProbation::add (const Packet &packet, GstBuffer *buffer, Stream &stream)
   c.used = ++uses_;
   c.heard = packet.time;
   if (!c.packets.empty () && packet.sequence == c.sequence)
-    return false; /* the network doubled it */
+    return false; /* duplicated by the network */
   if (!c.packets.empty () && packet.sequence != guint16 (c.sequence + 1))
     c.packets.unref ();
   c.packets.push (gst_buffer_ref (buffer));
@@ -91,7 +95,7 @@ SenderProbation::add (const Packet &packet, GstBuffer *buffer, Stream &stream)
   if (c.packets.size () < kPackets)
     return false;
   stream = c.packets;
-  c.packets.forget ();
+  c.packets.release ();
   c.clear ();
   return true;
 }

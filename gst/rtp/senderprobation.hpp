@@ -9,18 +9,18 @@
 /** Whether both are the same address and port; unknown ones (null) are the same. */
 bool same_sender (GSocketAddress *a, GSocketAddress *b);
 
-/** Tells a stream from packets that only look like some: it has kPackets sound ones one after
- *  another in its sequence numbers. They are kept, so that nothing is lost of it.
+/** Probation, before a sender is accepted: a source passes with kPackets valid packets with
+ *  consecutive sequence numbers. They are kept, so that none is lost.
  *
- *  Where a flood of strangers takes all places, room for somebody new is made by who was silent for
- *  kStale; else, where his own host has kPerHost places, by one of these; else by anybody: who has
- *  fewest packets, and of these the one that was silent for longest. So a flood from one host never
- *  drives out a stream of another one, nor any flood of ever new strangers one of two packets. */
+ *  When all places are taken, a new candidate replaces, in this order: one that was silent for
+ *  kStale; one of its own host, if that has kPerHost places; any other. Among these it is the one
+ *  with the fewest packets, then the one silent for longest. So a flood from one host never removes
+ *  a candidate of another host, and no flood of ever new sources one with two packets. */
 class SenderProbation {
 public:
   static constexpr std::size_t kPackets = 4;
-  static constexpr std::size_t kCandidates = 64; ///< strangers that are known at a time
-  static constexpr std::ptrdiff_t kPerHost = 16; ///< of them at one address, whatever its port
+  static constexpr std::size_t kCandidates = 64; ///< at a time
+  static constexpr std::ptrdiff_t kPerHost = 16; ///< at one address, with any port
   static constexpr GstClockTime kStale = 5 * GST_SECOND;
 
   struct Packet {
@@ -31,18 +31,17 @@ public:
     GstClockTime time;
   };
 
-  /** Packets in order, a reference of each. Whoever takes them unrefs them: it has no destructor.
-   */
+  /** References to packets, in order. It has no destructor: the owner calls unref(). */
   class Stream {
   public:
     [[nodiscard]] std::size_t size () const { return size_; }
     [[nodiscard]] bool empty () const { return size_ == 0; }
     GstBuffer **begin () { return packets_.data (); }
     GstBuffer **end () { return begin () + size_; }
-    /** There are fewer than kPackets. */
+    /** Call it only with fewer than kPackets. */
     void push (GstBuffer *packet) { packets_[size_++] = packet; }
-    /** They are somebody else's now. */
-    void forget () { size_ = 0; }
+    /** Clears it without unref: the references were given away. */
+    void release () { size_ = 0; }
     void unref ();
 
   private:
@@ -55,10 +54,10 @@ public:
   SenderProbation (const SenderProbation &) = delete;
 
   void clear ();
-  /** Takes note of a packet.
+  /** Records a packet.
    *  @param buffer  (transfer none)
-   *  @param[out] stream  its packets so far, this one included, once it has passed: (transfer full)
-   *  @return whether it has */
+   *  @param[out] stream  if the source has passed: its packets including this one, (transfer full)
+   *  @return whether the source has passed */
   bool add (const Packet &packet, GstBuffer *buffer, Stream &stream);
 
 private:
@@ -67,8 +66,8 @@ private:
     guint32 ssrc = 0;
     guint16 sequence = 0; /* of the last packet */
     int version = 0;
-    GstClockTime heard = 0;
-    guint64 used = 0; /* 0: nobody */
+    GstClockTime heard = 0; /* time of the last packet */
+    guint64 used = 0;       /* order of last use; 0: free */
     Stream packets;
 
     void clear ();

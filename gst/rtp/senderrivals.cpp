@@ -8,18 +8,22 @@ SenderRivals::clear ()
 {
   g_clear_object (&address_);
   packets_ = total_ = 0;
-  told_ = false;
+  reported_ = false;
 }
 
-static bool
+namespace {
+
+bool
 is_stale (GstClockTime since, GstClockTime now)
 {
   return now < since || now - since >= SenderRivals::kStale;
 }
 
-/* @return whether the one that is looked at is a rival */
+} // namespace
+
+/* One source is watched at a time. @return whether it is a rival */
 bool
-SenderRivals::look (const SenderProbation::Packet &packet, GstClockTime sender_time)
+SenderRivals::watch (const SenderProbation::Packet &packet, GstClockTime sender_time)
 {
   const bool stale = packets_ == 0 || is_stale (heard_, packet.time);
   const bool same =
@@ -35,11 +39,11 @@ SenderRivals::look (const SenderProbation::Packet &packet, GstClockTime sender_t
   }
   packets_ = std::min (packets_ + 1, kPackets);
   heard_ = packet.time;
-  /* The sender's own time: who comes because it is gone is no rival. */
+  /* By the sender's own time: a source that begins after the sender has stopped is no rival. */
   return packets_ == kPackets && sender_time >= since_ && sender_time - since_ >= kBeside;
 }
 
-/* @return whether those of all together are rivals */
+/* @return whether all sources together are rivals */
 bool
 SenderRivals::count (GstClockTime now)
 {
@@ -54,8 +58,8 @@ SenderRivals::count (GstClockTime now)
 bool
 SenderRivals::add (const SenderProbation::Packet &packet, GstClockTime sender_time)
 {
-  const bool one = look (packet, sender_time), all = count (packet.time);
-  const bool first = (one || all) && !told_;
-  told_ |= first;
+  const bool one = watch (packet, sender_time), all = count (packet.time);
+  const bool first = (one || all) && !reported_;
+  reported_ |= first;
   return first;
 }

@@ -3,40 +3,42 @@
 
 #include "senderprobation.hpp"
 
-/** Tells when somebody else sends beside the sender that passes. Of what others send the kernel may
- *  let a sample through only (SenderFilter), so their packets need not follow one another. */
+/** Detects other sources that send at the same time as the accepted sender. SenderFilter may pass
+ *  only a sample of their packets, so that sequence numbers need not be consecutive, as they are
+ * for SenderProbation. */
 class SenderRivals {
 public:
-  static constexpr guint kPackets = 4; ///< of one rival, if he has been there beside the sender ...
-  static constexpr GstClockTime kBeside = 2 * GST_SECOND; ///< ... for so long
-  static constexpr GstClockTime kStale = 10 * GST_SECOND; ///< then another one may be looked at
-  static constexpr guint kTotal = 100;                    ///< or so many of all within kStale
+  /* A rival is one source with kPackets packets while the sender has sent for kBeside since the
+   * first of them, or all sources together with kTotal packets within kStale. */
+  static constexpr guint kPackets = 4, kTotal = 100;
+  static constexpr GstClockTime kBeside = 2 * GST_SECOND;
+  static constexpr GstClockTime kStale = 10 * GST_SECOND; ///< silence of the watched source
 
   SenderRivals () = default;
   ~SenderRivals () { clear (); }
   SenderRivals (const SenderRivals &) = delete;
 
   void clear ();
-  /** Takes note of a sound packet of somebody who is not the sender.
+  /** Records a valid packet of another source than the sender.
    *  @param sender_time  of the sender's last packet
-   *  @return whether there is a rival now; once until clear() */
+   *  @return whether a rival is detected; only once until clear() */
   bool add (const SenderProbation::Packet &packet, GstClockTime sender_time);
-  /** Whether the rival that is looked at sends from there. */
+  /** Whether the watched source has this address. */
   [[nodiscard]] bool comes_from (GSocketAddress *address) const
   {
     return packets_ > 0 && same_sender (address, address_);
   }
 
 private:
-  bool look (const SenderProbation::Packet &packet, GstClockTime sender_time);
+  bool watch (const SenderProbation::Packet &packet, GstClockTime sender_time);
   bool count (GstClockTime now);
 
   GSocketAddress *address_ = nullptr; /* a reference */
   guint32 ssrc_ = 0;
   int version_ = 0;
-  guint packets_ = 0; /* of this one */
+  guint packets_ = 0; /* of the watched source, up to kPackets */
   GstClockTime since_ = 0, heard_ = 0;
-  guint total_ = 0; /* of all since all_since_, up to kTotal */
+  guint total_ = 0; /* of all sources since all_since_, up to kTotal */
   GstClockTime all_since_ = 0;
-  bool told_ = false;
+  bool reported_ = false;
 };

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <utility>
 
+namespace {
+
 /* ---- reading elements ---- */
 
-static guint64
+guint64
 stat_of (GstElement *element, const char *field)
 {
   GstStructure *stats = nullptr;
@@ -23,7 +25,7 @@ stat_of (GstElement *element, const char *field)
   return value;
 }
 
-static void
+void
 add_jitterbuffer (const GValue *item, gpointer user_data)
 {
   auto stats = static_cast<StreamStats *> (user_data);
@@ -36,7 +38,7 @@ add_jitterbuffer (const GValue *item, gpointer user_data)
   stats->rtp_lost += lost;
 }
 
-static void
+void
 read_cylinder (GstBin *bin, StreamStats &stats)
 {
   GstElement *cylinder = gst_bin_get_by_name (bin, "cylinder");
@@ -48,7 +50,7 @@ read_cylinder (GstBin *bin, StreamStats &stats)
   gst_object_unref (cylinder);
 }
 
-static void
+void
 read_decoder (GstBin *bin, StreamStats &stats)
 {
   GstElement *decoder = gst_bin_get_by_name (bin, "decoder");
@@ -67,6 +69,8 @@ read_decoder (GstBin *bin, StreamStats &stats)
   gst_object_unref (pad);
   gst_object_unref (decoder);
 }
+
+} // namespace
 
 StreamStats
 RunMeasure::stats ()

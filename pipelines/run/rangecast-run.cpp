@@ -14,10 +14,13 @@
 #include <memory>
 #include <string>
 
+#include "dump-graph.hpp"
 #include "latency-trace.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
+
+namespace {
 
 struct Runner {
   RunOptions options;
@@ -30,7 +33,7 @@ struct Runner {
   bool ending = false;
 };
 
-static gboolean
+gboolean
 send_eos (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
@@ -40,12 +43,13 @@ send_eos (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-static gboolean
+gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
   GError *error = nullptr;
   gchar *details = nullptr;
+  dump_graph (message, "rangecast-run");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       gst_message_parse_error (message, &error, &details);
@@ -82,7 +86,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
 }
 
 /* Where the pipeline does not start. Some elements fail without a message. */
-static void
+void
 tell_failure (Runner &runner, GstBus *bus)
 {
   runner.failed = true;
@@ -94,7 +98,7 @@ tell_failure (Runner &runner, GstBus *bus)
   }
 }
 
-static gboolean
+gboolean
 on_timeout (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
@@ -105,7 +109,7 @@ on_timeout (gpointer user_data)
 }
 
 /* What happens by time and by signals while the pipeline runs. */
-static void
+void
 add_sources (Runner &runner)
 {
   g_unix_signal_add (SIGINT, send_eos, &runner);
@@ -126,7 +130,7 @@ add_sources (Runner &runner)
     g_timeout_add_seconds (5, memory, &runner);
 }
 
-static void
+void
 remove_empty (const char *path)
 {
   GStatBuf file;
@@ -135,7 +139,7 @@ remove_empty (const char *path)
 }
 
 /* After the loop: what was asked for, from a pipeline that still has it, and its end. */
-static void
+void
 finish (Runner &runner)
 {
   const RunOptions &options = runner.options;
@@ -152,7 +156,7 @@ finish (Runner &runner)
   }
 }
 
-static void
+void
 play (Runner &runner)
 {
   runner.loop = g_main_loop_new (nullptr, FALSE);
@@ -178,7 +182,7 @@ play (Runner &runner)
 }
 
 /* @return false if there is something wrong with the address */
-static bool
+bool
 open_stats (Runner &runner)
 {
   const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
@@ -193,7 +197,7 @@ open_stats (Runner &runner)
 }
 
 /* @return transfer full; null if the launch string is none, which has been said */
-static GstElement *
+GstElement *
 parse_pipeline (gchar **launch)
 {
   GError *error = nullptr;
@@ -212,7 +216,7 @@ parse_pipeline (gchar **launch)
 }
 
 /* Gives the pipeline up. @return false if it failed, which has been said */
-static bool
+bool
 run (Runner &runner)
 {
   const RunOptions &options = runner.options;
@@ -228,6 +232,8 @@ run (Runner &runner)
   gst_object_unref (runner.pipeline);
   return !runner.failed;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

@@ -7,13 +7,19 @@
 #include <cstdio>
 #include <cstdlib>
 
-static constexpr int kWrongUsage = 2;
+namespace {
+
+constexpr int kWrongUsage = 2;
+
+} // namespace
 
 bool
 FakeCameraOptions::serves (const std::string &name) const
 {
   return only.empty () || ("," + only + ",").find ("," + name + ",") != only.npos;
 }
+
+namespace {
 
 /* As they stand on the command line. */
 struct RawOptions {
@@ -29,14 +35,14 @@ struct RawOptions {
   }
 };
 
-static bool
+bool
 bad (const char *option, const char *expected, const std::string &got)
 {
   g_printerr ("fake-cameras: %s: expected %s, got '%s'\n", option, expected, got.c_str ());
   return false;
 }
 
-static bool
+bool
 parse (int *argc, char ***argv, RawOptions &raw)
 {
   const GOptionEntry entries[] = {
@@ -78,7 +84,7 @@ parse (int *argc, char ***argv, RawOptions &raw)
   return good;
 }
 
-static bool
+bool
 take_numbers (const RawOptions &raw, FakeCameraOptions &options)
 {
   if (raw.views < 1 || raw.views > 64)
@@ -104,7 +110,7 @@ take_numbers (const RawOptions &raw, FakeCameraOptions &options)
   return true;
 }
 
-static bool
+bool
 take_texts (const RawOptions &raw, FakeCameraOptions &options)
 {
   char more = 0;
@@ -130,6 +136,8 @@ take_texts (const RawOptions &raw, FakeCameraOptions &options)
   options.only = raw.only ? raw.only : "";
   return true;
 }
+
+} // namespace
 
 int
 read_fake_camera_options (int argc, char **argv, FakeCameraOptions &options)

@@ -16,13 +16,16 @@
 
 #include "gige-description.hpp"
 
+namespace {
+
 using rangecast::Status;
 using rangecast::StatusCode;
 
-static constexpr std::int64_t kSecond = 1000000000;
-static constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
-static constexpr std::uint64_t kLatestAction = std::uint64_t (1)
-                                               << 62; /* ns; so sums stay numbers */
+constexpr std::int64_t kSecond = 1000000000;
+constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
+constexpr std::uint64_t kLatestAction = std::uint64_t (1) << 62; /* ns; so sums stay numbers */
+
+} // namespace
 
 struct GigeCamera::Frame {
   GvspPicture picture;
@@ -35,7 +38,9 @@ struct GigeCamera::Frame {
   }
 };
 
-static std::int64_t
+namespace {
+
+std::int64_t
 now ()
 {
   timespec time;
@@ -45,14 +50,14 @@ now ()
 
 /* A camera's hardware answers at once, whatever else this machine does. Where the user may not have
  * that (RLIMIT_RTPRIO), the thread is one as any other. */
-static void
+void
 set_at_once (bool at_once)
 {
   const sched_param priority = {at_once ? 10 : 0};
   pthread_setschedparam (pthread_self (), at_once ? SCHED_RR : SCHED_OTHER, &priority);
 }
 
-static sockaddr_in
+sockaddr_in
 make_address (const std::string &address, std::uint16_t port)
 {
   sockaddr_in result{};
@@ -62,11 +67,13 @@ make_address (const std::string &address, std::uint16_t port)
   return result;
 }
 
-static bool
+bool
 is_same (const sockaddr_in &a, const sockaddr_in &b)
 {
   return a.sin_port == b.sin_port && a.sin_addr.s_addr == b.sin_addr.s_addr;
 }
+
+} // namespace
 
 /* ---- life ---- */
 
@@ -89,7 +96,9 @@ GigeCamera::~GigeCamera ()
   g_clear_object (&registers_);
 }
 
-static int
+namespace {
+
+int
 bound_socket (const std::string &address, std::uint16_t port)
 {
   const int fd = socket (AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -102,6 +111,8 @@ bound_socket (const std::string &address, std::uint16_t port)
   }
   return fd;
 }
+
+} // namespace
 
 Status
 GigeCamera::open_sockets ()

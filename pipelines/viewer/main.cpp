@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <clocale>
 
+#include "dump-graph.hpp"
 #include "viewer.hpp"
 
 void
@@ -21,8 +22,10 @@ fail (Viewer &viewer, const std::string &text)
   g_main_loop_quit (viewer.loop);
 }
 
+namespace {
+
 /* That its window was closed glimagesink tells with its next picture only. */
-static gboolean
+gboolean
 look_for_window (gpointer user_data)
 {
   static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
@@ -30,7 +33,7 @@ look_for_window (gpointer user_data)
 }
 
 /* What fades or goes away also does so while there are no new pictures. */
-static gboolean
+gboolean
 update_overlay (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -40,7 +43,7 @@ update_overlay (gpointer user_data)
 }
 
 /* Recordings are short: at its end a file begins again. */
-static void
+void
 finish (Viewer &viewer)
 {
   if (!viewer.is_file || viewer.options.once)
@@ -49,7 +52,7 @@ finish (Viewer &viewer)
     fail (viewer, "the file cannot be played again: it has no times to go back to");
 }
 
-static gboolean
+gboolean
 say_that_nothing_comes (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -62,7 +65,7 @@ say_that_nothing_comes (gpointer user_data)
 
 /* The last line of what an element says to those who debug it: often the only one that names names.
  */
-static std::string
+std::string
 last_line (const gchar *text)
 {
   std::string all = text ? text : "";
@@ -72,14 +75,14 @@ last_line (const gchar *text)
 
 /* What is not a file of ours either has no type that GStreamer knows, or one that does not lead to
  * range frame sets. */
-static bool
+bool
 is_wrong_type (const GError *error)
 {
   return g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_TYPE_NOT_FOUND) ||
          g_error_matches (error, GST_CORE_ERROR, GST_CORE_ERROR_MISSING_PLUGIN);
 }
 
-static void
+void
 on_error (Viewer &viewer, GstMessage *message)
 {
   GError *error = nullptr;
@@ -103,10 +106,11 @@ on_error (Viewer &viewer, GstMessage *message)
   g_error_free (error);
 }
 
-static gboolean
+gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
+  dump_graph (message, "rangecast-viewer");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       on_error (viewer, message);
@@ -130,14 +134,14 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-static gboolean
+gboolean
 on_signal (gpointer user_data)
 {
   g_main_loop_quit (static_cast<Viewer *> (user_data)->loop);
   return G_SOURCE_CONTINUE;
 }
 
-static void
+void
 show (Viewer &viewer)
 {
   GstBus *bus = gst_element_get_bus (viewer.pipeline);
@@ -154,7 +158,7 @@ show (Viewer &viewer)
   gst_object_unref (bus);
 }
 
-static void
+void
 clear (Viewer &viewer)
 {
   gst_clear_object (&viewer.pipeline);
@@ -165,7 +169,7 @@ clear (Viewer &viewer)
 }
 
 /* The keys of a file, for --help. */
-static std::string
+std::string
 keys_text ()
 {
   std::string text = "Keys:\n";
@@ -175,6 +179,8 @@ keys_text ()
             row.text + "\n";
   return text;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

@@ -6,8 +6,10 @@
 
 #include "viewer.hpp"
 
+namespace {
+
 /* The first name in the folder that is free. */
-static std::string
+std::string
 free_name (const Viewer &viewer, const char *extension)
 {
   const char *folder = viewer.options.out ? viewer.options.out : ".";
@@ -20,7 +22,7 @@ free_name (const Viewer &viewer, const char *extension)
   }
 }
 
-static void
+void
 write_file (const std::string &path, GstBuffer *buffer)
 {
   GstMapInfo map;
@@ -40,7 +42,7 @@ write_file (const std::string &path, GstBuffer *buffer)
 }
 
 /* As striprender drew it: without what is laid over it. */
-static GstSample *
+GstSample *
 last_picture (Viewer &viewer)
 {
   GstSample *sample = nullptr;
@@ -55,7 +57,7 @@ last_picture (Viewer &viewer)
   return picture;
 }
 
-static bool
+bool
 write_last_picture (Viewer &viewer)
 {
   GstSample *sample = last_picture (viewer);
@@ -78,7 +80,7 @@ write_last_picture (Viewer &viewer)
 }
 
 /* Before the first picture, and where a file begins again, there is none for a moment. */
-static gboolean
+gboolean
 try_to_write_picture (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -90,6 +92,8 @@ try_to_write_picture (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
+} // namespace
+
 GstSample *
 take_frame_set (Viewer &viewer)
 {
@@ -97,8 +101,10 @@ take_frame_set (Viewer &viewer)
   return viewer.frame_set ? gst_sample_ref (viewer.frame_set) : nullptr;
 }
 
+namespace {
+
 /* Says how the writing of a file ended. */
-static void
+void
 tell_end (GstElement *pipeline, const std::string &path)
 {
   GstBus *bus = gst_element_get_bus (pipeline);
@@ -118,6 +124,8 @@ tell_end (GstElement *pipeline, const std::string &path)
     gst_message_unref (message);
   gst_object_unref (bus);
 }
+
+} // namespace
 
 void
 write_picture (Viewer &viewer)

@@ -60,8 +60,8 @@ public:
       return s;
     times.encode_ms.push_back (now_ms () - begin);
     bytes_.clear ();
-    for (std::size_t i = 0; i < encoder_.parts (); i++)
-      bytes_.insert (bytes_.end (), encoder_.part (i).begin (), encoder_.part (i).end ());
+    for (const auto part : encoder_.parts ())
+      bytes_.insert (bytes_.end (), part.begin (), part.end ());
     Picture shown (view.roi.width, view.roi.height);
     const RangeImage decoded = shown.image (view.view_id, view.roi);
     DecoderResult counted;

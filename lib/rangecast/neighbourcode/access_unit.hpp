@@ -30,8 +30,7 @@ public:
   void request_key ();
 
   /** Whole slices each, one or more. */
-  [[nodiscard]] std::size_t parts () const { return parts_.size (); }
-  [[nodiscard]] std::span<const std::uint8_t> part (std::size_t i) const { return parts_[i]; }
+  [[nodiscard]] std::span<const std::span<const std::uint8_t>> parts () const { return parts_; }
   [[nodiscard]] std::size_t size () const;
   /** A copy of all parts together. */
   [[nodiscard]] std::vector<std::uint8_t> bytes () const;
@@ -108,7 +107,14 @@ public:
    *  @param whole_rois  false: ROIs of which nearly nothing came shrink to the box around their
    *  slices, beyond which all pixels would be invalid, so that a few bytes do not claim a large
    *  image; pass true with older images to decode() */
-  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
+  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true)
+  {
+    plan (std::span (&bytes, 1), result, whole_rois);
+  }
+  /** The same for an access unit in several pieces of whole units. What follows damage, also in
+   *  later pieces, is not read. */
+  void plan (std::span<const std::span<const std::uint8_t>> pieces, DecoderResult &result,
+      bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
   /** Pixels of a view's coded ROI that no slice holds; where slices overlap a guess, at least 1. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
@@ -142,6 +148,7 @@ private:
     DecoderResult result;
   };
 
+  bool read_slices (std::span<const std::uint8_t> bytes, DecoderResult &result);
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
   void limit_pixels (const PlannedView &planned);
   void crop_to_slices (PlannedView &planned);

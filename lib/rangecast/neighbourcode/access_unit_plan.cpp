@@ -28,12 +28,10 @@ agrees (const SliceHeader &a, const SliceHeader &b)
          (a.profile == Profile::kPlain) == (b.profile == Profile::kPlain);
 }
 
-void
-AccessUnitDecoder::plan (
-    std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois)
+/* @return false if there is damage after which nothing can be read */
+bool
+AccessUnitDecoder::read_slices (std::span<const std::uint8_t> bytes, DecoderResult &result)
 {
-  slices_.clear ();
-  count_ = 0;
   UnitReader units (bytes);
   UnitHeader unit_header;
   while (const auto unit = units.next (unit_header)) {
@@ -47,8 +45,20 @@ AccessUnitDecoder::plan (
     slice.too_short = SliceDecoder::smallest_size (slice.header) > unit->size ();
     slices_.push_back (slice);
   }
-  result.bad_slices += !units.status ().ok ();
+  return units.status ().ok ();
+}
 
+void
+AccessUnitDecoder::plan (
+    std::span<const std::span<const std::uint8_t>> pieces, DecoderResult &result, bool whole_rois)
+{
+  slices_.clear ();
+  count_ = 0;
+  for (const auto piece : pieces)
+    if (!read_slices (piece, result)) {
+      result.bad_slices++;
+      break;
+    }
   std::ranges::sort (slices_, {}, [] (const PlannedSlice &s) {
     return std::pair{sort_key (s.header), s.arrival};
   });

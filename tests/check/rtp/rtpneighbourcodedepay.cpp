@@ -97,7 +97,7 @@ GST_START_TEST (test_access_units_come_back_byte_for_byte)
     gst_harness_push (h, gst_buffer_ref (packet));
   for (std::size_t i = 0; i < sent.access_units.size (); i++) {
     GstBuffer *received = gst_harness_pull (h);
-    fail_unless (bytes_of (received) == bytes_of (sent.access_units[i]));
+    fail_unless_cmp (bytes_of (received), ==, bytes_of (sent.access_units[i]));
     fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (received), i * GST_SECOND / 25);
     gst_buffer_unref (received);
   }
@@ -108,16 +108,17 @@ GST_END_TEST;
 GST_START_TEST (test_every_packet_fits_the_mtu_and_holds_whole_units)
 {
   const Sent sent (ring_rig (2));
-  fail_unless (sent.packets.size () > 20);
+  ck_assert_uint_gt (sent.packets.size (), 20);
   for (GstBuffer *packet : sent.packets) {
-    fail_unless (gst_buffer_get_size (packet) <= 1400);
+    ck_assert_uint_le (gst_buffer_get_size (packet), 1400);
     const auto payload = payload_of (packet);
     UnitReader reader (payload);
     UnitHeader header;
     int units = 0;
     while (reader.next (header))
       units++;
-    fail_unless (reader.status ().ok () && units > 0);
+    fail_unless_ok (reader.status ());
+    ck_assert_int_gt (units, 0);
   }
 }
 GST_END_TEST;
@@ -179,11 +180,11 @@ GST_START_TEST (test_rig_of_64_views_comes_in_band)
   for (GstBuffer *packet : sent.packets)
     gst_harness_push (h, gst_buffer_ref (packet));
   GstBuffer *received = gst_harness_pull (h);
-  fail_unless (bytes_of (received) == bytes_of (sent.access_units[0]));
+  fail_unless_cmp (bytes_of (received), ==, bytes_of (sent.access_units[0]));
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
-  fail_unless (encode_rig (info.rig) == encode_rig (rig));
+  fail_unless_ok (gstrange::parse_caps (caps, info));
+  fail_unless_cmp (encode_rig (info.rig), ==, encode_rig (rig));
   fail_unless_equals_int (info.fps_n, 25);
   gst_caps_unref (caps);
   gst_buffer_unref (received);
@@ -233,7 +234,7 @@ GST_START_TEST (test_slices_of_views_that_the_rig_has_not_are_damaged_units)
     fail_unless_equals_int (views, 0b011);
     gst_buffer_unref (received);
   }
-  fail_unless (stat (h, "bad-units") > 0);
+  ck_assert_uint_gt (stat (h, "bad-units"), 0);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -256,7 +257,7 @@ GST_START_TEST (test_damaged_packets_are_counted_and_never_fatal)
       fail_unless_equals_int (gst_harness_push (h, bad), GST_FLOW_OK);
     }
   g_rand_free (random);
-  fail_unless (stat (h, "bad-units") > 50);
+  ck_assert_uint_gt (stat (h, "bad-units"), 50);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -270,8 +271,7 @@ GST_START_TEST (test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_s
   const Rig rig = ring_rig (1);
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
-  fail_unless (
-      next_message_text (bus, GST_MESSAGE_ERROR).find ("max-slice-size") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "max-slice-size");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -286,7 +286,7 @@ GST_START_TEST (test_bad_rig_in_the_caps_is_one_error)
   GstCaps *caps = gst_caps_from_string (kPlainRtpCaps);
   gst_caps_set_simple (caps, "rig", G_TYPE_STRING, "AAAA", nullptr);
   gst_harness_set_src_caps (h, caps);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("rig") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "rig");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -351,6 +351,46 @@ GST_START_TEST (test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_
 }
 GST_END_TEST;
 
+/* Memory is used again, but never while somebody holds a buffer, or a part of one. */
+GST_START_TEST (test_access_units_keep_their_bytes_while_others_follow)
+{
+  const Sent sent (ring_rig (2), 40);
+  GstHarness *h = receiver (gst_caps_ref (sent.caps));
+  std::vector<GstBuffer *> kept, parts;
+  std::vector<gconstpointer> places;
+  for (GstBuffer *packet : sent.packets) {
+    gst_harness_push (h, gst_buffer_ref (packet));
+    while (GstBuffer *received = gst_harness_try_pull (h)) {
+      GstMapInfo map;
+      gst_buffer_map (received, &map, GST_MAP_READ);
+      places.push_back (map.data);
+      gst_buffer_unmap (received, &map);
+      const std::size_t i = places.size () - 1;
+      if (i < 20) {
+        kept.push_back (received);
+      } else if (i == 20) {
+        parts.push_back (gst_buffer_copy_region (received, GST_BUFFER_COPY_MEMORY, 7, 100));
+        gst_buffer_unref (received);
+      } else {
+        gst_buffer_unref (received);
+      }
+    }
+  }
+  fail_unless_equals_int (places.size (), 40);
+  for (std::size_t i = 0; i < kept.size (); i++) {
+    fail_unless (bytes_of (kept[i]) == bytes_of (sent.access_units[i]));
+    gst_buffer_unref (kept[i]);
+  }
+  const auto whole = bytes_of (sent.access_units[20]);
+  fail_unless (bytes_of (parts[0]) == std::vector (whole.begin () + 7, whole.begin () + 107));
+  gst_buffer_unref (parts[0]);
+  /* Those that nobody held lie in one place. */
+  for (std::size_t i = 22; i < places.size (); i++)
+    fail_unless (places[i] == places[i - 1] && places[i] != places[20]);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 static Suite *
 rtpneighbourcodedepay_suite ()
 {
@@ -358,6 +398,7 @@ rtpneighbourcodedepay_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_access_units_come_back_byte_for_byte);
+  tcase_add_test (tc, test_access_units_keep_their_bytes_while_others_follow);
   tcase_add_test (tc, test_every_packet_fits_the_mtu_and_holds_whole_units);
   tcase_add_test (tc, test_marker_is_on_the_last_packet_of_each_access_unit);
   tcase_add_test (tc, test_any_one_lost_packet_costs_only_its_own_units);

@@ -349,9 +349,9 @@ TEST (Threads, one_thread_allocates_nothing_from_frame_set_to_frame_set)
       std::size_t size = 0;
       const long before = allocations;
       const bool good = encoder.encode (images, std::uint32_t (frame), 1, result).ok ();
-      for (std::size_t i = 0; i < encoder.parts (); i++) {
-        std::ranges::copy (encoder.part (i), bytes.begin () + std::ptrdiff_t (size));
-        size += encoder.part (i).size ();
+      for (const auto part : encoder.parts ()) {
+        std::ranges::copy (part, bytes.begin () + std::ptrdiff_t (size));
+        size += part.size ();
       }
       const long between = allocations;
       decoder.plan (std::span (bytes).first (size), decoded);
