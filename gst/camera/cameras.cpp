@@ -8,10 +8,14 @@
 #include "camera/aravis/debug.hpp"
 #include "conflict.hpp"
 
-static constexpr std::int64_t kSecond_ns = 1'000'000'000;
-static constexpr std::int64_t kClockInterval_ns = 5 * kSecond_ns; /* cameras' clocks drift */
-static constexpr std::int64_t kUnknown_ns = INT64_MIN;
-static constexpr gint64 kMaxPtpWait_us = 30 * G_USEC_PER_SEC;
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kClockInterval_ns = 5 * kSecond_ns; /* cameras' clocks drift */
+constexpr std::int64_t kUnknown_ns = INT64_MIN;
+constexpr gint64 kMaxPtpWait_us = 30 * G_USEC_PER_SEC;
+
+} // namespace
 
 CameraStatus
 loss_or_fault (Camera &camera, const CameraStatus &status)
@@ -301,11 +305,13 @@ CameraGroup::update_clocks (std::int64_t now_ns)
                                                                     : CameraStatus ();
 }
 
+namespace {
+
 /* Reads g_get_monotonic_time minus the camera's time, taken as of the middle of the round trip:
  * the shorter the trip, the better. The first reading takes the shortest of several trips; later
  * ones are used only if they take no longer than twice the shortest.
  * @param[out] offset_ns  unchanged if the trip was too long */
-static CameraStatus
+CameraStatus
 read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
 {
   const bool first = shortest_us == 0;
@@ -325,6 +331,8 @@ read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
   }
   return {};
 }
+
+} // namespace
 
 /* Cameras that follow one IEEE 1588 clock share one offset, so that their timestamps compare
  * exactly. Cameras without a readable clock are paired by arrival. */

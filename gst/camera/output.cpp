@@ -87,7 +87,7 @@ SetOutput::send_gaps (GstClockTime until_ago)
   const GstClockTime end = now - base - until_ago;
   if (end <= covered_until_)
     return;
-  GST_DEBUG_OBJECT (element_, "gap from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+  GST_LOG_OBJECT (element_, "gap from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
       GST_TIME_ARGS (covered_until_), GST_TIME_ARGS (end));
   for (const auto &pad : pads_)
     pad->send_gap (group_id_, covered_until_, end - covered_until_);

@@ -10,12 +10,24 @@
 
 using rangecast::FrameSets;
 
+namespace {
+
 /* A camera that has not answered a trigger after this time will not. */
-static constexpr std::int64_t kMaxAnswer_ns = 1'000'000'000;
-static constexpr std::int64_t kMinAnswer_ns = 60'000'000;
+constexpr std::int64_t kMaxAnswer_ns = 1'000'000'000;
+constexpr std::int64_t kMinAnswer_ns = 60'000'000;
 
 /* Error of reading a camera's clock. */
-static constexpr std::int64_t kClockError_ns = 50'000'000;
+constexpr std::int64_t kClockError_ns = 50'000'000;
+
+/* 0: no timestamp. A time that no clock reaches is none. */
+std::int64_t
+timestamp (const CameraFrame &frame)
+{
+  return frame.camera_time_ns < kMaxCameraTime_ns ? static_cast<std::int64_t> (frame.camera_time_ns)
+                                                  : 0;
+}
+
+} // namespace
 
 FramePairing::FramePairing (GstElement *element) : element_ (element)
 {
@@ -184,14 +196,6 @@ FramePairing::add_frame (int camera, CameraFrame frame)
     add_triggered_frame (camera, std::move (frame));
   else
     add_timed_frame (camera, std::move (frame));
-}
-
-/* 0: no timestamp. A time that no clock reaches is none. */
-static std::int64_t
-timestamp (const CameraFrame &frame)
-{
-  return frame.camera_time_ns < kMaxCameraTime_ns ? static_cast<std::int64_t> (frame.camera_time_ns)
-                                                  : 0;
 }
 
 void

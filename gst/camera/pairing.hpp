@@ -89,7 +89,7 @@ private:
   struct WaitingFrame {
     CameraFrame frame;
     std::int64_t taken_ns = 0;   ///< comparable between cameras; decides
-    std::int64_t exposed_ns = 0; ///< by the cameras' clocks if they tell; for the statistics
+    std::int64_t exposed_ns = 0; ///< by the cameras' clocks if known; for statistics
     WaitingFrame *next_free = nullptr;
   };
   struct Trigger {

@@ -10,16 +10,18 @@
 
 using Milliseconds = std::chrono::milliseconds;
 
-static constexpr Milliseconds kRetry{1000}, kGapInterval{100};
-static constexpr GstClockTime kMaxClockWait = 10 * GST_SECOND;
+namespace {
+
+constexpr Milliseconds kRetry{1000}, kGapInterval{100};
+constexpr GstClockTime kMaxClockWait = 10 * GST_SECOND;
 
 /* Sessions of this process that were asked to stop and have not ended. One that is still looking
  * for its cameras may open one, until it sees that it is to stop. */
-static std::atomic<int> stopping_sessions = 0;
+std::atomic<int> stopping_sessions = 0;
 
 /* Exposure and transfer; a transfer takes no longer than a frame period, else images would pile
  * up. @param period  0: single shots */
-static GstClockTime
+GstClockTime
 expected_latency (GstClockTime exposure, GstClockTime period)
 {
   const GstClockTime longest = period > 0 ? period : 100 * GST_MSECOND;
@@ -28,7 +30,7 @@ expected_latency (GstClockTime exposure, GstClockTime period)
 
 /* Before the cameras have answered: the last session's, or that of the rate which is chosen where
  * downstream leaves a choice. */
-static GstClockTime
+GstClockTime
 first_latency (const CameraSession::Setup &setup)
 {
   if (setup.previous && setup.previous->latency () > 0)
@@ -36,6 +38,8 @@ first_latency (const CameraSession::Setup &setup)
   return expected_latency (static_cast<GstClockTime> (setup.settings.exposure_us * 1000),
       setup.settings.single_shot ? 0 : GST_SECOND / 30);
 }
+
+} // namespace
 
 CameraSession::CameraSession (Setup setup)
     : element_ (GST_ELEMENT (gst_object_ref (setup.element))), settings_ (setup.settings),
@@ -109,6 +113,7 @@ CameraSession::run ()
     stop_cameras ();
     if (!retry)
       break;
+    GST_DEBUG_OBJECT (element_, "cameras closed; opening them again in a second");
     wait_before_retry ();
   }
   stop_cameras ();
@@ -120,6 +125,7 @@ CameraSession::run_cameras ()
 {
   End end = End::kRenegotiate;
   try {
+    GST_DEBUG_OBJECT (element_, "opening cameras");
     CameraStatus status = open_cameras ();
     if (status.ok ())
       status = wait_for_clock ();
@@ -131,6 +137,7 @@ CameraSession::run_cameras ()
         reconnects_++;
         post_element_message ("stereocamsrc-back", "left", cameras_.cameras ()[0]->label ());
       }
+      GST_DEBUG_OBJECT (element_, "streaming");
       end = stream ();
       if (end == End::kFault)
         (void)report_fault (); /* stopping may have to wait for a camera that does not answer */
@@ -220,7 +227,7 @@ CameraSession::clear_inbox ()
 bool
 CameraSession::wait_for_other_sessions ()
 {
-  static constexpr Milliseconds kInterval (50), kMax (5000);
+  constexpr Milliseconds kInterval (50), kMax (5000);
   bool waited = false;
   for (Milliseconds passed (0); stopping_sessions > 0 && !stopping () && passed < kMax;
        passed += kInterval) {

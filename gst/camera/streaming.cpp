@@ -7,12 +7,16 @@
 
 #include "camera/aravis/debug.hpp"
 
-static constexpr std::int64_t kSecond_ns = 1'000'000'000;
-static constexpr std::int64_t kCheckInterval_ns = kSecond_ns / 10;
-static constexpr std::int64_t kStatsInterval_ns = 5 * kSecond_ns;
-static constexpr std::int64_t kSilence_ns = kSecond_ns; /* of all cameras, before GAPs are sent */
-static constexpr std::int64_t kMaxSilence_ns = 3 * kSecond_ns; /* of a camera that should send */
-static constexpr int kMaxSilentPeriods = 3;                    /* ... if that is longer */
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kCheckInterval_ns = kSecond_ns / 10;
+constexpr std::int64_t kStatsInterval_ns = 5 * kSecond_ns;
+constexpr std::int64_t kSilence_ns = kSecond_ns;        /* of all cameras, before GAPs are sent */
+constexpr std::int64_t kMaxSilence_ns = 3 * kSecond_ns; /* of a camera that should send */
+constexpr int kMaxSilentPeriods = 3;                    /* ... if that is longer */
+
+} // namespace
 
 CameraSession::End
 CameraSession::stream ()

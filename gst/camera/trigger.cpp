@@ -6,11 +6,15 @@
 #include "camera/aravis/debug.hpp"
 #include "common/realtimepriority.hpp"
 
+namespace {
+
 /* A requested trigger keeps its time if it is not later than this: the host is busy. */
-static constexpr GstClockTime kMaxLateness = 20 * GST_MSECOND;
+constexpr GstClockTime kMaxLateness = 20 * GST_MSECOND;
 
 /* Scheduled action commands are sent this long before their tick. */
-static constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
+constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
+
+} // namespace
 
 CameraStatus
 CameraTrigger::start (Cameras cameras, rangecast::TickRate rate, Failed failed)

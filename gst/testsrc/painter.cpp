@@ -70,7 +70,9 @@ AvatarPainter::make_raw_caps (int fps_n, int fps_d) const
       nullptr);
 }
 
-static PixelFormat
+namespace {
+
+PixelFormat
 pixel_format (const GstVideoInfo &info)
 {
   switch (GST_VIDEO_INFO_FORMAT (&info)) {
@@ -87,11 +89,13 @@ pixel_format (const GstVideoInfo &info)
   }
 }
 
-static double
+double
 seconds (GstClockTime time)
 {
   return static_cast<double> (time) / GST_SECOND;
 }
+
+} // namespace
 
 Status
 AvatarPainter::make_loop (SceneCamera camera)

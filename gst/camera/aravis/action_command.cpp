@@ -3,13 +3,17 @@
 
 #include <algorithm>
 
+namespace {
+
 /* GigE Vision 2.0, chapter GVCP: command packets begin with a key, flags, the command, the length
  * of the payload and the request id; all numbers are big-endian. */
-static constexpr std::uint8_t kCommandKey = 0x42;
-static constexpr std::uint8_t kFlagAcknowledge = 0x01;
-static constexpr std::uint8_t kFlagScheduled = 0x80; /* a time follows the masks */
-static constexpr std::uint16_t kActionCommand = 0x0100;
-static constexpr std::size_t kHeaderSize = 8;
+constexpr std::uint8_t kCommandKey = 0x42;
+constexpr std::uint8_t kFlagAcknowledge = 0x01;
+constexpr std::uint8_t kFlagScheduled = 0x80; /* a time follows the masks */
+constexpr std::uint16_t kActionCommand = 0x0100;
+constexpr std::size_t kHeaderSize = 8;
+
+} // namespace
 
 ActionCommandBytes
 action_command_bytes (const ActionCommand &command)

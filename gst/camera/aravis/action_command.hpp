@@ -4,12 +4,12 @@
 
 #include <array>
 #include <cstdint>
-#include <gio/gio.h>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "gvcp.hpp"
 #include "status.hpp"
 
 /** GigE Vision 2.0, ACTION_CMD. A camera reacts if `device_key` is its ActionDeviceKey, `group_key`
@@ -30,20 +30,18 @@ struct ActionCommandBytes {
 };
 [[nodiscard]] ActionCommandBytes action_command_bytes (const ActionCommand &command);
 
-/** Sends action commands by broadcast from this host's interfaces to port 3956. Not thread-safe. */
+/** Sends action commands by broadcast from this host's interfaces. Not thread-safe. */
 class ActionSender {
 public:
-  static constexpr std::uint16_t kPort = 3956; ///< GVCP
-
   ActionSender () = default;
   ActionSender (const ActionSender &) = delete;
   ActionSender &operator= (const ActionSender &) = delete;
   ~ActionSender () { close (); }
 
   /** @param interfaces  addresses of this host (Camera::interface_address); duplicates count once
-   *  @param port        other than kPort in tests
+   *  @param port        another one in tests
    *  @return kFailed: the text names the interface */
-  CameraStatus open (std::span<const std::string> interfaces, std::uint16_t port = kPort);
+  CameraStatus open (std::span<const std::string> interfaces, std::uint16_t port = kGvcpPort);
   void close ();
   /** Sends the command from every interface, with a new request id. Does not wait for answers.
    *  @return kFailed: the text names the interface; the others have sent it */

@@ -19,6 +19,8 @@
 namespace {
 
 constexpr std::size_t kMinSocketBuffer = 1 << 20; /* bytes */
+constexpr guint kPacketTimeout_us = 20000;        /* then a packet counts as missing */
+constexpr guint kFrameRetention_us = 100000;      /* then an incomplete image is given up */
 constexpr std::size_t kMaxChunkBytes = 1 << 20;   /* that chunk data may add to an image */
 
 /* Handles the device's signal control-lost, which may be emitted while the camera is deleted. */
@@ -231,14 +233,12 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
 {
   if (!ARV_IS_GV_STREAM (stream))
     return;
-  g_object_set (stream, "packet-timeout", guint (settings.packet_timeout_us), "frame-retention",
-      guint (settings.frame_retention_us), nullptr);
+  g_object_set (
+      stream, "packet-timeout", kPacketTimeout_us, "frame-retention", kFrameRetention_us, nullptr);
   if (!settings.packet_resend) /* else if the camera can */
     g_object_set (stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
   /* Aravis would take the size of one image, which is too little for small ones */
-  const std::size_t wanted = settings.socket_buffer > 0
-                                 ? std::size_t (settings.socket_buffer)
-                                 : std::max (2 * format.size (), kMinSocketBuffer);
+  const std::size_t wanted = std::max (2 * format.size (), kMinSocketBuffer);
   const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
       bytes, nullptr);

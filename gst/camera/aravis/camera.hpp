@@ -36,9 +36,6 @@ struct CameraFormat {
   [[nodiscard]] std::size_t size () const { return std::size_t (stride) * height; }
   /** video/x-raw or video/x-bayer with width and height, without a frame rate. Transfer full. */
   [[nodiscard]] GstCaps *caps () const;
-  /** Whether elements without GstVideoMeta, and bayer2rgb, find the rows: each begins at a multiple
-   *  of 4 bytes. */
-  [[nodiscard]] bool stride_is_default () const { return stride % 4 == 0; }
 };
 
 /** What a camera can be configured to, for caps. */
@@ -48,9 +45,7 @@ struct CameraAbilities {
   std::vector<std::string> other_formats; ///< unsupported ones, for messages
   int max_width = 0, max_height = 0;      ///< pixels
   int min_width = 0, min_height = 0, width_step = 1, height_step = 1;
-  double min_frame_rate = 0,
-         max_frame_rate = 0; ///< frames per second at the current settings; 0: not settable
-  bool software_trigger = false, line_trigger = false, action_trigger = false, ptp = false;
+  double max_frame_rate = 0; ///< frames per second at the current settings; 0: not settable
 };
 
 /** The caps of all supported pixel formats: GRAY8, RGB, BGR and 8-bit Bayer. Transfer full. */
@@ -109,7 +104,7 @@ public:
   CameraStatus abilities (CameraAbilities &abilities);
 
   /** Applies the settings, while stopped. What was applied before a failure stays.
-   *  @return kBadSetting (the text says the feature, the value, and what the camera accepts),
+   *  @return kBadSetting (the text names feature, value and what the camera accepts),
    * kUnsupported, kTimedOut, kLost */
   CameraStatus configure (const CameraSettings &settings);
   /** Valid after configure(). */

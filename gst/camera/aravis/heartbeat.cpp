@@ -6,8 +6,6 @@
 
 namespace {
 
-constexpr std::uint16_t kPort = 3956; /* GigE Vision, GVCP */
-
 /* More than a camera sends between two polls; the rest of a flood is read later. */
 constexpr int kMaxAnswers = 16;
 
@@ -43,19 +41,9 @@ receive_answers (GSocket *socket)
 void
 Heartbeat::start (const std::string &address, std::int64_t now_ns)
 {
-  socket_ = nullptr;
+  socket_ = connect_gvcp (address);
   alive_ns_ = asked_ns_ = now_ns;
   unanswered_ = 0;
-  GSocketAddress *camera = g_inet_socket_address_new_from_string (address.c_str (), kPort);
-  if (!camera)
-    return;
-  socket_.reset (g_socket_new (g_socket_address_get_family (camera), G_SOCKET_TYPE_DATAGRAM,
-      G_SOCKET_PROTOCOL_UDP, nullptr));
-  if (socket_)
-    g_socket_set_blocking (socket_.get (), FALSE);
-  if (socket_ && !g_socket_connect (socket_.get (), camera, nullptr, nullptr))
-    socket_ = nullptr;
-  g_object_unref (camera);
 }
 
 void

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <gio/gio.h>
-#include <memory>
 #include <string>
+
+#include "gvcp.hpp"
 
 /** Tells whether a silent GigE camera still answers. Aravis' own heartbeat waits 3 s for each
  * answer and tries for 5 s; this one asks on its own socket while other calls wait, and never
@@ -32,13 +32,10 @@ public:
   static constexpr std::int64_t kMaxSilence_ns = 3'000'000'000;
 
 private:
-  struct Unref {
-    void operator() (GSocket *socket) const { g_object_unref (socket); }
-  };
   static constexpr std::int64_t kInterval_ns = 400'000'000;
   static constexpr int kMinUnanswered = 4; ///< of seven in 3 s, unless this host is busy
 
-  std::unique_ptr<GSocket, Unref> socket_;
+  SocketPtr socket_;
   std::int64_t alive_ns_ = 0, asked_ns_ = 0;
   std::uint16_t request_ = 0;
   int unanswered_ = 0;

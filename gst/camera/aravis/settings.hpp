@@ -22,13 +22,11 @@ enum class AutoMode {
 
 /** TriggerMode::kHardware. */
 struct LineTrigger {
-  std::string source = "Line1";          ///< TriggerSource of all cameras but the master
-  std::string activation = "RisingEdge"; ///< TriggerActivation
+  std::string source = "Line1"; ///< TriggerSource of all cameras but the master
   /** This camera runs freely at its frame rate, and signals its exposure on `output_line`, which is
    * wired to `source` of the others. */
   bool master = false;
-  std::string output_line = "Line2";            ///< LineSelector, set to LineMode Output
-  std::string output_source = "ExposureActive"; ///< LineSource of that line
+  std::string output_line = "Line2"; ///< LineSelector, set to LineMode Output
 };
 
 /** TriggerMode::kAction: a camera reacts to commands that match these (see action_command.hpp). */
@@ -68,13 +66,6 @@ struct CameraSettings {
   int packet_size =
       0; ///< GigE: bytes with IP and UDP headers; 0: the largest that passes; -1: unchanged
   std::int64_t packet_delay_ns = -1; ///< GigE: delay between packets; -1: unchanged
-  /** GigE: receive through a memory-mapped packet socket, if permitted (CAP_NET_RAW): less CPU
-   * time, more delay (see docs/guide/cameras.md). */
-  bool packet_socket = false;
-  bool packet_resend = true;       ///< GigE: request missing packets again
-  int socket_buffer = 0;           ///< GigE: receive buffer, bytes, up to net.core.rmem_max; 0: two
-                                   ///< images, at least 1 MiB
-  int packet_timeout_us = 20000;   ///< GigE: when a packet counts as missing
-  int frame_retention_us = 100000; ///< GigE: when an incomplete image is given up
-  int n_buffers = 8;               ///< of the stream, in the camera layer and downstream; >= 2
+  bool packet_resend = true;         ///< GigE: request missing packets again
+  int n_buffers = 8;                 ///< of the stream, in the camera layer and downstream; >= 2
 };
