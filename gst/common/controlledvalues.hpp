@@ -3,8 +3,8 @@
 
 #include <gst/base/gstbasetransform.h>
 
-/** Gives controlled properties their values of the buffer's time. A buffer without PTS or outside
- *  the segment, as the first after a seek to between two frames, has no stream time: values stay.
+/** Sets controlled properties to their values at the buffer's stream time. Without one they stay:
+ *  the buffer has no PTS, or is outside the segment, as the first one after a seek between frames.
  */
 inline void
 sync_controlled_values (GstBaseTransform *base, GstBuffer *buffer)
