@@ -33,7 +33,7 @@ public:
   [[nodiscard]] std::span<const Bytes> pieces () const { return {bytes_.data (), count_}; }
 
 private:
-  /* @return false if a memory cannot be mapped, or a unit may go on in the next one */
+  /* @return false if a memory cannot be mapped, or a unit may continue in the next one */
   bool map_memories (guint memories)
   {
     while (count_ < memories) {

@@ -39,7 +39,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
@@ -439,19 +438,6 @@ struct Match {
   double speed = 1; /* of that one, see speed_of() */
 };
 } // namespace
-
-/* How much faster than it was captured a buffer is played; not 0. */
-static double
-speed_of (const WaitingBuffer &w)
-{
-  GST_OBJECT_LOCK (w.stream->pad);
-  const double rate = std::abs (w.stream->pad->segment.rate);
-  GST_OBJECT_UNLOCK (w.stream->pad);
-  /* Without a capture time, its running time takes its place, which is in playback time already. */
-  const bool has_capture_time =
-      rate == 1 || GST_CLOCK_TIME_IS_VALID (gst_range_buffer_get_capture_time (w.buffer));
-  return has_capture_time ? rate : 1;
-}
 
 /* Takes the buffers from their pads whose capture time is within the tolerance of the oldest one,
  * `first`, and gives them to the joiner. */

@@ -2,6 +2,8 @@
 #include "recordings.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <gstrange/gstrangemeta.h>
 
 bool
 Recordings::compare (std::span<const WaitingBuffer> waiting, GstClockTime last_capture)
@@ -51,6 +53,18 @@ Recordings::find_unmatched (const MuxStreams &streams)
   }
   const bool all_others_reported = reported > 0 && unreported == 1;
   return received > 1 && !all_others_reported ? ended : nullptr;
+}
+
+double
+speed_of (const WaitingBuffer &w)
+{
+  GST_OBJECT_LOCK (w.stream->pad);
+  const double rate = std::abs (w.stream->pad->segment.rate);
+  GST_OBJECT_UNLOCK (w.stream->pad);
+  /* A running time in place of the capture time is in playback time already. */
+  const bool has_capture_time =
+      rate == 1 || GST_CLOCK_TIME_IS_VALID (gst_range_buffer_get_capture_time (w.buffer));
+  return has_capture_time ? rate : 1;
 }
 
 GstClockTime

@@ -40,6 +40,9 @@ private:
   std::vector<GstClockTime> captures_; /* kept for its memory */
 };
 
+/** Playback speed: how much faster than its capture times proceed a buffer is played; > 0. */
+double speed_of (const WaitingBuffer &w);
+
 /** The running time of a frame set of recordings: as far from that of the last one as their capture
  *  times are. If these go back, or forward by more than Recordings::kMaxLater, it is the buffer's
  *  own running time, or one frame period after the last one if that is later.

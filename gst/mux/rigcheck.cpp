@@ -61,7 +61,8 @@ check_view (const View &view, View expected)
     return differs (view, "its orientation differs");
   const double scale = view.intrinsics.fx / expected.intrinsics.fx;
   if (!(std::abs (scale - 1) <= max_scale))
-    return differs (view, "its focal length is " + std::to_string (scale) + " times that of the rig");
+    return differs (
+        view, "its focal length is " + std::to_string (scale) + " times that of the rig");
   return {};
 }
 

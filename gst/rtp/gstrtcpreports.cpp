@@ -125,7 +125,7 @@ read_source (const RtcpPacket &packet, guint32 ssrc, Compound &compound)
         compound.reports |= read_report_block (packet, i).stream == ssrc;
       return;
     case GST_RTCP_TYPE_SDES:
-      for (guint i = 0; i < packet.count && take_sdes_chunk (chunks, source); i++)
+      for (guint i = 0; i < packet.count && pop_sdes_chunk (chunks, source); i++)
         compound.add_source (source);
       return;
     case GST_RTCP_TYPE_BYE:

@@ -25,7 +25,7 @@ has_chunks (const RtcpPacket &packet)
   Bytes chunks = packet.body;
   guint32 ssrc = 0;
   for (guint i = 0; i < packet.count; i++)
-    if (!take_sdes_chunk (chunks, ssrc))
+    if (!pop_sdes_chunk (chunks, ssrc))
       return false;
   return true;
 }
@@ -107,7 +107,7 @@ RtcpReader::is_sound (Bytes bytes)
 /* A chunk is an SSRC and items of type, size and text, with a zero and padding to 32 bits behind
  * them. Some senders omit the zero at the end of the packet. */
 bool
-take_sdes_chunk (Bytes &chunks, guint32 &ssrc)
+pop_sdes_chunk (Bytes &chunks, guint32 &ssrc)
 {
   constexpr std::size_t kItem = 2;
   std::size_t at = 4;

@@ -37,7 +37,7 @@ private:
 };
 
 /** Removes the first chunk of an SDES packet. @return false if there is no complete one */
-bool take_sdes_chunk (std::span<const guint8> &chunks, guint32 &ssrc);
+bool pop_sdes_chunk (std::span<const guint8> &chunks, guint32 &ssrc);
 
 /** A report block: RFC 3550, 6.4.1. */
 struct RtcpReportBlock {

@@ -63,15 +63,20 @@ row () { # NAME WITHOUT WITH
 }
 
 file="filesrc location=$dir/all-@.rcnc ! neighbourcodeparse"
-mux="rangemux name=m"
+quiet=stats-interval=0 # its messages come by time
+mux="rangemux name=m $quiet"
 for id in 0 1 2 3; do inputs="${inputs:-} filesrc location=$dir/view-$id-@.rcnc ! neighbourcodeparse ! m."; done
 sink="fakesink sync=false"
 alone=${inputs//m./$sink}
 echo "| element | allocations | KB allocated | KB copied |"
 echo "|---|---|---|---|"
-row "neighbourcodeenc" "$file ! neighbourcodedec n-threads=1 ! $sink" "$file ! neighbourcodedec n-threads=1 ! neighbourcodeenc n-threads=1 ! $sink"
-row "rtpneighbourcodepay" "$file ! $sink" "$file ! rtpneighbourcodepay ! $sink"
-row "rtpneighbourcodedepay" "$file ! rtpneighbourcodepay ! $sink" "$file ! rtpneighbourcodepay ! rtpneighbourcodedepay ! $sink"
+decode="neighbourcodedec n-threads=1 $quiet" encode="neighbourcodeenc n-threads=1 $quiet"
+pay="rtpneighbourcodepay $quiet" depay="rtpneighbourcodedepay $quiet"
+row "neighbourcodeenc" "$file ! $decode ! $sink" "$file ! $decode ! $encode ! $sink"
+row "neighbourcodeenc, rtpneighbourcodepay" "$file ! $decode ! $sink" "$file ! $decode ! $encode ! $pay ! $sink"
+row "neighbourcodeenc, rangemux" "$file ! $decode ! $sink" "$file ! $decode ! $encode ! rangemux $quiet ! $sink"
+row "rtpneighbourcodepay" "$file ! $sink" "$file ! $pay ! $sink"
+row "rtpneighbourcodedepay" "$file ! $pay ! $sink" "$file ! $pay ! $depay ! $sink"
 row "rangemux, 4 coded streams" "$alone" "$mux ! $sink $inputs"
-row "neighbourcodedec, one memory" "$file ! $sink" "$file ! neighbourcodedec n-threads=1 ! $sink"
-row "neighbourcodedec behind rangemux" "$mux ! $sink $inputs" "$mux ! neighbourcodedec n-threads=1 ! $sink $inputs"
+row "neighbourcodedec, one memory" "$file ! $sink" "$file ! $decode ! $sink"
+row "neighbourcodedec behind rangemux" "$mux ! $sink $inputs" "$mux ! $decode ! $sink $inputs"
