@@ -15,7 +15,7 @@
  *
  * Locks, in the order in which they are taken:
  * 1. the sink pad's stream lock, which the streaming thread holds;
- * 2. the source pad's stream lock. It is held by whoever draws and pushes while both threads may:
+ * 2. the source pad's stream lock. The thread that draws and pushes holds it while both may:
  *    for serialized events and queries, and for each picture of the task. The task takes both to
  *    negotiate and releases the sink pad's before it draws, so that frame sets come in meanwhile;
  * 3. GstStripRenderPrivate::lock: settings, statistics, schedule. Never held while pushing, posting
