@@ -43,7 +43,7 @@ uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
 uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
 layout (location = 2) in vec4 a_colour; /* and the square root of the weight */
 out vec4 v_colour;
-const float kMinAngle = 0.03; /* square root of the least weight; the cosine's power is 6 */
+const float kMinAngle = 0.03; /* square root of the minimum weight; the cosine's power is 6 */
 #endif
 void main ()
 {
@@ -61,7 +61,7 @@ const char *const kFragmentShader = R"(
 precision highp float;
 #if SUM
 in vec4 v_colour;
-uniform vec3 u_weights; /* largest, least, inside */
+uniform vec3 u_weights; /* maximum, minimum, inside */
 out vec4 sum;
 #endif
 void main ()
@@ -79,16 +79,16 @@ void main ()
 constexpr float kMaxWeight = 1000, kMaxSum = 64000, kMinShare = 2e-6f;
 
 struct Weights {
-  float largest, least, inside;
+  float max, min, inside;
 };
 
 Weights
 weights_for (std::size_t views, bool precise)
 {
   const auto n = static_cast<float> (std::max<std::size_t> (views, 1));
-  const float largest = precise ? kMaxWeight : std::min (kMaxWeight, kMaxSum / (4 * n)),
-              least = kMinShare * largest;
-  return {largest, least, least / (2.5f * n)};
+  const float max = precise ? kMaxWeight : std::min (kMaxWeight, kMaxSum / (4 * n)),
+              min = kMinShare * max;
+  return {max, min, min / (2.5f * n)};
 }
 
 /* The angle between the view's ray and the viewer's. */
@@ -133,8 +133,8 @@ uniform sampler2D u_sum; /* R, G, B times weight; weight */
 uniform sampler2D u_depth;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 uniform ivec4 u_part; /* first and last pixel */
-uniform float u_outside; /* weight of the least outside, less rounding */
-uniform int u_reach; /* gaps so wide are left, pixels */
+uniform float u_outside; /* minimum weight of an outside, less rounding */
+uniform int u_reach; /* pixels: wider gaps are not filled */
 out vec4 fragment;
 float distance_at (ivec2 at)
 {
@@ -301,7 +301,7 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
     if (is_new)
       describe_vertices (gl);
     const std::size_t size = layer.blend_vertices.size_bytes ();
-    if (size > objects.capacity) { /* with room for the next ones: memory is made anew seldom */
+    if (size > objects.capacity) { /* with room to grow: allocations are rare */
       objects.capacity = size + size / 2;
       gl->BufferData (GL_ARRAY_BUFFER, GLsizeiptr (objects.capacity), nullptr, GL_DYNAMIC_DRAW);
     }
@@ -365,13 +365,13 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   const Weights weights = weights_for (picture.rig_views, precise);
   gst_gl_shader_use (shaders_[kSum]);
   gst_gl_shader_set_uniform_3f (
-      shaders_[kSum], "u_weights", weights.largest, weights.least, weights.inside);
+      shaders_[kSum], "u_weights", weights.max, weights.min, weights.inside);
   draw_layers (layers, picture, kSum);
   gl->Disable (GL_BLEND);
   gl->BlendFunc (GL_ONE, GL_ZERO);
   gl->DepthMask (TRUE);
 
-  divide (picture, 0.9f * weights.least);
+  divide (picture, 0.9f * weights.min);
   gl->DepthFunc (GL_LESS);
   gl->FrontFace (GL_CCW);
   gl->Disable (GL_DEPTH_TEST);
@@ -424,7 +424,7 @@ BlendPainter::divide (const RenderPicture &picture, float outside) const
     gl->Scissor (part.x, part.y, part.width, part.height);
 }
 
-/* Makes the targets anew if size or precision change. @return false if OpenGL cannot have them:
+/* Replaces the targets if size or precision change. @return false if OpenGL cannot have them:
  * what was bound is bound again */
 bool
 BlendPainter::bind_targets (int width, int height, bool precise)

@@ -87,7 +87,7 @@ G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
 
-/* ---- caps and events: what begins anew ---- */
+/* ---- caps and events: what resets the state ---- */
 
 namespace {
 
@@ -224,7 +224,7 @@ send_rig (GstCylinderFilter *self)
   if (!gst_caps_is_equal (caps, present)) {
     GST_DEBUG_OBJECT (self, "sending caps with other poses");
     if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
-      GST_DEBUG_OBJECT (self, "downstream refused them"); /* pushing the buffer tells why */
+      GST_DEBUG_OBJECT (self, "downstream refused them"); /* pushing the buffer returns why */
   }
   gst_caps_unref (caps);
   gst_caps_unref (present);

@@ -12,7 +12,7 @@
  *  (0, 0, 0, 0) where the background shows; the means are then laid over the background. */
 class Multisampler {
 public:
-  /** Binds the framebuffer, which is made anew if size or samples change.
+  /** Binds the framebuffer, which is replaced if size or samples change.
    *  @param samples  at most; OpenGL may have fewer
    *  @return false if nothing was bound: samples below 2, or OpenGL cannot (which is logged once)
    */

@@ -88,7 +88,7 @@ OutputSchedule::known_until () const
 
 /* ---- output ---- */
 
-/* By how much a picture is at least before the end of the frame set that it shows: ends are not
+/* Minimum time of a picture before the end of the frame set that it shows: ends are not
  * exact. */
 GstClockTime
 OutputSchedule::slack (const FrameSet &set) const

@@ -96,19 +96,19 @@ OutputTask::wait (std::unique_lock<std::mutex> &guard, GstClockTime due)
 void
 OutputTask::iterate ()
 {
+  std::unique_lock guard (lock_);
   GstPad *src = src_; /* stop() clears it after the task */
   GST_PAD_STREAM_UNLOCK (src);
-  {
-    std::unique_lock guard (lock_);
-    changed_.wait (guard, [this] { return quit_ || playing_; });
-    woken_ = false;
-    if (!quit_) {
-      guard.unlock ();
-      const GstClockTime due = tick_ (GST_PAD_PARENT (src));
-      guard.lock ();
-      if (!quit_ && !woken_ && due != 0)
-        wait (guard, due);
-    }
+  changed_.wait (guard, [this] { return quit_ || playing_; });
+  woken_ = false;
+  if (!quit_) {
+    const Tick tick = tick_;
+    guard.unlock ();
+    const GstClockTime due = tick (GST_PAD_PARENT (src));
+    guard.lock ();
+    if (!quit_ && !woken_ && due != 0)
+      wait (guard, due);
   }
+  guard.unlock ();
   GST_PAD_STREAM_LOCK (src);
 }

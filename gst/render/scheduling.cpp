@@ -8,20 +8,18 @@
  * A frame rate of its own: downstream asked for another one than the input's, or keep-rate is set.
  *   chain -> submit_input_buffer() -> OutputSchedule, which says when there are pictures and which
  *   frame set each of them shows. They are drawn
- *   - not live: by generate_output() on the streaming thread, as soon as their frame set is
- * certain;
+ *   - not live: by generate_output() on the streaming thread, once their frame set is certain;
  *   - live: by the source pad's task, by the clock, also while the stream stalls.
  *   Serialized events go out after the pictures before them. What of a GAP the pictures do not fill
  *   waits in priv->gap until they are out.
  *
  * Locks, in the order in which they are taken:
  * 1. the sink pad's stream lock, which the streaming thread holds;
- * 2. the source pad's stream lock. It is held by whoever draws and pushes while both threads may:
+ * 2. the source pad's stream lock. The thread that draws and pushes holds it while both may:
  *    for serialized events and queries, and for each picture of the task. The task takes both to
  *    negotiate and releases the sink pad's before it draws, so that frame sets come in meanwhile;
  * 3. GstStripRenderPrivate::lock: settings, statistics, schedule. Never held while pushing, posting
- *    or querying.
- *    or querying; nor together with the output task's own lock, which is as far down the order. */
+ *    or querying, nor together with the output task's own lock, which is the last one, too. */
 #include <algorithm>
 #include <utility>
 

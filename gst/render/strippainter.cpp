@@ -49,19 +49,19 @@ bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
 }
 /* Surfaces are extended beyond their edges at 45 degrees at most: where they are seen at a grazing
  * angle, depth rises too fast to be trusted, and the extensions would be spikes. */
-const float kSteepest = 1.0;
+const float kMaxSlope = 1.0;
 float slope (ivec2 p, ivec2 way, float offset, float depth)
 {
-  float most = kSteepest * depth / u_focal, rise;
+  float limit = kMaxSlope * depth / u_focal, rise;
 #if BOTH_SIDES
   float fall;
   bool has_before = has_rise (p, way, depth, rise), has_after = has_rise (p, -way, depth, fall);
   if (has_before && has_after)
     return (rise - fall) * 0.5;
-  return clamp (has_before ? rise : has_after ? -fall : 0.0, -most, most);
+  return clamp (has_before ? rise : has_after ? -fall : 0.0, -limit, limit);
 #else
   int outward = offset > 0.0 ? 1 : -1;
-  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -most, most) : 0.0;
+  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -limit, limit) : 0.0;
 #endif
 }
 #endif
@@ -95,7 +95,7 @@ const char *const kVariants[] = {
 static_assert (int (StripMode::kStrips) == 1 && int (StripMode::kRectangles) == 2 &&
                int (StripMode::kPoints) == 3); /* the order in draw() */
 
-/* Textures grow in steps, so that a ROI that follows somebody does not need new ones in each
+/* Textures grow in steps, so that a ROI that follows a person does not need new ones in each
  * picture. */
 int
 texture_side (int pixels, int max)

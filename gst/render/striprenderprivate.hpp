@@ -49,7 +49,7 @@ struct GstStripRenderPrivate {
   bool live = false, live_known = false;
   bool caps_refused = false; /* the last ones, with an error */
 
-  /* For whoever draws: with the source pad's stream lock, or on the streaming thread if that draws;
+  /* Of drawing: with the source pad's stream lock, or on the streaming thread if that draws;
    * or on the OpenGL thread while that thread waits for it. */
   StripScene scene;
   GstBuffer *drawn = nullptr; /* whose strips the scene has, if it may be drawn again */
