@@ -13,13 +13,13 @@
 #include <string>
 
 /** The connections that the limit on open files allows beside the files of the server and its
- * launch string: max_viewers and some that are no viewers. Raises the soft limit as needed.
+ *  launch string: max_viewers and some that are no viewers. Raises the soft limit as needed.
  *  @return nothing after reporting that the limit is too low */
 [[nodiscard]] std::optional<std::size_t> max_connections (int max_viewers);
 
 /** A viewer is a connection that sent SETUP or PLAY; of several that named the same session, the
  *  last one, since anybody can name a session. Other connections are closed to make room, the
- * oldest first. Any thread, unless a function says otherwise. */
+ *  oldest first. Any thread, unless a function says otherwise. */
 class Connections {
 public:
   /** Sets the server's thread pool.

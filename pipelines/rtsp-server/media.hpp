@@ -23,7 +23,7 @@ struct StreamCounts {
 };
 
 /** A bin of the launch string, with a payloader pay0, which is added where coded frame sets have
- * none.
+ *  none.
  *  @return nullptr with error set on failure */
 GstElement *make_stream_bin (const std::string &launch, GError **error);
 
@@ -49,10 +49,10 @@ void end_waiting (GstRTSPMediaFactory *factory);
  * disable_live_sync(). */
 void disable_live_sync_at_play ();
 
-/** Sinks of a live media send at once instead of delaying frame sets by the pipeline's latency: the
- *  viewer's jitter buffer goes by RTP timestamps. Media that is not live (files) keeps waiting for
- * the clock. gst-rtsp-server 1.22 turns the waiting on at each PLAY: call this after it. Any
- * thread. */
+/** Sinks of a live media send at once instead of delaying frame sets by the pipeline's latency:
+ *  the viewer's jitter buffer goes by RTP timestamps. Media that is not live (files) keeps
+ *  waiting for the clock. gst-rtsp-server 1.22 turns the waiting on at each PLAY: call this
+ *  after it. Any thread. */
 void disable_live_sync (GstRTSPMedia *media);
 
 /** Requests a key frame set, with the rig in it, from the encoder. */

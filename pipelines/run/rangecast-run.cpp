@@ -85,9 +85,9 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-/* Where the pipeline does not start. Some elements fail without a message. */
+/* The pipeline did not start. Some elements fail without a message. */
 void
-tell_failure (Runner &runner, GstBus *bus)
+report_failure (Runner &runner, GstBus *bus)
 {
   runner.failed = true;
   if (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
@@ -108,7 +108,7 @@ on_timeout (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* What happens by time and by signals while the pipeline runs. */
+/* Timers and signals of the main loop. */
 void
 add_sources (Runner &runner)
 {
@@ -138,7 +138,7 @@ remove_empty (const char *path)
     g_remove (path);
 }
 
-/* After the loop: what was asked for, from a pipeline that still has it, and its end. */
+/* Reads the results while the pipeline still has them, and stops it. */
 void
 finish (Runner &runner)
 {
@@ -172,7 +172,7 @@ play (Runner &runner)
     runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
-    tell_failure (runner, bus);
+    report_failure (runner, bus);
   else
     g_main_loop_run (runner.loop);
   finish (runner);
@@ -181,7 +181,7 @@ play (Runner &runner)
   g_main_loop_unref (runner.loop);
 }
 
-/* @return false if there is something wrong with the address */
+/* @return false after reporting a wrong address */
 bool
 open_stats (Runner &runner)
 {
@@ -196,7 +196,7 @@ open_stats (Runner &runner)
   return runner.stats != nullptr;
 }
 
-/* @return transfer full; null if the launch string is none, which has been said */
+/* @return transfer full; nullptr after reporting what is wrong with it */
 GstElement *
 parse_pipeline (gchar **launch)
 {
@@ -215,7 +215,7 @@ parse_pipeline (gchar **launch)
   return pipeline;
 }
 
-/* Gives the pipeline up. @return false if it failed, which has been said */
+/* Releases the pipeline. @return false after reporting an error */
 bool
 run (Runner &runner)
 {

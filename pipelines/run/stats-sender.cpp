@@ -148,5 +148,5 @@ StatsSender::take (GstMessage *message)
                            ? sendto (fd_, line.data (), line.size (), MSG_DONTWAIT | MSG_NOSIGNAL,
                                  reinterpret_cast<const sockaddr *> (&to_), to_size_)
                            : write (fd_, line.data (), line.size ());
-  (void)sent; /* nobody listens yet, or no more */
+  (void)sent; /* there may be no receiver */
 }

@@ -85,7 +85,7 @@ parse (int *argc, char ***argv, RawOptions &raw)
 }
 
 bool
-take_numbers (const RawOptions &raw, FakeCameraOptions &options)
+parse_numbers (const RawOptions &raw, FakeCameraOptions &options)
 {
   if (raw.views < 1 || raw.views > 64)
     return bad ("--views", "1 to 64", std::to_string (raw.views));
@@ -111,7 +111,7 @@ take_numbers (const RawOptions &raw, FakeCameraOptions &options)
 }
 
 bool
-take_texts (const RawOptions &raw, FakeCameraOptions &options)
+parse_texts (const RawOptions &raw, FakeCameraOptions &options)
 {
   char more = 0;
   if (raw.size && (std::sscanf (raw.size, "%5dx%5d%c", &options.scene.width, &options.scene.height,
@@ -149,5 +149,5 @@ read_fake_camera_options (int argc, char **argv, FakeCameraOptions &options)
     g_printerr ("fake-cameras: unknown argument '%s'\n", argv[1]);
     return kWrongUsage;
   }
-  return take_numbers (raw, options) && take_texts (raw, options) ? -1 : kWrongUsage;
+  return parse_numbers (raw, options) && parse_texts (raw, options) ? -1 : kWrongUsage;
 }

@@ -33,7 +33,7 @@ struct ViewCameras {
   std::vector<GigeCamera *> wired; /* fired by the left camera's output line */
 };
 
-/* When each picture was taken, for whoever judges how well cameras agree. Any thread. */
+/* When each picture was taken, to measure how well cameras agree. Any thread. */
 class ExposureLog {
 public:
   Status open (const std::string &path)

@@ -398,7 +398,7 @@ GigeCamera::handle (const GvcpCommand &command, const sockaddr_in &from)
     case Gvcp::kPacketResend:
       return send_again (command);
     case Gvcp::kAction:
-      return take_action (command, from);
+      return handle_action (command, from);
     default:
       return refuse (command, from, GvcpStatus::kNotImplemented);
   }
@@ -413,7 +413,7 @@ GigeCamera::answer_discovery (const GvcpCommand &command, const sockaddr_in &fro
 }
 
 void
-GigeCamera::take_action (const GvcpCommand &command, const sockaddr_in &from)
+GigeCamera::handle_action (const GvcpCommand &command, const sockaddr_in &from)
 {
   ActionCommand action;
   if (!parse_action (command, action) || action.time_ns > kLatestAction)
@@ -475,7 +475,7 @@ GigeCamera::check_heartbeat (std::int64_t now_ns)
 }
 
 void
-GigeCamera::take_wake_ups (std::int64_t now_ns)
+GigeCamera::drain_wake_ups (std::int64_t now_ns)
 {
   bool due = false;
   {
@@ -527,7 +527,7 @@ GigeCamera::run ()
     if (ready > 0 && (fds[1].revents & POLLIN))
       eventfd_read (wake_, &ignored);
     time = now ();
-    take_wake_ups (time);
+    drain_wake_ups (time);
     if (acquiring_ && next_frame_ns_ != 0 && next_frame_ns_ <= time) {
       const std::int64_t due = next_frame_ns_, period = frame_period_ns ();
       next_frame_ns_ = (time / period + 1) * period;

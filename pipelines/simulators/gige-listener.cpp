@@ -93,7 +93,7 @@ GigeListener::receive (int socket)
     if (Gvcp (command.command) == Gvcp::kDiscovery)
       camera->answer_discovery (command, from);
     else if (Gvcp (command.command) == Gvcp::kAction)
-      camera->take_action (command, from);
+      camera->handle_action (command, from);
   }
 }
 

@@ -20,7 +20,7 @@ std::vector<guint>
 view_ids (Viewer &viewer)
 {
   std::vector<guint> ids;
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   if (!sample)
     return ids;
   GstRangeCamera camera;
@@ -61,7 +61,7 @@ switch_view (Viewer &viewer, guint number)
 GstClockTime
 frame_duration (Viewer &viewer)
 {
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   gint n = 0, d = 1;
   if (sample) {
     gst_structure_get_fraction (
@@ -195,7 +195,7 @@ gboolean
 act_on_mouse (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
-  if (const auto drag = viewer.overlay->take_drag ())
+  if (const auto drag = viewer.overlay->next_drag ())
     viewer.playback->seek (drag->position, drag->released);
   else if (viewer.overlay->is_stale ())
     viewer.playback->redraw_if_paused ();

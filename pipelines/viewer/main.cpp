@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Shows a recording or a stream of frame sets in a window. The mouse turns, moves and zooms (that
- * is striprender's doing: glimagesink sends it what the mouse and keys do); the viewer adds keys, a
- * time bar and files. Everything goes through public elements, so it can be copied into an
- * application.
+/* Shows a recording or a stream of frame sets in a window. striprender handles the mouse, through
+ * navigation events of glimagesink; the viewer adds keys, a time bar and files. It uses public
+ * elements only, so that applications can copy it.
  *
- * Threads: the mouse and keys come in glimagesink's, frame sets and pictures in streaming threads;
- * all of them only leave word, and the main loop acts. */
+ * Threads: mouse and key events come from glimagesink's thread, frame sets and pictures from
+ * streaming threads; all of them record what happened, and the main loop acts. */
 #include <glib-unix.h>
 
 #include <algorithm>
@@ -24,15 +23,15 @@ fail (Viewer &viewer, const std::string &text)
 
 namespace {
 
-/* That its window was closed glimagesink tells with its next picture only. */
+/* glimagesink reports a closed window only when it draws. */
 gboolean
-look_for_window (gpointer user_data)
+poll_window (gpointer user_data)
 {
   static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
   return G_SOURCE_CONTINUE;
 }
 
-/* What fades or goes away also does so while there are no new pictures. */
+/* Overlays fade while the picture stands still, too. */
 gboolean
 update_overlay (gpointer user_data)
 {
@@ -42,7 +41,7 @@ update_overlay (gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-/* Recordings are short: at its end a file begins again. */
+/* Recordings are short: a file is played again from its beginning. */
 void
 finish (Viewer &viewer)
 {
@@ -53,7 +52,7 @@ finish (Viewer &viewer)
 }
 
 gboolean
-say_that_nothing_comes (gpointer user_data)
+warn_no_frame_sets (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   if (!viewer.seen_frames)
@@ -63,8 +62,7 @@ say_that_nothing_comes (gpointer user_data)
 
 /* ---- the run ---- */
 
-/* The last line of what an element says to those who debug it: often the only one that names names.
- */
+/* Of an error's debug text: often the only line that names the cause. */
 std::string
 last_line (const gchar *text)
 {
@@ -73,8 +71,7 @@ last_line (const gchar *text)
   return all.substr (all.rfind ('\n') + 1);
 }
 
-/* What is not a file of ours either has no type that GStreamer knows, or one that does not lead to
- * range frame sets. */
+/* A foreign file has no type that GStreamer knows, or one that does not decode to frame sets. */
 bool
 is_wrong_type (const GError *error)
 {
@@ -95,7 +92,7 @@ on_error (Viewer &viewer, GstMessage *message)
   if (is_sink && g_error_matches (error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND) &&
       viewer.seen_frames) /* its window was closed */
     g_main_loop_quit (viewer.loop);
-  else if (viewer.failed) /* the first error is the one that tells */
+  else if (viewer.failed) /* the first error names the cause */
     ;
   else if (viewer.options.inputs && is_wrong_type (error))
     refuse_input (&viewer);
@@ -148,8 +145,8 @@ show (Viewer &viewer)
   gst_bus_add_watch (bus, on_message, &viewer);
   g_unix_signal_add (SIGINT, on_signal, &viewer);
   g_unix_signal_add (SIGTERM, on_signal, &viewer);
-  g_timeout_add_seconds (5, say_that_nothing_comes, &viewer);
-  g_timeout_add (500, look_for_window, &viewer);
+  g_timeout_add_seconds (5, warn_no_frame_sets, &viewer);
+  g_timeout_add (500, poll_window, &viewer);
   g_timeout_add (100, update_overlay, &viewer);
   gst_element_set_state (viewer.pipeline, GST_STATE_PLAYING); /* errors are on the bus */
   g_main_loop_run (viewer.loop);

@@ -75,7 +75,7 @@ check_out (const ViewerOptions &options)
 
 } // namespace
 
-/* Not left to glimagesink: with OpenGL that needs no display it would draw where nobody sees it. */
+/* glimagesink itself would draw off-screen where OpenGL needs no display. */
 bool
 check_display ()
 {

@@ -143,7 +143,7 @@ Overlay::release (int button)
 }
 
 std::optional<Overlay::Drag>
-Overlay::take_drag ()
+Overlay::next_drag ()
 {
   std::lock_guard guard (lock_);
   return std::exchange (drag_, std::nullopt);

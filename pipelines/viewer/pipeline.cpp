@@ -15,8 +15,8 @@ const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
 
 /* ---- frame sets ---- */
 
-/* Turns on by the time that has passed in the file, so that it neither jumps where the file begins
- * anew nor goes on while it is paused, as striprender's auto-orbit would. */
+/* Orbits by stream time. striprender's auto-orbit goes by running time: it would jump where a file
+ * begins again, and go on while it is paused. */
 void
 turn_on (Viewer &viewer, GstClockTime pts)
 {
@@ -91,7 +91,7 @@ follow_window (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* A larger window shows a larger picture, not a stretched one. */
+/* Renders at the window's size instead of scaling. */
 gboolean
 on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_data)
 {
@@ -100,7 +100,7 @@ on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_dat
     g_idle_add_full (G_PRIORITY_DEFAULT, follow_window,
         new Reshape{&viewer, int (width), int (height)},
         [] (gpointer reshape) { delete static_cast<Reshape *> (reshape); });
-  return FALSE; /* glimagesink does its own part */
+  return FALSE; /* glimagesink reshapes, too */
 }
 
 void
@@ -131,7 +131,6 @@ on_draw (GstElement *, GstSample *sample, gpointer user_data)
   return static_cast<Viewer *> (user_data)->overlay->draw (sample);
 }
 
-/* Frame sets to the window. */
 void
 build_view (Viewer &viewer)
 {
@@ -153,7 +152,7 @@ build_view (Viewer &viewer)
     gst_util_set_object_arg (G_OBJECT (viewer.render), "mode", options.mode);
   if (!viewer.is_file)
     g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
-  if (!viewer.is_file) /* the view turns while the stream stalls, too */
+  if (!viewer.is_file) /* renders on while the stream stalls */
     g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
   GstElement *before = viewer.first;
   if (!options.no_filter) {
@@ -242,7 +241,7 @@ build_opener (Viewer &viewer, const char *uri)
   g_signal_connect (opener, "source-setup", G_CALLBACK (on_source_setup), &viewer);
 }
 
-/* Whether a plugin opens such URIs; says it if not. */
+/* Reports it if no plugin opens such URIs. */
 bool
 is_supported (const char *uri)
 {
@@ -255,7 +254,7 @@ is_supported (const char *uri)
   return supported;
 }
 
-/* The input as a URI; nullptr after saying why there is none. */
+/* @return transfer full; nullptr after reporting an error */
 gchar *
 input_uri (const char *input)
 {

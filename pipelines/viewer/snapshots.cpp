@@ -95,7 +95,7 @@ try_to_write_picture (gpointer user_data)
 } // namespace
 
 GstSample *
-take_frame_set (Viewer &viewer)
+last_frame_set (Viewer &viewer)
 {
   std::lock_guard guard (viewer.lock);
   return viewer.frame_set ? gst_sample_ref (viewer.frame_set) : nullptr;
@@ -105,7 +105,7 @@ namespace {
 
 /* Says how the writing of a file ended. */
 void
-tell_end (GstElement *pipeline, const std::string &path)
+report_end (GstElement *pipeline, const std::string &path)
 {
   GstBus *bus = gst_element_get_bus (pipeline);
   GstMessage *message = gst_bus_timed_pop_filtered (
@@ -139,7 +139,7 @@ write_picture (Viewer &viewer)
 void
 write_points (Viewer &viewer)
 {
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   if (!sample) {
     g_printerr ("rangecast-viewer: there are no points yet\n");
     return;
@@ -156,7 +156,7 @@ write_points (Viewer &viewer)
     gst_element_set_state (encoder, GST_STATE_PLAYING);
     gst_app_src_push_sample (GST_APP_SRC (in), sample);
     gst_app_src_end_of_stream (GST_APP_SRC (in));
-    tell_end (encoder, path);
+    report_end (encoder, path);
     gst_element_set_state (encoder, GST_STATE_NULL);
     gst_object_unref (in);
     gst_object_unref (out);
