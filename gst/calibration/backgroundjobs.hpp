@@ -1,17 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <glib.h>
+
 #include <condition_variable>
-#include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <stop_token>
-#include <thread>
+#include <utility>
 
-/* One thread that does jobs one after the other. */
+/** Runs jobs one after the other on one thread (a GThreadPool), and lets a streaming thread wait
+ * for them. start() and stop() are called by one thread at a time; the others are thread-safe. */
 class BackgroundJobs {
 public:
-  /* Must end by itself, and soon once the token says so. */
+  /** Must return soon once the token requests it. */
   using Job = std::function<void (std::stop_token)>;
 
   BackgroundJobs () = default;
@@ -19,92 +22,94 @@ public:
   BackgroundJobs &operator= (const BackgroundJobs &) = delete;
   ~BackgroundJobs () { stop (); }
 
-  void start ()
+  /** @return false if the system refuses a thread */
+  [[nodiscard]] bool start ()
   {
+    const auto run = [] (gpointer job, gpointer self) {
+      static_cast<BackgroundJobs *> (self)->run (std::unique_ptr<Job> (static_cast<Job *> (job)));
+    };
+    const auto discard = [] (gpointer job) { delete static_cast<Job *> (job); };
     stop ();
     std::lock_guard guard (lock_);
-    quit_ = flushing_ = false;
+    GError *error = nullptr;
+    pool_ = g_thread_pool_new_full (run, this, discard, 1, TRUE, &error);
+    if (error) {
+      g_thread_pool_free (pool_, TRUE, FALSE);
+      pool_ = nullptr;
+      g_error_free (error);
+    }
     stop_source_ = {};
-    thread_ = std::thread ([this] { run (); });
+    flushing_ = false;
+    pending_ = 0;
+    return pool_;
   }
-  /* Any thread: forgets jobs that have not begun, asks the one that has to end, ends all waits. */
+  /** Skips jobs that have not begun, asks the current one to return, and ends all waits. */
   void interrupt ()
   {
-    std::deque<Job> forgotten; /* they go without the lock */
-    {
-      std::lock_guard guard (lock_);
-      quit_ = true;
-      forgotten.swap (jobs_);
-      stop_source_.request_stop ();
-    }
+    std::lock_guard guard (lock_);
+    stop_source_.request_stop ();
     changed_.notify_all ();
   }
-  /* interrupt(), and waits until no job is left. */
+  /** interrupt(), and waits for the current job. */
   void stop ()
   {
     interrupt ();
-    if (thread_.joinable ())
-      thread_.join ();
+    GThreadPool *pool;
+    {
+      std::lock_guard guard (lock_);
+      pool = std::exchange (pool_, nullptr);
+    }
+    if (pool) /* without the lock, which jobs take */
+      g_thread_pool_free (pool, TRUE, TRUE);
   }
-  /* While flushing, nobody waits; jobs go on. */
+  /** While flushing, waits end at once; jobs go on. */
   void set_flushing (bool flushing)
   {
-    {
-      std::lock_guard guard (lock_);
-      flushing_ = flushing;
-    }
+    std::lock_guard guard (lock_);
+    flushing_ = flushing;
     changed_.notify_all ();
   }
-  /* Does nothing while stopped. */
+  /** Does nothing while stopped or interrupted. */
   void post (Job job)
   {
-    {
-      std::lock_guard guard (lock_);
-      if (quit_)
-        return;
-      jobs_.push_back (std::move (job));
-    }
-    changed_.notify_all ();
+    std::lock_guard guard (lock_);
+    if (!pool_ || stop_source_.stop_requested ())
+      return;
+    pending_++;
+    g_thread_pool_push (pool_, new Job (std::move (job)), nullptr);
   }
   [[nodiscard]] bool idle ()
   {
     std::lock_guard guard (lock_);
-    return jobs_.empty () && !busy_;
+    return pending_ == 0;
   }
-  /* @return false: stopped or flushing, jobs may still be there */
+  /** @return false if stopped, interrupted or flushing; there may still be jobs */
   [[nodiscard]] bool wait_until_idle ()
   {
     std::unique_lock guard (lock_);
-    changed_.wait (guard, [&] { return quit_ || flushing_ || (jobs_.empty () && !busy_); });
-    return !quit_ && !flushing_;
+    const auto ended = [&] { return !pool_ || stop_source_.stop_requested () || flushing_; };
+    changed_.wait (guard, [&] { return ended () || pending_ == 0; });
+    return !ended ();
   }
 
 private:
-  void run ()
+  void run (std::unique_ptr<Job> job)
   {
     std::unique_lock guard (lock_);
-    while (!quit_) {
-      if (jobs_.empty ()) {
-        changed_.wait (guard);
-        continue;
-      }
-      Job job = std::move (jobs_.front ());
-      jobs_.pop_front ();
-      busy_ = true;
-      const std::stop_token token = stop_source_.get_token ();
-      guard.unlock ();
-      job (token);
-      job = nullptr; /* what it holds goes without the lock */
-      guard.lock ();
-      busy_ = false;
-      changed_.notify_all ();
-    }
+    const std::stop_token token = stop_source_.get_token ();
+    guard.unlock ();
+    if (!token.stop_requested ())
+      (*job) (token);
+    job.reset (); /* what it holds may take locks */
+    guard.lock ();
+    pending_--;
+    changed_.notify_all ();
   }
 
-  std::mutex lock_; /* guards what follows but thread_, which start() and stop() alone touch */
+  std::mutex lock_; /* guards all members */
   std::condition_variable changed_;
-  std::deque<Job> jobs_;
+  GThreadPool *pool_ = nullptr; /* null: stopped */
   std::stop_source stop_source_;
-  bool busy_ = false, quit_ = true, flushing_ = false;
-  std::thread thread_;
+  int pending_ = 0; /* jobs posted and not done */
+  bool flushing_ = false;
 };

@@ -6,54 +6,50 @@
 
 using rangecast::StatusCode;
 
-static constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
-
-CalibrationPictures::~CalibrationPictures ()
+ImageSet::~ImageSet ()
 {
-  for (GstBuffer *buffer : buffers)
-    if (buffer)
-      gst_buffer_unref (buffer);
+  for (GstBuffer *&buffer : buffers)
+    gst_clear_buffer (&buffer);
 }
 
-MappedCalibrationPictures::MappedCalibrationPictures (CalibrationPictures &pictures)
-    : views (pictures.sources.size ())
+MappedImages::MappedImages (ImageSet &set) : views (set.cameras.size ())
 {
-  for (std::size_t i = 0; i < pictures.sources.size () && status.ok (); i++)
-    if (pictures.buffers[i])
-      open (pictures, i);
+  for (std::size_t i = 0; i < set.cameras.size () && status.ok (); i++)
+    if (set.buffers[i])
+      open (set, i);
 }
 
-MappedCalibrationPictures::~MappedCalibrationPictures ()
+MappedImages::~MappedImages ()
 {
-  for (CalibrationSource *source : open_)
-    source->reader.close ();
+  for (CameraInput *camera : open_)
+    camera->reader.close ();
 }
 
 void
-MappedCalibrationPictures::open (CalibrationPictures &pictures, std::size_t i)
+MappedImages::open (ImageSet &set, std::size_t i)
 {
-  CalibrationSource &source = *pictures.sources[i];
-  if (!source.reader_set || !gst_video_info_is_equal (&source.reader_info, &pictures.infos[i])) {
-    source.reader_info = pictures.infos[i];
-    source.reader_set = source.reader.set (pictures.infos[i]);
+  CameraInput &camera = *set.cameras[i];
+  const std::string &name = set.described[i].name;
+  if (!camera.reader_info || !gst_video_info_is_equal (&*camera.reader_info, &set.infos[i])) {
+    camera.reader_info.reset ();
+    if (camera.reader.set (set.infos[i]))
+      camera.reader_info = set.infos[i];
   }
-  const std::string &name = pictures.described[i].name;
-  if (!source.reader_set)
+  if (!camera.reader_info)
     status = {StatusCode::kUnsupported, "pad " + name + ": cannot convert the images to RGBx"};
-  else if (!source.reader.open (pictures.buffers[i]))
+  else if (!camera.reader.open (set.buffers[i]))
     status = {StatusCode::kBadData, "pad " + name + ": a buffer is smaller than its caps require"};
   else {
-    open_.push_back (&source);
-    views[i] = source.reader.view ();
+    open_.push_back (&camera);
+    views[i] = camera.reader.view ();
   }
 }
 
-CalibrationFronts::CalibrationFronts (const CalibrationSources &sources, bool live)
+PadFronts::PadFronts (const CameraInputs &cameras, bool live)
 {
-  for (std::size_t i = 0; i < sources.size (); i++) {
-    GstAggregatorPad *pad = sources[i]->aggregator_pad ();
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
-    if (buffer)
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    GstAggregatorPad *pad = cameras[i]->aggregator_pad ();
+    if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad))
       list.push_back ({i, buffer, gstrange::capture_time_of (pad, buffer, live),
           gstrange::running_time_of (pad, buffer)});
     else
@@ -61,68 +57,75 @@ CalibrationFronts::CalibrationFronts (const CalibrationSources &sources, bool li
   }
 }
 
-CalibrationFronts::~CalibrationFronts ()
+PadFronts::~PadFronts ()
 {
   for (const Front &front : list)
     gst_buffer_unref (front.buffer);
 }
 
 GstClockTime
-calibration_tolerance (const CalibrationSources &sources, GstClockTime max_skew)
+max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew)
 {
   if (max_skew > 0)
     return max_skew;
   GstClockTime shortest = GST_CLOCK_TIME_NONE;
-  for (const auto &source : sources)
-    if (source->has_info && source->info.fps_n > 0)
-      shortest = std::min (
-          shortest, gst_util_uint64_scale_int (GST_SECOND, source->info.fps_d, source->info.fps_n));
-  return GST_CLOCK_TIME_IS_VALID (shortest) ? shortest / 2 : kDefaultTolerance;
+  for (const auto &camera : cameras)
+    if (camera->info && camera->info->fps_n > 0)
+      shortest = std::min (shortest,
+          gst_util_uint64_scale_int (GST_SECOND, camera->info->fps_d, camera->info->fps_n));
+  return gstrange::pairing_tolerance (shortest);
 }
 
 bool
-drop_unmatched (const CalibrationSources &sources, const CalibrationFronts &fronts,
-    GstClockTime tolerance, guint64 &dropped)
+drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
+    GstDebugCategory *category, guint64 &dropped)
 {
   GstClockTime latest = 0;
   for (const auto &front : fronts.list)
     if (!gstrange::is_gap (front.buffer))
       latest = std::max (latest, front.capture);
-  const bool early =
-      std::ranges::any_of (sources, [] (const auto &source) { return !source->has_info; });
+  const bool starting =
+      std::ranges::any_of (cameras, [] (const auto &camera) { return !camera->info; });
   bool any = false;
   for (const auto &front : fronts.list) {
     const bool gap = gstrange::is_gap (front.buffer);
-    if (!gap && !early && latest - front.capture <= tolerance)
+    if (!gap && !starting && latest - front.capture <= tolerance)
       continue;
-    gst_aggregator_pad_drop_buffer (sources[front.source]->aggregator_pad ());
+    GstAggregatorPad *pad = cameras[front.camera]->aggregator_pad ();
+    if (!gap && starting)
+      GST_CAT_DEBUG_OBJECT (category, pad, "dropping image: another camera has no caps yet");
+    else if (!gap)
+      GST_CAT_DEBUG_OBJECT (category, pad,
+          "dropping image: captured %.1f ms before the newest, tolerance %.1f ms",
+          double (latest - front.capture) / GST_MSECOND, double (tolerance) / GST_MSECOND);
+    gst_aggregator_pad_drop_buffer (pad);
     dropped += !gap;
     any = true;
   }
   return any;
 }
 
-std::shared_ptr<CalibrationPictures>
-take_pictures (const CalibrationSources &sources, const CalibrationFronts &fronts, guint64 number)
+std::shared_ptr<ImageSet>
+pop_images (const CameraInputs &cameras, const PadFronts &fronts, guint64 number)
 {
-  auto pictures = std::make_shared<CalibrationPictures> ();
-  pictures->sources = sources;
-  pictures->buffers.resize (sources.size ());
-  pictures->number = number;
-  for (const auto &source : sources) {
-    rangecast::CalibrationCamera described = calibration_camera (source->pad);
-    described.width = source->info.width;
-    described.height = source->info.height;
-    pictures->described.push_back (std::move (described));
-    pictures->infos.push_back (source->info);
+  auto set = std::make_shared<ImageSet> ();
+  set->cameras = cameras;
+  set->buffers.resize (cameras.size ());
+  set->number = number;
+  for (const auto &camera : cameras) {
+    rangecast::CalibrationCamera described = calibration_camera (camera->pad);
+    described.width = camera->info->width;
+    described.height = camera->info->height;
+    set->described.push_back (std::move (described));
+    set->infos.push_back (*camera->info);
   }
   for (const auto &front : fronts.list) {
-    pictures->buffers[front.source] =
-        gst_aggregator_pad_pop_buffer (sources[front.source]->aggregator_pad ());
-    pictures->capture = std::max (pictures->capture, front.capture);
-    pictures->running = std::min (pictures->running, front.running); /* NONE is the greatest */
+    set->buffers[front.camera] =
+        gst_aggregator_pad_pop_buffer (cameras[front.camera]->aggregator_pad ());
+    set->capture = std::max (set->capture, front.capture);
+    set->running = std::min (set->running, front.running); /* NONE is the maximum */
   }
-  if (!GST_CLOCK_TIME_IS_VALID (pictures->running))
-    pictures->capture = number * 2 * GST_SECOND; /* says nothing about motion */
-  return pictures;
+  if (!GST_CLOCK_TIME_IS_VALID (set->running))
+    set->capture = number * 2 * GST_SECOND; /* unknown: so far apart that no motion is inferred */
+  return set;
 }

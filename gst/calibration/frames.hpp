@@ -9,88 +9,92 @@
 #include <rangecast/calibration/session.hpp>
 #include <vector>
 
-/* From the pads of rigcalibrate to the pictures of one moment. */
+/* From the sink pads of rigcalibrate to sets of images of one moment. */
 
-/* One sink pad, and what its caps said. */
-struct CalibrationSource {
-  GstRigCalibratePad *pad;
-  GstVideoInfo info; /* streaming thread */
-  bool has_info = false;
-  bool refused = false; /* the caps that it has now; the error was posted */
-  PictureReader reader; /* jobs */
-  GstVideoInfo reader_info;
-  bool reader_set = false;
+/** One sink pad. */
+struct CameraInput {
+  GstRigCalibratePad *pad; /* reference */
 
-  explicit CalibrationSource (GstRigCalibratePad *p)
-      : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))), info{}, reader_info{}
-  {
-  }
-  ~CalibrationSource () { gst_object_unref (pad); }
-  CalibrationSource (const CalibrationSource &) = delete;
+  /* streaming thread */
+  std::optional<GstVideoInfo> info;
+  bool refused = false; /* its current caps; the error was posted */
+
+  /* jobs */
+  VideoFrameReader reader;
+  std::optional<GstVideoInfo> reader_info;
+
+  explicit CameraInput (GstRigCalibratePad *p) : pad (GST_RIG_CALIBRATE_PAD (gst_object_ref (p))) {}
+  ~CameraInput () { gst_object_unref (pad); }
+  CameraInput (const CameraInput &) = delete;
+  CameraInput &operator= (const CameraInput &) = delete;
   [[nodiscard]] GstAggregatorPad *aggregator_pad () const { return GST_AGGREGATOR_PAD (pad); }
 };
-using CalibrationSources = std::vector<std::shared_ptr<CalibrationSource>>;
+using CameraInputs = std::vector<std::shared_ptr<CameraInput>>;
 
-/* Pictures of one moment on their way to the board detector. */
-struct CalibrationPictures {
-  CalibrationSources sources;
+/** Images of one moment on their way to the board detector; vectors are by camera. */
+struct ImageSet {
+  CameraInputs cameras;
   std::vector<rangecast::CalibrationCamera> described;
   std::vector<GstVideoInfo> infos;
-  std::vector<GstBuffer *> buffers; /* by source; null where there is none */
+  std::vector<GstBuffer *> buffers; /* references; null where there is none */
   GstClockTime capture = 0, running = GST_CLOCK_TIME_NONE;
   guint64 number = 0;
-  std::optional<rangecast::SessionSettings> begin; /* with the first ones */
+  std::optional<rangecast::SessionSettings> begin; /* in the first set: starts the session */
   int tile_width = 0;
   bool auto_finish = false;
 
-  CalibrationPictures () = default;
-  CalibrationPictures (const CalibrationPictures &) = delete;
-  ~CalibrationPictures ();
+  ImageSet () = default;
+  ImageSet (const ImageSet &) = delete;
+  ImageSet &operator= (const ImageSet &) = delete;
+  ~ImageSet ();
 };
 
-/* The same as the core sees them; unmapped when it goes. */
-class MappedCalibrationPictures {
+/** Maps the images of a set as long as it lives. */
+class MappedImages {
 public:
-  explicit MappedCalibrationPictures (CalibrationPictures &pictures);
-  ~MappedCalibrationPictures ();
-  MappedCalibrationPictures (const MappedCalibrationPictures &) = delete;
+  explicit MappedImages (ImageSet &set);
+  ~MappedImages ();
+  MappedImages (const MappedImages &) = delete;
+  MappedImages &operator= (const MappedImages &) = delete;
 
-  std::vector<rangecast::ImageView<const rangecast::Rgbx>> views;
+  std::vector<rangecast::ImageView<const rangecast::Rgbx>> views; ///< by camera
   rangecast::Status status;
 
 private:
-  void open (CalibrationPictures &pictures, std::size_t i);
+  void open (ImageSet &set, std::size_t i);
 
-  std::vector<CalibrationSource *> open_;
+  std::vector<CameraInput *> open_;
 };
 
-/* The oldest picture of every pad; unrefs them when it goes. */
-class CalibrationFronts {
+/** The oldest image of every pad. */
+class PadFronts {
 public:
   struct Front {
-    std::size_t source;
-    GstBuffer *buffer; /* a reference of ours */
+    std::size_t camera;
+    GstBuffer *buffer; /* reference */
     GstClockTime capture, running;
   };
 
-  CalibrationFronts (const CalibrationSources &sources, bool live);
-  ~CalibrationFronts ();
-  CalibrationFronts (const CalibrationFronts &) = delete;
+  PadFronts (const CameraInputs &cameras, bool live);
+  ~PadFronts ();
+  PadFronts (const PadFronts &) = delete;
+  PadFronts &operator= (const PadFronts &) = delete;
 
   std::vector<Front> list;
-  int missing = 0, ended = 0;
+  int missing = 0, ended = 0; ///< pads without an image that wait for one; that are at EOS
 };
 
-/* How far apart capture times of one moment may be: max_skew, or half a frame where that is 0. */
-GstClockTime calibration_tolerance (const CalibrationSources &sources, GstClockTime max_skew);
+/** Maximum difference of the capture times of one set, ns.
+ *  @param max_skew  the property; 0: half a frame of the fastest camera, or 5 ms */
+GstClockTime max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew);
 
-/* Drops gaps, and pictures too old to be of the moment of the newest, and all while a camera has
- * not begun.
- * @param[out] dropped  counts the pictures among them
- * @return whether any went */
-bool drop_unmatched (const CalibrationSources &sources, const CalibrationFronts &fronts,
-    GstClockTime tolerance, guint64 &dropped);
+/** Drops GAPs, images that are older than the newest by more than the tolerance, and all images
+ *  while a camera has no caps yet. Each dropped image is logged.
+ *  @param[out] dropped  number of dropped images
+ *  @return whether anything was dropped */
+bool drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
+    GstDebugCategory *category, guint64 &dropped);
 
-/* Takes what waits on all pads. */
-std::shared_ptr<CalibrationPictures> take_pictures (
-    const CalibrationSources &sources, const CalibrationFronts &fronts, guint64 number);
+/** Takes the front images off their pads. */
+std::shared_ptr<ImageSet> pop_images (
+    const CameraInputs &cameras, const PadFronts &fronts, guint64 number);

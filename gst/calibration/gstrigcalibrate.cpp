@@ -22,6 +22,7 @@
 
 #include "backgroundjobs.hpp"
 #include "common/bufferpools.hpp"
+#include "common/elementproperties.hpp"
 #include "frames.hpp"
 #include "messages.hpp"
 #include "settings.hpp"
@@ -42,35 +43,40 @@ using rangecast::TileLayout;
 GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
 #define GST_CAT_DEFAULT gst_rig_calibrate_debug
 
-enum : guint { PROP_STATS = 1, PROP_SETTINGS };
+/* aggregate waits for one image of each camera, drops those whose capture times do not match, and
+ * posts the set as a job. Jobs look for the board, keep useful sets, draw a preview and, at EOS, on
+ * `calibrate` or with auto-finish, calibrate. If live, sets that arrive while a job runs are
+ * skipped; otherwise the streaming thread waits for each job. It pushes the previews. */
+
 enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
 static guint signals[LAST_SIGNAL];
 
-/* Pictures that come faster are a film, not photographs; per second. */
-static constexpr int kFastestPhotographs = 2;
+/* Maximum frame rate of what is taken for single photographs instead of video, Hz. */
+static constexpr int kMaxPhotoRate = 2;
 
 struct GstRigCalibratePrivate {
-  std::mutex lock; /* guards what follows; never held across a push, message or job */
-  CalibrationProperties properties;
-  CalibrationSources cameras;
+  /* Guards the members up to stale; never held across a push, message or job. */
+  std::mutex lock;
+  RigCalibrateSettings settings;
+  CameraInputs cameras;
   guint64 examined = 0, taken = 0, skipped = 0, dropped = 0;
-  GstBuffer *still = nullptr; /* drawn and not pushed yet */
+  GstBuffer *still = nullptr; /* preview that was not pushed yet */
   TileLayout still_layout;
   GstClockTime still_capture = 0;
-  Status failure;        /* of what a job did last */
-  bool finished = false; /* calibrated, and nothing more is wanted */
+  Status failure;        /* of the first job that failed */
+  bool finished = false; /* auto-finish has calibrated: EOS */
   bool stale = true;     /* frames were taken since the last calibration */
 
-  BackgroundJobs jobs; /* in which the board is looked for and all is calibrated */
+  BackgroundJobs jobs; /* thread-safe */
 
-  /* jobs only, and while there are none */
+  /* jobs, and the streaming thread while there are none */
   rangecast::CalibrationSession session;
   RecycledBytes stills;
 
-  /* streaming thread only */
-  bool begin = true;
+  /* streaming thread */
+  bool begin = true; /* no set was examined yet */
   guint64 sets = 0;
-  TileLayout layout; /* of the caps */
+  TileLayout layout; /* of the output caps */
 };
 
 struct _GstRigCalibrate {
@@ -89,35 +95,86 @@ G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR
     G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
 GST_ELEMENT_REGISTER_DEFINE (rigcalibrate, "rigcalibrate", GST_RANK_NONE, GST_TYPE_RIG_CALIBRATE)
 
-static CalibrationSources
+static CameraInputs
 current_cameras (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
   return self->priv->cameras;
 }
 
-static CalibrationProperties
-current_properties (GstRigCalibrate *self)
+static RigCalibrateSettings
+current_settings (GstRigCalibrate *self)
 {
   std::lock_guard guard (self->priv->lock);
-  return self->priv->properties;
+  return self->priv->settings;
+}
+
+/* ---- sink caps ---- */
+
+static Status
+handle_caps (GstRigCalibrate *self, CameraInput &camera, GstCaps *caps)
+{
+  const std::string name = calibration_camera (camera.pad).name;
+  GstVideoInfo info;
+  if (!gst_video_info_from_caps (&info, caps))
+    return {StatusCode::kUnsupported, "pad " + name + ": not the caps of raw video"};
+  bool begun;
+  {
+    std::lock_guard guard (self->priv->lock);
+    begun = self->priv->examined > 0;
+  }
+  if (begun && camera.info &&
+      (info.width != camera.info->width || info.height != camera.info->height))
+    return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
+                                      size_text (camera.info->width, camera.info->height) + " to " +
+                                      size_text (info.width, info.height) +
+                                      "; expected one size throughout a calibration"};
+  GST_INFO_OBJECT (camera.pad, "caps %" GST_PTR_FORMAT, caps);
+  camera.info = info;
+  return {};
+}
+
+/* Ends waits for jobs on a flush. */
+static gboolean
+gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  auto self = GST_RIG_CALIBRATE (aggregator);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START)
+    self->priv->jobs.set_flushing (true);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    self->priv->jobs.set_flushing (false);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    gst_event_parse_caps (event, &caps);
+    for (const auto &camera : current_cameras (self)) {
+      if (camera->aggregator_pad () != pad)
+        continue;
+      camera->refused = gst_range_flow_return (
+                            GST_ELEMENT (self), handle_caps (self, *camera, caps)) != GST_FLOW_OK;
+      if (camera->refused) {
+        gst_event_unref (event);
+        return FALSE;
+      }
+    }
+  }
+  return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
 }
 
 /* ---- jobs ---- */
 
-/* From frames to the rig file and the result message. */
+/* Calibrates from the frames taken so far, writes the rig file and posts the result. */
 static Status
 calibrate (GstRigCalibrate *self, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  const std::string location = current_properties (self).location;
+  const std::string location = current_settings (self).location;
   rangecast::CalibrationResult result;
   Status status = {StatusCode::kNotFound, "there were no images to calibrate from"};
   if (!priv->session.cameras ().empty ())
     status = priv->session.calibrate (result, std::move (stop));
   if (status.ok ()) {
     if (!location.empty ())
-      status = rangecast::save_rig (location, result.rig); /* the message has the rig anyway */
+      status = rangecast::save_rig (location, result.rig); /* the message has it, too */
     for (const std::string &warning : result.warnings)
       gst_range_post_warning (GST_ELEMENT (self), {StatusCode::kBadValue, warning});
     post_result (GST_ELEMENT (self), priv->session, result,
@@ -128,18 +185,9 @@ calibrate (GstRigCalibrate *self, std::stop_token stop)
   return status;
 }
 
-/* Nobody wants to hear of what was interrupted. */
+/* Draws the images with the corners found, for the streaming thread to push. */
 static void
-warn (GstRigCalibrate *self, const Status &status)
-{
-  if (status.code () != StatusCode::kInterrupted)
-    gst_range_post_warning (GST_ELEMENT (self), status);
-}
-
-/* Draws what was found, for the streaming thread to push. */
-static void
-draw_still (GstRigCalibrate *self, const CalibrationPictures &set,
-    const MappedCalibrationPictures &pictures)
+draw_still (GstRigCalibrate *self, const ImageSet &set, const MappedImages &images)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const TileLayout layout = rangecast::lay_out (set.described, set.tile_width);
@@ -149,9 +197,8 @@ draw_still (GstRigCalibrate *self, const CalibrationPictures &set,
   if (!still)
     return;
   if (gst_buffer_map (still, &map, GST_MAP_WRITE)) {
-    priv->session.draw (
-        pictures.views, {reinterpret_cast<rangecast::Rgbx *> (map.data), layout.width (),
-                            layout.height (), layout.width () * 4});
+    priv->session.draw (images.views, {reinterpret_cast<rangecast::Rgbx *> (map.data),
+                                          layout.width (), layout.height (), layout.width () * 4});
     gst_buffer_unmap (still, &map);
   }
   std::lock_guard guard (priv->lock);
@@ -161,28 +208,30 @@ draw_still (GstRigCalibrate *self, const CalibrationPictures &set,
   priv->still_capture = set.capture;
 }
 
-/* @param[out] taken  whether the pictures were kept */
+/* Looks for the board. @param[out] taken  whether the set was kept */
 static Status
-examine (GstRigCalibrate *self, CalibrationPictures &set, bool &taken)
+examine (GstRigCalibrate *self, ImageSet &set, bool &taken)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (set.begin)
     if (Status s = priv->session.set (*set.begin); !s.ok ())
       return s;
-  const MappedCalibrationPictures pictures (set);
-  if (!pictures.status.ok ())
-    return pictures.status;
-  if (Status s = priv->session.examine (set.described, pictures.views, set.capture, set.number);
+  const MappedImages images (set);
+  if (!images.status.ok ())
+    return images.status;
+  if (Status s = priv->session.examine (set.described, images.views, set.capture, set.number);
       !s.ok ())
     return s;
   taken = priv->session.verdict () == rangecast::FrameVerdict::kTaken;
+  GST_DEBUG_OBJECT (self, "set %" G_GUINT64_FORMAT ": %s", set.number,
+      std::string (rangecast::verdict_name (priv->session.verdict ())).c_str ());
   {
     std::lock_guard guard (priv->lock);
     priv->examined++;
     priv->taken += taken;
     priv->stale |= taken;
   }
-  draw_still (self, set, pictures);
+  draw_still (self, set, images);
   for (std::size_t i = 0; i < set.buffers.size (); i++)
     if (set.buffers[i])
       post_board (GST_ELEMENT (self), priv->session, int (i), set.number, set.running);
@@ -191,9 +240,9 @@ examine (GstRigCalibrate *self, CalibrationPictures &set, bool &taken)
   return {};
 }
 
-/* Coverage that is complete ends the stream: with the rig, or with the error that says why not. */
+/* With auto-finish, complete coverage ends the stream: after calibration, or with its error. */
 static void
-examine_job (GstRigCalibrate *self, CalibrationPictures &set, std::stop_token stop)
+examine_job (GstRigCalibrate *self, ImageSet &set, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
   bool taken = false, finished = false;
@@ -203,7 +252,7 @@ examine_job (GstRigCalibrate *self, CalibrationPictures &set, std::stop_token st
     finished = status.ok ();
   }
   std::lock_guard guard (priv->lock);
-  if (priv->failure.ok () && status.code () != StatusCode::kInterrupted) /* the first one counts */
+  if (priv->failure.ok () && status.code () != StatusCode::kInterrupted)
     priv->failure = std::move (status);
   priv->finished |= finished;
 }
@@ -213,8 +262,11 @@ examine_job (GstRigCalibrate *self, CalibrationPictures &set, std::stop_token st
 static void
 gst_rig_calibrate_calibrate (GstRigCalibrate *self)
 {
-  self->priv->jobs.post (
-      [self] (std::stop_token stop) { warn (self, calibrate (self, std::move (stop))); });
+  self->priv->jobs.post ([self] (std::stop_token stop) {
+    const Status status = calibrate (self, std::move (stop));
+    if (status.code () != StatusCode::kInterrupted)
+      gst_range_post_warning (GST_ELEMENT (self), status);
+  });
 }
 
 static void
@@ -233,11 +285,11 @@ gst_rig_calibrate_reset (GstRigCalibrate *self)
 static GstFlowReturn
 gst_rig_calibrate_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 {
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with each picture, see push_still() */
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* push_still() sets caps */
 }
 
-/* Pushes what was drawn last, with the time at which it goes: live, it was drawn of older pictures.
- */
+/* Pushes the latest preview with the running time of the current set; if live, it shows an older
+ * one. */
 static GstFlowReturn
 push_still (GstRigCalibrate *self, GstClockTime running)
 {
@@ -255,7 +307,7 @@ push_still (GstRigCalibrate *self, GstClockTime running)
   }
   if (!still)
     return GST_FLOW_OK;
-  if (!gst_pad_is_linked (aggregator->srcpad)) { /* nobody looks */
+  if (!gst_pad_is_linked (aggregator->srcpad)) {
     gst_buffer_unref (still);
     return GST_FLOW_OK;
   }
@@ -264,6 +316,7 @@ push_still (GstRigCalibrate *self, GstClockTime running)
     gst_video_info_set_format (
         &info, GST_VIDEO_FORMAT_RGBx, guint (layout.width ()), guint (layout.height ()));
     GstCaps *caps = gst_video_info_to_caps (&info);
+    GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
     gst_aggregator_set_src_caps (aggregator, caps);
     gst_caps_unref (caps);
     priv->layout = layout;
@@ -274,40 +327,42 @@ push_still (GstRigCalibrate *self, GstClockTime running)
 
 /* ---- streaming ---- */
 
-/* What the first pictures say: whether the cameras make up views, and what to keep. */
+/* Checks the cameras of the first set and decides how to select frames. */
 static Status
-begin (GstRigCalibrate *self, CalibrationPictures &set, const CalibrationProperties &p, bool live)
+begin_session (GstRigCalibrate *self, ImageSet &set, const RigCalibrateSettings &p, bool live)
 {
   if (Status s = rangecast::check_cameras (set.described, p.core.board); !s.ok ())
     return s;
-  bool film = live;
+  bool video = live;
   for (const GstVideoInfo &info : set.infos)
-    film |= info.fps_n > kFastestPhotographs * std::max (info.fps_d, 1);
+    video |= info.fps_n > kMaxPhotoRate * std::max (info.fps_d, 1);
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
   settings.selection.max_frames = p.max_frames;
-  settings.selection.all = p.selection == CalibrationSelection::kAll ||
-                           (p.selection == CalibrationSelection::kAuto && !film);
-  settings.thorough = !film;
+  settings.selection.all =
+      p.selection == FrameSelection::kAll || (p.selection == FrameSelection::kAuto && !video);
+  settings.thorough = !video;
   set.begin = settings;
   self->priv->begin = false;
   return {};
 }
 
-/* Live, pictures that come while the last ones are looked at go unseen; else they wait. */
+/* Posts a set as a job, waits for it unless live, and pushes the preview. */
 static GstFlowReturn
-hand_over (GstRigCalibrate *self, std::shared_ptr<CalibrationPictures> set, bool live)
+examine_set (GstRigCalibrate *self, std::shared_ptr<ImageSet> set, bool live)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  const CalibrationProperties p = current_properties (self);
+  const RigCalibrateSettings p = current_settings (self);
   const GstClockTime running = set->running;
   if (live && !priv->jobs.idle ()) {
+    GST_DEBUG_OBJECT (
+        self, "skipping set %" G_GUINT64_FORMAT ": an earlier one is being examined", set->number);
     std::lock_guard guard (priv->lock);
     priv->skipped++;
     return GST_FLOW_OK;
   }
   if (priv->begin)
-    if (Status s = begin (self, *set, p, live); !s.ok ())
+    if (Status s = begin_session (self, *set, p, live); !s.ok ())
       return gst_range_flow_return (GST_ELEMENT (self), s);
   set->tile_width = p.tile_width;
   set->auto_finish = p.auto_finish;
@@ -315,7 +370,7 @@ hand_over (GstRigCalibrate *self, std::shared_ptr<CalibrationPictures> set, bool
       [self, set] (std::stop_token stop) { examine_job (self, *set, std::move (stop)); });
   set.reset ();
   if (!live && !priv->jobs.wait_until_idle ())
-    return GST_FLOW_OK; /* flushing or stopping: not for us to say, the base class knows */
+    return GST_FLOW_OK; /* flushing or stopping, which the base class handles */
   Status failure;
   {
     std::lock_guard guard (priv->lock);
@@ -325,31 +380,22 @@ hand_over (GstRigCalibrate *self, std::shared_ptr<CalibrationPictures> set, bool
   return flow == GST_FLOW_OK ? push_still (self, running) : flow;
 }
 
-/* A camera of which nothing is known yet, or null. */
-static const CalibrationSource *
-without_caps (const CalibrationSources &cameras)
-{
-  const auto found = std::ranges::find_if (cameras, [] (const auto &c) { return !c->has_info; });
-  return found == cameras.end () ? nullptr : found->get ();
-}
-
-/* Why there is nothing to calibrate from, if so. */
+/* The reason why no set was examined. */
 static Status
-nothing_came (GstRigCalibrate *self, const CalibrationSources &cameras)
+explain_no_images (const CameraInputs &cameras)
 {
-  if (self->priv->sets > 0)
-    return {};
-  if (const CalibrationSource *camera = without_caps (cameras))
-    return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
-                                       ": no images arrived; expected some on every pad"};
+  for (const auto &camera : cameras)
+    if (!camera->info)
+      return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
+                                         ": no images arrived; expected some on every pad"};
   return {StatusCode::kNotFound,
       "no images with matching times arrived on all pads; expected capture "
       "times that differ by less than half a frame, or by max-skew"};
 }
 
-/* All pads have ended: calibrates, unless that was done already. */
+/* All pads are at EOS: calibrates, unless that was done already. */
 static GstFlowReturn
-finish (GstRigCalibrate *self, const CalibrationSources &cameras)
+finish (GstRigCalibrate *self, const CameraInputs &cameras)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (!priv->jobs.wait_until_idle ())
@@ -361,8 +407,8 @@ finish (GstRigCalibrate *self, const CalibrationSources &cameras)
     status = priv->failure;
     stale = priv->stale;
   }
-  if (status.ok ())
-    status = nothing_came (self, cameras);
+  if (status.ok () && priv->sets == 0)
+    status = explain_no_images (cameras);
   if (status.ok () && stale) {
     const auto outcome = std::make_shared<Status> ();
     priv->jobs.post (
@@ -385,85 +431,39 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
     if (priv->finished)
       return GST_FLOW_EOS;
   }
-  const CalibrationSources cameras = current_cameras (self);
+  const CameraInputs cameras = current_cameras (self);
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
     return GST_FLOW_ERROR;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const CalibrationFronts fronts (cameras, live);
+  const PadFronts fronts (cameras, live);
   if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
     return finish (self, cameras);
   if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime tolerance =
-      calibration_tolerance (cameras, current_properties (self).max_skew);
+  const GstClockTime tolerance = max_capture_skew (cameras, current_settings (self).max_skew);
   guint64 dropped = 0;
-  if (drop_unmatched (cameras, fronts, tolerance, dropped)) {
+  if (drop_unmatched (cameras, fronts, tolerance, GST_CAT_DEFAULT, dropped)) {
     std::lock_guard guard (priv->lock);
     priv->dropped += dropped;
-    return GST_AGGREGATOR_FLOW_NEED_DATA; /* come again with what is behind them */
+    return GST_AGGREGATOR_FLOW_NEED_DATA; /* aggregate is called again with the next buffers */
   }
-  return hand_over (self, take_pictures (cameras, fronts, priv->sets++), live);
+  return examine_set (self, pop_images (cameras, fronts, priv->sets++), live);
 }
 
-/* The deadline for a camera that is late counts from the oldest picture that waits. */
+/* A late camera is waited for until the deadline of the oldest image that waits. */
 static GstClockTime
 gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 {
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
-  const CalibrationFronts fronts (current_cameras (GST_RIG_CALIBRATE (aggregator)), true);
-  for (const CalibrationFronts::Front &front : fronts.list)
+  const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
+  for (const auto &camera : cameras)
+    if (!gst_aggregator_pad_has_buffer (camera->aggregator_pad ()))
+      GST_LOG_OBJECT (camera->pad, "waiting for %s",
+          gst_pad_has_current_caps (GST_PAD (camera->pad)) ? "an image" : "caps and an image");
+  const PadFronts fronts (cameras, true);
+  for (const PadFronts::Front &front : fronts.list)
     oldest = std::min (oldest, front.running);
   return oldest;
-}
-
-/* Corners of two sizes do not make one camera. */
-static Status
-take_caps (GstRigCalibrate *self, CalibrationSource &camera, GstCaps *caps)
-{
-  const std::string name = calibration_camera (camera.pad).name;
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, caps))
-    return {StatusCode::kUnsupported, "pad " + name + ": not the caps of raw video"};
-  bool begun;
-  {
-    std::lock_guard guard (self->priv->lock);
-    begun = self->priv->examined > 0;
-  }
-  if (begun && camera.has_info &&
-      (info.width != camera.info.width || info.height != camera.info.height))
-    return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
-                                      size_text (camera.info.width, camera.info.height) + " to " +
-                                      size_text (info.width, info.height) +
-                                      "; expected one size throughout a calibration"};
-  camera.info = info;
-  camera.has_info = true;
-  return {};
-}
-
-/* What waits for a job must not hold up a flush. */
-static gboolean
-gst_rig_calibrate_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
-{
-  auto self = GST_RIG_CALIBRATE (aggregator);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START)
-    self->priv->jobs.set_flushing (true);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    self->priv->jobs.set_flushing (false);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    GstCaps *caps;
-    gst_event_parse_caps (event, &caps);
-    for (const auto &camera : current_cameras (self)) {
-      if (camera->aggregator_pad () != pad)
-        continue;
-      camera->refused = gst_range_flow_return (
-                            GST_ELEMENT (self), take_caps (self, *camera, caps)) != GST_FLOW_OK;
-      if (camera->refused) {
-        gst_event_unref (event);
-        return FALSE;
-      }
-    }
-  }
-  return GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)->sink_event (aggregator, pad, event);
 }
 
 /* ---- request pads ---- */
@@ -483,14 +483,13 @@ gst_rig_calibrate_request_new_pad (
         GST_RIG_CALIBRATE_PAD (pad), int (std::min<unsigned> (number, rangecast::kMaxViews - 1)));
   {
     std::lock_guard guard (self->priv->lock);
-    self->priv->cameras.push_back (
-        std::make_shared<CalibrationSource> (GST_RIG_CALIBRATE_PAD (pad)));
+    self->priv->cameras.push_back (std::make_shared<CameraInput> (GST_RIG_CALIBRATE_PAD (pad)));
   }
   gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   return pad;
 }
 
-/* A camera that goes takes all frames with it: their numbers of cameras would be wrong. */
+/* Discards all frames: they have another number of cameras. */
 static void
 gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
 {
@@ -508,7 +507,7 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
 static GObject *
 gst_rig_calibrate_get_child_by_index (GstChildProxy *proxy, guint index)
 {
-  const CalibrationSources cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
+  const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
   return index < cameras.size () ? G_OBJECT (gst_object_ref (cameras[index]->pad)) : nullptr;
 }
 
@@ -526,7 +525,7 @@ gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer)
   proxy->get_children_count = gst_rig_calibrate_get_children_count;
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static GstFlowReturn
 gst_rig_calibrate_flush (GstAggregator *aggregator)
@@ -542,12 +541,12 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
 {
   auto self = GST_RIG_CALIBRATE (aggregator);
   GstRigCalibratePrivate *priv = self->priv;
-  const CalibrationProperties p = current_properties (self);
+  const RigCalibrateSettings p = current_settings (self);
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
   settings.selection.max_frames = p.max_frames;
   Status status;
-  if (!p.location.empty ()) /* before minutes of work are lost */
+  if (!p.location.empty ()) /* now, not after minutes of work */
     status = rangecast::check_output_path (p.location, rangecast::kRigExtensions);
   if (status.ok ())
     status = priv->session.set (settings);
@@ -562,11 +561,15 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
     priv->failure = {};
     priv->finished = false;
     priv->stale = true;
-    for (const auto &camera : priv->cameras)
-      camera->has_info = camera->refused = false;
+    for (const auto &camera : priv->cameras) {
+      camera->info.reset ();
+      camera->refused = false;
+    }
   }
-  priv->jobs.start ();
-  return TRUE;
+  if (priv->jobs.start ())
+    return TRUE;
+  GST_ELEMENT_ERROR (self, RESOURCE, FAILED, ("Could not start a thread"), (nullptr));
+  return FALSE;
 }
 
 static gboolean
@@ -577,7 +580,7 @@ gst_rig_calibrate_stop (GstAggregator *aggregator)
   priv->session.clear ();
   for (const auto &camera : current_cameras (GST_RIG_CALIBRATE (aggregator))) {
     camera->reader.reset ();
-    camera->reader_set = false;
+    camera->reader_info.reset ();
   }
   GstBuffer *still;
   {
@@ -590,7 +593,7 @@ gst_rig_calibrate_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
-/* A calibration can take long; its thread must end before the pads can. */
+/* Ends a calibration, which can take long, before the base class waits for the streaming thread. */
 static GstStateChangeReturn
 gst_rig_calibrate_change_state (GstElement *element, GstStateChange transition)
 {
@@ -599,27 +602,12 @@ gst_rig_calibrate_change_state (GstElement *element, GstStateChange transition)
   return GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->change_state (element, transition);
 }
 
-static void
-gst_rig_calibrate_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstRigCalibratePrivate *priv)
 {
-  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (!calibration_properties ().set (priv->properties, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_rig_calibrate_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (
-        value, gst_structure_new ("application/x-rigcalibrate-stats", "examined", G_TYPE_UINT64,
-                   priv->examined, "taken", G_TYPE_UINT64, priv->taken, "skipped", G_TYPE_UINT64,
-                   priv->skipped, "dropped", G_TYPE_UINT64, priv->dropped, nullptr));
-  else if (!calibration_properties ().get (priv->properties, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  return gst_structure_new ("application/x-rigcalibrate-stats", "examined", G_TYPE_UINT64,
+      priv->examined, "taken", G_TYPE_UINT64, priv->taken, "skipped", G_TYPE_UINT64, priv->skipped,
+      "dropped", G_TYPE_UINT64, priv->dropped, nullptr);
 }
 
 static void
@@ -641,8 +629,8 @@ install_signals (GstRigCalibrateClass *klass)
   /**
    * GstRigCalibrate::calibrate:
    *
-   * Calibrates from the frames so far, in the background; ends in a rigcalibrate-result message or
-   * a warning. The stream goes on.
+   * Calibrates from the frames taken so far, in the background, and posts a rigcalibrate-result
+   * message or a warning. The stream continues.
    */
   signals[SIGNAL_CALIBRATE] = g_signal_new_class_handler ("calibrate", G_TYPE_FROM_CLASS (klass),
       GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_calibrate),
@@ -650,7 +638,7 @@ install_signals (GstRigCalibrateClass *klass)
   /**
    * GstRigCalibrate::reset:
    *
-   * Forgets all frames.
+   * Discards all frames.
    */
   signals[SIGNAL_RESET] = g_signal_new_class_handler ("reset", G_TYPE_FROM_CLASS (klass),
       GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_reset),
@@ -664,12 +652,11 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->set_property = gst_rig_calibrate_set_property;
-  object_class->get_property = gst_rig_calibrate_get_property;
+  GST_DEBUG_CATEGORY_INIT (gst_rig_calibrate_debug, "rigcalibrate", 0, "Rig calibration");
+
   object_class->finalize = gst_rig_calibrate_finalize;
-  calibration_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
-      "Counters since the element was started: examined, taken, skipped, dropped");
+  install_properties<GstRigCalibrate, rig_calibrate_properties, make_stats> (
+      object_class, "Counters since the element was started: examined, taken, skipped, dropped");
   install_signals (klass);
 
   gst_element_class_add_static_pad_template_with_gtype (
@@ -681,19 +668,17 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
       "gst-rangecast");
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
 
-  element_class->change_state = gst_rig_calibrate_change_state;
-  element_class->request_new_pad = gst_rig_calibrate_request_new_pad;
-  element_class->release_pad = gst_rig_calibrate_release_pad;
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_rig_calibrate_change_state);
+  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_rig_calibrate_request_new_pad);
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_rig_calibrate_release_pad);
 
-  aggregator_class->start = gst_rig_calibrate_start;
-  aggregator_class->flush = gst_rig_calibrate_flush;
-  aggregator_class->propose_allocation = propose_picture_allocation;
-  aggregator_class->stop = gst_rig_calibrate_stop;
-  aggregator_class->sink_event = gst_rig_calibrate_sink_event;
-  aggregator_class->update_src_caps = gst_rig_calibrate_update_src_caps;
-  aggregator_class->get_next_time = gst_rig_calibrate_get_next_time;
-  aggregator_class->clip = gstrange::clip_to_segment;
-  aggregator_class->aggregate = gst_rig_calibrate_aggregate;
-
-  GST_DEBUG_CATEGORY_INIT (gst_rig_calibrate_debug, "rigcalibrate", 0, "Rig calibration");
+  aggregator_class->start = GST_DEBUG_FUNCPTR (gst_rig_calibrate_start);
+  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_rig_calibrate_flush);
+  aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (propose_video_meta);
+  aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_rig_calibrate_stop);
+  aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_rig_calibrate_sink_event);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_rig_calibrate_update_src_caps);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_rig_calibrate_get_next_time);
+  aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
+  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_rig_calibrate_aggregate);
 }

@@ -7,23 +7,25 @@ using rangecast::CalibrationCamera;
 using rangecast::CalibrationResult;
 using rangecast::CalibrationSession;
 
-static void
+namespace {
+
+void
 post (GstElement *element, GstStructure *structure)
 {
   gst_element_post_message (element, gst_message_new_element (GST_OBJECT (element), structure));
 }
 
-/* pad, view and role, which most messages begin with. */
-static GstStructure *
-about_camera (const char *name, const CalibrationCamera &camera)
+/* With the fields pad, view and role. */
+GstStructure *
+new_camera_structure (const char *name, const CalibrationCamera &camera)
 {
   return gst_structure_new (name, "pad", G_TYPE_STRING, camera.name.c_str (), "view", G_TYPE_INT,
       camera.view_id, "role", G_TYPE_STRING,
       std::string (rangecast::role_name (camera.role)).c_str (), nullptr);
 }
 
-static void
-take_array (GstStructure *structure, const char *field, std::vector<GstStructure *> items)
+void
+set_array (GstStructure *structure, const char *field, std::vector<GstStructure *> items)
 {
   GValue array = G_VALUE_INIT;
   gst_value_array_init (&array, guint (items.size ()));
@@ -36,7 +38,7 @@ take_array (GstStructure *structure, const char *field, std::vector<GstStructure
   gst_structure_take_value (structure, field, &array);
 }
 
-static void
+void
 set_strings (GstStructure *structure, const char *field, const std::vector<std::string> &texts)
 {
   GValue array = G_VALUE_INIT;
@@ -50,11 +52,32 @@ set_strings (GstStructure *structure, const char *field, const std::vector<std::
   gst_structure_take_value (structure, field, &array);
 }
 
+GstStructure *
+camera_structure (const CalibrationSession &session, const rangecast::CameraReport &report)
+{
+  GstStructure *s = new_camera_structure ("camera", session.cameras ()[report.camera]);
+  gst_structure_set (s, "frames", G_TYPE_UINT, guint (report.frames), "rms", G_TYPE_DOUBLE,
+      report.rms_px, "alone-rms", G_TYPE_DOUBLE, report.alone_rms_px, nullptr);
+  return s;
+}
+
+GstStructure *
+pair_structure (const CalibrationSession &session, const rangecast::PairReport &pair)
+{
+  return gst_structure_new ("pair", "first", G_TYPE_STRING,
+      session.cameras ()[pair.a].name.c_str (), "second", G_TYPE_STRING,
+      session.cameras ()[pair.b].name.c_str (), "frames", G_TYPE_UINT, guint (pair.frames), "rms",
+      G_TYPE_DOUBLE, pair.rms_px, "distance", G_TYPE_DOUBLE, pair.distance_m, "row-error",
+      G_TYPE_DOUBLE, pair.row_error_px, nullptr);
+}
+
+} // namespace
+
 void
 post_board (GstElement *element, const CalibrationSession &session, int camera, guint64 frame,
     GstClockTime running_time)
 {
-  GstStructure *s = about_camera ("rigcalibrate-board", session.cameras ()[camera]);
+  GstStructure *s = new_camera_structure ("rigcalibrate-board", session.cameras ()[camera]);
   const guint corners = guint (session.corners (camera).size ());
   gst_structure_set (s, "frame", G_TYPE_UINT64, frame, "running-time", G_TYPE_UINT64, running_time,
       "seen", G_TYPE_BOOLEAN, corners > 0, "corners", G_TYPE_UINT, corners, "verdict",
@@ -71,7 +94,7 @@ post_coverage (GstElement *element, const CalibrationSession &session)
     std::string cells;
     for (const bool seen : c.cells)
       cells += seen ? '1' : '0';
-    GstStructure *s = about_camera ("rigcalibrate-coverage", session.cameras ()[i]);
+    GstStructure *s = new_camera_structure ("rigcalibrate-coverage", session.cameras ()[i]);
     gst_structure_set (s, "frames", G_TYPE_UINT, guint (c.frames), "total-frames", G_TYPE_UINT,
         guint (session.frames ()), "share", G_TYPE_DOUBLE, c.share (), "complete", G_TYPE_BOOLEAN,
         c.complete (), "group", G_TYPE_INT, groups[i], "cells", G_TYPE_STRING, cells.c_str (),
@@ -79,25 +102,6 @@ post_coverage (GstElement *element, const CalibrationSession &session)
     set_strings (s, "missing", c.missing ());
     post (element, s);
   }
-}
-
-static GstStructure *
-camera_structure (const CalibrationSession &session, const rangecast::CameraReport &report)
-{
-  GstStructure *s = about_camera ("camera", session.cameras ()[report.camera]);
-  gst_structure_set (s, "frames", G_TYPE_UINT, guint (report.frames), "rms", G_TYPE_DOUBLE,
-      report.rms_px, "alone-rms", G_TYPE_DOUBLE, report.alone_rms_px, nullptr);
-  return s;
-}
-
-static GstStructure *
-pair_structure (const CalibrationSession &session, const rangecast::PairReport &pair)
-{
-  return gst_structure_new ("pair", "first", G_TYPE_STRING,
-      session.cameras ()[pair.a].name.c_str (), "second", G_TYPE_STRING,
-      session.cameras ()[pair.b].name.c_str (), "frames", G_TYPE_UINT, guint (pair.frames), "rms",
-      G_TYPE_DOUBLE, pair.rms_px, "distance", G_TYPE_DOUBLE, pair.distance_m, "row-error",
-      G_TYPE_DOUBLE, pair.row_error_px, nullptr);
 }
 
 void
@@ -117,9 +121,9 @@ post_result (GstElement *element, const CalibrationSession &session,
     dropped.push_back (gst_structure_new ("dropped", "pad", G_TYPE_STRING,
         session.cameras ()[board.camera].name.c_str (), "frame", G_TYPE_UINT64,
         guint64 (board.frame), "rms", G_TYPE_DOUBLE, board.rms_px, nullptr));
-  take_array (s, "cameras", cameras);
-  take_array (s, "pairs", pairs);
-  take_array (s, "dropped", dropped);
+  set_array (s, "cameras", cameras);
+  set_array (s, "pairs", pairs);
+  set_array (s, "dropped", dropped);
   set_strings (s, "warnings", result.warnings);
   const auto blob = rangecast::encode_rig (result.rig);
   GstBuffer *rig = gst_buffer_new_memdup (blob.data (), blob.size ());

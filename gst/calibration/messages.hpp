@@ -5,14 +5,14 @@
 
 #include <rangecast/calibration/session.hpp>
 
-/* The element messages of rigcalibrate; field by field in docs/elements/rigcalibrate.md. Any
- * thread, without locks. */
+/* The element messages of rigcalibrate, documented in docs/elements/rigcalibrate.md. Any thread,
+ * without locks held. */
 
-/* One rigcalibrate-board a camera that had a picture. */
+/** rigcalibrate-board, for a camera that had an image in the set. */
 void post_board (GstElement *element, const rangecast::CalibrationSession &session, int camera,
     guint64 frame, GstClockTime running_time);
-/* One rigcalibrate-coverage a camera. */
+/** One rigcalibrate-coverage for each camera. */
 void post_coverage (GstElement *element, const rangecast::CalibrationSession &session);
-/* @param location  null: no file was written */
+/** rigcalibrate-result. @param location  null: no file was written */
 void post_result (GstElement *element, const rangecast::CalibrationSession &session,
     const rangecast::CalibrationResult &result, const char *location);

@@ -11,8 +11,7 @@ enum { PROP_0, PROP_VIEW, PROP_ROLE };
 
 struct _GstRigCalibratePad {
   GstAggregatorPad parent;
-  int view_id; /* both guarded by the object lock */
-  int role;
+  int view_id, role; /* guarded by the object lock */
 };
 
 G_DEFINE_TYPE (GstRigCalibratePad, gst_rig_calibrate_pad, GST_TYPE_AGGREGATOR_PAD)
@@ -92,13 +91,12 @@ gst_rig_calibrate_pad_class_init (GstRigCalibratePadClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   object_class->set_property = gst_rig_calibrate_pad_set_property;
   object_class->get_property = gst_rig_calibrate_pad_get_property;
-  constexpr auto kReady = kMutableReady;
   g_object_class_install_property (object_class, PROP_VIEW,
       g_param_spec_int ("view", "View",
           "view-id of the view that the camera belongs to (default: the number of the pad)", 0,
-          rangecast::kMaxViews - 1, 0, kReady));
+          rangecast::kMaxViews - 1, 0, kMutableReady));
   g_object_class_install_property (object_class, PROP_ROLE,
       g_param_spec_enum ("role", "Role", "Role of the camera in its view",
-          GST_TYPE_RIG_CALIBRATE_ROLE, int (CameraRole::kLeft), kReady));
+          GST_TYPE_RIG_CALIBRATE_ROLE, int (CameraRole::kLeft), kMutableReady));
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_ROLE, GstPluginAPIFlags (0));
 }

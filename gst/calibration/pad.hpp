@@ -7,14 +7,14 @@
 
 G_BEGIN_DECLS
 
-/* A camera of rigcalibrate: a sink pad that knows its view and its role there. */
+/* Sink pad of rigcalibrate, with the properties view and role. */
 #define GST_TYPE_RIG_CALIBRATE_PAD (gst_rig_calibrate_pad_get_type ())
 G_DECLARE_FINAL_TYPE (
     GstRigCalibratePad, gst_rig_calibrate_pad, GST, RIG_CALIBRATE_PAD, GstAggregatorPad)
 
 G_END_DECLS
 
-/* The pad's properties; size is left out. Any thread. */
+/** The pad's name, view and role, without the image size. Any thread. */
 rangecast::CalibrationCamera calibration_camera (GstRigCalibratePad *pad);
-/* The view that the pad has until somebody says otherwise; before the pad is added. */
+/** Sets the default of `view`; before the pad is added. */
 void set_default_view (GstRigCalibratePad *pad, int view_id);

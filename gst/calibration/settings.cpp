@@ -41,10 +41,10 @@ gst_rig_calibrate_selection_get_type (void)
 {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {int (CalibrationSelection::kAuto),
+        {int (FrameSelection::kAuto),
             "'all' for still images (not live, at most 2 per second), else 'spread'", "auto"},
-        {int (CalibrationSelection::kAll), "Keep every frame that shows the board", "all"},
-        {int (CalibrationSelection::kSpread),
+        {int (FrameSelection::kAll), "Keep every frame that shows the board", "all"},
+        {int (FrameSelection::kSpread),
             "Keep frames in which the board is still, sharp and at a new place, size or tilt",
             "spread"},
         {}};
@@ -87,10 +87,10 @@ gst_rig_calibrate_world_get_type (void)
   return type;
 }
 
-PropertyTable<CalibrationProperties> &
-calibration_properties ()
+PropertyTable<RigCalibrateSettings> &
+rig_calibrate_properties ()
 {
-  using S = CalibrationProperties;
+  using S = RigCalibrateSettings;
   using Core = rangecast::CalibrationSettings;
   using Board = rangecast::BoardSpec;
   using P = PropertyTable<S>;

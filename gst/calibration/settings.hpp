@@ -8,19 +8,17 @@
 
 #include "common/properties.hpp"
 
-/* Which frames are kept. */
-enum class CalibrationSelection { kAuto, kAll, kSpread };
+enum class FrameSelection { kAuto, kAll, kSpread };
 
-/* rigcalibrate's properties as the application wants them. */
-struct CalibrationProperties {
+/** rigcalibrate's properties. Guarded by the element's lock. */
+struct RigCalibrateSettings {
   rangecast::CalibrationSettings core;
   int max_frames = 100;
-  CalibrationSelection selection = CalibrationSelection::kAuto;
+  FrameSelection selection = FrameSelection::kAuto;
   bool auto_finish = false;
   GstClockTime max_skew = 0;
   int tile_width = 480;
   std::string location;
 };
 
-/** Their properties, which may change in NULL and READY. */
-PropertyTable<CalibrationProperties> &calibration_properties ();
+PropertyTable<RigCalibrateSettings> &rig_calibrate_properties ();

@@ -2,12 +2,15 @@
 #include "caps.hpp"
 
 #include <algorithm>
+#include <numeric>
 
-static constexpr int kWidthStep = 4;
+namespace {
 
-/* ---- what the cameras can ---- */
+constexpr int kWidthStep = 4;
 
-static std::vector<std::string>
+/* ---- what the cameras provide ---- */
+
+std::vector<std::string>
 common_formats (std::span<const CameraAbilities> cameras)
 {
   std::vector<std::string> common = cameras[0].pixel_formats;
@@ -19,46 +22,40 @@ common_formats (std::span<const CameraAbilities> cameras)
 }
 
 struct SizeRange {
-  int least, most, step;
+  int min, max, step;
 };
 
-static int
-common_multiple (int a, int b)
-{
-  return a / std::max (1, int (gst_util_greatest_common_divisor (a, b))) * b;
-}
-
-/* Cameras count sizes from their least one in steps; ours are multiples of the steps, which both
- * are in practice. */
-static SizeRange
+/* Sizes of a camera are its minimum plus multiples of its step; these are multiples of the step,
+ * which in practice is the same. */
+SizeRange
 common_range (std::span<const CameraAbilities> cameras, bool widths)
 {
   SizeRange range{1, G_MAXINT, widths ? kWidthStep : 1};
   for (const CameraAbilities &c : cameras) {
-    range.least = std::max (range.least, widths ? c.min_width : c.min_height);
-    range.most = std::min (range.most, widths ? c.max_width : c.max_height);
-    range.step = common_multiple (range.step, std::max (1, widths ? c.width_step : c.height_step));
+    range.min = std::max (range.min, widths ? c.min_width : c.min_height);
+    range.max = std::min (range.max, widths ? c.max_width : c.max_height);
+    range.step = std::lcm (range.step, std::max (1, widths ? c.width_step : c.height_step));
   }
-  range.least = (range.least + range.step - 1) / range.step * range.step;
-  range.most = range.most / range.step * range.step;
+  range.min = (range.min + range.step - 1) / range.step * range.step;
+  range.max = range.max / range.step * range.step;
   return range;
 }
 
-static void
+void
 set_range (GstStructure *structure, const char *field, const SizeRange &range)
 {
   GValue value = G_VALUE_INIT;
-  if (range.least == range.most) {
-    gst_structure_set (structure, field, G_TYPE_INT, range.least, nullptr);
+  if (range.min == range.max) {
+    gst_structure_set (structure, field, G_TYPE_INT, range.min, nullptr);
     return;
   }
   g_value_init (&value, GST_TYPE_INT_RANGE);
-  gst_value_set_int_range_step (&value, range.least, range.most, range.step);
+  gst_value_set_int_range_step (&value, range.min, range.max, range.step);
   gst_structure_take_value (structure, field, &value);
 }
 
 /* The caps of one pixel format, without size. */
-static GstCaps *
+GstCaps *
 caps_of_format (const std::string &name)
 {
   GstCaps *all = gst_caps_normalize (camera_caps ()), *found = gst_caps_new_empty ();
@@ -73,7 +70,7 @@ caps_of_format (const std::string &name)
   return found;
 }
 
-static std::string
+std::string
 formats_of (const CameraAbilities &camera)
 {
   std::string text;
@@ -84,8 +81,8 @@ formats_of (const CameraAbilities &camera)
   return text.empty () ? "none" : text;
 }
 
-/* Cameras with one list are named together. */
-static std::string
+/* Cameras with equal lists are named together. */
+std::string
 list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> labels)
 {
   std::string text, who;
@@ -100,13 +97,15 @@ list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> 
   return text;
 }
 
+} // namespace
+
 GstCaps *
 camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const std::string> labels,
     const std::string &pixel_format, bool single_shot, std::string &why)
 {
   const SizeRange widths = common_range (cameras, true), heights = common_range (cameras, false);
   GstCaps *caps = gst_caps_new_empty ();
-  if (widths.least > widths.most || heights.least > heights.most) {
+  if (widths.min > widths.max || heights.min > heights.max) {
     why = "the cameras have no image size in common";
     return caps;
   }
@@ -127,10 +126,11 @@ camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const st
   return caps;
 }
 
-/* ---- what the peers want ---- */
+/* ---- what the peers accept ---- */
 
-static GstCaps *
-common_caps (GstCaps *offered, std::span<GstPad *const> pads)
+bool
+choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
+    std::span<const CameraAbilities> cameras, SourceFormat &format)
 {
   GstCaps *common = gst_caps_ref (offered);
   for (GstPad *pad : pads) {
@@ -138,14 +138,6 @@ common_caps (GstCaps *offered, std::span<GstPad *const> pads)
     gst_caps_unref (common);
     common = both;
   }
-  return common;
-}
-
-bool
-choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
-    std::span<const CameraAbilities> cameras, CamSourceFormat &format)
-{
-  GstCaps *common = common_caps (offered, pads);
   GstCaps *caps = gst_caps_intersect_full (common, offered, GST_CAPS_INTERSECT_FIRST);
   gst_caps_unref (common);
   if (gst_caps_is_empty (caps)) {
@@ -156,13 +148,13 @@ choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
   GstStructure *structure = gst_caps_get_structure (caps, 0);
   gst_structure_fixate_field_nearest_int (structure, "width", G_MAXINT);
   gst_structure_fixate_field_nearest_int (structure, "height", G_MAXINT);
-  double most = 30;
+  double max_rate = 30;
   for (const CameraAbilities &camera : cameras)
     if (camera.max_frame_rate > 0)
-      most = std::min (most, camera.max_frame_rate);
+      max_rate = std::min (max_rate, camera.max_frame_rate);
   gint n = 30, d = 1;
-  if (most < 30)
-    gst_util_double_to_fraction (most, &n, &d);
+  if (max_rate < 30)
+    gst_util_double_to_fraction (max_rate, &n, &d);
   gst_structure_fixate_field_nearest_fraction (structure, "framerate", n, d);
   caps = gst_caps_fixate (caps);
   structure = gst_caps_get_structure (caps, 0);

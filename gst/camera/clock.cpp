@@ -8,15 +8,13 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-static bool
-parse_number (const std::string &text, guint64 least, guint64 most, int &number)
-{
-  guint64 value = 0;
-  if (!g_ascii_string_to_unsigned (text.c_str (), 10, least, most, &value, nullptr))
-    return false;
-  number = static_cast<int> (value);
-  return true;
-}
+namespace {
+
+struct ClockServer {
+  bool ptp = false;
+  std::string host;
+  int port = 0; ///< or the PTP domain
+};
 
 Status
 parse_clock_server (const std::string &text, ClockServer &server)
@@ -28,8 +26,11 @@ parse_clock_server (const std::string &text, ClockServer &server)
     return bad;
   server.host = text.substr (0, colon);
   server.ptp = server.host == "ptp";
-  if (!parse_number (text.substr (colon + 1), !server.ptp, server.ptp ? 255 : 65535, server.port))
+  guint64 number = 0;
+  if (!g_ascii_string_to_unsigned (text.c_str () + colon + 1, 10, server.ptp ? 0 : 1,
+          server.ptp ? 255 : 65535, &number, nullptr))
     return bad;
+  server.port = static_cast<int> (number);
   if (server.host.front () == '[') {
     if (server.host.size () < 3 || server.host.back () != ']')
       return bad;
@@ -38,11 +39,13 @@ parse_clock_server (const std::string &text, ClockServer &server)
   return {};
 }
 
-/* A net clock begins at 0, before any other: when it is in step it can only go forward. The clock
- * stays until another is wanted: it is in step already then, and GStreamer 1.22's must not be let
- * go at the moment when it gets into step. */
+} // namespace
+
+/* A net clock starts at 0, before any other, so that it only jumps forward when it is synchronised.
+ * The clock stays until another one is wanted: it is synchronised already then, and GStreamer 1.22
+ * must not release it at the moment when that happens. */
 Status
-CamSourceClock::open (const std::string &text)
+NetworkClock::open (const std::string &text)
 {
   if (clock_ && text == server_)
     return {};
@@ -54,7 +57,7 @@ CamSourceClock::open (const std::string &text)
   if (Status s = parse_clock_server (text, server); !s.ok ())
     return s;
   if (!server.ptp) {
-    const PromptThread prompt; /* that asks: what it is late is error of the clock */
+    const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
     clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
   } else {
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))

@@ -6,34 +6,23 @@
 #include <rangecast/base/status.hpp>
 #include <string>
 
-/** The clock that stereocamsrc provides: one that another host serves. */
-class CamSourceClock {
+/** The clock of another host, which stereocamsrc provides to its pipeline. */
+class NetworkClock {
 public:
-  CamSourceClock () = default;
-  ~CamSourceClock () { gst_clear_object (&clock_); }
-  CamSourceClock (const CamSourceClock &) = delete;
-  CamSourceClock &operator= (const CamSourceClock &) = delete;
+  NetworkClock () = default;
+  ~NetworkClock () { gst_clear_object (&clock_); }
+  NetworkClock (const NetworkClock &) = delete;
+  NetworkClock &operator= (const NetworkClock &) = delete;
 
-  /** Begins to ask the server; nothing waits for it, but for the look-up of a host's name.
+  /** Starts to synchronise; waits only for the look-up of a host name.
    *  @param server  HOST:PORT, [IPv6]:PORT or ptp:DOMAIN; empty: no clock
-   *  @return kBadValue: the text says what was expected; kNotFound: there can be no such clock here
-   */
+   *  @return kBadValue: the text says what was expected; kNotFound: no such clock on this host */
   rangecast::Status open (const std::string &server);
 
-  /** Transfer none; null: none. */
+  /** Transfer none; may be null. */
   [[nodiscard]] GstClock *clock () const { return clock_; }
 
 private:
   std::string server_;
   GstClock *clock_ = nullptr;
 };
-
-/** What a clock-server property names. */
-struct ClockServer {
-  bool ptp = false;
-  std::string host;
-  int port = 0; ///< or the PTP domain
-};
-
-/** @return kBadValue: the text says what was expected */
-rangecast::Status parse_clock_server (const std::string &text, ClockServer &server);

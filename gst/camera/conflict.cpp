@@ -5,12 +5,14 @@
 #include <set>
 #include <vector>
 
-/* The order in which users think of them. "format" is told with the media type: GRAY8 of
- * video/x-raw and rggb of video/x-bayer are one choice. */
-static constexpr const char *kFields[] = {"format", "width", "height", "framerate"};
+namespace {
 
-/* Caps of which only the media type and one field are left. Transfer full. */
-static GstCaps *
+/* In the order that users think of them. "format" goes with the media type: GRAY8 of video/x-raw
+ * and rggb of video/x-bayer are one choice. */
+constexpr const char *kFields[] = {"format", "width", "height", "framerate"};
+
+/* Caps reduced to the media type and one field. Transfer full. */
+GstCaps *
 only (GstCaps *caps, const char *field)
 {
   GstCaps *result = gst_caps_new_empty ();
@@ -24,8 +26,8 @@ only (GstCaps *caps, const char *field)
   return result;
 }
 
-static bool
-meet (GstCaps *a, GstCaps *b, const char *field)
+bool
+intersect (GstCaps *a, GstCaps *b, const char *field)
 {
   GstCaps *of_a = only (a, field), *of_b = only (b, field);
   const bool can = gst_caps_can_intersect (of_a, of_b);
@@ -35,7 +37,7 @@ meet (GstCaps *a, GstCaps *b, const char *field)
 }
 
 /* As "640", or "RGB or GRAY8"; each value once, at most six. */
-static std::string
+std::string
 values_of (GstCaps *caps, const char *field)
 {
   std::set<std::string> seen;
@@ -55,11 +57,11 @@ values_of (GstCaps *caps, const char *field)
   return text.empty () ? "nothing" : text;
 }
 
-static std::string
+std::string
 conflict_of (GstCaps *asked, GstCaps *there, const std::string &pad, const std::string &whose)
 {
   for (const char *field : kFields)
-    if (!meet (asked, there, field))
+    if (!intersect (asked, there, field))
       return "pad " + pad + ": downstream asks for " + field + " " + values_of (asked, field) +
              "; " + whose + " " + values_of (there, field);
   gchar *text = gst_caps_to_string (asked);
@@ -68,6 +70,8 @@ conflict_of (GstCaps *asked, GstCaps *there, const std::string &pad, const std::
   g_free (text);
   return all;
 }
+
+} // namespace
 
 std::string
 caps_conflict (GstCaps *offered, std::span<GstPad *const> pads)

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-/** Why no format satisfies all: the first pad whose peer cannot be pleased, the field that it is
- *  about, what downstream asks for and what there is, as the cameras and the pads before have it.
- *  @param offered  what all cameras can */
+/** Why negotiation failed: the first pad whose peer accepts none of the formats, the field in
+ *  question, what downstream asks for, and what the cameras and the pads before it leave.
+ *  @param offered  of camera_source_caps() */
 std::string caps_conflict (GstCaps *offered, std::span<GstPad *const> pads);

@@ -34,33 +34,31 @@
 #include <mutex>
 #include <utility>
 
+#include "camera/aravis/debug.hpp"
 #include "clock.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "session.hpp"
-
-GST_DEBUG_CATEGORY (gst_stereo_cam_src_debug); /* the other files of this plugin log to it, too */
-#define GST_CAT_DEFAULT gst_stereo_cam_src_debug
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 enum { SIGNAL_CAPTURE, N_SIGNALS };
 static guint signals[N_SIGNALS];
 
-/* How long going to NULL waits for cameras to be given back. */
-static constexpr std::chrono::milliseconds kGiveBack{2000};
+/* How long READY to NULL waits for cameras to be closed. */
+static constexpr std::chrono::milliseconds kMaxClose{2000};
 
 struct GstStereoCamSrcPrivate {
-  std::mutex lock; /* guards settings and session; taken before the session's */
-  CamSourceSettings settings;
-  std::shared_ptr<CamSourceSession> session; ///< the last one; it may have ended
+  std::mutex lock; /* guards settings and session; held while no other lock is taken */
+  StereoCamSettings settings;
+  std::shared_ptr<CameraSession> session; ///< the last one, which may have ended
 
   /* State changes; constant between them. */
-  CamSourcePads pads; ///< left, right, and third while it is there
-  CamSourceClock clock;
-  StatsReporter reporter; /* has locks of its own */
+  CameraPads pads; ///< left, right, and third while it exists
+  NetworkClock clock;
+  StatsReporter reporter;
 
-  std::shared_ptr<CamSourceSession> current ()
+  std::shared_ptr<CameraSession> current ()
   {
     std::lock_guard guard (lock);
     return session;
@@ -104,8 +102,8 @@ static gboolean
 gst_stereo_cam_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_RECONFIGURE: /* has marked the pad already */
-    case GST_EVENT_QOS:         /* these two ask for nothing that we could do */
+    case GST_EVENT_RECONFIGURE: /* GstPad has marked the pad */
+    case GST_EVENT_QOS:         /* cameras are not throttled */
     case GST_EVENT_LATENCY:
       gst_event_unref (event);
       return TRUE;
@@ -118,47 +116,33 @@ gst_stereo_cam_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
   }
 }
 
-static bool
-end_stream (GstStereoCamSrc *self, GstEvent *event)
-{
-  const auto session = self->priv->current ();
-  if (session)
-    session->end (gst_event_get_seqnum (event));
-  return session != nullptr;
-}
-
-static bool
-flush_stream (GstStereoCamSrc *self, GstEvent *event)
-{
-  const auto session = self->priv->current ();
-  if (!session)
-    return false;
-  const bool start = GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_START;
-  if (!start)
-    session->flushed ();
-  for (const auto &pad : self->priv->pads)
-    start ? pad->flush_start (event) : pad->flush_stop (event);
-  return true;
-}
-
 static gboolean
 gst_stereo_cam_src_send_event (GstElement *element, GstEvent *event)
 {
-  auto self = GST_STEREO_CAM_SRC (element);
-  bool handled;
+  GstStereoCamSrcPrivate *priv = GST_STEREO_CAM_SRC (element)->priv;
+  const auto session = priv->current ();
   switch (GST_EVENT_TYPE (event)) {
     case GST_EVENT_EOS:
-      handled = end_stream (self, event);
+      if (session)
+        session->send_eos (gst_event_get_seqnum (event));
       break;
     case GST_EVENT_FLUSH_START:
+      for (const auto &pad : priv->pads)
+        if (session)
+          pad->flush_start (event);
+      break;
     case GST_EVENT_FLUSH_STOP:
-      handled = flush_stream (self, event);
+      if (session)
+        session->flush ();
+      for (const auto &pad : priv->pads)
+        if (session)
+          pad->flush_stop (event);
       break;
     default:
       return GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->send_event (element, event);
   }
   gst_event_unref (event);
-  return handled;
+  return session != nullptr;
 }
 
 /* ---- pads ---- */
@@ -166,7 +150,7 @@ gst_stereo_cam_src_send_event (GstElement *element, GstEvent *event)
 static gboolean
 gst_stereo_cam_src_activate_mode (GstPad *pad, GstObject *, GstPadMode mode, gboolean active)
 {
-  auto entry = static_cast<CamSourcePad *> (gst_pad_get_element_private (pad));
+  auto entry = static_cast<CameraPad *> (gst_pad_get_element_private (pad));
   return mode == GST_PAD_MODE_PUSH && entry->activate (active);
 }
 
@@ -174,14 +158,14 @@ static void
 add_pad (GstStereoCamSrc *self, GstStaticPadTemplate *pad_template)
 {
   GstPad *pad = gst_pad_new_from_static_template (pad_template, pad_template->name_template);
-  gst_pad_set_query_function (pad, gst_stereo_cam_src_query);
-  gst_pad_set_event_function (pad, gst_stereo_cam_src_event);
-  gst_pad_set_activatemode_function (pad, gst_stereo_cam_src_activate_mode);
+  gst_pad_set_query_function (pad, GST_DEBUG_FUNCPTR (gst_stereo_cam_src_query));
+  gst_pad_set_event_function (pad, GST_DEBUG_FUNCPTR (gst_stereo_cam_src_event));
+  gst_pad_set_activatemode_function (pad, GST_DEBUG_FUNCPTR (gst_stereo_cam_src_activate_mode));
   gst_pad_use_fixed_caps (pad);
-  self->priv->pads.push_back (std::make_shared<CamSourcePad> (
-      GST_ELEMENT (self), pad, [self] (CamSourcePad &pushed, GstFlowReturn flow) {
+  self->priv->pads.push_back (std::make_shared<CameraPad> (
+      GST_ELEMENT (self), pad, [self] (CameraPad &pushed, GstFlowReturn flow) {
         if (const auto session = self->priv->current ())
-          session->pad_flowed (pushed, flow);
+          session->handle_flow (pushed, flow);
       }));
   gst_pad_set_element_private (pad, self->priv->pads.back ().get ());
 }
@@ -211,10 +195,9 @@ remove_third_pad (GstStereoCamSrc *self)
   self->priv->pads.pop_back ();
 }
 
-/* ---- life ---- */
+/* ---- state changes ---- */
 
-/* What the session counts, in the words that all elements have. Latency is the delay of pictures.
- */
+/* The session's counters under the names of rangecast-stats. Latency is the delay of images. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
@@ -248,7 +231,7 @@ collect_stats (GstElement *element)
 }
 
 static bool
-check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames &names)
+check_settings (GstStereoCamSrc *self, StereoCamSettings &settings, CameraNames &names)
 {
   {
     std::lock_guard guard (self->priv->lock);
@@ -260,11 +243,11 @@ check_settings (GstStereoCamSrc *self, CamSourceSettings &settings, CameraNames 
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* NULL to READY: names and texts, no network. */
+/* NULL to READY: checks settings and provides the clock; no network. */
 static bool
 open_clock (GstStereoCamSrc *self)
 {
-  CamSourceSettings settings;
+  StereoCamSettings settings;
   CameraNames names;
   if (!check_settings (self, settings, names))
     return false;
@@ -284,27 +267,27 @@ open_clock (GstStereoCamSrc *self)
   return true;
 }
 
-/* Names and pads of the session that start() begins. */
+/* READY to PAUSED, before the pads become active: the names and pads of the next session. */
 static bool
-prepare (GstStereoCamSrc *self, CamSourceSession::Setup &setup)
+prepare_session (GstStereoCamSrc *self, CameraSession::Setup &setup)
 {
   if (!check_settings (self, setup.settings, setup.names))
     return false;
   setup.element = GST_ELEMENT (self);
   setup.clock = self->priv->clock.clock ();
-  setup.stream = gst_util_group_id_next ();
-  add_third_pad (self, !setup.names[2].empty (), setup.stream);
+  setup.group_id = gst_util_group_id_next ();
+  add_third_pad (self, !setup.names[2].empty (), setup.group_id);
   gst_element_no_more_pads (setup.element);
   setup.pads = self->priv->pads;
   return true;
 }
 
-/* The pads are active. */
+/* READY to PAUSED, with active pads. */
 static bool
-start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
+begin_session (GstStereoCamSrc *self, CameraSession::Setup setup)
 {
   setup.previous = self->priv->current ();
-  auto session = CamSourceSession::begin (std::move (setup));
+  auto session = CameraSession::begin (std::move (setup));
   if (!session) {
     GST_ELEMENT_ERROR (self, RESOURCE, FAILED, ("Could not start the camera thread"), (nullptr));
     return false;
@@ -314,43 +297,27 @@ start (GstStereoCamSrc *self, CamSourceSession::Setup setup)
   return true;
 }
 
-static void
-stop (GstStereoCamSrc *self)
-{
-  if (const auto session = self->priv->current ())
-    session->ask_to_stop ();
-}
-
-/* READY to NULL: other programs may have the cameras then. A camera that does not answer is given
- * up later. */
-static void
-close (GstStereoCamSrc *self)
-{
-  const auto session = self->priv->current ();
-  if (session && !session->wait_for_cameras (kGiveBack))
-    GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
-}
-
 static GstStateChangeReturn
 gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
 {
   auto self = GST_STEREO_CAM_SRC (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && !open_clock (self))
     return GST_STATE_CHANGE_FAILURE;
-  CamSourceSession::Setup setup;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare (self, setup))
+  CameraSession::Setup setup;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !prepare_session (self, setup))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     self->priv->current ()->set_playing (false);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     self->priv->reporter.stop ();
-    stop (self);
+    if (const auto session = self->priv->current ())
+      session->request_stop ();
   }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->change_state (element, transition);
   const bool began = transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-                     result != GST_STATE_CHANGE_FAILURE && start (self, std::move (setup));
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !began) { /* back, as far as we are */
+                     result != GST_STATE_CHANGE_FAILURE && begin_session (self, std::move (setup));
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !began) { /* undo */
     GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)
         ->change_state (element, GST_STATE_CHANGE_PAUSED_TO_READY);
     remove_third_pad (self);
@@ -358,8 +325,11 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
   }
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
     remove_third_pad (self);
-  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
-    close (self);
+  if (transition == GST_STATE_CHANGE_READY_TO_NULL) { /* other programs may use the cameras now */
+    const auto session = self->priv->current ();
+    if (session && !session->wait_until_closed (kMaxClose))
+      GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
+  }
   if (result == GST_STATE_CHANGE_FAILURE)
     return result;
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING)
@@ -394,7 +364,7 @@ gst_stereo_cam_src_set_property (GObject *object, guint id, const GValue *value,
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!camera_properties ().set (priv->settings, id, value))
+  if (!stereo_cam_properties ().set (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -413,7 +383,7 @@ gst_stereo_cam_src_get_property (GObject *object, guint id, GValue *value, GPara
     return;
   }
   std::lock_guard guard (priv->lock);
-  if (!camera_properties ().get (priv->settings, id, value))
+  if (!stereo_cam_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
@@ -437,23 +407,6 @@ gst_stereo_cam_src_init (GstStereoCamSrc *self)
 }
 
 static void
-install_capture (GstStereoCamSrcClass *klass)
-{
-  /**
-   * GstStereoCamSrc::capture:
-   * @time: when, on the pipeline's clock; GST_CLOCK_TIME_NONE, or what has passed: at once
-   *
-   * Takes one picture with all cameras: single-shot=true, trigger=software or action. It has the
-   * PTS and the capture time of that moment.
-   *
-   * Returns: %FALSE if the element does not play, or 64 shots wait already
-   */
-  signals[SIGNAL_CAPTURE] = g_signal_new_class_handler ("capture", G_TYPE_FROM_CLASS (klass),
-      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_stereo_cam_src_capture),
-      nullptr, nullptr, nullptr, G_TYPE_BOOLEAN, 1, G_TYPE_UINT64);
-}
-
-static void
 gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
@@ -461,10 +414,21 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->set_property = gst_stereo_cam_src_set_property;
   object_class->get_property = gst_stereo_cam_src_get_property;
   object_class->finalize = gst_stereo_cam_src_finalize;
-  camera_properties ().install (object_class, PROP_SETTINGS);
+  stereo_cam_properties ().install (object_class, PROP_SETTINGS);
   install_stats (object_class, PROP_STATS, "Counters since the element was started");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
-  install_capture (klass);
+  /**
+   * GstStereoCamSrc::capture:
+   * @time: time on the pipeline clock; now if it is GST_CLOCK_TIME_NONE or has passed
+   *
+   * Captures one image with all cameras: single-shot=true, trigger=software or action. Its PTS and
+   * capture time are those of that moment.
+   *
+   * Returns: %FALSE if the element does not play, or 64 requests are pending
+   */
+  signals[SIGNAL_CAPTURE] = g_signal_new_class_handler ("capture", G_TYPE_FROM_CLASS (klass),
+      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_stereo_cam_src_capture),
+      nullptr, nullptr, nullptr, G_TYPE_BOOLEAN, 1, G_TYPE_UINT64);
 
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template, &third_template})
     gst_element_class_add_static_pad_template (element_class, pad_template);
@@ -473,9 +437,9 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
       "Captures synchronised images from two or three GigE Vision or USB3 Vision cameras",
       "gst-rangecast");
 
-  element_class->send_event = gst_stereo_cam_src_send_event;
-  element_class->change_state = gst_stereo_cam_src_change_state;
-  element_class->provide_clock = gst_stereo_cam_src_provide_clock;
+  element_class->send_event = GST_DEBUG_FUNCPTR (gst_stereo_cam_src_send_event);
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_stereo_cam_src_change_state);
+  element_class->provide_clock = GST_DEBUG_FUNCPTR (gst_stereo_cam_src_provide_clock);
 
-  GST_DEBUG_CATEGORY_INIT (gst_stereo_cam_src_debug, "stereocamsrc", 0, "Stereo camera source");
+  (void)camera_debug_category (); /* so that GST_DEBUG_CATEGORIES lists it */
 }

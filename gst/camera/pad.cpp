@@ -4,118 +4,62 @@
 #include <chrono>
 #include <utility>
 
-CamSourcePad::CamSourcePad (GstElement *element, GstPad *pad, Flowed flowed)
-    : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))), flowed_ (std::move (flowed))
+#include "camera/aravis/debug.hpp"
+
+CameraPad::CameraPad (GstElement *element, GstPad *pad, FlowChanged flow_changed)
+    : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))),
+      flow_changed_ (std::move (flow_changed))
 {
-  flush_probe_ = gst_pad_add_probe (pad_, GST_PAD_PROBE_TYPE_EVENT_FLUSH, see_flush, this, nullptr);
+  flush_probe_ = gst_pad_add_probe (
+      pad_, GST_PAD_PROBE_TYPE_EVENT_FLUSH, GST_DEBUG_FUNCPTR (probe_flush), this, nullptr);
 }
 
-CamSourcePad::~CamSourcePad ()
+CameraPad::~CameraPad ()
 {
   gst_pad_remove_probe (pad_, flush_probe_);
   clear ();
+  gst_queue_array_free (queue_);
   gst_clear_caps (&caps_);
   gst_object_unref (pad_);
 }
 
-/* ---- the queue ---- */
-
-/* With the lock. */
-void
-CamSourcePad::remove (guint index)
-{
-  GstMiniObject *item = ring_[(first_ + index) % kMaxItems];
-  pictures_ -= GST_IS_BUFFER (item);
-  for (guint i = index; i > 0; i--)
-    ring_[(first_ + i) % kMaxItems] = ring_[(first_ + i - 1) % kMaxItems];
-  first_ = (first_ + 1) % kMaxItems;
-  count_--;
-  gst_mini_object_unref (item);
-}
-
-/* With the lock. @return false: there is none */
-bool
-CamSourcePad::let_oldest_go (bool gap_too)
-{
-  for (guint i = 0; i < count_; i++) {
-    GstMiniObject *item = ring_[(first_ + i) % kMaxItems];
-    const bool gap = GST_IS_EVENT (item) && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_GAP;
-    if (GST_IS_BUFFER (item) || (gap && gap_too)) {
-      remove (i);
-      return true;
-    }
-  }
-  return false;
-}
+/* ---- into the queue ---- */
 
 void
-CamSourcePad::clear ()
-{
-  while (count_ > 0)
-    remove (0);
-}
-
-/* Takes it; with the lock. */
-void
-CamSourcePad::put (GstMiniObject *item)
-{
-  if (flushing_ || ended_) {
-    gst_mini_object_unref (item);
-    return;
-  }
-  const bool picture = GST_IS_BUFFER (item);
-  if (picture && pictures_ >= kMaxPictures) {
-    let_oldest_go (false);
-    overrun_++;
-    discont_ = true;
-  } else if (count_ >= kMaxItems && !let_oldest_go (true)) {
-    gst_mini_object_unref (item); /* that many changes of caps have no sense */
-    return;
-  }
-  if (picture && discont_) {
-    GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
-    discont_ = false;
-  }
-  ring_[(first_ + count_++) % kMaxItems] = item;
-  pictures_ += picture;
-  changed_.notify_all ();
-}
-
-void
-CamSourcePad::set_caps (guint stream, GstCaps *caps)
+CameraPad::set_caps (guint group_id, GstCaps *caps)
 {
   std::lock_guard guard (lock_);
-  if (stream != group_id_ || (caps_ && gst_caps_is_equal (caps_, caps)))
+  if (group_id != group_id_ || (caps_ && gst_caps_is_equal (caps_, caps)))
     return;
   gst_caps_replace (&caps_, caps);
   put (GST_MINI_OBJECT_CAST (gst_event_new_caps (caps)));
 }
 
 void
-CamSourcePad::send (guint stream, GstBuffer *buffer)
+CameraPad::send (guint group_id, GstBuffer *buffer)
 {
   std::lock_guard guard (lock_);
-  if (stream == group_id_)
+  if (group_id == group_id_)
     put (GST_MINI_OBJECT_CAST (buffer));
   else
     gst_buffer_unref (buffer);
 }
 
-/* Of many in a row some do: it is the same silence. Before there are caps nobody waits. */
+/* Before there are caps nobody waits. Some of many gaps in a row are enough. */
 void
-CamSourcePad::send_gap (guint stream, GstClockTime begin, GstClockTime duration)
+CameraPad::send_gap (guint group_id, GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
   discont_ = true;
-  if (stream == group_id_ && caps_ && count_ < kMaxItems / 2)
+  if (group_id == group_id_ && caps_ && gst_queue_array_get_length (queue_) < kMaxItems / 2)
     put (GST_MINI_OBJECT_CAST (gst_event_new_gap (begin, duration)));
 }
 
 void
-CamSourcePad::send_eos (guint stream, guint32 seqnum)
+CameraPad::send_eos (guint group_id, guint32 seqnum)
 {
   std::lock_guard guard (lock_);
-  if (stream != group_id_)
+  if (group_id != group_id_)
     return;
   GstEvent *event = gst_event_new_eos ();
   gst_event_set_seqnum (event, seqnum);
@@ -123,79 +67,108 @@ CamSourcePad::send_eos (guint stream, guint32 seqnum)
   ended_ = true;
 }
 
-/* Waits. @return null: flushing */
-GstMiniObject *
-CamSourcePad::next_item ()
-{
-  std::unique_lock guard (lock_);
-  changed_.wait (guard, [this] { return flushing_ || count_ > 0; });
-  if (flushing_)
-    return nullptr;
-  GstMiniObject *item = ring_[first_];
-  first_ = (first_ + 1) % kMaxItems;
-  count_--;
-  pictures_ -= GST_IS_BUFFER (item);
-  return item;
-}
-
-/* ---- flushes that are not ours ---- */
-
-GstPadProbeReturn
-CamSourcePad::see_flush (GstPad *, GstPadProbeInfo *info, gpointer self)
-{
-  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_FLUSH_STOP)
-    static_cast<CamSourcePad *> (self)->flushed_by_others ();
-  return GST_PAD_PROBE_OK;
-}
-
-/* The pad has forgotten its segment. The task may have ended because the branch had. */
+/* Takes the item. With the lock. */
 void
-CamSourcePad::flushed_by_others ()
+CameraPad::put (GstMiniObject *item)
 {
-  std::lock_guard guard (lock_);
-  if (flushing_)
-    return; /* it is ours, or the pad is not active */
-  flushed_ = discont_ = true;
-  gst_pad_start_task (pad_, loop, this, nullptr);
+  if (flushing_ || ended_) {
+    gst_mini_object_unref (item);
+    return;
+  }
+  const bool image = GST_IS_BUFFER (item);
+  if (image && images_ >= kMaxImages) {
+    GST_DEBUG_OBJECT (pad_, "downstream is blocked: dropping the oldest queued image");
+    drop_oldest (false);
+    overrun_++;
+    discont_ = true;
+  } else if (gst_queue_array_get_length (queue_) >= kMaxItems && !drop_oldest (true)) {
+    gst_mini_object_unref (item); /* a queue full of caps events */
+    return;
+  }
+  if (image && discont_) {
+    GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
+    discont_ = false;
+  }
+  gst_queue_array_push_tail (queue_, item);
+  images_ += image;
+  changed_.notify_all ();
 }
 
-/* What is pushed meanwhile is refused. */
-void
-CamSourcePad::wait_while_flushing ()
+/* The oldest image, or GAP event. With the lock. @return false: there is none */
+bool
+CameraPad::drop_oldest (bool or_gap)
 {
-  std::unique_lock guard (lock_);
-  changed_.wait_for (guard, std::chrono::milliseconds (20), [this] { return flushing_; });
+  for (guint i = 0; i < gst_queue_array_get_length (queue_); i++) {
+    auto item = static_cast<GstMiniObject *> (gst_queue_array_peek_nth (queue_, i));
+    const bool image = GST_IS_BUFFER (item);
+    if (!image && !(or_gap && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_GAP))
+      continue;
+    gst_queue_array_drop_element (queue_, i);
+    images_ -= image;
+    gst_mini_object_unref (item);
+    return true;
+  }
+  return false;
+}
+
+/* With the lock. */
+void
+CameraPad::clear ()
+{
+  while (auto item = static_cast<GstMiniObject *> (gst_queue_array_pop_head (queue_)))
+    gst_mini_object_unref (item);
+  images_ = 0;
 }
 
 /* ---- the task ---- */
 
 void
-CamSourcePad::push_stream_start ()
+CameraPad::loop (gpointer self)
 {
-  if (!needs_start_)
-    return;
-  needs_start_ = false;
-  gchar *id = gst_pad_create_stream_id (pad_, element_, GST_PAD_NAME (pad_));
-  GstEvent *event = gst_event_new_stream_start (id);
-  gst_event_set_group_id (event, group_id_);
-  gst_pad_push_event (pad_, event);
-  g_free (id);
+  static_cast<CameraPad *> (self)->push_next ();
 }
 
 void
-CamSourcePad::push_segment ()
+CameraPad::push_next ()
 {
-  if (!needs_segment_)
+  if (std::exchange (needs_start_, false)) {
+    gchar *id = gst_pad_create_stream_id (pad_, element_, GST_PAD_NAME (pad_));
+    GstEvent *event = gst_event_new_stream_start (id);
+    gst_event_set_group_id (event, group_id_);
+    gst_pad_push_event (pad_, event);
+    g_free (id);
+  }
+  GstMiniObject *item = nullptr;
+  {
+    std::unique_lock guard (lock_);
+    changed_.wait (guard, [this] { return flushing_ || gst_queue_array_get_length (queue_) > 0; });
+    if (!flushing_) {
+      item = static_cast<GstMiniObject *> (gst_queue_array_pop_head (queue_));
+      images_ -= GST_IS_BUFFER (item);
+      needs_segment_ |= std::exchange (flushed_, false);
+    }
+  }
+  if (!item) {
+    gst_pad_pause_task (pad_);
     return;
-  needs_segment_ = false;
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  gst_pad_push_event (pad_, gst_event_new_segment (&segment));
+  }
+  const bool image = GST_IS_BUFFER (item);
+  const GstFlowReturn flow = push (item);
+  const bool tells_flow = image || flow == GST_FLOW_NOT_NEGOTIATED; /* other events do not */
+  if (tells_flow && flow != GST_FLOW_FLUSHING && std::exchange (last_flow_, flow) != flow)
+    flow_changed_ (*this, flow);
+  if (flow == GST_FLOW_FLUSHING) { /* pushing fails until the flush ends */
+    std::unique_lock guard (lock_);
+    changed_.wait_for (guard, std::chrono::milliseconds (20), [this] { return flushing_; });
+  } else if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* that may be linked again */ {
+    GST_DEBUG_OBJECT (pad_, "pausing: %s", gst_flow_get_name (flow));
+    gst_pad_pause_task (pad_);
+  }
 }
 
 /* Takes the item. */
 GstFlowReturn
-CamSourcePad::push (GstMiniObject *item)
+CameraPad::push (GstMiniObject *item)
 {
   if (GST_IS_BUFFER (item)) {
     push_segment ();
@@ -204,72 +177,43 @@ CamSourcePad::push (GstMiniObject *item)
   const GstEventType type = GST_EVENT_TYPE (GST_EVENT_CAST (item));
   if (type != GST_EVENT_CAPS)
     push_segment ();
-  const bool taken = gst_pad_push_event (pad_, GST_EVENT_CAST (item));
+  const bool accepted = gst_pad_push_event (pad_, GST_EVENT_CAST (item));
   if (type == GST_EVENT_EOS)
     return GST_FLOW_EOS;
-  return taken || type != GST_EVENT_CAPS || !gst_pad_is_linked (pad_) ? GST_FLOW_OK
-                                                                      : GST_FLOW_NOT_NEGOTIATED;
+  return accepted || type != GST_EVENT_CAPS || !gst_pad_is_linked (pad_) ? GST_FLOW_OK
+                                                                         : GST_FLOW_NOT_NEGOTIATED;
 }
 
 void
-CamSourcePad::one_item ()
+CameraPad::push_segment ()
 {
-  push_stream_start ();
-  GstMiniObject *item = next_item ();
-  if (!item) {
-    gst_pad_pause_task (pad_);
+  if (!std::exchange (needs_segment_, false))
     return;
-  }
-  const bool picture = GST_IS_BUFFER (item);
-  {
-    std::lock_guard guard (lock_);
-    needs_segment_ |= std::exchange (flushed_, false);
-  }
-  const GstFlowReturn flow = push (item);
-  const bool tells = picture || flow == GST_FLOW_NOT_NEGOTIATED; /* of the peer's wishes */
-  if (tells && flow != GST_FLOW_FLUSHING && std::exchange (last_flow_, flow) != flow)
-    flowed_ (*this, flow);
-  if (flow == GST_FLOW_FLUSHING)
-    wait_while_flushing ();
-  else if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* it may be linked again */
-    gst_pad_pause_task (pad_);
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_pad_push_event (pad_, gst_event_new_segment (&segment));
+}
+
+/* ---- flushes ---- */
+
+/* A flush that the application pushed on this pad: it removed the segment, and the task may have
+ * paused because downstream had ended. */
+GstPadProbeReturn
+CameraPad::probe_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
+{
+  auto self = static_cast<CameraPad *> (data);
+  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) != GST_EVENT_FLUSH_STOP)
+    return GST_PAD_PROBE_OK;
+  std::lock_guard guard (self->lock_);
+  if (self->flushing_) /* the element's own flush, or the pad is inactive */
+    return GST_PAD_PROBE_OK;
+  self->flushed_ = self->discont_ = true;
+  gst_pad_start_task (self->pad_, loop, self, nullptr);
+  return GST_PAD_PROBE_OK;
 }
 
 void
-CamSourcePad::loop (gpointer self)
-{
-  static_cast<CamSourcePad *> (self)->one_item ();
-}
-
-/* ---- life ---- */
-
-void
-CamSourcePad::prepare (guint group_id)
-{
-  std::lock_guard guard (lock_);
-  clear ();
-  gst_clear_caps (&caps_);
-  ended_ = false;
-  discont_ = needs_start_ = needs_segment_ = true;
-  last_flow_ = GST_FLOW_OK;
-  group_id_ = group_id;
-}
-
-bool
-CamSourcePad::activate (bool active)
-{
-  {
-    std::lock_guard guard (lock_);
-    flushing_ = !active;
-    if (!active)
-      clear ();
-    changed_.notify_all ();
-  }
-  return active ? gst_pad_start_task (pad_, loop, this, nullptr) : gst_pad_stop_task (pad_);
-}
-
-void
-CamSourcePad::flush_start (GstEvent *event)
+CameraPad::flush_start (GstEvent *event)
 {
   {
     std::lock_guard guard (lock_);
@@ -282,9 +226,9 @@ CamSourcePad::flush_start (GstEvent *event)
 }
 
 void
-CamSourcePad::flush_stop (GstEvent *event)
+CameraPad::flush_stop (GstEvent *event)
 {
-  GST_PAD_STREAM_LOCK (pad_); /* the task stands still */
+  GST_PAD_STREAM_LOCK (pad_); /* the task is paused */
   gst_pad_push_event (pad_, gst_event_ref (event));
   needs_segment_ = true;
   last_flow_ = GST_FLOW_OK;
@@ -297,4 +241,31 @@ CamSourcePad::flush_stop (GstEvent *event)
   }
   GST_PAD_STREAM_UNLOCK (pad_);
   gst_pad_start_task (pad_, loop, this, nullptr);
+}
+
+/* ---- state changes ---- */
+
+void
+CameraPad::prepare (guint group_id)
+{
+  std::lock_guard guard (lock_);
+  clear ();
+  gst_clear_caps (&caps_);
+  ended_ = false;
+  discont_ = needs_start_ = needs_segment_ = true;
+  last_flow_ = GST_FLOW_OK;
+  group_id_ = group_id;
+}
+
+bool
+CameraPad::activate (bool active)
+{
+  {
+    std::lock_guard guard (lock_);
+    flushing_ = !active;
+    if (!active)
+      clear ();
+    changed_.notify_all ();
+  }
+  return active ? gst_pad_start_task (pad_, loop, this, nullptr) : gst_pad_stop_task (pad_);
 }

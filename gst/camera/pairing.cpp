@@ -6,372 +6,391 @@
 #include <span>
 #include <utility>
 
+#include "camera/aravis/debug.hpp"
+
 using rangecast::FrameSets;
 
-/* A camera that did not answer a shot within this time does not any more. */
-static constexpr std::int64_t kAnswerTime = 1'000'000'000;
-static constexpr std::int64_t kMinAnswerTime = 60'000'000;
+namespace {
 
-/* How wrong the reading of a camera's clock may be. */
-static constexpr std::int64_t kClockError = 50'000'000;
+/* A camera that has not answered a trigger after this time will not. */
+constexpr std::int64_t kMaxAnswer_ns = 1'000'000'000;
+constexpr std::int64_t kMinAnswer_ns = 60'000'000;
 
-CamSourcePairing::CamSourcePairing ()
+/* Error of reading a camera's clock. */
+constexpr std::int64_t kClockError_ns = 50'000'000;
+
+/* 0: no timestamp. A time that no clock reaches is none. */
+std::int64_t
+timestamp (const CameraFrame &frame)
 {
-  for (Held &held : held_)
-    held.next_free = std::exchange (free_, &held);
+  return frame.camera_time_ns < kMaxCameraTime_ns ? static_cast<std::int64_t> (frame.camera_time_ns)
+                                                  : 0;
 }
 
-CamSourcePairing::~CamSourcePairing ()
+} // namespace
+
+FramePairing::FramePairing (GstElement *element) : element_ (element)
+{
+  for (WaitingFrame &waiting : frames_)
+    waiting.next_free = std::exchange (free_, &waiting);
+}
+
+FramePairing::~FramePairing ()
 {
   drop_waiting ();
 }
 
 void
-CamSourcePairing::start (
-    int cameras, Fired fired, GstClockTime period, GstClockTime exposure, int waiting)
+FramePairing::configure (
+    int cameras, TriggeredBy by, GstClockTime period_ns, GstClockTime exposure_ns, int max_waiting)
 {
   drop_waiting ();
   std::lock_guard guard (lock_);
   cameras_ = cameras;
-  waiting_ = waiting;
-  triggered_ = fired == Fired::kHere;
-  one_signal_ = fired == Fired::kElsewhere;
-  period_ = period > 0 ? period : GST_SECOND;
-  exposure_ = exposure;
+  max_waiting_ = max_waiting;
+  by_ = by;
+  period_ns_ = static_cast<std::int64_t> (period_ns > 0 ? period_ns : GST_SECOND);
+  exposure_ns_ = static_cast<std::int64_t> (exposure_ns);
+}
+
+void
+FramePairing::reset ()
+{
+  drop_waiting ();
+  std::lock_guard guard (lock_);
+  tolerance_ns_ = period_ns_ / 2;
+  sets_.start (cameras_, by_ == TriggeredBy::kElement ? 0 : tolerance_ns_, max_waiting_);
+  intervals_.reset ();
+  counted_intervals_ = 0;
+  clocks_are_off_ = false;
+  for (int c = 0; c < kMaxCameras; c++) {
+    matchers_[c].start (period_ns_);
+    associators_[c].start (period_ns_);
+    clocks_[c].reset ();
+    offsets_ns_[c].reset ();
+    answered_[c] = last_frame_ns_[c] = last_taken_ns_[c] = 0;
+    last_number_[c].reset ();
+  }
+  triggers_ = {};
+  n_triggers_ = 0;
+  learning_triggers_ = 0;
+  spacing_ns_ = 0;
+  answers_owed_ = false;
+}
+
+void
+FramePairing::drop_waiting ()
+{
+  std::lock_guard guard (lock_);
+  FrameSets::Set frames;
+  while (sets_.take_rest (frames) == FrameSets::Step::kDrop)
+    for (FrameSets::Frame frame : frames.frames)
+      if (frame)
+        release (static_cast<WaitingFrame *> (frame));
+}
+
+void
+FramePairing::set_clock_offset (int camera, std::int64_t offset_ns)
+{
+  std::lock_guard guard (lock_);
+  offsets_ns_[camera] = offset_ns;
 }
 
 bool
-CamSourcePairing::clocks_are_off ()
+FramePairing::clocks_are_off ()
 {
   std::lock_guard guard (lock_);
   return std::exchange (clocks_are_off_, false);
 }
 
-void
-CamSourcePairing::forget ()
+/* ---- triggers ---- */
+
+bool
+FramePairing::all_answered () const
 {
-  drop_waiting ();
-  std::lock_guard guard (lock_);
-  tolerance_ = static_cast<std::int64_t> (period_) / 2;
-  sets_.start (cameras_, triggered_ ? 0 : tolerance_, waiting_);
-  intervals_.reset ();
-  counted_intervals_ = 0;
-  clocks_are_off_ = false;
-  for (int c = 0; c < kMaxCameras; c++) {
-    finders_[c].start (static_cast<std::int64_t> (period_));
-    partners_[c].start (static_cast<std::int64_t> (period_));
-    clocks_[c].reset ();
-    offsets_[c].reset ();
-    answered_[c] = last_arrival_ns_[c] = last_taken_ns_[c] = 0;
-    has_number_[c] = false;
-  }
-  ticks_ = {};
-  shots_ = 0;
-  lone_shots_ = 0;
-  spacing_ = 0;
-  owing_ = false;
+  return std::all_of (answered_.begin (), answered_.begin () + cameras_,
+      [this] (std::int64_t answered) { return answered >= n_triggers_; });
 }
 
-/* ---- frames that are kept ---- */
-
-CamSourcePairing::Held *
-CamSourcePairing::hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns)
-{
-  if (!free_) /* FrameSets keeps fewer than there are */
-    return nullptr;
-  Held *held = std::exchange (free_, free_->next_free);
-  held->frame = std::move (frame);
-  held->taken_ns = taken_ns;
-  held->exposed_ns = exposed_ns;
-  return held;
-}
-
-void
-CamSourcePairing::let_go (Held *held)
-{
-  held->frame.buffer.reset ();
-  held->next_free = std::exchange (free_, held);
-}
-
-void
-CamSourcePairing::drop (FrameSets::Set &set)
-{
-  for (int c = 0; c < cameras_; c++)
-    if (set.frames[c]) {
-      counts_.dropped[c]++;
-      let_go (static_cast<Held *> (set.frames[c]));
-    }
-}
-
-void
-CamSourcePairing::drop_waiting ()
-{
-  std::lock_guard guard (lock_);
-  FrameSets::Set set;
-  while (sets_.take_rest (set) == FrameSets::Step::kDrop)
-    for (FrameSets::Frame frame : set.frames)
-      if (frame)
-        let_go (static_cast<Held *> (frame));
-}
-
-/* ---- shots ---- */
-
-/* How long a shot that teaches waits for its answers: where pictures get lost, the next one should
- * come soon; a camera that is slow to begin gets longer each time. */
+/* How long a trigger from which delays are learnt waits for its answers. Where images get lost the
+ * next one should come soon; a camera that is slow to begin gets longer each time. */
 std::int64_t
-CamSourcePairing::answer_time () const
+FramePairing::answer_timeout () const
 {
-  std::int64_t time =
-      std::max<std::int64_t> (3 * static_cast<std::int64_t> (period_), kMinAnswerTime);
-  for (int i = 1; i < lone_shots_ && time < kAnswerTime; i++)
-    time *= 2;
-  return std::min (time, kAnswerTime) + 2 * static_cast<std::int64_t> (exposure_);
+  std::int64_t timeout = std::max (3 * period_ns_, kMinAnswer_ns);
+  for (int i = 1; i < learning_triggers_ && timeout < kMaxAnswer_ns; i++)
+    timeout *= 2;
+  return std::min (timeout, kMaxAnswer_ns) + 2 * exposure_ns_;
 }
 
 bool
-CamSourcePairing::may_fire (bool alone, std::int64_t now_ns)
+FramePairing::may_trigger (bool single_shot, std::int64_t now_ns)
 {
   std::lock_guard guard (lock_);
-  const auto finders = std::span (finders_).first (static_cast<std::size_t> (cameras_));
-  for (auto &finder : finders)
-    if (finder.lost_sync ()) {
-      finder.start (static_cast<std::int64_t> (period_));
-      lone_shots_ = 0;
+  const auto matchers = std::span (matchers_).first (static_cast<std::size_t> (cameras_));
+  for (auto &matcher : matchers)
+    if (matcher.lost_sync ()) {
+      GST_DEBUG_OBJECT (element_, "a camera lost synchronisation; learning its delay again");
+      matcher.start (period_ns_);
+      learning_triggers_ = 0;
     }
-  if (!alone && std::ranges::all_of (finders, [] (const auto &f) { return f.settled (); }))
+  if (!single_shot && std::ranges::all_of (matchers, [] (const auto &m) { return m.settled (); }))
     return true;
-  if (lone_shots_ > kMaxLoneShots) {
-    for (auto &finder : finders)
-      finder.settle ();
-    lone_shots_ = 0;
+  if (learning_triggers_ > kMaxLearningTriggers) {
+    for (auto &matcher : matchers)
+      matcher.settle ();
+    learning_triggers_ = 0;
   }
-  const Tick &last = ticks_[(shots_ + kTicks - 1) % kTicks];
-  /* An answer that is late would be taken for that of a later shot, by the time between the two.
-   * Where each of these times is more than all before it, two such mistakes do not agree. */
-  if (owing_ && now_ns - last.fired_ns <
-                    std::min (2 * spacing_ + static_cast<std::int64_t> (period_), kAnswerTime))
+  const std::int64_t since_ns =
+      now_ns - triggers_[(n_triggers_ + kMaxTriggers - 1) % kMaxTriggers].sent_ns;
+  /* A late answer would be taken for that of a later trigger, by the time between the two. Where
+   * each of these times is longer than all before it, two such mistakes do not agree. */
+  if (answers_owed_ && since_ns < std::min (2 * spacing_ns_ + period_ns_, kMaxAnswer_ns))
     return false;
-  const std::int64_t patience =
-      alone ? kAnswerTime + 2 * static_cast<std::int64_t> (exposure_) : answer_time ();
-  if (shots_ == 0 || now_ns - last.fired_ns > patience)
-    return true;
-  for (int c = 0; c < cameras_; c++)
-    if (answered_[c] < shots_)
-      return false;
-  return true;
+  return n_triggers_ == 0 || all_answered () ||
+         since_ns > (single_shot ? kMaxAnswer_ns + 2 * exposure_ns_ : answer_timeout ());
 }
 
 void
-CamSourcePairing::fired (GstClockTime tick, std::int64_t fired_ns)
+FramePairing::add_trigger (GstClockTime time, std::int64_t sent_ns)
 {
   std::lock_guard guard (lock_);
-  const Tick &last = ticks_[(shots_ + kTicks - 1) % kTicks];
-  bool answered = true;
-  for (int c = 0; c < cameras_; c++)
-    answered &= answered_[c] >= shots_;
-  const bool alone = answered || fired_ns - last.fired_ns > answer_time ();
+  const std::int64_t since_ns =
+      sent_ns - triggers_[(n_triggers_ + kMaxTriggers - 1) % kMaxTriggers].sent_ns;
+  const bool answered = all_answered ();
   bool settled = true;
   for (int c = 0; c < cameras_; c++) {
-    finders_[c].fired (shots_, fired_ns, alone);
-    settled &= finders_[c].settled ();
+    matchers_[c].fired (n_triggers_, sent_ns, answered || since_ns > answer_timeout ());
+    settled &= matchers_[c].settled ();
   }
-  lone_shots_ = settled ? 0 : lone_shots_ + 1;
-  owing_ = !settled && (owing_ || !answered);
-  spacing_ = shots_ > 0 ? std::min (fired_ns - last.fired_ns, kAnswerTime) : 0;
-  ticks_[shots_ % kTicks] = {shots_, tick, fired_ns};
-  shots_++;
+  learning_triggers_ = settled ? 0 : learning_triggers_ + 1;
+  answers_owed_ = !settled && (answers_owed_ || !answered);
+  spacing_ns_ = n_triggers_ > 0 ? std::min (since_ns, kMaxAnswer_ns) : 0;
+  triggers_[n_triggers_ % kMaxTriggers] = {time, sent_ns};
+  n_triggers_++;
 }
 
 /* ---- frames ---- */
 
 void
-CamSourcePairing::set_clock_offset (int camera, std::int64_t offset_ns)
+FramePairing::add_frame (int camera, CameraFrame frame)
 {
   std::lock_guard guard (lock_);
-  offsets_[camera] = offset_ns;
+  last_frame_ns_[camera] = frame.arrived_us * 1000;
+  counters_.missing_packets += frame.missing_packets;
+  if (last_number_[camera] && frame.number > *last_number_[camera] + 1) {
+    const std::uint64_t lost = frame.number - *last_number_[camera] - 1;
+    counters_.incomplete[camera] += lost;
+    GST_DEBUG_OBJECT (element_,
+        "camera %d: %" G_GUINT64_FORMAT " images lost before number %" G_GUINT64_FORMAT, camera,
+        guint64 (lost), guint64 (frame.number));
+  }
+  last_number_[camera] = frame.number;
+  if (!frame.buffer) {
+    counters_.incomplete[camera]++;
+    GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", camera,
+        guint64 (frame.number),
+        frame.state == FrameState::kUnfit ? "wrong size or pixel format" : "packets are missing");
+  }
+  if (by_ == TriggeredBy::kElement)
+    add_triggered_frame (camera, std::move (frame));
+  else
+    add_timed_frame (camera, std::move (frame));
 }
 
-/* A stamp that no clock reaches is none. */
-static std::int64_t
-stamp_of (const CameraFrame &frame)
+void
+FramePairing::add_triggered_frame (int camera, CameraFrame frame)
 {
-  constexpr std::uint64_t kMax = std::uint64_t (1) << 62;
-  return frame.camera_time_ns < kMax ? static_cast<std::int64_t> (frame.camera_time_ns) : 0;
+  const auto found =
+      matchers_[camera].find (frame.number + 1, timestamp (frame), frame.arrived_us * 1000);
+  if (n_triggers_ > 0)
+    answered_[camera] = std::max (answered_[camera], found.known ? found.trigger + 1 : 0);
+  if (!found.known || answers_owed_) {
+    if (frame.buffer) {
+      counters_.dropped[camera]++;
+      counters_.unknown++;
+      GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", camera,
+          guint64 (frame.number),
+          found.known ? "delays are being learnt" : "it answers no known trigger");
+    }
+    return;
+  }
+  const std::int64_t sent_ns = triggers_[found.trigger % kMaxTriggers].sent_ns;
+  if (frame.buffer)
+    delay_.add (frame.arrived_us * 1000 - sent_ns);
+  /* without a timestamp the residual is the arrival's, and does not tell the exposure */
+  const std::int64_t residual_ns = timestamp (frame) ? found.residual_ns : 0;
+  queue (camera, found.trigger, std::move (frame), sent_ns + residual_ns);
 }
 
-/* By the cameras' clocks, if all were read and this one was not set since. */
+void
+FramePairing::add_timed_frame (int camera, CameraFrame frame)
+{
+  const auto taken_ns = capture_time (camera, frame);
+  if (!taken_ns)
+    return;
+  if (frame.buffer)
+    delay_.add (frame.arrived_us * 1000 - *taken_ns);
+  if (timestamp (frame) > 0) /* arrivals come in bursts */
+    update_tolerance (camera, *taken_ns);
+  queue (camera, *taken_ns, std::move (frame), *taken_ns);
+}
+
+/* When a frame was taken, comparable between cameras; absent: unknown. */
 std::optional<std::int64_t>
-CamSourcePairing::exposed_at (int camera, const CameraFrame &frame)
+FramePairing::capture_time (int camera, const CameraFrame &frame)
 {
-  const std::int64_t stamp = stamp_of (frame), arrived = frame.arrived_us * 1000;
-  const auto offsets = std::span (offsets_).first (static_cast<std::size_t> (cameras_));
-  if (stamp == 0 || !std::ranges::all_of (offsets, [] (const auto &o) { return o.has_value (); }))
+  const std::int64_t arrived_ns =
+      clocks_[camera].host_time (timestamp (frame), frame.arrived_us * 1000);
+  const auto exposed_ns = exposure_time (camera, frame);
+  std::optional<std::int64_t> taken_ns;
+  if (frame.buffer || frame.camera_time_ns > 0) /* else it was given up long after its arrival */
+    taken_ns = exposed_ns ? *exposed_ns : arrived_ns - exposure_ns_;
+  if (by_ == TriggeredBy::kCamera)
+    return taken_ns;
+  if (camera > 0)
+    return associators_[camera].place (frame.number, taken_ns, exposed_ns.has_value ());
+  for (int c = 1; taken_ns && c < cameras_; c++)
+    associators_[c].leader (frame.number, *taken_ns);
+  return taken_ns;
+}
+
+/* The timestamp on the host's clock, if all cameras' clocks were read and this one was not set
+ * since. */
+std::optional<std::int64_t>
+FramePairing::exposure_time (int camera, const CameraFrame &frame)
+{
+  const std::int64_t stamp_ns = timestamp (frame), arrived_ns = frame.arrived_us * 1000;
+  const auto offsets = std::span (offsets_ns_).first (static_cast<std::size_t> (cameras_));
+  if (stamp_ns == 0 ||
+      !std::ranges::all_of (offsets, [] (const auto &offset) { return offset.has_value (); }))
     return {};
-  const std::int64_t time = stamp + *offsets_[camera];
-  const auto most = kAnswerTime + 2 * static_cast<std::int64_t> (exposure_);
-  if (time <= arrived + kClockError && time >= arrived - most)
-    return time;
+  const std::int64_t time_ns = stamp_ns + *offsets_ns_[camera];
+  if (time_ns <= arrived_ns + kClockError_ns &&
+      time_ns >= arrived_ns - kMaxAnswer_ns - 2 * exposure_ns_)
+    return time_ns;
   clocks_are_off_ = true;
   return {};
 }
 
+/* Images on an external signal may come faster than the caps say: then partners lie closer. Takes
+ * the first quartile of the intervals, since losses make some longer and jitter some shorter. */
 void
-CamSourcePairing::place_by_shot (int camera, CameraFrame frame)
+FramePairing::update_tolerance (int camera, std::int64_t taken_ns)
 {
-  const auto found =
-      finders_[camera].find (frame.number + 1, stamp_of (frame), frame.arrived_us * 1000);
-  if (shots_ > 0)
-    answered_[camera] = std::max (answered_[camera], found.known ? found.trigger + 1 : 0);
-  if (!found.known || owing_) {
-    counts_.dropped[camera] += frame.buffer != nullptr;
-    counts_.unknown += frame.buffer != nullptr;
+  const std::int64_t last_ns = std::exchange (last_taken_ns_[camera], taken_ns);
+  if (last_ns == 0 || taken_ns <= last_ns)
     return;
-  }
-  const Tick &tick = ticks_[found.trigger % kTicks];
-  /* without stamps the residual is of the arrival, and says nothing about the exposure */
-  const std::int64_t taken = tick.fired_ns + (stamp_of (frame) ? found.residual_ns : 0);
-  if (frame.buffer)
-    delay_.add (frame.arrived_us * 1000 - tick.fired_ns);
-  put (camera, found.trigger, std::move (frame), taken);
-}
-
-/* Pictures of a line may come faster than the caps say: what belongs together then lies closer. A
- * quarter of the intervals, for losses make them longer and jitter some shorter. */
-void
-CamSourcePairing::learn_interval (int camera, std::int64_t taken)
-{
-  const std::int64_t last = std::exchange (last_taken_ns_[camera], taken);
-  if (last == 0 || taken <= last)
-    return;
-  const auto period = static_cast<std::int64_t> (period_);
-  intervals_.add (taken - last);
+  intervals_.add (taken_ns - last_ns);
   if (++counted_intervals_ % 16 == 0)
-    tolerance_ = std::clamp (intervals_.quantile (0.25), period / 8, period) / 2;
-  sets_.set_tolerance (tolerance_);
+    tolerance_ns_ = std::clamp (intervals_.quantile (0.25), period_ns_ / 8, period_ns_) / 2;
+  sets_.set_tolerance (tolerance_ns_);
 }
 
-/* Comparable between cameras. */
-std::optional<std::int64_t>
-CamSourcePairing::time_of (int camera, const CameraFrame &frame)
-{
-  const std::int64_t arrived =
-      clocks_[camera].host_time (stamp_of (frame), frame.arrived_us * 1000);
-  const auto exposed = exposed_at (camera, frame);
-  std::optional<std::int64_t> taken;
-  if (frame.buffer || frame.camera_time_ns > 0) /* else it came too late to say when */
-    taken = exposed ? *exposed : arrived - static_cast<std::int64_t> (exposure_);
-  if (!one_signal_)
-    return taken;
-  if (camera > 0)
-    return partners_[camera].place (frame.number, taken, exposed.has_value ());
-  for (int c = 1; taken && c < cameras_; c++)
-    partners_[c].leader (frame.number, *taken);
-  return taken;
-}
-
+/* @param key  trigger number, or taken_ns */
 void
-CamSourcePairing::place_by_time (int camera, CameraFrame frame)
+FramePairing::queue (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken_ns)
 {
-  const auto taken = time_of (camera, frame);
-  if (!taken)
-    return;
-  if (frame.buffer)
-    delay_.add (frame.arrived_us * 1000 - *taken);
-  if (stamp_of (frame) > 0) /* arrivals come in bursts */
-    learn_interval (camera, *taken);
-  put (camera, *taken, std::move (frame), *taken);
-}
-
-void
-CamSourcePairing::put (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken)
-{
-  Held *held = nullptr;
-  if (frame.buffer) {
-    const std::int64_t exposed = exposed_at (camera, frame).value_or (taken);
-    held = hold (std::move (frame), taken, exposed);
-    counts_.dropped[camera] += held == nullptr;
+  WaitingFrame *waiting = nullptr;
+  if (frame.buffer && free_) { /* FrameSets keeps fewer than there are */
+    const std::int64_t exposed_ns = exposure_time (camera, frame).value_or (taken_ns);
+    waiting = std::exchange (free_, free_->next_free);
+    waiting->frame = std::move (frame);
+    waiting->taken_ns = taken_ns;
+    waiting->exposed_ns = exposed_ns;
+  } else if (frame.buffer) {
+    counters_.dropped[camera]++;
   }
-  if (auto refused = static_cast<Held *> (sets_.put (camera, key, held))) {
-    counts_.dropped[camera]++;
-    let_go (refused);
+  if (auto refused = static_cast<WaitingFrame *> (sets_.put (camera, key, waiting))) {
+    counters_.dropped[camera]++;
+    GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: out of order",
+        camera, guint64 (refused->frame.number));
+    release (refused);
   }
 }
 
 void
-CamSourcePairing::take (int camera, CameraFrame frame)
+FramePairing::release (WaitingFrame *waiting)
 {
-  std::lock_guard guard (lock_);
-  last_arrival_ns_[camera] = frame.arrived_us * 1000;
-  counts_.missing_packets += frame.missing_packets;
-  if (has_number_[camera] && frame.number > last_number_[camera] + 1)
-    counts_.incomplete[camera] += frame.number - last_number_[camera] - 1;
-  last_number_[camera] = frame.number;
-  has_number_[camera] = true;
-  counts_.incomplete[camera] += frame.buffer == nullptr;
-  if (triggered_)
-    place_by_shot (camera, std::move (frame));
-  else
-    place_by_time (camera, std::move (frame));
+  waiting->frame.buffer.reset ();
+  waiting->next_free = std::exchange (free_, waiting);
 }
 
-/* @return false: taken too far apart to be one set; it is dropped */
-bool
-CamSourcePairing::hand_out (FrameSets::Set &from, CamSourceSet &set)
-{
-  const auto held_by = [&] (int c) { return static_cast<Held *> (from.frames[c]); };
-  std::int64_t spread = 0, apart = 0;
-  for (int c = 1; c < cameras_; c++)
-    for (int d = 0; d < c; d++) {
-      spread = std::max (spread, std::abs (held_by (c)->exposed_ns - held_by (d)->exposed_ns));
-      apart = std::max (apart, std::abs (held_by (c)->taken_ns - held_by (d)->taken_ns));
-    }
-  if (apart > tolerance_) {
-    drop (from);
-    counts_.apart++;
-    return false;
-  }
-  spread_.add (spread);
-  set.tick = triggered_ ? ticks_[from.keys[0] % kTicks].time : GST_CLOCK_TIME_NONE;
-  set.taken_ns = held_by (0)->taken_ns;
-  for (int c = 0; c < cameras_; c++) {
-    const auto held = static_cast<Held *> (from.frames[c]);
-    set.pictures[c] = std::move (held->frame.buffer);
-    let_go (held);
-  }
-  counts_.sets++;
-  return true;
-}
+/* ---- sets ---- */
 
 bool
-CamSourcePairing::next (CamSourceSet &set)
+FramePairing::next_set (ImageSet &set)
 {
   std::lock_guard guard (lock_);
-  FrameSets::Set from;
+  FrameSets::Set frames;
   for (;;)
-    switch (sets_.next (from)) {
+    switch (sets_.next (frames)) {
       case FrameSets::Step::kWait:
         return false;
       case FrameSets::Step::kDrop:
-        drop (from);
+        drop (frames, "no partner");
         break;
       case FrameSets::Step::kSet:
-        if (hand_out (from, set))
+        if (complete (frames, set))
           return true;
     }
 }
 
-std::int64_t
-CamSourcePairing::last_arrival (int camera)
+/* @return false: exposed too far apart to be one set; it is dropped */
+bool
+FramePairing::complete (FrameSets::Set &frames, ImageSet &set)
 {
-  std::lock_guard guard (lock_);
-  return last_arrival_ns_[camera];
+  const auto waiting = [&] (int c) { return static_cast<WaitingFrame *> (frames.frames[c]); };
+  std::int64_t spread_ns = 0, apart_ns = 0;
+  for (int c = 1; c < cameras_; c++)
+    for (int d = 0; d < c; d++) {
+      spread_ns =
+          std::max (spread_ns, std::abs (waiting (c)->exposed_ns - waiting (d)->exposed_ns));
+      apart_ns = std::max (apart_ns, std::abs (waiting (c)->taken_ns - waiting (d)->taken_ns));
+    }
+  if (apart_ns > tolerance_ns_) {
+    drop (frames, "exposed too far apart from its partners");
+    counters_.apart++;
+    return false;
+  }
+  spread_.add (spread_ns);
+  set.trigger_time = by_ == TriggeredBy::kElement ? triggers_[frames.keys[0] % kMaxTriggers].time
+                                                  : GST_CLOCK_TIME_NONE;
+  set.exposed_ns = waiting (0)->taken_ns;
+  for (int c = 0; c < cameras_; c++) {
+    set.images[c] = std::move (waiting (c)->frame.buffer);
+    release (waiting (c));
+  }
+  counters_.sets++;
+  return true;
 }
 
-CamSourcePairingStats
-CamSourcePairing::stats ()
+void
+FramePairing::drop (FrameSets::Set &frames, const char *reason)
+{
+  for (int c = 0; c < cameras_; c++)
+    if (auto waiting = static_cast<WaitingFrame *> (frames.frames[c])) {
+      counters_.dropped[c]++;
+      GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", c,
+          guint64 (waiting->frame.number), reason);
+      release (waiting);
+    }
+}
+
+/* ---- statistics ---- */
+
+std::int64_t
+FramePairing::last_frame_ns (int camera)
 {
   std::lock_guard guard (lock_);
-  CamSourcePairingStats stats = counts_;
+  return last_frame_ns_[camera];
+}
+
+PairingStatistics
+FramePairing::stats ()
+{
+  std::lock_guard guard (lock_);
+  PairingStatistics stats = counters_;
   stats.has_spread = !spread_.empty ();
   stats.spread_p50_ns = spread_.quantile (0.5);
   stats.spread_p99_ns = spread_.quantile (0.99);

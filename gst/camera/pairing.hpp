@@ -15,124 +15,135 @@
 
 using rangecast::kMaxCameras;
 
-/** Pictures of all cameras that were taken at one moment. */
-struct CamSourceSet {
-  std::array<GstBufferPtr, kMaxCameras> pictures;
-  GstClockTime tick = GST_CLOCK_TIME_NONE; ///< on the pipeline's clock; NONE: see taken_ns
-  std::int64_t taken_ns = 0; ///< else when the left one was taken, g_get_monotonic_time
+/** Images of all cameras that were exposed at the same time. */
+struct ImageSet {
+  std::array<GstBufferPtr, kMaxCameras> images;
+  GstClockTime trigger_time = GST_CLOCK_TIME_NONE; ///< on the pipeline clock; NONE: see exposed_ns
+  std::int64_t exposed_ns = 0; ///< exposure of the left image, g_get_monotonic_time
 };
 
-/** Counted since the beginning. */
-struct CamSourcePairingStats {
+/** Counters since the session began. */
+struct PairingStatistics {
   guint64 sets = 0;
-  std::array<guint64, kMaxCameras> dropped{};    ///< whole pictures without partners
-  std::array<guint64, kMaxCameras> incomplete{}; ///< pictures that lack packets, or did not come
-  guint64 apart = 0;   ///< sets that were dropped because they were not taken at one moment
-  guint64 unknown = 0; ///< pictures that answer no trigger of ours
+  std::array<guint64, kMaxCameras> dropped{};    ///< complete images without partner
+  std::array<guint64, kMaxCameras> incomplete{}; ///< images with missing packets, or lost
+  guint64 apart = 0;   ///< sets that were dropped because their exposures lie too far apart
+  guint64 unknown = 0; ///< images that answer no known trigger
   guint64 missing_packets = 0;
-  bool has_spread = false;
+  bool has_spread = false;                           ///< the following are valid
   std::int64_t spread_p50_ns = 0, spread_p99_ns = 0; ///< of the exposures within a set
-  std::int64_t delay_p50_ns = 0, delay_p99_ns = 0;   ///< from tick, or exposure, to the last packet
+  std::int64_t delay_p50_ns = 0, delay_p99_ns = 0; ///< from trigger or exposure to the last packet
 };
 
-/** Puts frames of two or three cameras together: by the trigger that they answer, or, where this
- *  element sends none, by the time when they were taken. Any thread. */
-class CamSourcePairing {
+/** Assembles image sets from the frames of two or three cameras: by the trigger that they answer
+ *  or, where this element sends none, by exposure time. Any thread; one lock guards all. */
+class FramePairing {
 public:
-  CamSourcePairing ();
-  ~CamSourcePairing ();
-  CamSourcePairing (const CamSourcePairing &) = delete;
-  CamSourcePairing &operator= (const CamSourcePairing &) = delete;
+  /** @param element  for log messages; outlives this; may be null */
+  explicit FramePairing (GstElement *element = nullptr);
+  ~FramePairing ();
+  FramePairing (const FramePairing &) = delete;
+  FramePairing &operator= (const FramePairing &) = delete;
 
-  /** Who fires the cameras. */
-  enum class Fired {
-    kHere,      ///< this element: shots are told with fired()
-    kElsewhere, ///< one signal, or command, that reaches all of them
-    kAlone,     ///< each by itself
+  enum class TriggeredBy {
+    kElement,  ///< this element, which reports each trigger with add_trigger()
+    kExternal, ///< one signal or command that reaches all cameras
+    kCamera,   ///< each camera by itself
   };
 
-  /** @param period     ns; 0 for single shots
-   *  @param exposure   ns, as far as it is known
-   *  @param waiting    pictures of one camera that may wait for partners */
-  void start (int cameras, Fired fired, GstClockTime period, GstClockTime exposure, int waiting);
-  /** Forgets frames, and what it learnt about the cameras' clocks, not what it counted. */
-  void forget ();
-  /** Lets waiting frames go. */
+  /** @param period_ns    frame period; 0 for single shots
+   *  @param exposure_ns  as far as it is known
+   *  @param max_waiting  images of one camera that may wait for partners */
+  void configure (int cameras, TriggeredBy by, GstClockTime period_ns, GstClockTime exposure_ns,
+      int max_waiting);
+  /** Drops frames and what was learnt about delays and clocks; keeps the counters. */
+  void reset ();
+  /** Drops the frames that wait for partners. */
   void drop_waiting ();
 
-  /** Of one camera's clock: add it to a time stamp for g_get_monotonic_time, ns. */
+  /** Sets what to add to a camera's timestamps for g_get_monotonic_time, ns. */
   void set_clock_offset (int camera, std::int64_t offset_ns);
-  /** Once after each time that stamps contradict the offsets: read the clocks again. */
+  /** True once after timestamps contradicted the offsets: read the clocks again. */
   bool clocks_are_off ();
 
-  /** Whether a shot may be fired now. While a camera's delay is not known, one must be over before
-   * the next.
-   *  @param alone   no shot may be under way in any case: a camera that exposes takes no other
-   *  @param now_ns  g_get_monotonic_time */
-  bool may_fire (bool alone, std::int64_t now_ns);
-  /** A shot is about to be fired: answers count from now on.
-   *  @param tick  when it is due, on the pipeline's clock
-   *  @param fired_ns  when the cameras are told, g_get_monotonic_time */
-  void fired (GstClockTime tick, std::int64_t fired_ns);
+  /** Whether a trigger may be sent now. While a camera's delay is unknown, a trigger must have been
+   *  answered before the next one.
+   *  @param single_shot  never two triggers in progress: an exposing camera ignores the second
+   *  @param now_ns       g_get_monotonic_time */
+  bool may_trigger (bool single_shot, std::int64_t now_ns);
+  /** A trigger is about to be sent; answers count from now on.
+   *  @param time     on the pipeline clock
+   *  @param sent_ns  when cameras receive it, g_get_monotonic_time */
+  void add_trigger (GstClockTime time, std::int64_t sent_ns);
 
-  void take (int camera, CameraFrame frame);
-  /** The next complete set, in order of time. */
-  bool next (CamSourceSet &set);
+  void add_frame (int camera, CameraFrame frame);
+  /** The next complete set, in order of time. @return false: none yet */
+  bool next_set (ImageSet &set);
 
-  /** When the last frame of a camera came, whole or not, g_get_monotonic_time, ns; 0: none. */
-  [[nodiscard]] std::int64_t last_arrival (int camera);
-  CamSourcePairingStats stats ();
+  /** When a camera's last frame came, complete or not, g_get_monotonic_time, ns; 0: none. */
+  [[nodiscard]] std::int64_t last_frame_ns (int camera);
+  PairingStatistics stats ();
 
 private:
-  struct Held {
+  /** A frame that waits for its partners, in a pool of fixed size. */
+  struct WaitingFrame {
     CameraFrame frame;
     std::int64_t taken_ns = 0;   ///< comparable between cameras; decides
-    std::int64_t exposed_ns = 0; ///< by the cameras' clocks if they tell; for the statistics
-    Held *next_free = nullptr;
+    std::int64_t exposed_ns = 0; ///< by the cameras' clocks if known; for statistics
+    WaitingFrame *next_free = nullptr;
   };
-  struct Tick {
-    std::int64_t shot = -1;
-    GstClockTime time = 0;
-    std::int64_t fired_ns = 0;
+  struct Trigger {
+    GstClockTime time = 0;    ///< on the pipeline clock
+    std::int64_t sent_ns = 0; ///< g_get_monotonic_time
   };
-  static constexpr int kHeld = 40, kTicks = 64, kMaxLoneShots = 8;
+  static constexpr int kMaxFrames = 40, kMaxTriggers = 64, kMaxLearningTriggers = 8;
 
-  Held *hold (CameraFrame frame, std::int64_t taken_ns, std::int64_t exposed_ns);
-  void let_go (Held *held);
-  void place_by_shot (int camera, CameraFrame frame);
-  void place_by_time (int camera, CameraFrame frame);
-  void put (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken);
-  std::optional<std::int64_t> exposed_at (int camera, const CameraFrame &frame);
-  std::int64_t answer_time () const;
-  std::optional<std::int64_t> time_of (int camera, const CameraFrame &frame);
-  void learn_interval (int camera, std::int64_t taken);
-  void drop (rangecast::FrameSets::Set &set);
-  bool hand_out (rangecast::FrameSets::Set &from, CamSourceSet &set);
+  void add_triggered_frame (int camera, CameraFrame frame);
+  void add_timed_frame (int camera, CameraFrame frame);
+  std::optional<std::int64_t> capture_time (int camera, const CameraFrame &frame);
+  std::optional<std::int64_t> exposure_time (int camera, const CameraFrame &frame);
+  void update_tolerance (int camera, std::int64_t taken_ns);
+  void queue (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken_ns);
+  bool complete (rangecast::FrameSets::Set &frames, ImageSet &set);
+  void drop (rangecast::FrameSets::Set &frames, const char *reason);
+  void release (WaitingFrame *waiting);
+  [[nodiscard]] std::int64_t answer_timeout () const;
+  [[nodiscard]] bool all_answered () const;
 
-  std::mutex lock_; /* guards all */
-  int cameras_ = 2, waiting_ = 1;
-  bool triggered_ = false, one_signal_ = false;
-  GstClockTime period_ = 0, exposure_ = 0;
+  GstElement *element_;
+
+  std::mutex lock_; /* guards all that follows */
+  int cameras_ = 2, max_waiting_ = 1;
+  TriggeredBy by_ = TriggeredBy::kCamera;
+  std::int64_t period_ns_ = 0, exposure_ns_ = 0;
+
+  /* Frames that wait for partners, keyed by trigger number or by time. */
   rangecast::FrameSets sets_;
-  std::array<rangecast::TriggerMatcher, kMaxCameras> finders_;
-  std::array<rangecast::FrameAssociator, kMaxCameras> partners_; ///< of those beside the left one
-  std::array<rangecast::CameraClock, kMaxCameras> clocks_;
-  std::array<std::optional<std::int64_t>, kMaxCameras> offsets_;
-  std::array<Tick, kTicks> ticks_;
-  std::int64_t shots_ = 0;
-  int lone_shots_ = 0;
-  std::int64_t spacing_ = 0; ///< of the last two shots, ns
-  bool owing_ = false; ///< while delays are learnt, answers may come that older shots are owed
-  std::array<std::int64_t, kMaxCameras> answered_{}; ///< shot
-  std::array<std::int64_t, kMaxCameras> last_arrival_ns_{};
-  std::array<std::uint64_t, kMaxCameras> last_number_{};
-  std::array<bool, kMaxCameras> has_number_{};
-  std::array<Held, kHeld> held_;
-  Held *free_ = nullptr;
-  CamSourcePairingStats counts_;
-  rangecast::RecentValues spread_, delay_, intervals_;
-  std::int64_t tolerance_ = 0; ///< ns; half of the time between pictures
+  std::array<WaitingFrame, kMaxFrames> frames_;
+  WaitingFrame *free_ = nullptr;
+  std::int64_t tolerance_ns_ = 0; ///< half of the time between images
+  rangecast::RecentValues intervals_;
   unsigned counted_intervals_ = 0;
   std::array<std::int64_t, kMaxCameras> last_taken_ns_{};
+
+  /* Triggers, and which of them a frame answers. */
+  std::array<rangecast::TriggerMatcher, kMaxCameras> matchers_;
+  std::array<Trigger, kMaxTriggers> triggers_; ///< ring
+  std::int64_t n_triggers_ = 0;
+  std::array<std::int64_t, kMaxCameras> answered_{}; ///< triggers, per camera
+  int learning_triggers_ = 0;   ///< sent one at a time since delays are being learnt
+  std::int64_t spacing_ns_ = 0; ///< between the last two triggers
+  bool answers_owed_ = false; ///< while delays are learnt, late answers to older triggers may come
+
+  /* Without triggers of this element: when frames were exposed. */
+  std::array<rangecast::FrameAssociator, kMaxCameras> associators_; ///< all but the left camera's
+  std::array<rangecast::CameraClock, kMaxCameras> clocks_;
+  std::array<std::optional<std::int64_t>, kMaxCameras> offsets_ns_;
   bool clocks_are_off_ = false;
+
+  /* Statistics. */
+  PairingStatistics counters_;
+  rangecast::RecentValues spread_, delay_;
+  std::array<std::int64_t, kMaxCameras> last_frame_ns_{};
+  std::array<std::optional<std::uint64_t>, kMaxCameras> last_number_;
 };

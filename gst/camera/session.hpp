@@ -4,184 +4,139 @@
 #include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 
-#include "camera/aravis/action_command.hpp"
-#include "camera/aravis/camera.hpp"
-#include "camera/aravis/exposure_sync.hpp"
-#include "camera/aravis/heartbeat.hpp"
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
 
-#include "caps.hpp"
+#include "cameras.hpp"
+#include "output.hpp"
 #include "pad.hpp"
 #include "pairing.hpp"
 #include "settings.hpp"
-#include "ticker.hpp"
+#include "trigger.hpp"
 
-using CamSourcePads = std::vector<std::shared_ptr<CamSourcePad>>; ///< left, right, perhaps third
-
-/** What stereocamsrc does from READY to PAUSED and back, in a thread of its own, for cameras make
- *  one wait: opens the cameras, agrees with downstream on a format, lets them run, pairs what
- * comes, and begins again when one is lost. The thread keeps itself and the element alive, so that
- * no state change has to wait for a camera that does not answer.
+/** What stereocamsrc does from READY to PAUSED and back, in a thread of its own, because cameras
+ *  make one wait: opens the cameras, negotiates, lets them stream, pairs and sends their images,
+ *  and starts over when one is lost.
  *
- *  Threads: this one; Aravis' (frames and losses are only noted); the ticker's and the cameras'
- *  trigger threads; the pads' tasks, which tell how pushing goes. lock_ is held while
- *  nothing is called that waits, pushes or posts. */
-class CamSourceSession : public std::enable_shared_from_this<CamSourceSession> {
+ *  The thread keeps this object and the element alive, so that no state change waits for a camera
+ *  that does not answer. It is no GstTask, since that must be joined.
+ *
+ *  Threads: this one; Aravis' and the trigger threads, which only report frames and faults; the
+ *  pads' tasks, which report flows. No lock is held while anything waits for a camera, pushes or
+ *  posts. */
+class CameraSession {
 public:
   struct Setup {
     GstElement *element = nullptr; ///< transfer none
-    CamSourceSettings settings;
+    StereoCamSettings settings;
     CameraNames names;
-    CamSourcePads pads;
-    guint stream = 0;          ///< the pads' group id: what comes for another one they do not take
-    GstClock *clock = nullptr; ///< to be waited for; transfer none; may be null
-    std::shared_ptr<CamSourceSession> previous; ///< must have ended first; may be null
+    CameraPads pads;
+    guint group_id = 0;        ///< of the pads; they take nothing from a session with another one
+    GstClock *clock = nullptr; ///< clock-server's, to wait for; transfer none; may be null
+    std::shared_ptr<CameraSession> previous; ///< must have ended first; may be null
   };
 
   /** @return null if the system gives no thread */
-  static std::shared_ptr<CamSourceSession> begin (Setup setup);
-  ~CamSourceSession ();
+  static std::shared_ptr<CameraSession> begin (Setup setup);
+  ~CameraSession ();
 
   /* Any thread. */
 
   void set_playing (bool playing);
-  /** The thread will end soon. Posts and sends nothing more. */
-  void ask_to_stop ();
-  /** @return false if it still runs after that time */
-  bool wait_for_end (std::chrono::milliseconds most);
-  /** Until other programs may have the cameras. While none is open, as when it is still looked for,
-   *  that is at once. @return false if it still has some after that time */
-  bool wait_for_cameras (std::chrono::milliseconds most);
-  /** An EOS event of the application's. */
-  void end (guint32 seqnum);
-  /** What waits between frames is forgotten. */
-  void flushed ();
-  bool capture (GstClockTime time) { return ticker_.ask (time); }
-  /** What pushing on a pad gives now. */
-  void pad_flowed (const CamSourcePad &pad, GstFlowReturn flow);
+  /** Ends the thread soon; nothing is posted or sent any more. */
+  void request_stop ();
+  /** @return false if a camera is still open after that time */
+  bool wait_until_closed (std::chrono::milliseconds limit)
+  {
+    return cameras_.wait_until_closed (limit);
+  }
+  /** Ends all pads. */
+  void send_eos (guint32 seqnum);
+  /** The application flushes: drops images between cameras and pads, and goes on after EOS. */
+  void flush ();
+  bool capture (GstClockTime time) { return trigger_.request (time); }
+  /** Pushing on a pad gives a new flow. */
+  void handle_flow (const CameraPad &pad, GstFlowReturn flow);
 
-  /** From a picture's time to when it is handed out, ns; what is known of it. */
+  /** From capture to output, ns, as far as it is known. */
   [[nodiscard]] GstClockTime latency () const { return latency_; }
-  /** What it is by what was set. @param period  0: single shots */
-  static GstClockTime latency_of (GstClockTime exposure, GstClockTime period);
   /** Transfer full. */
   GstStructure *stats ();
 
 private:
-  explicit CamSourceSession (Setup setup);
-
-  /** Why a part of the session ended. */
-  enum class End { kStopped, kAgain, kFault };
-
-  /* camsourcesession.cpp: life, faults */
-  void run ();
-  End one_guarded_life ();
-  End one_life ();
-  bool open_with_gaps ();
-  /** @return whether there were such sessions of this process, and this one is still wanted */
-  bool wait_for_leavers ();
-  bool stands_fault ();
-  bool tell_fault ();
-  void rest_before_retry ();
-  void post_fault (bool warning);
-  void say (const char *name, const char *field, const std::string &value);
-  void fail (CameraStatus status);
-  void lose (Camera &camera);
-  bool fail_if_gone (Camera &camera, const CameraStatus &status);
-  void finish (guint32 seqnum);
-  [[nodiscard]] bool quits ();
-  bool wait_for_clock ();
-  GstClockTime running_time ();
-
-  /** Whether this element fires its cameras. */
-  [[nodiscard]] bool fires () const
-  {
-    return settings_.trigger == TriggerMode::kSoftware ||
-           (settings_.trigger == TriggerMode::kAction && settings_.action_send);
-  }
-
-  /* camsourcecameras.cpp: the cameras */
-  bool open_cameras ();
-  CameraStatus busy_or_twice (const CameraInfo &seen, std::size_t camera, CameraStatus busy) const;
-  bool choose_format ();
-  bool configure_cameras ();
-  bool start_cameras ();
-  bool wait_for_ptp ();
-  void bank_statistics ();
-  void set_has_cameras (bool has);
-  void stop_cameras ();
-  void start_ticker ();
-  void fire (GstClockTime tick);
-  void read_clocks ();
-  std::vector<GstPad *> gst_pads () const;
-  bool needs_other_format ();
-
-  /* camsourceserve.cpp: what comes */
-  End serve ();
-  void take_frames ();
-  void send (CamSourceSet &set);
-  bool stamp (const CamSourceSet &set, GstClockTime &pts, GstClockTime &capture);
-  void begin_to_play ();
-  void warn_if_not_ptp (GstClock *clock);
-  void raise_latency ();
-  void look_around ();
-  void send_gaps (GstClockTime until_ago = 0);
-  void feel_pulses (std::int64_t now_ns);
-  void watch_clock (std::int64_t now_ns, std::int64_t most_ns);
-  void watch_cameras (std::int64_t now_ns);
-  bool keeps_buffers ();
-  void warn_once (const CameraStatistics &all);
-  CameraStatistics camera_statistics ();
-
-  GstElement *element_;
-  const CamSourceSettings settings_;
-  const CameraNames names_;
-  const CamSourcePads pads_;
-  const guint stream_;
-  GstClock *clock_;
-  std::shared_ptr<CamSourceSession> previous_;
-  std::atomic<GstClockTime> latency_ = 0;
-  std::atomic<guint64> reconnects_ = 0;
-  CamSourcePairing pairing_;
-  CamSourceTicker ticker_;
-
-  std::mutex lock_; /* guards down to the blank line */
-  std::condition_variable changed_;
-  bool quit_ = false, ended_ = false, has_cameras_ = false, playing_ = false, eos_ = false,
-       flushed_ = false;
-  struct Arrival {
+  struct CameraEvent {
     int camera;
     CameraFrame frame;
   };
-  std::vector<Arrival> inbox_;
-  CameraStatus fault_; ///< what ended the life
-  GstFlowReturn fatal_flow_ = GST_FLOW_OK;
-  GstFlowCombiner *flows_ = gst_flow_combiner_new ();
-  CameraStatistics before_{};                    ///< of cameras that are closed
-  std::vector<std::shared_ptr<Camera>> counted_; ///< for stats()
+  /** Why streaming ended. */
+  enum class End { kStopped, kRenegotiate, kFault };
 
-  /* This thread's. */
-  std::vector<std::shared_ptr<Camera>> cameras_;
-  std::vector<CameraAbilities> abilities_;
-  std::array<CameraPulse, kMaxCameras> pulses_;
-  LookFollower look_;
-  SimultaneousCalls triggers_;
-  ActionSender action_;
-  CamSourceFormat format_;
-  std::vector<Arrival> taken_;
-  bool was_playing_ = false, said_fault_ = false, said_underruns_ = false, said_incomplete_ = false,
-       clock_ready_ = false;
-  std::int64_t playing_since_ns_ = 0, last_look_ns_ = 0, last_clock_read_ns_ = 0,
-               last_stats_ns_ = 0, last_sent_ns_ = 0;
-  guint64 sent_ = 0;
-  GstClockTime exposure_ = 0; ///< of the one that exposes longest, ns; 0: not known
-  std::array<std::uint64_t, kMaxCameras> underruns_{}; ///< when it was last looked
-  std::optional<bool> stands_;                         ///< the fault of this life, once it was told
-  std::array<std::int64_t, kMaxCameras> shortest_trip_us_{}; ///< to a camera's clock and back
-  GstClockTime last_pts_ = GST_CLOCK_TIME_NONE, sent_until_ = GST_CLOCK_TIME_NONE, gap_until_ = 0;
+  explicit CameraSession (Setup setup);
+
+  /* session.cpp: from opening the cameras to their loss, and again */
+  void run ();
+  End run_cameras ();
+  CameraStatus open_cameras ();
+  CameraStatus wait_for_clock ();
+  CameraStatus start_cameras ();
+  void stop_cameras ();
+  void clear_inbox ();
+  bool wait_for_other_sessions ();
+  bool wait (std::chrono::milliseconds time);
+  void wait_before_retry ();
+  void fail (CameraStatus fault);
+  bool report_fault ();
+  void post_fault (const CameraStatus &fault, bool warning);
+  void post_element_message (const char *name, const char *field, const std::string &value);
+  [[nodiscard]] bool stopping ();
+  void send_gaps (GstClockTime until_ago = 0);
+
+  /* streaming.cpp: while cameras stream */
+  End stream ();
+  void handle_frames ();
+  void begin_playing ();
+  void warn_if_not_ptp (GstClock *clock);
+  void check_progress ();
+  void check_silence (std::int64_t now_ns);
+  void warn_about_losses ();
+  void update_latency ();
+
+  /* Constant. */
+  GstElement *element_; ///< a reference, which the thread drops last
+  const StereoCamSettings settings_;
+  const CameraNames names_;
+  const CameraPads pads_;
+  GstClock *clock_;
+
+  /* Each has its own rules for threads. */
+  FramePairing pairing_;
+  CameraTrigger trigger_;
+  CameraGroup cameras_;
+  SetOutput output_;
+  std::atomic<GstClockTime> latency_;
+  std::atomic<guint64> reconnects_ = 0;
+
+  /* Between threads. */
+  std::mutex lock_; /* guards what follows */
+  std::condition_variable changed_;
+  bool stop_ = false, ended_ = false, playing_ = false, eos_ = false, flushed_ = false;
+  CameraStatus fault_; ///< the first since the cameras were opened: the cause of others
+  GstFlowReturn flow_ = GST_FLOW_OK; ///< of all pads together, if it ends the stream
+  GstFlowCombiner *combiner_ = gst_flow_combiner_new ();
+  std::vector<CameraEvent> inbox_;
+
+  /* The thread's. */
+  std::shared_ptr<CameraSession> previous_;
+  std::vector<CameraEvent> events_; ///< swapped with the inbox
+  std::optional<bool> retry_; ///< once the fault was reported: whether it is worth trying again
+  bool clock_ready_ = false;  ///< clock-server answered
+  bool lost_ = false;         ///< stereocamsrc-lost was posted, stereocamsrc-back was not
+  bool warned_buffers_ = false, warned_incomplete_ = false;
+  bool was_playing_ = false;
+  std::int64_t playing_since_ns_ = 0, checked_ns_ = 0, stats_posted_ns_ = 0;
 };

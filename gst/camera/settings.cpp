@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "settings.hpp"
 
-#include <rangecast/geometry/rig.hpp>
 #include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::Status;
 using rangecast::StatusCode;
-using Settings = CamSourceSettings;
 
 GType
 gst_stereo_cam_src_trigger_get_type (void)
@@ -27,113 +25,119 @@ gst_stereo_cam_src_trigger_get_type (void)
   return type;
 }
 
-PropertyTable<CamSourceSettings> &
-camera_properties ()
+namespace {
+
+struct Name {
+  int index;
+  auto &operator() (auto &settings) const { return settings.names[index]; }
+};
+constexpr Name kLeft{0}, kRight{1}, kThird{2};
+
+} // namespace
+
+PropertyTable<StereoCamSettings> &
+stereo_cam_properties ()
 {
-  using S = CamSourceSettings;
+  using S = StereoCamSettings;
   using P = PropertyTable<S>;
-  static P table = {P::text < [](auto &s) -> auto &{return s.names[0];
-}
-> ("left", "Left camera", "Left camera: name, serial number, IP or MAC address, or Aravis id",
-      kMutableReady),
-    P::text < [](auto &s) -> auto &
-{
-  return s.names[1];
-}
-> ("right", "Right camera", "Right camera: name, serial number, IP or MAC address, or Aravis id",
-      kMutableReady),
-    P::text < [](auto &s) -> auto &
-{
-  return s.names[2];
-}
-> ("third", "Third camera", "Third camera: name, serial number, IP or MAC address, or Aravis id",
-      kMutableReady),
-    P::text<&S::rig> ("rig", "Rig",
-        "Rig file that names the cameras of the view, used if left and right are unset",
-        kMutableReady),
-    P::text<&S::format> ("format", "Pixel format",
-        "GenICam pixel format, such as Mono8 or BayerRG8 (unset = negotiated with downstream)",
-        kMutableReady),
-    P::text<&S::features> ("features", "Features",
-        "GenICam features to set on all cameras after all other settings: \"Name=Value Name=Value "
-        "Command ...\"",
-        kMutableReady),
-    P::text<&S::trigger_line> ("trigger-line", "Trigger line",
-        "Input line of the cameras for trigger=hardware", kMutableReady),
-    P::text<&S::output_line> ("output-line", "Output line",
-        "Output line of the left camera for trigger=hardware; the left camera then runs freely and "
-        "triggers the others (unset = external signal)",
-        kMutableReady),
-    P::text<&S::clock_server> ("clock-server", "Clock server",
-        "Network clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or "
-        "ptp:DOMAIN",
-        kMutableReady),
-    P::number<&S::view_id> (
-        "view-id", "View ID", "View of the rig file that names the cameras", 0, 63, kMutableReady),
-    P::number<&S::offset_x> ("offset-x", "Offset x",
-        "Left edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-        kMutableReady),
-    P::number<&S::offset_y> ("offset-y", "Offset y",
-        "Top edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-        kMutableReady),
-    P::number<&S::packet_size> ("packet-size", "Packet size",
-        "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 = "
-        "leave unchanged)",
-        -1, 65535, kMutableReady),
-    P::number<&S::n_buffers> ("buffers", "Buffers",
-        "Number of buffers per camera, shared by the camera's stream and downstream", 2, 256,
-        kMutableReady),
-    P::number<&S::num_buffers> ("num-buffers", "num-buffers",
-        "Number of image sets to output before EOS (-1 = unlimited)", -1, G_MAXINT, kMutableReady),
-    P::number<&S::action_device_key> ("action-device-key", "Action device key",
-        "ActionDeviceKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
-    P::number<&S::action_group_key> ("action-group-key", "Action group key",
-        "ActionGroupKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
-    P::number<&S::action_group_mask> ("action-group-mask", "Action group mask",
-        "ActionGroupMask of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
-    P::boolean<&S::auto_exposure> ("auto-exposure", "Automatic exposure",
-        "Automatic exposure time on the left camera", kMutableReady),
-    P::boolean<&S::auto_gain> (
-        "auto-gain", "Automatic gain", "Automatic gain on the left camera", kMutableReady),
-    P::boolean<&S::auto_white_balance> ("auto-white-balance", "Automatic white balance",
-        "Automatic white balance on the left camera", kMutableReady),
-    P::boolean<&S::lock_exposure> ("lock-exposure", "Lock exposure",
-        "Copy the left camera's automatic settings to the other cameras (false = each camera "
-        "adjusts itself)",
-        kMutableReady),
-    P::boolean<&S::packet_resend> ("packet-resend", "Packet resend",
-        "Request retransmission of missing GigE Vision packets", kMutableReady),
-    P::boolean<&S::action_send> ("action-send", "Action send",
-        "Send the action commands for trigger=action; exactly one element per rig does",
-        kMutableReady),
-    P::boolean<&S::action_scheduled> ("action-scheduled", "Action scheduled",
-        "Send action commands ahead of time with the time to execute them; requires cameras and "
-        "pipeline on one PTP clock",
-        kMutableReady),
-    P::boolean<&S::single_shot> ("single-shot", "Single shot",
-        "Capture only when the capture signal is emitted", kMutableReady),
-    P::boolean<&S::reconnect> ("reconnect", "Reconnect",
-        "Reconnect to a lost camera and post a warning instead of an error", kMutableReady),
-    P::enumeration<&S::trigger> ("trigger", "Trigger", "What triggers the cameras",
-        GST_TYPE_STEREO_CAM_SRC_TRIGGER, kMutableReady),
-    P::number<&S::exposure_us> ("exposure", "Exposure",
-        "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0., 1e9,
-        kMutableReady),
-    P::number<&S::gain> ("gain", "Gain",
-        "Gain of all cameras in their own unit, usually dB (-1 = leave unchanged)", -1, 1000,
-        kMutableReady),
-    P::number<&S::packet_delay_ns> ("packet-delay", "Packet delay",
-        "Delay between GigE Vision packets in nanoseconds (-1 = leave unchanged)", -1, 1000000000,
-        kMutableReady),
-}
-;
-return table;
+  static P table = {
+      P::text<kLeft> ("left", "Left camera",
+          "Left camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
+      P::text<kRight> ("right", "Right camera",
+          "Right camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
+      P::text<kThird> ("third", "Third camera",
+          "Third camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
+      P::text<&S::rig> ("rig", "Rig",
+          "Rig file that names the cameras of the view, used if left and right are unset",
+          kMutableReady),
+      P::text<&S::format> ("format", "Pixel format",
+          "GenICam pixel format, such as Mono8 or BayerRG8 (unset = negotiated with downstream)",
+          kMutableReady),
+      P::text<&S::features> ("features", "Features",
+          "GenICam features to set on all cameras after all other settings: \"Name=Value "
+          "Name=Value "
+          "Command ...\"",
+          kMutableReady),
+      P::text<&S::trigger_line> ("trigger-line", "Trigger line",
+          "Input line of the cameras for trigger=hardware", kMutableReady),
+      P::text<&S::output_line> ("output-line", "Output line",
+          "Output line of the left camera for trigger=hardware; the left camera then runs freely "
+          "and "
+          "triggers the others (unset = external signal)",
+          kMutableReady),
+      P::text<&S::clock_server> ("clock-server", "Clock server",
+          "Network clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or "
+          "ptp:DOMAIN",
+          kMutableReady),
+      P::number<&S::view_id> ("view-id", "View ID", "View of the rig file that names the cameras",
+          0, 63, kMutableReady),
+      P::number<&S::offset_x> ("offset-x", "Offset x",
+          "Left edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
+          kMutableReady),
+      P::number<&S::offset_y> ("offset-y", "Offset y",
+          "Top edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
+          kMutableReady),
+      P::number<&S::packet_size> ("packet-size", "Packet size",
+          "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 "
+          "= "
+          "leave unchanged)",
+          -1, 65535, kMutableReady),
+      P::number<&S::n_buffers> ("buffers", "Buffers",
+          "Number of buffers per camera, shared by the camera's stream and downstream", 2, 256,
+          kMutableReady),
+      P::number<&S::num_buffers> ("num-buffers", "num-buffers",
+          "Number of image sets to output before EOS (-1 = unlimited)", -1, G_MAXINT,
+          kMutableReady),
+      P::number<&S::action_device_key> ("action-device-key", "Action device key",
+          "ActionDeviceKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+      P::number<&S::action_group_key> ("action-group-key", "Action group key",
+          "ActionGroupKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+      P::number<&S::action_group_mask> ("action-group-mask", "Action group mask",
+          "ActionGroupMask of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
+      P::boolean<&S::auto_exposure> ("auto-exposure", "Automatic exposure",
+          "Automatic exposure time on the left camera", kMutableReady),
+      P::boolean<&S::auto_gain> (
+          "auto-gain", "Automatic gain", "Automatic gain on the left camera", kMutableReady),
+      P::boolean<&S::auto_white_balance> ("auto-white-balance", "Automatic white balance",
+          "Automatic white balance on the left camera", kMutableReady),
+      P::boolean<&S::lock_exposure> ("lock-exposure", "Lock exposure",
+          "Copy the left camera's automatic settings to the other cameras (false = each camera "
+          "adjusts itself)",
+          kMutableReady),
+      P::boolean<&S::packet_resend> ("packet-resend", "Packet resend",
+          "Request retransmission of missing GigE Vision packets", kMutableReady),
+      P::boolean<&S::action_send> ("action-send", "Action send",
+          "Send the action commands for trigger=action; exactly one element per rig does",
+          kMutableReady),
+      P::boolean<&S::action_scheduled> ("action-scheduled", "Action scheduled",
+          "Send action commands ahead of time with the time to execute them; requires cameras and "
+          "pipeline on one PTP clock",
+          kMutableReady),
+      P::boolean<&S::single_shot> ("single-shot", "Single shot",
+          "Capture only when the capture signal is emitted", kMutableReady),
+      P::boolean<&S::reconnect> ("reconnect", "Reconnect",
+          "Reconnect to a lost camera and post a warning instead of an error", kMutableReady),
+      P::enumeration<&S::trigger> ("trigger", "Trigger", "What triggers the cameras",
+          GST_TYPE_STEREO_CAM_SRC_TRIGGER, kMutableReady),
+      P::number<&S::exposure_us> ("exposure", "Exposure",
+          "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0., 1e9,
+          kMutableReady),
+      P::number<&S::gain> ("gain", "Gain",
+          "Gain of all cameras in their own unit, usually dB (-1 = leave unchanged)", -1, 1000,
+          kMutableReady),
+      P::number<&S::packet_delay_ns> ("packet-delay", "Packet delay",
+          "Delay between GigE Vision packets in nanoseconds (-1 = leave unchanged)", -1, 1000000000,
+          kMutableReady),
+  };
+  return table;
 }
 
 /* ---- the cameras ---- */
 
-static Status
-names_from_rig (const Settings &settings, CameraNames &found)
+namespace {
+
+Status
+names_from_rig (const StereoCamSettings &settings, CameraNames &found)
 {
   rangecast::Rig rig;
   if (Status s = rangecast::load_rig (settings.rig, rig); !s.ok ())
@@ -143,8 +147,7 @@ names_from_rig (const Settings &settings, CameraNames &found)
   if (!view)
     return {StatusCode::kNotFound,
         settings.rig + ": has no view with view-id " + std::to_string (settings.view_id)};
-  found = {
-      view->camera, view->right ? view->right->camera : "", view->third ? view->third->camera : ""};
+  found = camera_names (*view);
   for (int i = 0; i < 2; i++)
     if (found[i].empty ())
       return {StatusCode::kNotFound, which + " does not name its " + (i ? "right" : "left") +
@@ -152,8 +155,18 @@ names_from_rig (const Settings &settings, CameraNames &found)
   return {};
 }
 
+AutoMode
+mode_of (bool regulates, bool follows, bool is_left, bool fixed)
+{
+  if (regulates && (is_left || !follows))
+    return AutoMode::kAuto;
+  return regulates || fixed ? AutoMode::kManual : AutoMode::kUnchanged;
+}
+
+} // namespace
+
 Status
-CamSourceSettings::find_names (CameraNames &found) const
+StereoCamSettings::find_names (CameraNames &found) const
 {
   found = names;
   if (names[0].empty () && names[1].empty () && !rig.empty ()) {
@@ -181,7 +194,7 @@ CamSourceSettings::find_names (CameraNames &found) const
 }
 
 Status
-CamSourceSettings::check () const
+StereoCamSettings::check () const
 {
   const bool by_element = trigger == TriggerMode::kSoftware || trigger == TriggerMode::kAction;
   if (single_shot && !by_element)
@@ -192,16 +205,8 @@ CamSourceSettings::check () const
   return {};
 }
 
-static AutoMode
-mode_of (bool regulates, bool follows, bool is_left, bool fixed)
-{
-  if (regulates && (is_left || !follows))
-    return AutoMode::kAuto;
-  return regulates || fixed ? AutoMode::kManual : AutoMode::kUnchanged;
-}
-
 CameraSettings
-CamSourceSettings::for_camera (int camera) const
+StereoCamSettings::for_camera (int camera) const
 {
   CameraSettings s;
   const bool left = camera == 0;

@@ -6,6 +6,7 @@
 #include "camera/aravis/settings.hpp"
 #include <array>
 #include <rangecast/base/status.hpp>
+#include <rangecast/geometry/rig.hpp>
 #include <rangecast/sync/frame_sets.hpp>
 #include <string>
 
@@ -13,44 +14,55 @@
 
 using CameraNames = std::array<std::string, rangecast::kMaxCameras>; ///< left, right, third
 
-/** What an application wants of stereocamsrc. Any thread, under the element's lock. */
-struct CamSourceSettings {
+/** The cameras of a rig's view; empty where it names none. */
+inline CameraNames
+camera_names (const rangecast::View &view)
+{
+  return {view.camera, view.right ? view.right->camera : "", view.third ? view.third->camera : ""};
+}
+
+/** Property values of stereocamsrc, which may change in NULL and READY. */
+struct StereoCamSettings {
   CameraNames names;  ///< empty third: two cameras
-  std::string rig;    ///< file that names them, unless `names` does
-  int view_id = 0;    ///< in it
-  std::string format; ///< GenICam pixel format; empty: what downstream takes
+  std::string rig;    ///< file that names them, if names are empty
+  int view_id = 0;    ///< in the rig file
+  std::string format; ///< GenICam pixel format; empty: negotiated
   int offset_x = -1, offset_y = -1;
   TriggerMode trigger = TriggerMode::kFreeRun;
-  double exposure_us = 0, gain = -1; ///< 0, -1: as the cameras are set
+  double exposure_us = 0, gain = -1; ///< 0, -1: unchanged
   bool auto_exposure = false, auto_gain = false, auto_white_balance = false;
   bool lock_exposure = true;
   std::string features;
   int packet_size = 0, n_buffers = 8;
   gint64 packet_delay_ns = -1;
   bool packet_resend = true;
-  std::string trigger_line = "Line1", output_line; ///< output line empty: the trigger is foreign
+  std::string trigger_line = "Line1", output_line; ///< output line empty: external signal
   guint action_device_key = 0x52414e47, action_group_key = 1, action_group_mask = 1;
-  bool action_send = true, action_scheduled = false; ///< send: this element tells the cameras
+  bool action_send = true, action_scheduled = false; ///< send: by this element
   bool single_shot = false, reconnect = false;
   int num_buffers = -1;
   std::string clock_server;
 
-  /** The names, from the rig file where there is none.
+  /** The names, from the rig file if left and right are empty.
    *  @return kNotFound, kBadValue: the text says which property, or the file */
   rangecast::Status find_names (CameraNames &found) const;
-  /** Whether the properties go together. @return kBadValue: the text says which do not */
+  /** @return kBadValue: properties contradict each other; the text says which */
   [[nodiscard]] rangecast::Status check () const;
-  /** For one camera. Size and frame rate are still to be set. @param camera  0 is the left one */
+  /** Settings of one camera, without size and frame rate. @param camera  0 is the left one */
   [[nodiscard]] CameraSettings for_camera (int camera) const;
-  /** Whether the left camera's regulators steer the others, too. */
+  /** Whether this element triggers the cameras. */
+  [[nodiscard]] bool triggers_cameras () const
+  {
+    return trigger == TriggerMode::kSoftware || (trigger == TriggerMode::kAction && action_send);
+  }
+  /** Whether the left camera's automatic settings are copied to the others. */
   [[nodiscard]] bool follows_left () const
   {
     return lock_exposure && (auto_exposure || auto_gain || auto_white_balance);
   }
 };
 
-/** Their properties, which may change in NULL and READY. */
-PropertyTable<CamSourceSettings> &camera_properties ();
+PropertyTable<StereoCamSettings> &stereo_cam_properties ();
 
 GType gst_stereo_cam_src_trigger_get_type (void);
 #define GST_TYPE_STEREO_CAM_SRC_TRIGGER (gst_stereo_cam_src_trigger_get_type ())

@@ -42,7 +42,7 @@ RecycledBytes::acquire (GstElement *element, gsize size, const char *what)
 {
   if (!pool_ || size > size_) {
     drop ();
-    if (size > G_MAXUINT) { /* more than a pool can be told */
+    if (size > G_MAXUINT) { /* a pool's size is a guint */
       post_no_memory (element, what);
       return nullptr;
     }

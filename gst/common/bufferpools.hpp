@@ -3,16 +3,18 @@
 
 #include <gst/gst.h>
 
-/** Gives up a pool, made here or offered by a peer, and clears the pointer; null stays null. */
+/** Deactivates and unrefs a pool, whether created here or offered by a peer, and clears the
+ * pointer, which may be null. */
 void drop_pool (GstBufferPool *&pool);
 
-/** A buffer of the pool. Posts an error "no memory left for `what`" where the pool has no memory,
- *  and none where it is flushing. */
+/** Acquires a buffer. Posts the error "out of memory for `what`" if the pool cannot allocate one; a
+ *  flushing pool posts nothing. */
 GstFlowReturn acquire_buffer (
     GstElement *element, GstBufferPool *pool, const char *what, GstBuffer **buffer);
 
-/** Recycled buffers of plain bytes. Streaming thread. GStreamer's own memory ends the process where
- *  the system refuses it; only what the pool itself refuses is an error here. */
+/** A pool of plain byte buffers that grows to the largest size requested. Not thread-safe.
+ *  GStreamer's allocator aborts when the system is out of memory; errors reported here are the
+ *  pool's own. */
 class RecycledBytes {
 public:
   RecycledBytes () = default;
@@ -20,8 +22,7 @@ public:
   RecycledBytes &operator= (const RecycledBytes &) = delete;
   ~RecycledBytes () { drop (); }
 
-  /** A buffer of `size` bytes; null after an error was posted. The pool grows to the largest size
-   *  seen. */
+  /** @return a buffer of `size` bytes (transfer full), or null after posting an error */
   GstBuffer *acquire (GstElement *element, gsize size, const char *what);
   void drop ();
 

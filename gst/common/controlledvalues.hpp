@@ -3,9 +3,8 @@
 
 #include <gst/base/gstbasetransform.h>
 
-/** Sets controlled properties to their values at the buffer's stream time. Without one they stay:
- *  the buffer has no PTS, or is outside the segment, as the first one after a seek between frames.
- */
+/** Updates controlled properties to the buffer's stream time. A buffer without PTS or outside the
+ *  segment (the first one after a seek between two frames) has none: values stay as they are. */
 inline void
 sync_controlled_values (GstBaseTransform *base, GstBuffer *buffer)
 {

@@ -11,9 +11,9 @@
 #include <type_traits>
 #include <vector>
 
-/* Properties of elements, as tables of rows. A row names a member of the element's struct of
- * settings; its type makes the GParamSpec, and a default-constructed struct holds the default
- * value. */
+/* Properties of elements as tables of rows. A row names a member of the element's settings struct:
+ * the member's type determines the GParamSpec, and its value in a default-constructed struct is the
+ * default value. elementproperties.hpp installs a table together with `stats`. */
 
 inline constexpr auto kReadWrite = GParamFlags (G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
 /** A change takes effect in the states NULL and READY. */
@@ -24,7 +24,7 @@ inline constexpr auto kMutablePlaying = GParamFlags (kReadWrite | GST_PARAM_MUTA
 inline constexpr auto kControllable = GParamFlags (kMutablePlaying | GST_PARAM_CONTROLLABLE);
 inline constexpr auto kReadOnly = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
 
-/** A property that is a member of `Settings`, or is stored by functions of its own. */
+/** A property that is stored in a member of `Settings`, or by custom functions. */
 template <typename Settings> struct PropertyRow {
   GParamSpec *spec; ///< floating until it is installed
   void (*set) (Settings &, const GValue *);
@@ -33,7 +33,7 @@ template <typename Settings> struct PropertyRow {
 
 namespace properties {
 
-/* The member at the end of a path of pointers to members. */
+/* Follows a path of pointers to members. */
 template <auto... kPath, typename Settings>
 decltype (auto)
 member (Settings &settings)
@@ -135,15 +135,17 @@ number_spec (const char *name, const char *nick, const char *blurb, T minimum, T
 
 } // namespace properties
 
-/** The rows of an element's settings. Made in class_init, never freed, as classes are not. */
+/** The properties of an element's settings. Created in class_init and never freed, like the class.
+ */
 template <typename Settings> class PropertyTable {
 public:
   using Row = PropertyRow<Settings>;
 
   PropertyTable (std::initializer_list<Row> rows) : rows_ (rows) {}
 
-  /** A number (gint, guint, gint64, guint64, float or double). @tparam kPath  pointers to members
-   *  that lead from Settings to it, or functions that return it by reference */
+  /** A number (gint, guint, gint64, guint64, float or double).
+   *  @tparam kPath  path from Settings to the member: pointers to members, or functions that return
+   *  a reference */
   template <auto... kPath, typename Minimum, typename Maximum>
   static Row number (const char *name, const char *nick, const char *blurb, Minimum minimum,
       Maximum maximum, GParamFlags flags)
@@ -164,7 +166,7 @@ public:
         g_param_spec_boolean (name, nick, blurb, properties::member<kPath...> (defaults), flags));
   }
 
-  /** A std::string; empty is null. */
+  /** A std::string; an empty one reads as null. */
   template <auto... kPath>
   static Row text (const char *name, const char *nick, const char *blurb, GParamFlags flags)
   {
@@ -174,8 +176,8 @@ public:
         name, nick, blurb, default_value.empty () ? nullptr : default_value.c_str (), flags));
   }
 
-  /** An enumeration. @param type  its GType, whose values are those of the member; it is documented
-   *  with the plugin */
+  /** An enumeration. @param type  GType with the values of the member's type; gets marked as plugin
+   *  API, so that documentation tools find it */
   template <auto... kPath>
   static Row enumeration (
       const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
@@ -197,14 +199,14 @@ public:
         name, nick, blurb, type, guint (properties::member<kPath...> (defaults)), flags));
   }
 
-  /** What no single member holds. */
+  /** A property that is not one member, with its own setter and getter. */
   static Row custom (GParamSpec *spec, void (*set) (Settings &, const GValue *),
       void (*get) (const Settings &, GValue *))
   {
     return {spec, set, get};
   }
 
-  /** Installs the rows as properties `first_id` and following. @return the next free number */
+  /** Installs the rows with the ids `first_id` and following. @return the next free id */
   guint install (GObjectClass *object_class, guint first_id)
   {
     first_id_ = first_id;
@@ -213,7 +215,7 @@ public:
     return first_id;
   }
 
-  /** @return false if the table has no property of that number */
+  /** @return false if the table has no property with that id */
   bool set (Settings &settings, guint id, const GValue *value) const
   {
     const Row *row = find (id);
@@ -229,8 +231,8 @@ public:
     return row != nullptr;
   }
 
-  /** Calls g_object_notify_by_pspec() for each property whose value differs. Call it without locks.
-   */
+  /** Calls g_object_notify_by_pspec() for each property whose value differs. Call without locks
+   *  held. */
   void notify_changes (GObject *object, const Settings &before, const Settings &after) const
   {
     for (const Row &row : rows_) {

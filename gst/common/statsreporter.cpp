@@ -9,38 +9,42 @@
 #include <gstrange/gstrange.h>
 #include <mutex>
 
-static constexpr guint kDefaultIntervalMs = 1000, kLongestIntervalMs = 3600000;
-/* Of more pictures in an interval, the last ones are looked at. */
-static constexpr std::size_t kMaxLatencies = 1024;
-/* A latency beyond this is that of clocks that have nothing to do with each other, ns. */
-static constexpr gint64 kNoLatency = 10 * GST_SECOND;
+namespace {
 
-/* Counters as they were in the message before. */
-struct RowBefore {
+constexpr guint kDefaultIntervalMs = 1000, kMaxIntervalMs = 3600000;
+/* Per interval; of more, the most recent ones count. */
+constexpr std::size_t kMaxLatencies = 1024;
+/* A greater time since capture means that the clocks are unrelated, ns. */
+constexpr gint64 kMaxLatency = 10 * GST_SECOND;
+
+/* A row of the previous message. */
+struct PreviousRow {
   std::string pad;
   StreamCounters counters;
 };
 
+} // namespace
+
 struct StatsReporter::State {
-  /* Locks, in this order: `reporting`, then what collect() takes or `lock`. So no element's lock
-   * may be held where `reporting` is taken: start(), finish(). Whoever has `lock` calls nothing but
-   * the clock. None is held while posting. */
-  std::mutex reporting; /* guards before, since */
-  std::vector<RowBefore> before;
-  GstClockTime since = 0; /* when the interval began */
+  /* Locking order: `reporting`, then the locks that collect() takes, or `lock`. So start() and
+   * finish(), which take `reporting`, must be called without the element's locks. With `lock` held
+   * only the clock is called. No lock is held while posting. */
+  std::mutex reporting; /* guards previous, since */
+  std::vector<PreviousRow> previous;
+  GstClockTime since = 0; /* start of the interval */
 
-  std::atomic<guint> interval_ms = kDefaultIntervalMs; /* written with `lock` */
+  std::atomic<guint> interval_ms = kDefaultIntervalMs; /* written with `lock` held */
 
-  std::mutex lock;           /* guards what follows */
+  std::mutex lock;           /* guards the members up to n_latencies */
   Collect collect = nullptr; /* null: stopped */
   GstClockID timer = nullptr;
   guint64 views = 0;
   std::array<gint32, kMaxLatencies> latencies_us{};
-  std::size_t n_latencies = 0; /* beyond the array's size they have gone round */
+  std::size_t n_latencies = 0; /* recorded; latencies_us is a ring */
 
-  std::atomic<bool> is_reporting{false}; /* because of the timer */
+  std::atomic<bool> is_reporting{false}; /* a report that the timer started is in progress */
 
-  GWeakRef element; /* has a lock of its own; written before the timer runs */
+  GWeakRef element; /* thread-safe; set before the timer starts */
 
   State () { g_weak_ref_init (&element, nullptr); }
   ~State () { g_weak_ref_clear (&element); }
@@ -48,7 +52,7 @@ struct StatsReporter::State {
   void unschedule ();
   void begin_interval (GstElement *e, Collect read);
   void report (bool at_end);
-  void report_elsewhere ();
+  void report_async ();
   std::vector<GstStructure *> make_messages (
       GstElement *e, const std::vector<StatsRow> &rows, GstClockTime interval);
 };
@@ -79,11 +83,11 @@ set_views_field (GstStructure *s, guint64 views)
   gst_structure_take_value (s, "view-ids", &array);
 }
 
-/* Counters that went back have begun anew. */
+/* A counter that decreased was reset in between. */
 static guint64
-growth (guint64 now, guint64 before)
+increase (guint64 now, guint64 previous)
 {
-  return now >= before ? now - before : now;
+  return now >= previous ? now - previous : now;
 }
 
 static void
@@ -95,7 +99,7 @@ set_count (GstStructure *s, const char *field, const std::optional<guint64> &cou
 
 static GstStructure *
 make_structure (
-    GstElement *element, const StatsRow &row, const StreamCounters &before, GstClockTime interval)
+    GstElement *element, const StatsRow &row, const StreamCounters &previous, GstClockTime interval)
 {
   const StreamCounters &now = row.counters;
   GstElementFactory *factory = gst_element_get_factory (element);
@@ -107,17 +111,17 @@ make_structure (
   if (row.views)
     set_views_field (s, row.views);
   const double seconds = double (std::max<GstClockTime> (interval, 1)) / GST_SECOND;
-  const guint64 frames = growth (now.frames, before.frames);
+  const guint64 frames = increase (now.frames, previous.frames);
   gst_structure_set (s, "frames", G_TYPE_UINT64, now.frames, "fps", G_TYPE_DOUBLE,
       double (frames) / seconds, nullptr);
   set_count (s, "points", now.points);
   if (now.points && frames > 0)
     gst_structure_set (s, "points-per-frame", G_TYPE_DOUBLE,
-        double (growth (*now.points, before.points.value_or (0))) / double (frames), nullptr);
+        double (increase (*now.points, previous.points.value_or (0))) / double (frames), nullptr);
   set_count (s, "bytes", now.bytes);
   if (now.bytes)
     gst_structure_set (s, "bitrate", G_TYPE_UINT64,
-        guint64 (8 * double (growth (*now.bytes, before.bytes.value_or (0))) / seconds + 0.5),
+        guint64 (8 * double (increase (*now.bytes, previous.bytes.value_or (0))) / seconds + 0.5),
         nullptr);
   set_count (s, "packets", now.packets);
   set_count (s, "lost", now.lost);
@@ -128,7 +132,7 @@ make_structure (
   return s;
 }
 
-/* @param[in,out] us  is sorted in part */
+/* @param[in,out] us  gets partially sorted */
 static gint64
 quantile_ns (std::span<gint32> us, double share)
 {
@@ -137,20 +141,20 @@ quantile_ns (std::span<gint32> us, double share)
   return gint64{us[std::size_t (k)]} * 1000;
 }
 
-/* With `reporting`. The first row is the element's own: it gets the latency. */
+/* With `reporting` held. The latencies go into the first row, the element's own. */
 std::vector<GstStructure *>
 StatsReporter::State::make_messages (
     GstElement *e, const std::vector<StatsRow> &rows, GstClockTime interval)
 {
   std::vector<GstStructure *> messages;
-  std::vector<RowBefore> now;
+  std::vector<PreviousRow> now;
   for (const StatsRow &row : rows) {
-    const auto found = std::ranges::find (before, row.pad, &RowBefore::pad);
+    const auto found = std::ranges::find (previous, row.pad, &PreviousRow::pad);
     messages.push_back (make_structure (
-        e, row, found == before.end () ? StreamCounters () : found->counters, interval));
+        e, row, found == previous.end () ? StreamCounters () : found->counters, interval));
     now.push_back ({row.pad, row.counters});
   }
-  before = std::move (now);
+  previous = std::move (now);
   if (messages.empty ())
     return messages;
   std::lock_guard guard (lock);
@@ -169,10 +173,10 @@ void
 StatsReporter::State::begin_interval (GstElement *e, Collect read)
 {
   std::lock_guard guard (reporting);
-  before.clear ();
+  previous.clear ();
   if (read)
     for (const StatsRow &row : read (e))
-      before.push_back ({row.pad, row.counters});
+      previous.push_back ({row.pad, row.counters});
   since = gst_util_get_timestamp ();
   std::lock_guard others (lock);
   n_latencies = 0;
@@ -201,7 +205,7 @@ StatsReporter::State::report (bool at_end)
     {
       std::lock_guard guard (reporting);
       const GstClockTime now = gst_util_get_timestamp (), interval = now - since;
-      /* A timer that comes late catches up at once. */
+      /* A timer that fires late fires again early: skip the short interval. */
       if (at_end || interval >= ms * GST_MSECOND / 2) {
         since = now;
         messages = make_messages (e, read (e), interval);
@@ -217,14 +221,14 @@ StatsReporter::State::report (bool at_end)
 
 /* ---- the timer ---- */
 
-/* The clock's thread is that of all timers of the process: whoever handles the message at once, or
- * the end of an element whose last reference this may be, must not hold it up. So this reference
- * goes to a thread of GStreamer's pool, whose own one keeps the element, and with it the state,
- * until the work is done. */
+/* The clock's thread serves all timers of the process. A synchronous message handler must not block
+ * it, nor must finalizing an element of which this may be the last reference. So this reference is
+ * handed to gst_element_call_async(), whose own reference keeps the element, and with it this
+ * state, until the report is done. */
 void
-StatsReporter::State::report_elsewhere ()
+StatsReporter::State::report_async ()
 {
-  if (is_reporting.exchange (true)) /* somebody handles the last message still */
+  if (is_reporting.exchange (true)) /* a handler of the previous message still runs */
     return;
   auto e = static_cast<GstElement *> (g_weak_ref_get (&element));
   if (!e)
@@ -233,12 +237,12 @@ StatsReporter::State::report_elsewhere ()
     State &state = *static_cast<State *> (data);
     state.report (false);
     state.is_reporting = false;
-    gst_object_unref (element); /* the clock's thread's */
+    gst_object_unref (element); /* taken on the clock's thread */
   };
   gst_element_call_async (e, work, this, nullptr);
 }
 
-/* With `lock`. */
+/* With `lock` held. */
 void
 StatsReporter::State::unschedule ()
 {
@@ -249,7 +253,7 @@ StatsReporter::State::unschedule ()
   timer = nullptr;
 }
 
-/* With `lock`. */
+/* With `lock` held. */
 void
 StatsReporter::State::schedule (const std::shared_ptr<State> &self)
 {
@@ -262,11 +266,11 @@ StatsReporter::State::schedule (const std::shared_ptr<State> &self)
   gst_object_unref (clock);
   const auto on_time = [] (GstClock *, GstClockTime time, GstClockID, gpointer data) -> gboolean {
     if (GST_CLOCK_TIME_IS_VALID (time))
-      (*static_cast<std::shared_ptr<State> *> (data))->report_elsewhere ();
+      (*static_cast<std::shared_ptr<State> *> (data))->report_async ();
     return TRUE;
   };
-  const auto forget = [] (gpointer data) { delete static_cast<std::shared_ptr<State> *> (data); };
-  gst_clock_id_wait_async (timer, on_time, new std::shared_ptr<State> (self), forget);
+  const auto destroy = [] (gpointer data) { delete static_cast<std::shared_ptr<State> *> (data); };
+  gst_clock_id_wait_async (timer, on_time, new std::shared_ptr<State> (self), destroy);
 }
 
 /* ---- the element's side ---- */
@@ -284,7 +288,7 @@ StatsReporter::install (GObjectClass *object_class, guint property_id)
   g_object_class_install_property (object_class, property_id,
       g_param_spec_uint ("stats-interval", "Statistics interval",
           "Interval between rangecast-stats messages in milliseconds (0 = never)", 0,
-          kLongestIntervalMs, kDefaultIntervalMs, kMutablePlaying));
+          kMaxIntervalMs, kDefaultIntervalMs, kMutablePlaying));
 }
 
 void
@@ -343,7 +347,7 @@ StatsReporter::passed (GstElement *element, GstBuffer *buffer)
     return;
   const gint64 latency = GST_CLOCK_DIFF (capture, gst_clock_get_time (clock));
   gst_object_unref (clock);
-  if (latency < -kNoLatency || latency > kNoLatency)
+  if (latency < -kMaxLatency || latency > kMaxLatency)
     return;
   std::lock_guard guard (state.lock);
   state.latencies_us[state.n_latencies++ % kMaxLatencies] = gint32 (latency / 1000);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-/* What all elements tell of their streams, at regular times: the element message `rangecast-stats`
- * of docs/guide/statistics.md. */
+/* The element message `rangecast-stats`, which all elements post at regular intervals; its fields
+ * are documented in docs/guide/statistics.md. */
 
 #include <gst/gst.h>
 
@@ -12,35 +12,34 @@
 #include <string>
 #include <vector>
 
-/** Counters since start, of an element or of one of its pads. Those that it does not have are left
- *  out of the message. */
+/** Counters since start, of an element or of one of its pads. The message leaves out those that are
+ *  not set. docs/guide/statistics.md says what each element counts. */
 struct StreamCounters {
-  guint64 frames = 0; ///< what one of these is, and what is lost or late: docs/guide/statistics.md
+  guint64 frames = 0;
   std::optional<guint64> points = {}, bytes = {}, packets = {}, lost = {}, late = {};
 };
 
-/** A message: an element's own, or that of a pad. */
+/** The contents of one message: of an element, or of one of its pads. */
 struct StatsRow {
-  std::string pad = {}; ///< empty: the element's own
+  std::string pad = {}; ///< pad name; empty: the element itself
   StreamCounters counters = {};
-  guint64 views = 0; ///< bits by view-id; of the element's own: 0, see StatsReporter::set_views()
-  /** Where StatsReporter::passed() is not told, ns. */
+  guint64 views = 0; ///< bits by view-id; 0 for the element itself, see StatsReporter::set_views()
+  /** ns; for rows whose buffers are not given to StatsReporter::passed() */
   std::optional<gint64> latency_p50 = {}, latency_p99 = {};
 };
 
-/** Bits by view-id. */
+/** The view-ids of a rig as a bit mask. */
 guint64 view_bits (const rangecast::Rig &rig);
 
-/** Posts an element's statistics.
+/** Posts an element's statistics, in PLAYING and at the end of the stream.
  *
- *  A timer of GStreamer's system clock does it, so that a stream that stalls is seen to: there is
- *  no streaming thread then. Nothing is posted but in PLAYING, and at the end of the stream.
- *  Nothing is allocated but once an interval. start() and finish() may not be called with a
- *  lock held that `collect` takes. */
+ *  The timer is one of GStreamer's system clock, not the streaming thread, so that statistics of a
+ *  stalled stream are posted, too. Allocates once per interval. Do not call start() or finish()
+ * with a lock held that `collect` takes. */
 class StatsReporter {
 public:
-  /** Reads the counters; on any thread, with locks of the element's own. The element's own row is
-   *  the first. */
+  /** Reads the counters, on any thread; takes the element's locks itself. The element's own row
+   *  comes first. */
   using Collect = std::vector<StatsRow> (*) (GstElement *element);
 
   StatsReporter ();
@@ -50,24 +49,25 @@ public:
 
   /** Installs `stats-interval`. */
   static void install (GObjectClass *object_class, guint property_id);
-  /** Milliseconds; 0: off. Any thread, without a lock of the element's: it sets a timer. */
+  /** Milliseconds; 0: off. Any thread. Call without the element's locks: it (re)starts the timer.
+   */
   void set_interval (guint interval_ms);
   [[nodiscard]] guint interval () const;
 
-  /** Counters begin anew. On READY to PAUSED. */
+  /** READY to PAUSED: counters restart from 0. */
   void start (GstElement *element, Collect collect);
-  /** On PAUSED to READY. One message may still be on its way. */
+  /** PAUSED to READY. A message that is being posted may still arrive afterwards. */
   void stop ();
 
-  /** Those of the stream. Any thread. */
+  /** The stream's views, for the element's own row. Any thread. */
   void set_views (const rangecast::Rig &rig);
-  /** Notes how long ago a buffer that is about to go out was taken, if its capture time and the
-   *  element's clock tell. Any thread. */
+  /** Records the time since capture of a buffer that is about to be pushed, if its capture time and
+   *  the element's clock are known. Any thread. */
   void passed (GstElement *element, GstBuffer *buffer);
-  /** The end of the stream: posts what there is. */
+  /** At EOS: posts the statistics of the unfinished interval. */
   void finish ();
 
 private:
   struct State;
-  std::shared_ptr<State> state_; /* the timer's thread has it, too */
+  std::shared_ptr<State> state_; /* shared with the timer's thread */
 };

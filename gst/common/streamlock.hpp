@@ -3,9 +3,9 @@
 
 #include <gst/base/gstbasetransform.h>
 
-/** The stream lock of the sink pad, for stop(): GstBaseTransform has seen to it that no buffer and
- *  no event comes any more, but GStreamer (1.22) lets serialised queries through to pads that are
- *  flushing, and an ALLOCATION query may bring set_caps(). */
+/** Holds the stream lock of the sink pad during stop(). GstBaseTransform has stopped buffers and
+ *  events by then, but GStreamer 1.22 still passes serialized queries to flushing pads, and an
+ *  ALLOCATION query may call set_caps(). */
 class StreamLock {
 public:
   explicit StreamLock (GstBaseTransform *base) : pad_ (GST_BASE_TRANSFORM_SINK_PAD (base))

@@ -6,20 +6,23 @@
 
 #include <rangecast/geometry/range_image.hpp>
 
-/* What a sink pad whose pictures a PictureReader takes says to ALLOCATION queries: rows may be
- * padded.
- */
+/** propose_allocation() of an aggregator that reads its input with VideoFrameReader: any stride and
+ *  plane offset. */
 inline gboolean
-propose_picture_allocation (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
+propose_video_meta (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
 {
   gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
   return TRUE;
 }
 
-/* One camera's pictures as RGBx: mapped as they are, or converted into memory of ours. */
-class PictureReader {
+/** Maps video frames as RGBx: RGBx and RGBA directly, other formats through a converter into memory
+ *  of its own. Not thread-safe. */
+class VideoFrameReader {
 public:
-  ~PictureReader () { reset (); }
+  VideoFrameReader () = default;
+  VideoFrameReader (const VideoFrameReader &) = delete;
+  VideoFrameReader &operator= (const VideoFrameReader &) = delete;
+  ~VideoFrameReader () { reset (); }
   void reset ()
   {
     if (converter_)
@@ -27,6 +30,7 @@ public:
     converter_ = nullptr;
     gst_clear_buffer (&converted_);
   }
+  /** @return false if the format cannot be converted to RGBx */
   bool set (const GstVideoInfo &info)
   {
     reset ();
@@ -43,7 +47,9 @@ public:
     converted_ = gst_buffer_new_allocate (nullptr, rgbx_.size, nullptr);
     return converter_ != nullptr;
   }
-  /* Valid until close(). */
+  /** Maps a buffer; view() is valid until close().
+   *  @return false, and there is nothing to close, if the buffer is smaller than the format needs
+   */
   bool open (GstBuffer *buffer)
   {
     if (!converter_)

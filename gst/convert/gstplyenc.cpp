@@ -15,32 +15,30 @@
  */
 #include "gstplyenc.h"
 
-#include <atomic>
+#include "common/elementproperties.hpp"
+#include "common/streamlock.hpp"
+
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <rangecast/base/guarded.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
 
-#include "common/properties.hpp"
-#include "common/streamlock.hpp"
-
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 #define GST_CAT_DEFAULT gst_ply_enc_debug
-
-enum { PROP_0, PROP_VIEW_ID, PROP_NORMALS, PROP_FORMAT };
 
 using rangecast::PointCloudFormat;
 
 struct GstPlyEncPrivate {
-  std::atomic<bool> with_view_id{false}, with_normals{false};
-  std::atomic<PointCloudFormat::Kind> kind{PointCloudFormat::kPly}; /* as the application wants */
-  /* What the stream's caps say, and with them its files: `kind` as it was in READY. */
-  std::atomic<PointCloudFormat::Kind> kind_of_stream{PointCloudFormat::kPly};
-  std::atomic<bool> started{false};
-  gstrange::RangeInfo info; /* streaming thread only */
+  std::mutex lock; /* guards settings, kind, started */
+  PointCloudFormat settings;
+  PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the stream: settings.kind at start */
+  bool started = false;
+
+  gstrange::RangeInfo info; /* streaming thread */
 };
 
 struct _GstPlyEnc {
@@ -56,31 +54,21 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, GST_TYPE_PLY_ENC)
 
-#define GST_TYPE_PLY_ENC_FORMAT (gst_ply_enc_format_get_type ())
-static GType
-gst_ply_enc_format_get_type (void)
+static PointCloudFormat
+current_format (GstPlyEncPrivate *priv)
 {
-  static const GType type = [] {
-    static const GEnumValue values[] = {{PointCloudFormat::kPly, "PLY, binary", "ply"},
-        {PointCloudFormat::kPcd, "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
-    return g_enum_register_static ("GstPlyEncFormat", values);
-  }();
-  return type;
-}
-
-/* ---- streaming ---- */
-
-static PointCloudFormat::Kind
-gst_ply_enc_kind (const GstPlyEncPrivate *priv)
-{
-  return priv->started ? priv->kind_of_stream : priv->kind;
+  std::lock_guard guard (priv->lock);
+  PointCloudFormat format = priv->settings;
+  if (priv->started)
+    format.kind = priv->kind;
+  return format;
 }
 
 static GstCaps *
 gst_ply_enc_transform_caps (
     GstBaseTransform *base, GstPadDirection direction, GstCaps *, GstCaps *filter)
 {
-  const bool is_pcd = gst_ply_enc_kind (GST_PLY_ENC (base)->priv) == PointCloudFormat::kPcd;
+  const bool is_pcd = current_format (GST_PLY_ENC (base)->priv).kind == PointCloudFormat::kPcd;
   GstCaps *other =
       direction == GST_PAD_SRC
           ? gst_static_pad_template_get_caps (&sink_template)
@@ -96,41 +84,41 @@ static gboolean
 gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
 {
   auto self = GST_PLY_ENC (base);
+  GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT, in);
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* A buffer with the file in it. */
+/* Writes the file into a new buffer. */
 static rangecast::Status
-gst_ply_enc_write (GstPlyEncPrivate *priv, GstBuffer *input, GstBuffer *&output)
+write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
 {
   const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
-  const rangecast::PointCloudWriter writer (
-      {gst_ply_enc_kind (priv), priv->with_normals, priv->with_view_id});
+  const rangecast::PointCloudWriter writer (current_format (self->priv));
   std::size_t points = 0;
   for (const auto &view : frame.views ())
     points += rangecast::count_points (view);
+  GST_LOG_OBJECT (self, "%zu points, %zu bytes", points, writer.size (points));
   output = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
   GstMapInfo map;
   if (!output || !gst_buffer_map (output, &map, GST_MAP_WRITE))
     throw std::bad_alloc ();
   const auto unmap = [&] (GstBuffer *buffer) { gst_buffer_unmap (buffer, &map); };
   const std::unique_ptr<GstBuffer, decltype (unmap)> mapped (output, unmap);
-  return writer.write (frame.views (), priv->info.rig, {map.data, map.size});
+  return writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
 }
 
-/* The output's size depends on the points, so the file is written here, where its buffer is made.
- */
+/* Writes the file, too: the buffer's size depends on the number of points. */
 static GstFlowReturn
 gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
 {
   auto self = GST_PLY_ENC (base);
   GstBuffer *buffer = nullptr;
   const rangecast::Status status =
-      rangecast::guarded ("plyenc", [&] { return gst_ply_enc_write (self->priv, input, buffer); });
+      rangecast::guarded ("plyenc", [&] { return write_file (self, input, buffer); });
   if (!status.ok ()) {
     gst_clear_buffer (&buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -143,23 +131,24 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
 static GstFlowReturn
 gst_ply_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
 {
-  return GST_FLOW_OK; /* prepare_output_buffer has written it */
+  return GST_FLOW_OK; /* prepare_output_buffer() has done it */
 }
 
-/* The views' places mean nothing in such a file; when they were taken still does. */
+/* Only the capture time applies to a file. */
 static gboolean
 gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
 {
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static gboolean
 gst_ply_enc_start (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
-  priv->kind_of_stream = priv->kind.load ();
+  std::lock_guard guard (priv->lock);
+  priv->kind = priv->settings.kind;
   priv->started = true;
   return TRUE;
 }
@@ -168,48 +157,42 @@ static gboolean
 gst_ply_enc_stop (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
-  const StreamLock lock (base);
+  {
+    const StreamLock lock (base);
+    priv->info = {};
+  }
+  std::lock_guard guard (priv->lock);
   priv->started = false;
-  priv->info = {};
   return TRUE;
 }
 
-static void
-gst_ply_enc_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+#define GST_TYPE_PLY_ENC_FORMAT (gst_ply_enc_format_get_type ())
+static GType
+gst_ply_enc_format_get_type (void)
 {
-  GstPlyEncPrivate *priv = GST_PLY_ENC (object)->priv;
-  switch (id) {
-    case PROP_VIEW_ID:
-      priv->with_view_id = g_value_get_boolean (value);
-      break;
-    case PROP_NORMALS:
-      priv->with_normals = g_value_get_boolean (value);
-      break;
-    case PROP_FORMAT:
-      priv->kind = PointCloudFormat::Kind (g_value_get_enum (value));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  static const GType type = [] {
+    static const GEnumValue values[] = {{PointCloudFormat::kPly, "PLY, binary", "ply"},
+        {PointCloudFormat::kPcd, "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
+    return g_enum_register_static ("GstPlyEncFormat", values);
+  }();
+  return type;
 }
 
-static void
-gst_ply_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
+static PropertyTable<PointCloudFormat> &
+ply_enc_properties ()
 {
-  GstPlyEncPrivate *priv = GST_PLY_ENC (object)->priv;
-  switch (id) {
-    case PROP_VIEW_ID:
-      g_value_set_boolean (value, priv->with_view_id);
-      break;
-    case PROP_NORMALS:
-      g_value_set_boolean (value, priv->with_normals);
-      break;
-    case PROP_FORMAT:
-      g_value_set_enum (value, priv->kind);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  using S = PointCloudFormat;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::boolean<&S::with_view_id> ("view-id", "View ID",
+          "Write the view-id of each point as property view_id", kMutablePlaying),
+      P::boolean<&S::with_normals> ("normals", "Normals",
+          "Write a unit normal for each point, estimated from the neighbouring pixels",
+          kMutablePlaying),
+      P::enumeration<&S::kind> (
+          "format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT, kMutableReady),
+  };
+  return table;
 }
 
 static void
@@ -232,34 +215,21 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->set_property = gst_ply_enc_set_property;
-  object_class->get_property = gst_ply_enc_get_property;
-  object_class->finalize = gst_ply_enc_finalize;
+  GST_DEBUG_CATEGORY_INIT (gst_ply_enc_debug, "plyenc", 0, "PLY encoder");
 
-  g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_boolean ("view-id", "View ID",
-          "Write the view-id of each point as property view_id", FALSE, kMutablePlaying));
-  g_object_class_install_property (object_class, PROP_NORMALS,
-      g_param_spec_boolean ("normals", "Normals",
-          "Write a unit normal for each point, estimated from the neighbouring pixels", FALSE,
-          kMutablePlaying));
-  g_object_class_install_property (object_class, PROP_FORMAT,
-      g_param_spec_enum ("format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT,
-          PointCloudFormat::kPly, kMutableReady));
+  object_class->finalize = gst_ply_enc_finalize;
+  install_properties<GstPlyEnc, ply_enc_properties> (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
       "Encodes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
-  gst_type_mark_as_plugin_api (GST_TYPE_PLY_ENC_FORMAT, GstPluginAPIFlags (0));
 
-  transform_class->start = gst_ply_enc_start;
-  transform_class->stop = gst_ply_enc_stop;
-  transform_class->transform_caps = gst_ply_enc_transform_caps;
-  transform_class->set_caps = gst_ply_enc_set_caps;
-  transform_class->prepare_output_buffer = gst_ply_enc_prepare_output_buffer;
-  transform_class->transform = gst_ply_enc_transform;
-  transform_class->transform_meta = gst_ply_enc_transform_meta;
-
-  GST_DEBUG_CATEGORY_INIT (gst_ply_enc_debug, "plyenc", 0, "PLY encoder");
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_ply_enc_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_ply_enc_stop);
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_transform_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_set_caps);
+  transform_class->prepare_output_buffer = GST_DEBUG_FUNCPTR (gst_ply_enc_prepare_output_buffer);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_ply_enc_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_ply_enc_transform_meta);
 }

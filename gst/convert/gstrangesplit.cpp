@@ -17,12 +17,14 @@
  */
 #include "gstrangesplit.h"
 
+#include "common/bufferpools.hpp"
+#include "common/elementproperties.hpp"
+
 #include <gst/base/gstflowcombiner.h>
 #include <gst/video/gstvideopool.h>
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <atomic>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
@@ -30,9 +32,6 @@
 #include <mutex>
 #include <rangecast/geometry/paste.hpp>
 #include <vector>
-
-#include "common/bufferpools.hpp"
-#include "common/properties.hpp"
 
 using rangecast::ConstRangeImage;
 using rangecast::ImageView;
@@ -42,19 +41,24 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_range_split_debug);
 #define GST_CAT_DEFAULT gst_range_split_debug
 
-enum { PROP_0, PROP_VIEW_ID, PROP_MASK };
+namespace {
 
-static constexpr int kFirstView = -1;
+constexpr int kFirstView = -1;
 
-/* One request pad and its stream. Made and dropped under the lock; the rest belongs to the
- * streaming thread, which holds a reference of its own. */
+struct SplitSettings {
+  int view_id = kFirstView;
+  bool mask = true;
+};
+
+/* A request pad and its stream. The members below view_id belong to the streaming thread, which
+ * keeps a reference while it uses them. */
 struct SplitPad {
   GstPad *pad;
   bool depth;  /* else colour */
-  int view_id; /* kFirstView: as the property says */
+  int view_id; /* kFirstView: that of the property */
 
   bool needs_start = true, needs_caps = true, needs_segment = true;
-  int shown_view = -1;
+  int current_view = -1; /* of the caps */
   GstVideoInfo video;
   GstBufferPool *pool = nullptr;
 
@@ -70,16 +74,15 @@ struct SplitPad {
 };
 using SplitPads = std::vector<std::shared_ptr<SplitPad>>;
 
-/* Lock order: `lock` is never held across a push, query, event or message. */
-struct GstRangeSplitPrivate {
-  std::atomic<int> view_id{kFirstView};
-  std::atomic<bool> mask{true};
+} // namespace
 
-  std::mutex lock; /* guards pads and combiner */
+struct GstRangeSplitPrivate {
+  std::mutex lock; /* guards settings, pads, combiner; never held across a push, query or message */
+  SplitSettings settings;
   SplitPads pads;
   GstFlowCombiner *combiner = gst_flow_combiner_new ();
 
-  /* streaming thread only */
+  /* streaming thread */
   gstrange::RangeInfo info;
   GstSegment segment;
   guint group_id = GST_GROUP_ID_INVALID;
@@ -118,15 +121,11 @@ current_pads (GstRangeSplit *self)
   return self->priv->pads;
 }
 
-/* The view that a pad shows, or nullptr if the rig has none such. */
-static const View *
-view_of (GstRangeSplit *self, const SplitPad &pad)
+static SplitSettings
+current_settings (GstRangeSplit *self)
 {
-  const rangecast::Rig &rig = self->priv->info.rig;
-  const int id = pad.view_id == kFirstView ? self->priv->view_id.load () : pad.view_id;
-  if (id == kFirstView)
-    return rig.views.empty () ? nullptr : &rig.views.front ();
-  return rig.find (id);
+  std::lock_guard guard (self->priv->lock);
+  return self->priv->settings;
 }
 
 static bool
@@ -162,23 +161,28 @@ push_caps (GstRangeSplit *self, SplitPad &pad, const View &view)
   pad.video.fps_n = info.fps_n;
   pad.video.fps_d = info.fps_d;
   GstCaps *caps = gst_video_info_to_caps (&pad.video);
-  const bool good =
+  GST_INFO_OBJECT (pad.pad, "view %d, caps %" GST_PTR_FORMAT, view.id, caps);
+  const bool accepted =
       gst_pad_push_event (pad.pad, gst_event_new_caps (caps)) && set_up_pool (pad, caps);
   gst_caps_unref (caps);
-  pad.shown_view = view.id;
-  return good;
+  pad.current_view = view.id;
+  if (!accepted)
+    GST_DEBUG_OBJECT (pad.pad, "caps or pool refused downstream");
+  return accepted;
 }
 
-/* Sends what must come before data on this pad: stream-start, caps, segment. */
+/* Pushes the events that precede data on this pad, where needed: STREAM_START, CAPS, SEGMENT. */
 static GstFlowReturn
-make_ready (GstRangeSplit *self, SplitPad &pad)
+make_ready (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings)
 {
-  const View *view = view_of (self, pad);
+  const rangecast::Rig &rig = self->priv->info.rig;
+  const int id = pad.view_id == kFirstView ? settings.view_id : pad.view_id;
+  const View *view = id != kFirstView     ? rig.find (id)
+                     : rig.views.empty () ? nullptr
+                                          : &rig.views[0];
   if (!view) {
     GST_ELEMENT_ERROR (self, LIBRARY, SETTINGS,
-        ("pad %s: the stream's rig has no view %d", GST_PAD_NAME (pad.pad),
-            pad.view_id == kFirstView ? self->priv->view_id.load () : pad.view_id),
-        (nullptr));
+        ("pad %s: the stream's rig has no view %d", GST_PAD_NAME (pad.pad), id), (nullptr));
     return GST_FLOW_ERROR;
   }
   if (pad.needs_start) {
@@ -190,7 +194,7 @@ make_ready (GstRangeSplit *self, SplitPad &pad)
     g_free (id);
     pad.needs_start = false;
   }
-  if (gst_pad_check_reconfigure (pad.pad) || pad.needs_caps || pad.shown_view != view->id) {
+  if (gst_pad_check_reconfigure (pad.pad) || pad.needs_caps || pad.current_view != view->id) {
     if (!push_caps (self, pad, *view)) {
       gst_pad_mark_reconfigure (pad.pad);
       return GST_PAD_IS_FLUSHING (pad.pad) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
@@ -207,20 +211,23 @@ make_ready (GstRangeSplit *self, SplitPad &pad)
 /* ---- data ---- */
 
 static GstFlowReturn
-push_view (GstRangeSplit *self, SplitPad &pad, const gstrange::RangeFrameMap &frame, GstBuffer *in)
+push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
+    const gstrange::RangeFrameMap &frame, GstBuffer *in)
 {
   if (!gst_pad_is_linked (pad.pad))
     return GST_FLOW_NOT_LINKED;
-  GstFlowReturn flow = make_ready (self, pad);
+  GstFlowReturn flow = make_ready (self, pad, settings);
   if (flow != GST_FLOW_OK)
     return flow;
-  ConstRangeImage image;
+  ConstRangeImage image; /* stays empty if the frame set lacks the view */
   for (const auto &view : frame.views ())
-    if (view.view_id == pad.shown_view)
+    if (view.view_id == pad.current_view)
       image = view;
+  GST_LOG_OBJECT (
+      pad.pad, "view %d, ROI %dx%d", pad.current_view, image.roi.width, image.roi.height);
 
   GstBuffer *out = nullptr;
-  flow = acquire_buffer (GST_ELEMENT (self), pad.pool, "a picture", &out);
+  flow = acquire_buffer (GST_ELEMENT (self), pad.pool, "an image", &out);
   if (flow != GST_FLOW_OK)
     return flow;
   GstVideoFrame video;
@@ -236,7 +243,7 @@ push_view (GstRangeSplit *self, SplitPad &pad, const gstrange::RangeFrameMap &fr
     rangecast::paste_depth (image, {static_cast<std::uint16_t *> (pixels), width, height, stride});
   else
     rangecast::paste_colour (
-        image, self->priv->mask.load (), {static_cast<Rgbx *> (pixels), width, height, stride});
+        image, settings.mask, {static_cast<Rgbx *> (pixels), width, height, stride});
   gst_video_frame_unmap (&video);
   gst_buffer_copy_into (
       out, in, GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0, -1);
@@ -254,11 +261,12 @@ gst_range_split_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
     flow = gst_range_flow_return (GST_ELEMENT (self), frame.status ());
     if (flow == GST_FLOW_OK && self->priv->info.views () == 0)
       flow = GST_FLOW_NOT_NEGOTIATED;
+    const SplitSettings settings = current_settings (self);
     for (const auto &pad : flow == GST_FLOW_OK ? current_pads (self) : SplitPads{}) {
-      const GstFlowReturn pushed = push_view (self, *pad, frame, buffer);
+      const GstFlowReturn pushed = push_view (self, *pad, settings, frame, buffer);
       std::lock_guard guard (self->priv->lock);
-      /* Of a pad that was released meanwhile: it is not in the combiner, which would hand its
-       * FLUSHING on all the same. */
+      /* Ignore the FLUSHING of a pad that was released meanwhile, which the combiner would return
+       * although it does not know the pad. */
       if (std::ranges::find (self->priv->pads, pad) == self->priv->pads.end ())
         continue;
       flow = gst_flow_combiner_update_pad_flow (self->priv->combiner, pad->pad, pushed);
@@ -281,6 +289,8 @@ handle_caps (GstRangeSplit *self, GstEvent *event)
   gst_event_unref (event);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
+  GST_INFO_OBJECT (self, "caps: %d views, %dx%d", self->priv->info.views (), self->priv->info.width,
+      self->priv->info.height);
   for (const auto &pad : current_pads (self))
     pad->needs_caps = true;
   return TRUE;
@@ -318,7 +328,7 @@ gst_range_split_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
     case GST_EVENT_GAP:
       for (const auto &pad : pads)
         if (self->priv->info.views () > 0)
-          make_ready (self, *pad);
+          make_ready (self, *pad, current_settings (self));
       break;
     default:
       break;
@@ -354,7 +364,7 @@ gst_range_split_request_new_pad (
   GstPad *pad = gst_pad_new_from_template (pad_template, pad_name);
   g_free (pad_name);
   gst_pad_set_active (pad, TRUE);
-  if (!gst_element_add_pad (element, pad)) /* the name is taken; says so itself */
+  if (!gst_element_add_pad (element, pad)) /* warns that the name is taken */
     return nullptr;
   std::lock_guard guard (self->priv->lock);
   self->priv->pads.push_back (std::make_shared<SplitPad> (pad, depth, view_id));
@@ -366,7 +376,7 @@ static void
 gst_range_split_release_pad (GstElement *element, GstPad *pad)
 {
   auto self = GST_RANGE_SPLIT (element);
-  { /* first, so that a push which the next line ends is known for one of a pad that goes */
+  { /* before deactivation, so that chain() ignores the flow return of a push that this ends */
     std::lock_guard guard (self->priv->lock);
     std::erase_if (self->priv->pads, [&] (const auto &entry) { return entry->pad == pad; });
     gst_flow_combiner_remove_pad (self->priv->combiner, pad);
@@ -375,7 +385,7 @@ gst_range_split_release_pad (GstElement *element, GstPad *pad)
   gst_element_remove_pad (element, pad);
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static GstStateChangeReturn
 gst_range_split_change_state (GstElement *element, GstStateChange transition)
@@ -397,36 +407,19 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
   return result;
 }
 
-static void
-gst_range_split_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static PropertyTable<SplitSettings> &
+split_properties ()
 {
-  auto self = GST_RANGE_SPLIT (object);
-  switch (id) {
-    case PROP_VIEW_ID:
-      self->priv->view_id = g_value_get_int (value);
-      break;
-    case PROP_MASK:
-      self->priv->mask = g_value_get_boolean (value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
-}
-
-static void
-gst_range_split_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto self = GST_RANGE_SPLIT (object);
-  switch (id) {
-    case PROP_VIEW_ID:
-      g_value_set_int (value, self->priv->view_id);
-      break;
-    case PROP_MASK:
-      g_value_set_boolean (value, self->priv->mask);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
+  using S = SplitSettings;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::number<&S::view_id> ("view-id", "View ID",
+          "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
+          rangecast::kMaxViews - 1, kMutablePlaying),
+      P::boolean<&S::mask> (
+          "mask", "Mask colour", "Make colour black where depth is invalid", kMutablePlaying),
+  };
+  return table;
 }
 
 static void
@@ -442,8 +435,8 @@ gst_range_split_init (GstRangeSplit *self)
   self->priv = new GstRangeSplitPrivate;
   gst_segment_init (&self->priv->segment, GST_FORMAT_TIME);
   GstPad *sink = gst_pad_new_from_static_template (&sink_template, "sink");
-  gst_pad_set_chain_function (sink, gst_range_split_chain);
-  gst_pad_set_event_function (sink, gst_range_split_sink_event);
+  gst_pad_set_chain_function (sink, GST_DEBUG_FUNCPTR (gst_range_split_chain));
+  gst_pad_set_event_function (sink, GST_DEBUG_FUNCPTR (gst_range_split_sink_event));
   gst_element_add_pad (GST_ELEMENT (self), sink);
 }
 
@@ -453,17 +446,10 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->set_property = gst_range_split_set_property;
-  object_class->get_property = gst_range_split_get_property;
-  object_class->finalize = gst_range_split_finalize;
+  GST_DEBUG_CATEGORY_INIT (gst_range_split_debug, "rangesplit", 0, "Range image splitter");
 
-  g_object_class_install_property (object_class, PROP_VIEW_ID,
-      g_param_spec_int ("view-id", "View ID",
-          "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
-          rangecast::kMaxViews - 1, kFirstView, kMutablePlaying));
-  g_object_class_install_property (object_class, PROP_MASK,
-      g_param_spec_boolean ("mask", "Mask colour", "Make colour black where depth is invalid", TRUE,
-          kMutablePlaying));
+  object_class->finalize = gst_range_split_finalize;
+  install_properties<GstRangeSplit, split_properties> (object_class);
 
   for (GstStaticPadTemplate *pad_template :
       {&sink_template, &depth_template, &colour_template, &depth_of_template, &colour_of_template})
@@ -471,9 +457,7 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
   gst_element_class_set_static_metadata (element_class, "Range image splitter", "Filter/Video",
       "Converts single views of range frame sets to depth and colour video", "gst-rangecast");
 
-  element_class->request_new_pad = gst_range_split_request_new_pad;
-  element_class->release_pad = gst_range_split_release_pad;
-  element_class->change_state = gst_range_split_change_state;
-
-  GST_DEBUG_CATEGORY_INIT (gst_range_split_debug, "rangesplit", 0, "Range image splitter");
+  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_range_split_request_new_pad);
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_split_release_pad);
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_split_change_state);
 }

@@ -3,8 +3,8 @@
  * SECTION:element-rangecombine
  * @title: rangecombine
  *
- * Combines the colour and depth images of any depth camera into range images of one view. They may
- * be registered pixel to pixel, of different size, or of two cameras side by side (see
+ * Combines the colour and depth images of any depth camera into range images of one view. The two
+ * may be registered pixel to pixel, differ in size, or come from separate cameras (see
  * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16_LE in any unit
  * (default: millimetres).
  *
@@ -19,24 +19,25 @@
  */
 #include "gstrangecombine.h"
 
+#include "common/bufferpools.hpp"
+#include "common/elementproperties.hpp"
+#include "framepairing.hpp"
+#include "viewsettings.hpp"
+
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <cmath>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <optional>
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
-#include <rangecast/rigfile/rig_file.hpp>
 #include <string>
-
-#include "common/bufferpools.hpp"
-#include "common/properties.hpp"
 
 using rangecast::RangeImage;
 using rangecast::RegisterInto;
@@ -48,47 +49,46 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_range_combine_debug);
 #define GST_CAT_DEFAULT gst_range_combine_debug
 
-enum : guint { PROP_STATS = 1, PROP_SETTINGS };
+/* Data flow, in the order of this file: sink_event records caps; aggregate takes a colour and a
+ * depth image of one running time, negotiates after new caps, and pushes the range image. All of it
+ * runs on GstAggregator's streaming thread. */
 
-static constexpr double kDefaultDepthScale = 0.001;
-static constexpr double kDefaultDepthUnit = 0.0001;
-/* Of an ordinary RGB-D camera, whose horizontal field of view is about 63 degrees. */
-static constexpr double kDefaultFocalOfWidth = 0.82;
+namespace {
+
+constexpr double kDefaultDepthScale = 0.001;
+/* Focal length by width of an ordinary RGB-D camera, with a horizontal field of view of 63 degrees
+ */
+constexpr double kDefaultFocalLength = 0.82;
+constexpr double kDefaultFar = 6;
 
 struct CombineSettings {
-  std::string rig;
-  int view_id = 0;
-  int colour_view_id = -1; /* -1: the depth camera gives the colour, too */
+  ViewSettings view;
+  int colour_view_id = -1; /* -1: colour comes from the depth camera, too */
   RegisterInto into = RegisterInto::kDepth;
-  double focal_length = 0; /* pixels; 0: kDefaultFocalOfWidth of the width */
-  double principal_x = -1; /* pixels; -1: the centre */
-  double principal_y = -1;
   double depth_scale = kDefaultDepthScale; /* metres per unit of the input */
-  double depth_unit = 0;                   /* metres; 0: the rig's, or kDefaultDepthUnit */
-  double near = 0, far = 0;                /* metres; 0: the rig's */
 };
 
+} // namespace
+
 struct GstRangeCombinePrivate {
-  std::mutex lock; /* guards settings and the counter; never held across a push or message */
+  std::mutex lock; /* guards settings and frames; never held across a push or message */
   CombineSettings settings;
   guint64 frames = 0;
 
-  /* streaming thread only */
-  GstAggregatorPad *colour_pad = nullptr, *depth_pad = nullptr; /* owned by the element */
-  gstrange::PairMatcher *matcher = nullptr;
-  gstrange::GapSender gaps;
-  GstVideoInfo colour, depth;
-  bool have_colour = false, have_depth = false;
-  bool negotiate = true;
-  View view;              /* what the output's caps say */
-  bool registered = true; /* pixel to pixel already: nothing to register */
-  rangecast::Registration registration;
-  GstBuffer *straight = nullptr; /* RGBx, the colour picture before it is registered */
+  /* streaming thread */
+  GstAggregatorPad *colour_pad, *depth_pad; /* owned by the element */
+  std::optional<PairMatcher> matcher;
+  std::optional<GstVideoInfo> colour, depth; /* caps */
+  bool negotiate = true;                     /* there are new caps */
+  View view;                                 /* of the output */
+  bool registered = true;                    /* colour and depth are registered pixel to pixel */
+  rangecast::Registration registration;      /* if not */
+  GstBuffer *unregistered = nullptr;         /* RGBx colour before registration */
   double depth_scale = kDefaultDepthScale;
-  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
+  GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
   GstVideoConverter *converter = nullptr;
-  GstVideoInfo rgbx; /* what the converter writes */
+  GstVideoInfo rgbx; /* the converter's output */
 };
 
 struct _GstRangeCombine {
@@ -106,110 +106,84 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRangeCombine, gst_range_combine, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (rangecombine, "rangecombine", GST_RANK_NONE, GST_TYPE_RANGE_COMBINE)
 
-#define GST_TYPE_RANGE_COMBINE_INTO (gst_range_combine_into_get_type ())
-static GType
-gst_range_combine_into_get_type (void)
+/* ---- sink caps ---- */
+
+static gboolean
+gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
-        {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured",
-            "colour"},
-        {}};
-    return g_enum_register_static ("GstRangeCombineInto", values);
-  }();
-  return type;
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    GstVideoInfo info;
+    gst_event_parse_caps (event, &caps);
+    if (!gst_video_info_from_caps (&info, caps)) {
+      GST_WARNING_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
+      gst_event_unref (event);
+      return FALSE;
+    }
+    GST_INFO_OBJECT (pad, "caps %" GST_PTR_FORMAT, caps);
+    (pad == priv->colour_pad ? priv->colour : priv->depth) = info;
+    priv->negotiate = true;
+  }
+  return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* ---- the view ---- */
+/* ---- negotiation ---- */
 
-/* A view of the rig at the size of the pictures. */
+/* The view of the depth camera. */
 static Status
-view_from_rig (
-    const std::string &path, int id, const char *property, int width, int height, View &view)
+make_depth_view (const ViewSettings &settings, int width, int height, View &view)
 {
-  rangecast::Rig rig;
-  if (Status s = rangecast::load_rig (path, rig); !s.ok ())
-    return s;
-  const View *found = rig.find (id);
-  if (!found)
-    return {StatusCode::kNotFound, path + ": has no view-id " + std::to_string (id) +
-                                       ", which property " + property + " names"};
-  view = *found;
-  view.right.reset ();
-  view.third.reset ();
-  const Status scaled = rangecast::scale_view (view, width, height);
-  return scaled.ok () ? scaled : Status{scaled.code (), path + ": " + scaled.message ()};
-}
-
-static View
-view_from_settings (const CombineSettings &settings, int width, int height)
-{
-  View view;
-  view.id = settings.view_id;
-  view.width = width;
-  view.height = height;
-  const double f = settings.focal_length > 0 ? settings.focal_length : kDefaultFocalOfWidth * width;
-  view.intrinsics = {f, f, settings.principal_x >= 0 ? settings.principal_x : (width - 1) / 2.0,
-      settings.principal_y >= 0 ? settings.principal_y : (height - 1) / 2.0};
-  view.world_from_view.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* level, looking along -z */
-  view.depth_unit_m = kDefaultDepthUnit;
-  view.near_m = 0.3;
-  view.far_m = 6.0;
-  return view;
-}
-
-/* The camera that took the depth. */
-static Status
-make_depth_view (const CombineSettings &settings, int width, int height, View &view)
-{
-  if (settings.rig.empty ())
-    view = view_from_settings (settings, width, height);
-  else if (Status s =
-               view_from_rig (settings.rig, settings.view_id, "view-id", width, height, view);
-           !s.ok ())
-    return s;
-  if (settings.depth_unit > 0)
-    view.depth_unit_m = settings.depth_unit;
-  if (settings.near > 0)
-    view.near_m = settings.near;
-  if (settings.far > 0)
-    view.far_m = settings.far;
+  if (settings.rig.empty ()) {
+    const double focal_length =
+        settings.focal_length > 0 ? settings.focal_length : kDefaultFocalLength * width;
+    view = make_pinhole_view (settings, focal_length, width, height);
+    view.far_m = kDefaultFar;
+  } else {
+    if (Status s = load_view (settings.rig, settings.view_id, width, height, view); !s.ok ())
+      return s;
+    view.right.reset ();
+    view.third.reset ();
+  }
+  set_depth_range (settings, view);
   return rangecast::validate ({{view}});
 }
 
-/* The camera that took the colour: one of the rig's own, or the depth camera at another size. */
+/* The view of the colour camera: one of the rig, or the depth camera at another size. */
 static Status
 make_colour_view (
     const CombineSettings &settings, const View &depth, int width, int height, View &view)
 {
-  if (settings.colour_view_id >= 0 && settings.rig.empty ())
-    return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
-                                   "with the poses of both cameras"};
-  if (settings.colour_view_id >= 0)
-    return view_from_rig (
-        settings.rig, settings.colour_view_id, "colour-view-id", width, height, view);
+  if (settings.colour_view_id >= 0) {
+    if (settings.view.rig.empty ())
+      return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
+                                     "with the poses of both cameras"};
+    const Status status =
+        load_view (settings.view.rig, settings.colour_view_id, width, height, view);
+    view.right.reset ();
+    view.third.reset ();
+    return status;
+  }
   view = depth;
   const Status scaled = rangecast::scale_view (view, width, height);
   if (scaled.ok ())
     return scaled;
-  return {scaled.code (), "pad depth is " + size_text (depth.width, depth.height) +
-                              " but pad colour is " + size_text (width, height) +
-                              "; expected the same shape, or property colour-view-id for a colour "
-                              "camera of its own"};
+  return {scaled.code (),
+      "pad depth is " + size_text (depth.width, depth.height) + " but pad colour is " +
+          size_text (width, height) +
+          "; expected the same shape, or property colour-view-id for a colour camera of its own"};
 }
 
-/* Both cameras, and what comes out of them. */
+/* Sets up the views of both cameras and of the output, and the registration between them. */
 static Status
-make_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
+configure_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
 {
   View depth, colour;
-  if (Status s = make_depth_view (settings, GST_VIDEO_INFO_WIDTH (&priv->depth),
-          GST_VIDEO_INFO_HEIGHT (&priv->depth), depth);
+  if (Status s = make_depth_view (settings.view, priv->depth->width, priv->depth->height, depth);
       !s.ok ())
     return s;
-  if (Status s = make_colour_view (settings, depth, GST_VIDEO_INFO_WIDTH (&priv->colour),
-          GST_VIDEO_INFO_HEIGHT (&priv->colour), colour);
+  if (Status s =
+          make_colour_view (settings, depth, priv->colour->width, priv->colour->height, colour);
       !s.ok ())
     return s;
   priv->registered = settings.colour_view_id < 0 && depth.distortion.empty () &&
@@ -222,13 +196,11 @@ make_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
   return status.ok () ? rangecast::validate ({{priv->view}}) : status;
 }
 
-/* ---- negotiation ---- */
-
 static void
 drop_pool_and_converter (GstRangeCombinePrivate *priv)
 {
   drop_pool (priv->pool);
-  gst_clear_buffer (&priv->straight);
+  gst_clear_buffer (&priv->unregistered);
   if (priv->converter)
     gst_video_converter_free (priv->converter);
   priv->converter = nullptr;
@@ -237,56 +209,52 @@ drop_pool_and_converter (GstRangeCombinePrivate *priv)
 static bool
 make_converter (GstRangeCombinePrivate *priv)
 {
-  gst_video_info_set_format (&priv->rgbx, GST_VIDEO_FORMAT_RGBx,
-      guint (GST_VIDEO_INFO_WIDTH (&priv->colour)), guint (GST_VIDEO_INFO_HEIGHT (&priv->colour)));
-  priv->rgbx.fps_n = priv->colour.fps_n;
-  priv->rgbx.fps_d = priv->colour.fps_d;
-  priv->rgbx.interlace_mode = priv->colour.interlace_mode;
-  if (GST_VIDEO_INFO_FORMAT (&priv->colour) == GST_VIDEO_FORMAT_RGBx)
-    priv->rgbx.colorimetry = priv->colour.colorimetry;
-  priv->converter = gst_video_converter_new (&priv->colour, &priv->rgbx, nullptr);
+  GstVideoInfo &rgbx = priv->rgbx;
+  GstVideoInfo &colour = *priv->colour;
+  gst_video_info_set_format (
+      &rgbx, GST_VIDEO_FORMAT_RGBx, guint (colour.width), guint (colour.height));
+  rgbx.fps_n = colour.fps_n;
+  rgbx.fps_d = colour.fps_d;
+  rgbx.interlace_mode = colour.interlace_mode;
+  if (GST_VIDEO_INFO_FORMAT (&colour) == GST_VIDEO_FORMAT_RGBx)
+    rgbx.colorimetry = colour.colorimetry;
+  priv->converter = gst_video_converter_new (&colour, &rgbx, nullptr);
   if (!priv->registered)
-    priv->straight = gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&priv->rgbx), nullptr);
+    priv->unregistered = gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&rgbx), nullptr);
   return priv->converter;
-}
-
-/* How long a frame is: that of the slower stream, for so many pairs there are; how far two may be
- * apart is half a frame of the faster one, so that each of the slower finds its nearest. */
-static GstClockTime
-frame_duration_of (const GstVideoInfo &info)
-{
-  return info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND, info.fps_d, info.fps_n)
-                        : GST_CLOCK_TIME_NONE;
-}
-
-static const GstVideoInfo &
-slower (const GstRangeCombinePrivate *priv)
-{
-  const GstClockTime colour = frame_duration_of (priv->colour),
-                     depth = frame_duration_of (priv->depth);
-  const bool depth_is =
-      GST_CLOCK_TIME_IS_VALID (depth) && (!GST_CLOCK_TIME_IS_VALID (colour) || depth > colour);
-  return depth_is ? priv->depth : priv->colour;
 }
 
 static GstFlowReturn
 negotiate (GstRangeCombine *self)
 {
   GstRangeCombinePrivate *priv = self->priv;
+  if (!priv->colour || !priv->depth) {
+    GST_WARNING_OBJECT (self, "pad %s: frames without caps", priv->colour ? "depth" : "colour");
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
   CombineSettings settings;
   {
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
-  const GstFlowReturn flow =
-      gst_range_flow_return (GST_ELEMENT (self), make_views (priv, settings));
-  if (flow != GST_FLOW_OK)
+  if (const GstFlowReturn flow =
+          gst_range_flow_return (GST_ELEMENT (self), configure_views (priv, settings));
+      flow != GST_FLOW_OK)
     return flow;
   priv->depth_scale = settings.depth_scale;
 
-  const auto info = gstrange::make_info ({{priv->view}}, slower (priv).fps_n, slower (priv).fps_d);
+  /* There are as many pairs as the slower stream has frames. */
+  const GstClockTime colour = frame_duration (priv->colour), depth = frame_duration (priv->depth);
+  const bool depth_is_slower =
+      GST_CLOCK_TIME_IS_VALID (depth) && (!GST_CLOCK_TIME_IS_VALID (colour) || depth > colour);
+  const GstVideoInfo &slower = depth_is_slower ? *priv->depth : *priv->colour;
+  const auto info = gstrange::make_info ({{priv->view}}, slower.fps_n, slower.fps_d);
   priv->frame_duration = info.frame_duration ();
   GstCaps *caps = gstrange::make_range_caps (info);
+  GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
+  GST_DEBUG_OBJECT (self, "view %d, %g to %g m, %s", priv->view.id, priv->view.near_m,
+      priv->view.far_m,
+      priv->registered ? "colour and depth are registered" : "registering colour and depth");
   drop_pool_and_converter (priv);
   const Status pooled = gstrange::make_pool (caps, priv->pool);
   if (pooled.ok ())
@@ -297,7 +265,7 @@ negotiate (GstRangeCombine *self)
   if (!make_converter (priv)) {
     GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
         ("pad colour: cannot convert %s to RGBx",
-            gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&priv->colour))),
+            gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&*priv->colour))),
         (nullptr));
     return GST_FLOW_ERROR;
   }
@@ -308,26 +276,7 @@ negotiate (GstRangeCombine *self)
 static GstFlowReturn
 gst_range_combine_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 {
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with the first pair, see negotiate() */
-}
-
-static gboolean
-gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
-{
-  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    GstCaps *caps;
-    GstVideoInfo info;
-    gst_event_parse_caps (event, &caps);
-    if (!gst_video_info_from_caps (&info, caps)) {
-      gst_event_unref (event);
-      return FALSE;
-    }
-    (pad == priv->colour_pad ? priv->colour : priv->depth) = info;
-    (pad == priv->colour_pad ? priv->have_colour : priv->have_depth) = true;
-    priv->negotiate = true;
-  }
-  return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
 }
 
 /* ---- data ---- */
@@ -337,7 +286,7 @@ convert_colour (
     GstRangeCombinePrivate *priv, GstBuffer *colour, rangecast::ImageView<rangecast::Rgbx> out)
 {
   GstVideoFrame from, to = {};
-  if (!gst_video_frame_map (&from, &priv->colour, colour, GST_MAP_READ))
+  if (!gst_video_frame_map (&from, &*priv->colour, colour, GST_MAP_READ))
     return false;
   to.info = priv->rgbx;
   to.info.stride[0] = static_cast<gint> (out.stride);
@@ -347,7 +296,7 @@ convert_colour (
   return true;
 }
 
-/* Depth and colour of one camera, pixel to pixel: straight into the planes of the output. */
+/* Writes directly into the planes of the output. */
 static Status
 combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
     rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
@@ -365,15 +314,15 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
     rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
   GstMapInfo map;
-  if (!gst_buffer_map (priv->straight, &map, GST_MAP_READWRITE))
+  if (!gst_buffer_map (priv->unregistered, &map, GST_MAP_READWRITE))
     return {StatusCode::kNoSpace, "pad colour: out of memory"};
-  const rangecast::ImageView<rangecast::Rgbx> straight = {
+  const rangecast::ImageView<rangecast::Rgbx> unregistered = {
       reinterpret_cast<rangecast::Rgbx *> (map.data), GST_VIDEO_INFO_WIDTH (&priv->rgbx),
       GST_VIDEO_INFO_HEIGHT (&priv->rgbx), GST_VIDEO_INFO_PLANE_STRIDE (&priv->rgbx, 0)};
   Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
-  if (convert_colour (priv, colour, straight))
-    status = priv->registration.process (depth, priv->depth_scale, straight, image);
-  gst_buffer_unmap (priv->straight, &map);
+  if (convert_colour (priv, colour, unregistered))
+    status = priv->registration.process (depth, priv->depth_scale, unregistered, image);
+  gst_buffer_unmap (priv->unregistered, &map);
   return status;
 }
 
@@ -384,7 +333,7 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
   if (!frame.status ().ok ())
     return frame.status ();
   GstVideoFrame from;
-  if (!gst_video_frame_map (&from, &priv->depth, depth, GST_MAP_READ))
+  if (!gst_video_frame_map (&from, &*priv->depth, depth, GST_MAP_READ))
     return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps require"};
   const rangecast::ImageView<const std::uint16_t> picture = {
       static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)),
@@ -397,7 +346,7 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
 }
 
 static GstFlowReturn
-push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
+push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
 {
   GstRangeCombinePrivate *priv = self->priv;
   auto aggregator = GST_AGGREGATOR (self);
@@ -421,7 +370,8 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
                                     : GST_BUFFER_DURATION (pair.first);
   const GstClockTime running = gstrange::running_time_of (priv->colour_pad, pair.first);
   gstrange::stamp (aggregator, output, running, duration, capture);
-  priv->gaps.note_buffer (running, duration);
+  GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT, GST_TIME_ARGS (running));
+  priv->matcher->record_output (running, duration);
   if (GST_BUFFER_IS_DISCONT (pair.first))
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   {
@@ -431,22 +381,20 @@ push_pair (GstRangeCombine *self, const gstrange::PairMatcher::Pair &pair)
   return gst_aggregator_finish_buffer (aggregator, output);
 }
 
-/* Tells downstream of a time of which there will be nothing, up to the pair that waits. */
+/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
 static GstFlowReturn
 push_gap (GstRangeCombine *self, GstBuffer *waiting)
 {
   GstRangeCombinePrivate *priv = self->priv;
   GstClockTime begin, end;
-  if (!priv->matcher->take_gap (begin, end))
-    return GST_FLOW_OK;
-  if (waiting) /* NONE is the greatest number */
-    end = std::min (end, gstrange::running_time_of (priv->colour_pad, waiting));
-  if (!priv->gaps.cut (begin, end) || !priv->have_colour || !priv->have_depth)
+  const GstClockTime until =
+      waiting ? gstrange::running_time_of (priv->colour_pad, waiting) : GST_CLOCK_TIME_NONE;
+  if (!priv->matcher->take_gap (until, begin, end) || !priv->colour || !priv->depth)
     return GST_FLOW_OK;
   if (priv->negotiate)
     if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
       return flow;
-  priv->gaps.push (GST_AGGREGATOR (self), priv->colour_pad, begin, end);
+  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
   return GST_FLOW_OK;
 }
 
@@ -455,13 +403,11 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
 {
   auto self = GST_RANGE_COMBINE (aggregator);
   GstRangeCombinePrivate *priv = self->priv;
-  GstClockTime duration = GST_CLOCK_TIME_NONE; /* of the faster stream */
-  if (priv->have_colour)
-    duration = frame_duration_of (priv->colour);
-  if (priv->have_depth)
-    duration = std::min (duration, frame_duration_of (priv->depth));
-
-  gstrange::PairMatcher::Pair pair;
+  /* Within half a frame of the faster stream, so that each frame of the slower one is paired with
+   * the nearest. NONE is the maximum. */
+  const GstClockTime duration =
+      std::min (frame_duration (priv->colour), frame_duration (priv->depth));
+  PairMatcher::Pair pair;
   const GstFlowReturn taken = priv->matcher->take (duration, pair);
   GstFlowReturn flow = push_gap (self, pair.first);
   if (taken != GST_FLOW_OK)
@@ -475,29 +421,36 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
   return flow;
 }
 
-static GstFlowReturn
-gst_range_combine_flush (GstAggregator *aggregator)
+/* Without a frame on both pads there is nothing to push, so there is no deadline. */
+static GstClockTime
+gst_range_combine_get_next_time (GstAggregator *aggregator)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
-  GstClockTime begin, end;
-  priv->matcher->take_gap (begin, end);
-  priv->gaps.reset ();
-  return GST_FLOW_OK;
+  log_waiting (GST_CAT_DEFAULT, priv->colour_pad);
+  log_waiting (GST_CAT_DEFAULT, priv->depth_pad);
+  return GST_CLOCK_TIME_NONE;
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static gboolean
 gst_range_combine_start (GstAggregator *aggregator)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
-  priv->have_colour = priv->have_depth = false;
+  priv->colour.reset ();
+  priv->depth.reset ();
   priv->negotiate = true;
   priv->matcher->reset ();
-  priv->gaps.reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;
   return TRUE;
+}
+
+static GstFlowReturn
+gst_range_combine_flush (GstAggregator *aggregator)
+{
+  GST_RANGE_COMBINE (aggregator)->priv->matcher->flush ();
+  return GST_FLOW_OK;
 }
 
 static gboolean
@@ -507,17 +460,35 @@ gst_range_combine_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
+/* ---- properties ---- */
+
+#define GST_TYPE_RANGE_COMBINE_INTO (gst_range_combine_into_get_type ())
+static GType
+gst_range_combine_into_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
+        {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured",
+            "colour"},
+        {}};
+    return g_enum_register_static ("GstRangeCombineInto", values);
+  }();
+  return type;
+}
+
 static PropertyTable<CombineSettings> &
 combine_properties ()
 {
   using S = CombineSettings;
+  using V = ViewSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::text<&S::rig> ("rig", "Rig",
+      P::text<&S::view, &V::rig> ("rig", "Rig",
           "Rig file with the calibration of the view (unset = a pinhole camera at the origin with "
           "focal-length)",
           kMutableReady),
-      P::number<&S::view_id> ("view-id", "View ID",
+      P::number<&S::view, &V::view_id> ("view-id", "View ID",
           "view-id of the depth camera, and of the output unless into=colour", 0,
           rangecast::kMaxViews - 1, kMutableReady),
       P::number<&S::colour_view_id> ("colour-view-id", "Colour view ID",
@@ -526,66 +497,48 @@ combine_properties ()
       P::enumeration<&S::into> ("into", "Output view",
           "Output view if colour and depth come from different cameras",
           GST_TYPE_RANGE_COMBINE_INTO, kMutableReady),
-      P::number<&S::focal_length> ("focal-length", "Focal length",
+      P::number<&S::view, &V::focal_length> ("focal-length", "Focal length",
           "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, kMutableReady),
-      P::number<&S::principal_x> ("principal-x", "Principal point x",
+      P::number<&S::view, &V::principal_x> ("principal-x", "Principal point x",
           "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
           kMutableReady),
-      P::number<&S::principal_y> ("principal-y", "Principal point y",
+      P::number<&S::view, &V::principal_y> ("principal-y", "Principal point y",
           "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
           kMutableReady),
       P::number<&S::depth_scale> ("depth-scale", "Depth scale",
           "Metres per unit of the input depth", 1e-7, 1, kMutableReady),
-      P::number<&S::depth_unit> ("depth-unit", "Depth unit",
+      P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
           "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, kMutableReady),
-      P::number<&S::near> ("near", "Near",
+      P::number<&S::view, &V::near> ("near", "Near",
           "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
-      P::number<&S::far> ("far", "Far", "Farthest valid depth in metres (0 = from the rig, or 6)",
-          0, 1e4, kMutableReady),
+      P::number<&S::view, &V::far> ("far", "Far",
+          "Farthest valid depth in metres (0 = from the rig, or 6)", 0, 1e4, kMutableReady),
   };
   return table;
 }
 
-static void
-gst_range_combine_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstRangeCombinePrivate *priv)
 {
-  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (!combine_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_range_combine_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (
-        value, gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
-                   priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
-                   "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr));
-  else if (!combine_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  return gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
+      priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
+      "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr);
 }
 
 static void
 gst_range_combine_finalize (GObject *object)
 {
-  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (object)->priv;
-  drop_pool_and_converter (priv);
-  delete priv->matcher;
-  delete priv;
+  delete GST_RANGE_COMBINE (object)->priv;
   G_OBJECT_CLASS (gst_range_combine_parent_class)->finalize (object);
 }
 
 static void
 gst_range_combine_init (GstRangeCombine *self)
 {
-  self->priv = new GstRangeCombinePrivate;
-  self->priv->colour_pad = gstrange::add_sink_pad (GST_ELEMENT (self), "colour");
-  self->priv->depth_pad = gstrange::add_sink_pad (GST_ELEMENT (self), "depth");
-  self->priv->matcher = new gstrange::PairMatcher (self->priv->colour_pad, self->priv->depth_pad);
+  auto priv = self->priv = new GstRangeCombinePrivate;
+  priv->colour_pad = add_sink_pad (GST_ELEMENT (self), "colour");
+  priv->depth_pad = add_sink_pad (GST_ELEMENT (self), "depth");
+  priv->matcher.emplace (priv->colour_pad, priv->depth_pad, GST_CAT_DEFAULT);
 }
 
 static void
@@ -595,29 +548,24 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->set_property = gst_range_combine_set_property;
-  object_class->get_property = gst_range_combine_get_property;
+  GST_DEBUG_CATEGORY_INIT (gst_range_combine_debug, "rangecombine", 0, "Range image combiner");
+
   object_class->finalize = gst_range_combine_finalize;
-  combine_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRangeCombine, combine_properties, make_stats> (object_class,
       "Counters since the element was started: frames, dropped-colour, dropped-depth");
 
-  gst_element_class_add_static_pad_template_with_gtype (
-      element_class, &colour_template, GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_add_static_pad_template_with_gtype (
-      element_class, &depth_template, GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_add_static_pad_template_with_gtype (
-      element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
+  for (GstStaticPadTemplate *pad_template : {&colour_template, &depth_template, &src_template})
+    gst_element_class_add_static_pad_template_with_gtype (
+        element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range image combiner", "Filter/Video",
       "Combines the colour and depth images of a depth camera into range images", "gst-rangecast");
 
-  aggregator_class->start = gst_range_combine_start;
-  aggregator_class->stop = gst_range_combine_stop;
-  aggregator_class->flush = gst_range_combine_flush;
-  aggregator_class->sink_event = gst_range_combine_sink_event;
-  aggregator_class->update_src_caps = gst_range_combine_update_src_caps;
-  aggregator_class->clip = gstrange::clip_to_segment;
-  aggregator_class->aggregate = gst_range_combine_aggregate;
-
-  GST_DEBUG_CATEGORY_INIT (gst_range_combine_debug, "rangecombine", 0, "Range image combiner");
+  aggregator_class->start = GST_DEBUG_FUNCPTR (gst_range_combine_start);
+  aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_range_combine_stop);
+  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_combine_flush);
+  aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_combine_sink_event);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_combine_update_src_caps);
+  aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
+  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_combine_aggregate);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_combine_get_next_time);
 }

@@ -17,27 +17,26 @@
  */
 #include "gstroiextract.h"
 
+#include "common/controlledvalues.hpp"
+#include "common/elementproperties.hpp"
+#include "common/streamlock.hpp"
+#include "roisettings.hpp"
+
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
 #include <rangecast/base/output_path.hpp>
-#include <rangecast/base/parallel.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <rangecast/geometry/size_text.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
 #include <rangecast/roi/opencv_threads.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
-
-#include "common/controlledvalues.hpp"
-#include "common/statsreporter.hpp"
-#include "common/streamlock.hpp"
-#include "roisettings.hpp"
 
 using rangecast::BackgroundModel;
 using rangecast::RangeImage;
@@ -49,43 +48,54 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
 #define GST_CAT_DEFAULT gst_roi_extract_debug
 
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+/* Data flow, in the order of this file: set_caps prepares a state for each view; transform_ip
+ * segments all views in parallel and crops them, then, view by view, requests the region from
+ * upstream and finishes learning. The background is learnt from the first frames, on
+ * capture-background, or loaded in set_caps; it is saved when all views have learnt theirs, and
+ * again at EOS. */
+
 enum { SIGNAL_CAPTURE_BACKGROUND, N_SIGNALS };
 static guint signals[N_SIGNALS];
 
-/* It is taught no more often than this, which nobody sees and saves time, seconds. */
-static constexpr double kShortestStep = 0.2;
-/* The ROI told upstream is this much larger than the box, and told again when the box leaves it or
- * fits it no more. */
-static constexpr int kAnnouncedMargin = 16;
+namespace {
 
-/* What is kept of one view. */
+/* Minimum time between adaptations of the background, seconds; more often would make no visible
+ * difference. */
+constexpr double kMinAdaptInterval = 0.2;
+/* Margin of the region requested from upstream around the foreground's bounding box, pixels. */
+constexpr int kRequestMargin = 16;
+
+/* One view of the stream. */
 struct ViewState {
   BackgroundModel background;
   rangecast::Segmenter segmenter;
   bool learnt = false;
-  int learning_target = 0;
-  int settled = 0;        /* frames seen before learning began */
-  guint64 adapted_ns = 0; /* capture time of the last frame that taught the background, */
-  int adapted_area = 0;   /* and the pixels of its ROI */
-  Roi announced;
-  guint64 points_in = 0, points_out = 0; /* of the present frame */
+  int learning_target = 0; /* frames */
+  int settled = 0;         /* frames skipped before learning */
+  guint64 adapted_ns = 0;  /* capture time of the frame of the last adaptation */
+  int adapted_area = 0;    /* pixels of its ROI */
+  Roi requested;           /* from upstream; empty: everything */
+
+  /* results of the current frame */
+  guint64 points_in = 0, points_out = 0;
   Roi box;
   Status status;
 };
 
+} // namespace
+
 struct GstRoiExtractPrivate {
-  std::mutex lock; /* guards settings and stats; never held across a push, event or message */
+  std::mutex lock; /* guards settings up to last_roi; never held across a push, event or message */
   RoiSettings settings;
   guint64 frames = 0, points_in = 0, points_out = 0;
   Roi last_roi;
 
-  StatsReporter reporter; /* has locks of its own */
-  std::atomic<bool> relearn{false};
+  StatsReporter reporter;           /* thread-safe */
+  std::atomic<bool> relearn{false}; /* set by capture-background */
 
-  /* streaming thread only */
-  std::string refused; /* what was said of caps last: they come again with each buffer */
-  std::string unsaved; /* a file that cannot be written is told once */
+  /* streaming thread */
+  std::string caps_error; /* already posted; refused caps come again with each buffer */
+  std::string unsaved;    /* file that could not be written; reported once */
   gstrange::RangeInfo info;
   std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
 };
@@ -103,8 +113,6 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
 
-/* ---- the background ---- */
-
 static RoiSettings
 copy_settings (GstRoiExtractPrivate *priv)
 {
@@ -116,15 +124,17 @@ static void
 begin_learning (ViewState &state, const View &view, int frames)
 {
   state.background.reset (view.width, view.height);
-  state.segmenter = {}; /* the light is that of the new background */
+  state.segmenter = {}; /* its estimate of the light refers to the old background */
   state.adapted_ns = 0;
   state.adapted_area = 0;
   state.learning_target = frames;
   state.learnt = false;
 }
 
-/* Each view of the caps gets a state; backgrounds of views that keep their size stay. What upstream
- * was told holds until new caps only. */
+/* ---- caps ---- */
+
+/* Creates a state for each view of the caps; views that keep their size keep their background.
+ * Upstream drops region requests with new caps. */
 static void
 prepare_views (GstRoiExtractPrivate *priv, int background_frames)
 {
@@ -139,7 +149,7 @@ prepare_views (GstRoiExtractPrivate *priv, int background_frames)
       state = std::make_unique<ViewState> ();
     if (state->background.width () != view->width || state->background.height () != view->height)
       begin_learning (*state, *view, background_frames);
-    state->announced = {};
+    state->requested = {};
   }
 }
 
@@ -157,62 +167,21 @@ load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
   if (Status s = rangecast::load_backgrounds (path, loaded); !s.ok ())
     return s;
   for (const View &view : priv->info.rig.views) {
-    const auto found = std::find_if (
-        loaded.begin (), loaded.end (), [&] (const auto &entry) { return entry.first == view.id; });
+    const auto found = std::ranges::find (loaded, view.id, &decltype (loaded)::value_type::first);
     if (found == loaded.end ())
       return {
           StatusCode::kNotFound, path + ": has no background of view " + std::to_string (view.id)};
-    if (found->second.width () != view.width || found->second.height () != view.height)
-      return {StatusCode::kBadSize, path + ": the background of view " + std::to_string (view.id) +
-                                        " is " + std::to_string (found->second.width ()) + "x" +
-                                        std::to_string (found->second.height ()) + ", expected " +
-                                        std::to_string (view.width) + "x" +
-                                        std::to_string (view.height)};
+    const BackgroundModel &model = found->second;
+    if (model.width () != view.width || model.height () != view.height)
+      return {StatusCode::kBadSize,
+          path + ": the background of view " + std::to_string (view.id) + " is " +
+              rangecast::size_text (model.width (), model.height ()) + ", expected " +
+              rangecast::size_text (view.width, view.height)};
     ViewState &state = *priv->views[view.id];
     state.background = std::move (found->second);
     state.learnt = true;
   }
   return {};
-}
-
-/* What OpenCV can write, and says more politely than it does. */
-static Status
-check_save_path (const std::string &path)
-{
-  static constexpr std::string_view kExtensions[] = {
-      ".yml", ".yaml", ".json", ".yml.gz", ".yaml.gz", ".json.gz"};
-  return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
-}
-
-static void
-save_when_all_learnt (GstRoiExtract *self, const std::string &path)
-{
-  if (path.empty () || path == self->priv->unsaved || !all_learnt (self->priv))
-    return;
-  std::vector<std::pair<int, const BackgroundModel *>> models;
-  for (const View &view : self->priv->info.rig.views)
-    models.emplace_back (view.id, &self->priv->views[view.id]->background);
-  Status status = check_save_path (path);
-  if (status.ok ())
-    status = rangecast::save_backgrounds (path, models);
-  self->priv->unsaved = status.ok () ? "" : path;
-  gst_range_post_warning (GST_ELEMENT (self), status);
-}
-
-/* Who wants a background in a file should hear that the stream was too short for one. */
-static void
-warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
-{
-  if (settings.save_background.empty () || all_learnt (self->priv))
-    return;
-  int seen = 0;
-  for (const View &view : self->priv->info.rig.views)
-    seen = std::max (seen, self->priv->views[view.id]->background.frames ());
-  gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kNotFound, settings.save_background + ": not written: the stream ended after " +
-                                  std::to_string (seen) +
-                                  " frames of the background; expected background-frames, " +
-                                  std::to_string (settings.background_frames)});
 }
 
 static gboolean
@@ -223,20 +192,24 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
   const RoiSettings settings = copy_settings (priv);
   Status status = gstrange::parse_caps (caps, priv->info);
   if (status.ok ()) {
+    GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT, caps);
     priv->reporter.set_views (priv->info.rig);
     prepare_views (priv, settings.background_frames);
     if (!settings.background_file.empty () && !all_learnt (priv))
       status = load_background_file (priv, settings.background_file);
+    GST_DEBUG_OBJECT (
+        self, "%s", all_learnt (priv) ? "background is known" : "learning background");
   }
-  const bool said = !status.ok () && status.message () == priv->refused;
-  priv->refused = status.message ();
-  return !said && gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  const bool posted = !status.ok () && status.message () == priv->caps_error;
+  priv->caps_error = status.message ();
+  return !posted && gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* ---- one frame set ---- */
+/* ---- segmentation ---- */
 
-/* Lets the background follow slow change, where nobody is. A frame that shows more of it than the
- * last one always does: stereodepth matches the whole picture only now and then. */
+/* Adapts the background to slow changes outside of the foreground: at intervals, and to every frame
+ * with a larger ROI than the last one, because stereodepth matches full images only now and then.
+ */
 static void
 adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s)
 {
@@ -245,7 +218,7 @@ adapt_background (ViewState &state, const RangeImage &image, double adapt_time_s
     state.adapted_ns = now;
   const double passed = double (now - state.adapted_ns) * 1e-9;
   const int area = image.roi.width * image.roi.height;
-  if (adapt_time_s <= 0 || area == 0 || (passed < kShortestStep && area <= state.adapted_area))
+  if (adapt_time_s <= 0 || area == 0 || (passed < kMinAdaptInterval && area <= state.adapted_area))
     return;
   state.adapted_ns = now;
   state.adapted_area = area;
@@ -283,78 +256,7 @@ process_view (
   state.box = rangecast::bounding_box (image, settings.margin);
 }
 
-static void
-push_roi_event (GstRoiExtract *self, int view_id, const Roi &roi)
-{
-  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
-      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
-      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
-  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
-      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
-}
-
-/* Tells upstream (stereodepth) which part of the picture is still wanted. */
-static void
-announce_roi (GstRoiExtract *self, ViewState &state, int view_id)
-{
-  const Roi &box = state.box, &told = state.announced;
-  /* Upstream gives nothing beyond what it was told, so a box that grows is told before it gets
-   * there: when it comes near an edge that is not the picture's. */
-  const View *full = self->priv->info.rig.find (view_id);
-  constexpr int kNear = kAnnouncedMargin / 2;
-  const int right = told.x + told.width, bottom = told.y + told.height;
-  const bool inside = !told.empty () && (told.x == 0 || box.x >= told.x + kNear) &&
-                      (told.y == 0 || box.y >= told.y + kNear) &&
-                      (right >= full->width || box.x + box.width <= right - kNear) &&
-                      (bottom >= full->height || box.y + box.height <= bottom - kNear);
-  const bool fits = told.width <= box.width + 3 * kAnnouncedMargin &&
-                    told.height <= box.height + 3 * kAnnouncedMargin;
-  if (box.empty () ? told.empty () : inside && fits)
-    return;
-  Roi &roi = state.announced;
-  roi = {};
-  if (!box.empty ()) {
-    roi.x = std::max (0, box.x - kAnnouncedMargin);
-    roi.y = std::max (0, box.y - kAnnouncedMargin);
-    roi.width = std::min (full->width, box.x + box.width + kAnnouncedMargin) - roi.x;
-    roi.height = std::min (full->height, box.y + box.height + kAnnouncedMargin) - roi.y;
-  }
-  push_roi_event (self, view_id, roi);
-}
-
-/* A view that has seen enough of the empty scene is ready. */
-static bool
-finish_learning (ViewState &state)
-{
-  if (state.learnt || state.background.frames () < state.learning_target)
-    return false;
-  state.background.finish ();
-  state.learnt = true;
-  return true;
-}
-
-static void
-relearn_all (GstRoiExtract *self, int frames)
-{
-  for (const View &view : self->priv->info.rig.views) {
-    ViewState &state = *self->priv->views[view.id];
-    begin_learning (state, view, frames);
-    if (!state.announced.empty ())
-      push_roi_event (self, view.id, {}); /* the whole background is to be seen */
-    state.announced = {};
-  }
-}
-
-static Status
-check_views (GstRoiExtractPrivate *priv, const gstrange::RangeFrameMap &frame)
-{
-  for (const RangeImage &image : frame.views ())
-    if (!priv->views[image.view_id])
-      return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
-                                         " is not in the rig of the caps"};
-  return {};
-}
-
+/* Segments and crops all views of a frame set. */
 static Status
 process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSettings &settings)
 {
@@ -362,8 +264,10 @@ process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSet
   const auto images = frame.views ();
   if (Status s = frame.status (); !s.ok ())
     return s;
-  if (Status s = check_views (priv, frame); !s.ok ())
-    return s;
+  for (const RangeImage &image : images)
+    if (!priv->views[image.view_id])
+      return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
+                                         " is not in the rig of the caps"};
   rangecast::in_parallel_with_opencv (images.size (), settings.n_threads, [&] (std::size_t i) {
     process_view (*priv->views[images[i].view_id], *priv->info.rig.find (images[i].view_id),
         images[i], settings);
@@ -377,6 +281,107 @@ process_frame (GstRoiExtract *self, gstrange::RangeFrameMap &frame, const RoiSet
   return {};
 }
 
+/* ---- requests to upstream ---- */
+
+/* An empty ROI requests the full image. */
+static void
+push_roi_event (GstRoiExtract *self, int view_id, const Roi &roi)
+{
+  GstStructure *structure = gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT,
+      guint (view_id), "x", G_TYPE_UINT, guint (roi.x), "y", G_TYPE_UINT, guint (roi.y), "width",
+      G_TYPE_UINT, guint (roi.width), "height", G_TYPE_UINT, guint (roi.height), nullptr);
+  GST_DEBUG_OBJECT (
+      self, "view %d: requesting %dx%d at (%d, %d)", view_id, roi.width, roi.height, roi.x, roi.y);
+  gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (self),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, structure));
+}
+
+/* Requests the foreground's bounding box with a margin from upstream (stereodepth), if it does not
+ * fit the region requested before. Upstream gives nothing outside of that region, so a growing box
+ * is requested before it reaches an edge that is not the image's. */
+static void
+request_roi (GstRoiExtract *self, ViewState &state, int view_id)
+{
+  const Roi &box = state.box, &now = state.requested;
+  const View *full = self->priv->info.rig.find (view_id);
+  constexpr int kNear = kRequestMargin / 2;
+  const int right = now.x + now.width, bottom = now.y + now.height;
+  const bool inside = !now.empty () && (now.x == 0 || box.x >= now.x + kNear) &&
+                      (now.y == 0 || box.y >= now.y + kNear) &&
+                      (right >= full->width || box.x + box.width <= right - kNear) &&
+                      (bottom >= full->height || box.y + box.height <= bottom - kNear);
+  const bool fits =
+      now.width <= box.width + 3 * kRequestMargin && now.height <= box.height + 3 * kRequestMargin;
+  if (box.empty () ? now.empty () : inside && fits)
+    return;
+  Roi roi;
+  if (!box.empty ()) {
+    roi.x = std::max (0, box.x - kRequestMargin);
+    roi.y = std::max (0, box.y - kRequestMargin);
+    roi.width = std::min (full->width, box.x + box.width + kRequestMargin) - roi.x;
+    roi.height = std::min (full->height, box.y + box.height + kRequestMargin) - roi.y;
+  }
+  state.requested = roi;
+  push_roi_event (self, view_id, roi);
+}
+
+/* ---- after each frame set ---- */
+
+/* Checks for what OpenCV can write, with clearer errors. */
+static Status
+check_save_path (const std::string &path)
+{
+  static constexpr std::string_view kExtensions[] = {
+      ".yml", ".yaml", ".json", ".yml.gz", ".yaml.gz", ".json.gz"};
+  return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
+}
+
+static void
+save_when_all_learnt (GstRoiExtract *self, const std::string &path)
+{
+  if (path.empty () || path == self->priv->unsaved || !all_learnt (self->priv))
+    return;
+  std::vector<std::pair<int, const BackgroundModel *>> models;
+  for (const View &view : self->priv->info.rig.views)
+    models.emplace_back (view.id, &self->priv->views[view.id]->background);
+  Status status = check_save_path (path);
+  if (status.ok ())
+    status = rangecast::save_backgrounds (path, models);
+  self->priv->unsaved = status.ok () ? "" : path;
+  if (status.ok ())
+    GST_DEBUG_OBJECT (self, "saved the background to %s", path.c_str ());
+  gst_range_post_warning (GST_ELEMENT (self), status);
+}
+
+/* For save-background and a stream that was too short to learn a background. */
+static void
+warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
+{
+  if (settings.save_background.empty () || all_learnt (self->priv))
+    return;
+  int seen = 0;
+  for (const View &view : self->priv->info.rig.views)
+    seen = std::max (seen, self->priv->views[view.id]->background.frames ());
+  gst_range_post_warning (GST_ELEMENT (self),
+      {StatusCode::kNotFound, settings.save_background + ": not written: the stream ended after " +
+                                  std::to_string (seen) +
+                                  " frames of the background; expected background-frames, " +
+                                  std::to_string (settings.background_frames)});
+}
+
+static void
+relearn_all (GstRoiExtract *self, int frames)
+{
+  GST_DEBUG_OBJECT (self, "learning background");
+  for (const View &view : self->priv->info.rig.views) {
+    ViewState &state = *self->priv->views[view.id];
+    begin_learning (state, view, frames);
+    if (!state.requested.empty ())
+      push_roi_event (self, view.id, {}); /* to see the whole background */
+    state.requested = {};
+  }
+}
+
 static void
 after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const RoiSettings &settings)
 {
@@ -387,9 +392,17 @@ after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const Ro
     ViewState &state = *priv->views[image.view_id];
     points_in += state.points_in;
     points_out += state.points_out;
-    if (state.learnt)
-      announce_roi (self, state, image.view_id);
-    learnt_now |= finish_learning (state);
+    GST_LOG_OBJECT (self,
+        "view %d: %" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points are foreground, ROI %dx%d",
+        image.view_id, state.points_out, state.points_in, state.box.width, state.box.height);
+    if (state.learnt) {
+      request_roi (self, state, image.view_id);
+    } else if (state.background.frames () >= state.learning_target) {
+      state.background.finish ();
+      state.learnt = learnt_now = true;
+      GST_DEBUG_OBJECT (self, "view %d: background learnt from %d frames", image.view_id,
+          state.background.frames ());
+    }
   }
   if (learnt_now)
     save_when_all_learnt (self, settings.save_background);
@@ -417,7 +430,7 @@ gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
-/* At the end the file gets what the background has become. */
+/* At EOS, the adapted background is saved again. */
 static gboolean
 gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
 {
@@ -433,7 +446,7 @@ gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
   return GST_BASE_TRANSFORM_CLASS (gst_roi_extract_parent_class)->sink_event (base, event);
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
@@ -450,7 +463,7 @@ gst_roi_extract_start (GstBaseTransform *base)
   const Status status = check_save_path (copy_settings (priv).save_background);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->refused.clear ();
+  priv->caps_error.clear ();
   priv->unsaved.clear ();
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
@@ -478,19 +491,6 @@ gst_roi_extract_capture_background (GstRoiExtract *self)
   self->priv->relearn = true;
 }
 
-static void
-gst_roi_extract_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
-  if (id == PROP_STATS_INTERVAL) {
-    priv->reporter.set_interval (g_value_get_uint (value));
-    return;
-  }
-  std::lock_guard guard (priv->lock);
-  if (!roi_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
 static GstStructure *
 make_stats (const GstRoiExtractPrivate *priv)
 {
@@ -499,19 +499,6 @@ make_stats (const GstRoiExtractPrivate *priv)
       "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64, priv->points_out,
       "roi-x", G_TYPE_INT, roi.x, "roi-y", G_TYPE_INT, roi.y, "roi-width", G_TYPE_INT, roi.width,
       "roi-height", G_TYPE_INT, roi.height, nullptr);
-}
-
-static void
-gst_roi_extract_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value, make_stats (priv));
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!roi_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -535,19 +522,17 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->set_property = gst_roi_extract_set_property;
-  object_class->get_property = gst_roi_extract_get_property;
+  GST_DEBUG_CATEGORY_INIT (gst_roi_extract_debug, "roiextract", 0, "Region of interest extractor");
+
   object_class->finalize = gst_roi_extract_finalize;
-  roi_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRoiExtract, roi_properties, make_stats> (object_class,
       "Counters since the element was started: frames, points-in, points-out; and the last ROI "
       "of the first view");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   /**
    * GstRoiExtract::capture-background:
    *
-   * Forgets the background and learns it anew from the next frames, in which the scene should be
+   * Discards the background and learns it again from the next frames, in which the scene should be
    * empty.
    */
   signals[SIGNAL_CAPTURE_BACKGROUND] = g_signal_new_class_handler ("capture-background",
@@ -561,11 +546,9 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       "Removes the background of range images by depth and colour and crops them to the rest",
       "gst-rangecast");
 
-  transform_class->start = gst_roi_extract_start;
-  transform_class->stop = gst_roi_extract_stop;
-  transform_class->sink_event = gst_roi_extract_sink_event;
-  transform_class->set_caps = gst_roi_extract_set_caps;
-  transform_class->transform_ip = gst_roi_extract_transform_ip;
-
-  GST_DEBUG_CATEGORY_INIT (gst_roi_extract_debug, "roiextract", 0, "Region of interest extractor");
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_roi_extract_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_roi_extract_stop);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_roi_extract_sink_event);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_roi_extract_set_caps);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (gst_roi_extract_transform_ip);
 }

@@ -26,8 +26,9 @@
 #include "gststereodepth.h"
 
 #include "common/bufferpools.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "common/videoframereader.hpp"
+#include "framepairing.hpp"
 #include "roischedule.hpp"
 #include "stereosettings.hpp"
 
@@ -40,8 +41,8 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangepairing.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <memory>
 #include <mutex>
+#include <optional>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 #include <string>
@@ -57,48 +58,76 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
 
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+/* Data flow, in the order of this file. All of it runs on GstAggregator's streaming thread, the
+ * source pad's task:
+ *
+ *   sink_event       records the caps of each pad
+ *   aggregate
+ *     take_pair      takes a left and a right image of one running time off their pads
+ *     drop_if_late   drops the pair if its depth would arrive too late (QoS)
+ *     take_third     takes the third image of that time, if there is a pad for it
+ *     negotiate      after new caps: loads the view, configures the matcher, sets output caps
+ *     push_gap,
+ *     push_pair      announces time without pairs; rectifies, matches and pushes
+ *
+ * A pair that waits for its third image is kept in `pair`, off its pads: a source that feeds all
+ * pads from one thread and loses a third image would otherwise block on pad left for ever. So caps
+ * of later images can arrive before the pair is matched, see Input::next_info. */
 
-/* Pictures without a partner, one after the other, that are worth a warning: two seconds. */
-static constexpr guint64 kManyWithoutPartner = 100;
+namespace {
 
-/* Left and right of one moment. Both times are by the segment they came in. */
+enum Side { kLeft, kRight, kThird };
+constexpr const char *kPadNames[] = {"left", "right", "third"};
+
+/* Successive images without partner before a warning is posted: two seconds at 25 Hz. */
+constexpr guint64 kMaxUnpaired = 100;
+
+struct Input {
+  std::optional<GstVideoInfo> info;
+  std::optional<GstVideoInfo> next_info; /* left, right: caps that follow the pair that waits */
+  VideoFrameReader reader;
+};
+
+/* A left and a right image. Times are those of the left image. */
 struct WaitingPair {
-  gstrange::PairMatcher::Pair buffers; /* null: none waits */
+  PairMatcher::Pair buffers; /* null: none waits */
   GstClockTime running = GST_CLOCK_TIME_NONE, capture = 0;
 };
 
-struct GstStereoDepthPrivate {
-  std::mutex lock; /* guards what follows; never held across a push, event or message */
-  StereoDepthSettings settings;
+struct Counters {
   guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0, dropped_late = 0;
   GstClockTime match_time = 0;
-  GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time; what is older comes too late */
+};
+
+} // namespace
+
+struct GstStereoDepthPrivate {
+  /* Guards the members up to proportion. Never held across a push, event or message; no other lock
+   * is taken under it. */
+  std::mutex lock;
+  StereoDepthSettings settings;
+  Counters counters;
+  GstClockTime earliest = GST_CLOCK_TIME_NONE; /* QoS: running time; older frames are too late */
   double proportion = 1;                       /* of the last QOS event */
 
-  StatsReporter reporter;                   /* has locks of its own */
-  RoiSchedule rois;                         /* so has this */
-  std::atomic<bool> third_released = false; /* by any thread; the streaming thread clears it */
+  /* thread-safe */
+  StatsReporter reporter;
+  RoiSchedule rois;
+  std::atomic<bool> third_released = false; /* cleared by the streaming thread */
 
-  /* streaming thread only */
-  GstAggregatorPad *pads[2] = {nullptr, nullptr}; /* left, right; owned by the element */
-  std::unique_ptr<gstrange::PairMatcher> matcher;
-  WaitingPair pair;     /* for the third camera's picture */
-  GstVideoInfo info[3]; /* left, right, third */
-  bool have_info[3] = {false, false, false};
-  GstVideoInfo next_info[2]; /* left, right: of what comes after the pair that waits */
-  bool have_next_info[2] = {false, false};
-  bool negotiate = true;      /* left or right have changed */
-  bool third_changed = false; /* matters with its next picture */
-  bool said_mirrored = false, said_unpaired = false;
-  bool discont = false;
-  guint64 dropped_before = 0; /* by the matcher, up to the last pair */
-  gstrange::GapSender gaps;
-  GstClockTime head_start = 0; /* live: of the element's own latency, what matching takes */
-  PictureReader readers[3];
+  /* streaming thread */
+  GstAggregatorPad *left, *right; /* owned by the element */
+  std::optional<PairMatcher> matcher;
+  WaitingPair pair;
+  Input inputs[3];
+  bool negotiate = true;        /* left or right have new caps */
+  bool negotiate_third = false; /* third has new caps: negotiate with its next image */
   rangecast::StereoDepth core;
-  GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   GstBufferPool *pool = nullptr;
+  bool discont = false;             /* a pair was dropped */
+  GstClockTime processing_time = 0; /* mean time to match a pair, at most `latency` */
+  guint64 dropped_before_pair = 0;  /* images without partner up to the last pair */
+  bool warned_mirrored = false, warned_unpaired = false;
 };
 
 struct _GstStereoDepth {
@@ -118,120 +147,21 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstStereoDepth, gst_stereo_depth, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (stereodepth, "stereodepth", GST_RANK_NONE, GST_TYPE_STEREO_DEPTH)
 
-/* ---- negotiation ---- */
-
 static bool
-same_size (const GstVideoInfo &a, const GstVideoInfo &b)
+is_live (GstStereoDepth *self)
 {
-  return a.width == b.width && a.height == b.height;
+  return gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
 }
 
-/* The third camera may change its size a little before or after the others; that matters where its
- * picture is to be matched. */
-static Status
-check_sizes (GstStereoDepthPrivate *priv, bool third_is_there)
-{
-  static constexpr const char *kNames[] = {"left", "right", "third"};
-  const GstVideoInfo &left = priv->info[0];
-  for (int i = 1; i < (third_is_there ? 3 : 2); i++)
-    if (const GstVideoInfo &other = priv->info[i]; priv->have_info[i] && !same_size (left, other))
-      return {StatusCode::kBadSize, std::string ("pad ") + kNames[i] + " is " +
-                                        size_text (other.width, other.height) +
-                                        " but pad left is " + size_text (left.width, left.height) +
-                                        "; expected the same size"};
-  return {};
-}
+/* ---- sink caps ---- */
 
-/* Downstream does not see that caps are set anew where they are equal, and so would not ask for its
- * part of the picture again. */
-static StereoDepthSettings
-current_settings (GstStereoDepthPrivate *priv)
-{
-  const View &before = priv->core.range_view ();
-  if (before.width != priv->info[0].width || before.height != priv->info[0].height)
-    priv->rois.forget ();
-  std::lock_guard guard (priv->lock);
-  return priv->settings;
-}
-
-static Status
-configure_core (GstStereoDepthPrivate *priv, bool third_is_there)
-{
-  const GstVideoInfo &left = priv->info[0];
-  if (Status s = check_sizes (priv, third_is_there); !s.ok ())
-    return s;
-  const StereoDepthSettings settings = current_settings (priv);
-  View view;
-  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
-    return s;
-  if (priv->have_info[2] && !view.third)
-    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
-                                   "rig with a file that has one in view " +
-                                       std::to_string (view.id)};
-  const bool with_third = priv->have_info[2] && same_size (left, priv->info[2]);
-  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
-    return s;
-  priv->said_mirrored = false;
-  priv->third_changed = priv->have_info[2] && !with_third;
-  for (int i = 0; i < (with_third ? 3 : 2); i++)
-    if (!priv->readers[i].set (priv->info[i]))
-      return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
-  return {};
-}
-
-static GstFlowReturn
-negotiate (GstStereoDepth *self, bool third_is_there)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  const GstFlowReturn flow =
-      gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, third_is_there));
-  if (flow != GST_FLOW_OK)
-    return flow;
-  const auto info =
-      gstrange::make_info ({{priv->core.range_view ()}}, priv->info[0].fps_n, priv->info[0].fps_d);
-  GstCaps *caps = gstrange::make_range_caps (info);
-  priv->frame_duration = info.frame_duration ();
-  priv->rois.restart ();
-  drop_pool (priv->pool);
-  const Status pooled = gstrange::make_pool (caps, priv->pool);
-  if (pooled.ok ())
-    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
-  gst_caps_unref (caps);
-  priv->negotiate = !pooled.ok ();
-  priv->reporter.set_views (info.rig);
-  return gst_range_flow_return (GST_ELEMENT (self), pooled);
-}
-
-static GstFlowReturn
-gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* caps are set with the first pair, see negotiate() */
-}
-
-/* Streaming thread. */
 static void
-forget_released_third (GstStereoDepthPrivate *priv)
+apply_release_of_third (GstStereoDepthPrivate *priv)
 {
-  if (priv->third_released.exchange (false))
-    priv->have_info[2] = priv->third_changed = false;
-}
-
-static gboolean
-take_caps (GstStereoDepthPrivate *priv, int side, GstCaps *caps)
-{
-  GstVideoInfo info;
-  if (!gst_video_info_from_caps (&info, caps))
-    return FALSE;
-  forget_released_third (priv);
-  if (side < 2 && priv->pair.buffers.first) {
-    priv->next_info[side] = info;
-    priv->have_next_info[side] = true;
-    return TRUE;
-  }
-  priv->info[side] = info;
-  priv->have_info[side] = true;
-  (side < 2 ? priv->negotiate : priv->third_changed) = true;
-  return TRUE;
+  if (!priv->third_released.exchange (false))
+    return;
+  priv->inputs[kThird].info.reset ();
+  priv->negotiate_third = false;
 }
 
 static gboolean
@@ -239,250 +169,94 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    const int side = pad == priv->pads[0] ? 0 : pad == priv->pads[1] ? 1 : 2;
+    const Side side = pad == priv->left ? kLeft : pad == priv->right ? kRight : kThird;
     GstCaps *caps;
+    GstVideoInfo info;
     gst_event_parse_caps (event, &caps);
-    if (!take_caps (priv, side, caps)) {
+    if (!gst_video_info_from_caps (&info, caps)) {
+      GST_WARNING_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
       gst_event_unref (event);
       return FALSE;
+    }
+    GST_INFO_OBJECT (pad, "caps %" GST_PTR_FORMAT, caps);
+    apply_release_of_third (priv);
+    if (side != kThird && priv->pair.buffers.first) {
+      priv->inputs[side].next_info = info;
+    } else {
+      priv->inputs[side].info = info;
+      (side == kThird ? priv->negotiate_third : priv->negotiate) = true;
     }
   }
   return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* GstRangeRoi comes from whatever thread pushes it downstream. */
-static bool
-take_roi_event (GstStereoDepthPrivate *priv, const GstStructure *s)
-{
-  std::unique_lock guard (priv->lock);
-  const int view_id = priv->settings.view_id;
-  guard.unlock ();
-  return priv->rois.take_event (s, view_id);
-}
-
-/* From the sink's thread. Not live, more than is late already is given up, or the next frame would
- * be late again. */
-static void
-take_qos_event (GstStereoDepth *self, GstEvent *event)
-{
-  double proportion;
-  GstClockTimeDiff late;
-  GstClockTime time;
-  gst_event_parse_qos (event, nullptr, &proportion, &late, &time);
-  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
-  std::lock_guard guard (self->priv->lock);
-  self->priv->proportion = proportion;
-  self->priv->earliest = GST_CLOCK_TIME_NONE;
-  if (!GST_CLOCK_TIME_IS_VALID (time) || (late < 0 && 0 - GstClockTime (late) > time))
-    return;
-  self->priv->earliest = time + GstClockTime (late) * (late > 0 && !live ? 2 : 1);
-}
-
+/* Only logs refused caps, which GStreamer itself logs in other categories. */
 static gboolean
-gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
+gst_stereo_depth_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS)
-    take_qos_event (GST_STEREO_DEPTH (aggregator), event);
-  const GstStructure *s = gst_event_get_structure (event);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM && s &&
-      gst_structure_has_name (s, "GstRangeRoi")) {
-    const gboolean taken = take_roi_event (GST_STEREO_DEPTH (aggregator)->priv, s);
-    gst_event_unref (event);
-    return taken;
+  const gboolean handled =
+      GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_query (aggregator, pad, query);
+  if (GST_QUERY_TYPE (query) == GST_QUERY_ACCEPT_CAPS) {
+    GstCaps *caps;
+    gboolean accepted = FALSE;
+    gst_query_parse_accept_caps (query, &caps);
+    gst_query_parse_accept_caps_result (query, &accepted);
+    if (!accepted)
+      GST_DEBUG_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
   }
-  return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->src_event (aggregator, event);
+  return handled;
 }
 
-/* ---- data ---- */
+/* ---- pairs of images ---- */
 
-/* What to match of the pair that was taken. */
-static Roi
-next_roi (GstStereoDepthPrivate *priv)
-{
-  std::unique_lock guard (priv->lock);
-  const int interval = priv->settings.refresh_interval;
-  guard.unlock ();
-  bool restricted = false;
-  const Roi roi = priv->rois.next (priv->core, interval, restricted);
-  guard.lock ();
-  priv->restricted_frames += restricted;
-  return roi;
-}
-
-static Status
-match_pictures (
-    GstStereoDepthPrivate *priv, bool with_third, GstBuffer *output, GstClockTime capture)
-{
-  const GstClockTime begin = gst_util_get_timestamp ();
-  if (Status s = priv->core.rectify (priv->readers[0].view (), priv->readers[1].view (),
-          with_third ? priv->readers[2].view () : ImageView<const Rgbx>{});
-      !s.ok ())
-    return s;
-  const Roi roi = next_roi (priv);
-  if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, capture); !s.ok ())
-    return s;
-  gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
-  if (!frame.status ().ok ())
-    return frame.status ();
-  const Status status = priv->core.match (frame.views ()[0]);
-  std::lock_guard guard (priv->lock);
-  priv->frames++;
-  priv->third_frames += with_third;
-  priv->match_time += gst_util_get_timestamp () - begin;
-  return status;
-}
-
-/* @param third  may be null */
-static Status
-match_pair (GstStereoDepthPrivate *priv, GstBuffer *third, GstBuffer *output)
-{
-  static constexpr const char *kNames[] = {"left", "right", "third"};
-  GstBuffer *buffers[] = {priv->pair.buffers.first, priv->pair.buffers.second, third};
-  Status status;
-  int n = 0;
-  for (; n < 3 && buffers[n] && status.ok (); n++)
-    if (!priv->readers[n].open (buffers[n])) {
-      status = {StatusCode::kBadData,
-          std::string ("pad ") + kNames[n] + ": a buffer is smaller than its caps require"};
-      break;
-    }
-  if (status.ok ())
-    status = match_pictures (priv, third != nullptr, output, priv->pair.capture);
-  while (n-- > 0)
-    priv->readers[n].close ();
-  return status;
-}
-
-/* One warning a stream: the depth of exchanged cameras is nonsense, but no frame is wrong. */
+/* Two cameras with unrelated clocks may never capture at the same time. */
 static void
-warn_if_mirrored (GstStereoDepth *self)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  if (priv->said_mirrored || !priv->core.looks_mirrored ())
-    return;
-  priv->said_mirrored = true;
-  GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-      ("The left and right cameras seem to be exchanged: swap what is linked to pads left and "
-       "right"),
-      ("hardly anything matches; with the images exchanged, much does"));
-}
-
-static GstFlowReturn
-push_pair (GstStereoDepth *self, GstBuffer *third)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  const WaitingPair &pair = priv->pair;
-  GstBuffer *left = pair.buffers.first;
-  auto aggregator = GST_AGGREGATOR (self);
-  GstBuffer *output = nullptr;
-  GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
-  if (flow != GST_FLOW_OK)
-    return flow;
-  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (priv, third, output));
-  if (flow != GST_FLOW_OK) {
-    gst_buffer_unref (output);
-    return flow;
-  }
-  warn_if_mirrored (self);
-  const GstClockTime duration =
-      GST_BUFFER_DURATION_IS_VALID (left) ? GST_BUFFER_DURATION (left) : priv->frame_duration;
-  gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
-  if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
-    GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
-  priv->discont = false;
-  priv->gaps.note_buffer (pair.running, duration);
-  priv->reporter.passed (GST_ELEMENT (self), output);
-  return gst_aggregator_finish_buffer (aggregator, output);
-}
-
-/* Tells downstream of a time of which there will be nothing, so that it does not wait for it. */
-static GstFlowReturn
-push_gap (GstStereoDepth *self)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  GstClockTime begin, end;
-  if (!priv->matcher->take_gap (begin, end))
-    return GST_FLOW_OK;
-  end = std::min (end, priv->pair.running); /* NONE is the greatest number */
-  const bool begun = priv->pool != nullptr;
-  if (!priv->gaps.cut (begin, end) || (!begun && (!priv->have_info[0] || !priv->have_info[1])))
-    return GST_FLOW_OK;
-  if (!begun)
-    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
-      return flow;
-  priv->gaps.push (GST_AGGREGATOR (self), priv->pads[0], begin, end);
-  return GST_FLOW_OK;
-}
-
-/* The third camera's picture for the pair that waits: none (null) if it is lost or its stream has
- * ended, for depth of two cameras is better than none.
- * @return GST_AGGREGATOR_FLOW_NEED_DATA while it may still come */
-static GstFlowReturn
-take_third (GstStereoDepth *self, GstClockTime frame_duration, bool timeout, GstBuffer **third)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
-  if (!pad)
-    return GST_FLOW_OK;
-  guint64 dropped = 0;
-  const GstFlowReturn flow = gstrange::take_companion (GST_AGGREGATOR_PAD (pad), priv->pair.running,
-      gstrange::pairing_tolerance (frame_duration), timeout, dropped, third);
-  gst_object_unref (pad);
-  if (*third && !priv->have_info[2]) /* of a pad that was released just now */
-    gst_clear_buffer (third);
-  std::lock_guard guard (priv->lock);
-  priv->dropped_third += dropped;
-  return flow;
-}
-
-static void
-forget_pair (GstStereoDepthPrivate *priv)
-{
-  gst_clear_buffer (&priv->pair.buffers.first);
-  gst_clear_buffer (&priv->pair.buffers.second);
-  priv->pair = {};
-  for (int i = 0; i < 2; i++)
-    if (priv->have_next_info[i]) {
-      priv->info[i] = priv->next_info[i];
-      priv->have_next_info[i] = false;
-      priv->negotiate = true;
-    }
-}
-
-/* Two cameras whose clocks have nothing to do with each other may never take a picture at once. */
-static void
-warn_if_nothing_pairs (GstStereoDepth *self, bool paired)
+warn_if_unpaired (GstStereoDepth *self, bool paired)
 {
   GstStereoDepthPrivate *priv = self->priv;
   const guint64 dropped = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
   if (paired)
-    priv->dropped_before = dropped;
-  if (priv->said_unpaired || dropped - priv->dropped_before < kManyWithoutPartner)
+    priv->dropped_before_pair = dropped;
+  if (priv->warned_unpaired || dropped - priv->dropped_before_pair < kMaxUnpaired)
     return;
-  priv->said_unpaired = true;
+  priv->warned_unpaired = true;
   GST_ELEMENT_WARNING (self, STREAM, FAILED,
       ("Left and right images do not pair up: expected times that differ by at most half a frame, "
        "or 5 ms if the caps have no framerate"),
-      ("the last %" G_GUINT64_FORMAT " images found no partner", dropped - priv->dropped_before));
+      ("the last %" G_GUINT64_FORMAT " images found no partner",
+          dropped - priv->dropped_before_pair));
 }
 
 static GstFlowReturn
-take_pair (GstStereoDepth *self, GstClockTime frame_duration)
+take_pair (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
   WaitingPair &pair = priv->pair;
-  const GstFlowReturn flow = priv->matcher->take (frame_duration, pair.buffers);
-  warn_if_nothing_pairs (self, flow == GST_FLOW_OK);
+  const GstFlowReturn flow =
+      priv->matcher->take (frame_duration (priv->inputs[kLeft].info), pair.buffers);
+  warn_if_unpaired (self, flow == GST_FLOW_OK);
   if (flow == GST_FLOW_OK) {
-    const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
-    pair.running = gstrange::running_time_of (priv->pads[0], pair.buffers.first);
-    pair.capture = gstrange::capture_time_of (priv->pads[0], pair.buffers.first, live);
+    pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
+    pair.capture = gstrange::capture_time_of (priv->left, pair.buffers.first, is_live (self));
   }
-  const GstFlowReturn pushed = push_gap (self);
-  return pushed == GST_FLOW_OK ? flow : pushed;
+  return flow;
 }
 
-/* Gives up the pair that waits if the sink would throw its depth away. */
+/* Caps that followed the pair apply from now on. */
+static void
+release_pair (GstStereoDepthPrivate *priv)
+{
+  gst_clear_buffer (&priv->pair.buffers.first);
+  gst_clear_buffer (&priv->pair.buffers.second);
+  priv->pair = {};
+  for (const Side side : {kLeft, kRight})
+    if (Input &input = priv->inputs[side]; input.next_info) {
+      input.info = std::exchange (input.next_info, std::nullopt);
+      priv->negotiate = true;
+    }
+}
+
+/* Drops the pair if a sink would discard its depth, and posts a QOS message. */
 static bool
 drop_if_late (GstStereoDepth *self)
 {
@@ -497,36 +271,260 @@ drop_if_late (GstStereoDepth *self)
     if (!priv->settings.qos || !GST_CLOCK_TIME_IS_VALID (earliest) ||
         !GST_CLOCK_TIME_IS_VALID (running) || running > earliest)
       return false;
-    dropped = ++priv->dropped_late;
-    frames = priv->frames;
+    dropped = ++priv->counters.dropped_late;
+    frames = priv->counters.frames;
     proportion = priv->proportion;
   }
+  GST_DEBUG_OBJECT (self, "dropping pair at %" GST_TIME_FORMAT ": late by %.1f ms (QoS)",
+      GST_TIME_ARGS (running), double (earliest - running) / GST_MSECOND);
   GstBuffer *left = priv->pair.buffers.first;
-  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
-  GST_OBJECT_LOCK (priv->pads[0]);
+  GST_OBJECT_LOCK (priv->left);
   const GstClockTime stream_time =
-      gst_segment_to_stream_time (&priv->pads[0]->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (left));
-  GST_OBJECT_UNLOCK (priv->pads[0]);
-  GstMessage *message = gst_message_new_qos (GST_OBJECT (self), live, running, stream_time,
-      GST_BUFFER_PTS (left), GST_BUFFER_DURATION (left));
+      gst_segment_to_stream_time (&priv->left->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (left));
+  GST_OBJECT_UNLOCK (priv->left);
+  GstMessage *message = gst_message_new_qos (GST_OBJECT (self), is_live (self), running,
+      stream_time, GST_BUFFER_PTS (left), GST_BUFFER_DURATION (left));
   gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), proportion, 1000000);
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, frames, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
   priv->discont = true;
-  forget_pair (priv);
+  release_pair (priv);
   return true;
 }
 
-/* Live, the element's own latency is for the third camera to be late and for matching. */
+/* The third image of the pair; null if it was lost, its stream has ended or there is no such pad:
+ * the pair is then matched without it.
+ * @return GST_AGGREGATOR_FLOW_NEED_DATA while it may still arrive */
+static GstFlowReturn
+take_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
+  if (!pad)
+    return GST_FLOW_OK;
+  guint64 dropped = 0;
+  const GstFlowReturn flow = take_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT,
+      priv->pair.running, gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)),
+      timeout, dropped, third);
+  gst_object_unref (pad);
+  if (*third && !priv->inputs[kThird].info) /* the pad was released meanwhile */
+    gst_clear_buffer (third);
+  std::lock_guard guard (priv->lock);
+  priv->counters.dropped_third += dropped;
+  return flow;
+}
+
+/* ---- negotiation ---- */
+
+static bool
+same_size (const GstVideoInfo &a, const GstVideoInfo &b)
+{
+  return a.width == b.width && a.height == b.height;
+}
+
+/* Configures matcher and readers for the caps of all inputs. The third camera may change its size
+ * somewhat earlier or later than the others; until then pairs are matched without it.
+ * @param has_third  the pair has a third image, whose size must match */
+static Status
+configure_core (GstStereoDepthPrivate *priv, bool has_third)
+{
+  Input *inputs = priv->inputs;
+  const GstVideoInfo &left = *inputs[kLeft].info;
+  for (const Side side : {kRight, kThird})
+    if (const auto &other = inputs[side].info;
+        other && !same_size (left, *other) && (side == kRight || has_third))
+      return {StatusCode::kBadSize, std::string ("pad ") + kPadNames[side] + " is " +
+                                        size_text (other->width, other->height) +
+                                        " but pad left is " + size_text (left.width, left.height) +
+                                        "; expected the same size"};
+  const View &before = priv->core.range_view ();
+  if (before.width != left.width || before.height != left.height)
+    priv->rois.reset (); /* downstream requests a region again only if the output caps change */
+  StereoDepthSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  View view;
+  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
+    return s;
+  if (inputs[kThird].info && !view.third)
+    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
+                                   "rig with a file that has one in view " +
+                                       std::to_string (view.id)};
+  const bool with_third = inputs[kThird].info && same_size (left, *inputs[kThird].info);
+  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
+    return s;
+  for (int side = kLeft; side <= (with_third ? kThird : kRight); side++)
+    if (!inputs[side].reader.set (*inputs[side].info))
+      return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
+  priv->negotiate_third = inputs[kThird].info && !with_third;
+  priv->warned_mirrored = false;
+  return {};
+}
+
+static GstFlowReturn
+negotiate (GstStereoDepth *self, bool has_third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  for (const Side side : {kLeft, kRight})
+    if (!priv->inputs[side].info) {
+      GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
+      return GST_FLOW_NOT_NEGOTIATED;
+    }
+  if (const GstFlowReturn flow =
+          gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, has_third));
+      flow != GST_FLOW_OK)
+    return flow;
+  const GstVideoInfo &left = *priv->inputs[kLeft].info;
+  const auto info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
+  GstCaps *caps = gstrange::make_range_caps (info);
+  GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
+  const View &view = info.rig.views.front ();
+  GST_DEBUG_OBJECT (self, "view %d, %g to %g m, focal length %g pixels, %s third camera", view.id,
+      view.near_m, view.far_m, view.intrinsics.fx,
+      priv->inputs[kThird].info && !priv->negotiate_third ? "with" : "without");
+  drop_pool (priv->pool);
+  const Status status = gstrange::make_pool (caps, priv->pool);
+  if (status.ok ())
+    gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
+  gst_caps_unref (caps);
+  priv->rois.restart_interval ();
+  priv->reporter.set_views (info.rig);
+  priv->negotiate = !status.ok ();
+  return gst_range_flow_return (GST_ELEMENT (self), status);
+}
+
+static GstFlowReturn
+gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+{
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
+}
+
+/* ---- output ---- */
+
+/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
+static GstFlowReturn
+push_gap (GstStereoDepth *self)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  GstClockTime begin, end;
+  if (!priv->matcher->take_gap (priv->pair.running, begin, end))
+    return GST_FLOW_OK;
+  if (!priv->pool) { /* caps come before a GAP */
+    if (!priv->inputs[kLeft].info || !priv->inputs[kRight].info)
+      return GST_FLOW_OK;
+    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
+      return flow;
+  }
+  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
+  return GST_FLOW_OK;
+}
+
+/* Matches the images that the readers have open. */
+static Status
+match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  Input *inputs = priv->inputs;
+  const GstClockTime begin = gst_util_get_timestamp ();
+  if (Status s = priv->core.rectify (inputs[kLeft].reader.view (), inputs[kRight].reader.view (),
+          with_third ? inputs[kThird].reader.view () : ImageView<const Rgbx>{});
+      !s.ok ())
+    return s;
+  int interval;
+  {
+    std::lock_guard guard (priv->lock);
+    interval = priv->settings.refresh_interval;
+  }
+  bool restricted = false;
+  const Roi roi = priv->rois.next (priv->core, interval, restricted);
+  if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, priv->pair.capture);
+      !s.ok ())
+    return s;
+  gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  const Status status = priv->core.match (frame.views ()[0]);
+  const GstClockTime elapsed = gst_util_get_timestamp () - begin;
+  GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT ": matched %dx%d at (%d, %d)%s in %.1f ms",
+      GST_TIME_ARGS (priv->pair.running), roi.width, roi.height, roi.x, roi.y,
+      with_third ? " with third image" : "", double (elapsed) / GST_MSECOND);
+  std::lock_guard guard (priv->lock);
+  priv->counters.frames++;
+  priv->counters.restricted_frames += restricted;
+  priv->counters.third_frames += with_third;
+  priv->counters.match_time += elapsed;
+  return status;
+}
+
+/* @param third  may be null */
+static Status
+match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  GstBuffer *buffers[] = {priv->pair.buffers.first, priv->pair.buffers.second, third};
+  Status status;
+  int open = 0;
+  for (; open < 3 && buffers[open]; open++)
+    if (!priv->inputs[open].reader.open (buffers[open])) {
+      status = {StatusCode::kBadData,
+          std::string ("pad ") + kPadNames[open] + ": a buffer is smaller than its caps require"};
+      break;
+    }
+  if (status.ok ())
+    status = match_images (self, third != nullptr, output);
+  while (open-- > 0)
+    priv->inputs[open].reader.close ();
+  return status;
+}
+
+static GstFlowReturn
+push_pair (GstStereoDepth *self, GstBuffer *third)
+{
+  GstStereoDepthPrivate *priv = self->priv;
+  const WaitingPair &pair = priv->pair;
+  GstBuffer *left = pair.buffers.first;
+  auto aggregator = GST_AGGREGATOR (self);
+  GstBuffer *output = nullptr;
+  GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (self, third, output));
+  if (flow != GST_FLOW_OK) {
+    gst_buffer_unref (output);
+    return flow;
+  }
+  if (!priv->warned_mirrored && priv->core.looks_mirrored ()) {
+    priv->warned_mirrored = true;
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("The left and right cameras seem to be exchanged: swap what is linked to pads left and "
+         "right"),
+        ("hardly anything matches; with the images exchanged, much does"));
+  }
+  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (left)
+                                    ? GST_BUFFER_DURATION (left)
+                                    : frame_duration (priv->inputs[kLeft].info);
+  gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
+  if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
+    GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
+  priv->discont = false;
+  priv->matcher->record_output (pair.running, duration);
+  priv->reporter.passed (GST_ELEMENT (self), output);
+  return gst_aggregator_finish_buffer (aggregator, output);
+}
+
+/* Live, matching starts so early that it is done by the deadline, see get_next_time(). */
 static void
-learn_head_start (GstStereoDepth *self)
+update_processing_time (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
   guint64 latency = 0;
   g_object_get (self, "latency", &latency, nullptr);
   std::lock_guard guard (priv->lock);
-  if (priv->frames > 0)
-    priv->head_start = std::min<GstClockTime> (latency, priv->match_time / priv->frames);
+  const Counters &c = priv->counters;
+  if (c.frames > 0)
+    priv->processing_time = std::min<GstClockTime> (latency, c.match_time / c.frames);
 }
 
 static GstFlowReturn
@@ -534,87 +532,109 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
-  forget_released_third (priv);
-  GstClockTime duration = GST_CLOCK_TIME_NONE;
-  if (priv->have_info[0] && priv->info[0].fps_n > 0)
-    duration = gst_util_uint64_scale_int (GST_SECOND, priv->info[0].fps_d, priv->info[0].fps_n);
-  if (!priv->pair.buffers.first)
-    if (const GstFlowReturn flow = take_pair (self, duration); flow != GST_FLOW_OK) {
-      if (flow == GST_FLOW_EOS)
-        priv->reporter.finish ();
+  apply_release_of_third (priv);
+  if (!priv->pair.buffers.first) {
+    const GstFlowReturn taken = take_pair (self);
+    if (const GstFlowReturn flow = push_gap (self); flow != GST_FLOW_OK)
       return flow;
-    }
+    if (taken == GST_FLOW_EOS)
+      priv->reporter.finish ();
+    if (taken != GST_FLOW_OK)
+      return taken;
+  }
   if (drop_if_late (self))
     return GST_FLOW_OK;
   GstBuffer *third = nullptr;
-  if (const GstFlowReturn flow = take_third (self, duration, timeout, &third); flow != GST_FLOW_OK)
+  GstFlowReturn flow = take_third (self, timeout, &third);
+  if (flow != GST_FLOW_OK)
     return flow;
-  GstFlowReturn flow = GST_FLOW_OK;
-  if (priv->negotiate || (priv->third_changed && third))
+  if (priv->negotiate || (priv->negotiate_third && third))
     flow = negotiate (self, third != nullptr);
   if (flow == GST_FLOW_OK)
     flow = push_pair (self, third);
   gst_clear_buffer (&third);
-  forget_pair (priv);
-  learn_head_start (self);
+  release_pair (priv);
+  update_processing_time (self);
   return flow;
 }
 
-/* Live, the third camera is waited for until the latency is over. Without left or right there is
- * nothing to put out, and so no deadline. Called by the streaming thread. */
+/* The deadline for the third image of the next pair; there is none while left or right is missing,
+ * because without them there is nothing to push. */
 static GstClockTime
 gst_stereo_depth_get_next_time (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  log_waiting (GST_CAT_DEFAULT, priv->left);
+  log_waiting (GST_CAT_DEFAULT, priv->right);
+  if (GstPad *third = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third")) {
+    log_waiting (GST_CAT_DEFAULT, GST_AGGREGATOR_PAD (third));
+    gst_object_unref (third);
+  }
   GstClockTime time = priv->pair.running;
   if (!priv->pair.buffers.first) {
-    int n = 0;
-    for (GstAggregatorPad *pad : priv->pads)
-      if (gst_aggregator_pad_is_eos (pad))
-        return 0; /* the end, whatever the third camera does */
-      else if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad)) {
-        time = std::min (time, gstrange::running_time_of (pad, buffer)); /* NONE is greatest */
-        gst_buffer_unref (buffer);
-        n++;
-      }
-    if (n < 2)
-      return GST_CLOCK_TIME_NONE;
+    if (gst_aggregator_pad_is_eos (priv->left) || gst_aggregator_pad_is_eos (priv->right))
+      return 0; /* the stream ends now, whatever the third camera does */
+    for (GstAggregatorPad *pad : {priv->left, priv->right}) {
+      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
+      if (!buffer)
+        return GST_CLOCK_TIME_NONE;
+      time = std::min (time, gstrange::running_time_of (pad, buffer)); /* NONE is the maximum */
+      gst_buffer_unref (buffer);
+    }
   }
-  return GST_CLOCK_TIME_IS_VALID (time) ? time - std::min (time, priv->head_start) : time;
+  return GST_CLOCK_TIME_IS_VALID (time) ? time - std::min (time, priv->processing_time) : time;
 }
 
-/* Strides and offsets are taken as they are. */
+/* ---- events from downstream, on any thread ---- */
+
+/* If not live, as many frames again as are late already are skipped, or the next one would be late,
+ * too (as GstVideoDecoder does). */
+static void
+handle_qos (GstStereoDepth *self, GstEvent *event)
+{
+  double proportion;
+  GstClockTimeDiff late;
+  GstClockTime time;
+  gst_event_parse_qos (event, nullptr, &proportion, &late, &time);
+  const bool live = is_live (self);
+  std::lock_guard guard (self->priv->lock);
+  self->priv->proportion = proportion;
+  self->priv->earliest = GST_CLOCK_TIME_NONE;
+  if (!GST_CLOCK_TIME_IS_VALID (time) || (late < 0 && 0 - GstClockTime (late) > time))
+    return;
+  self->priv->earliest = time + GstClockTime (late) * (late > 0 && !live ? 2 : 1);
+}
+
 static gboolean
-gst_stereo_depth_propose_allocation (
-    GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
+gst_stereo_depth_src_event (GstAggregator *aggregator, GstEvent *event)
 {
-  gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
-  return TRUE;
+  auto self = GST_STEREO_DEPTH (aggregator);
+  GstStereoDepthPrivate *priv = self->priv;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS)
+    handle_qos (self, event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM &&
+      gst_event_has_name (event, "GstRangeRoi")) {
+    int view_id;
+    {
+      std::lock_guard guard (priv->lock);
+      view_id = priv->settings.view.view_id;
+    }
+    const bool handled = priv->rois.handle_event (gst_event_get_structure (event), view_id);
+    GST_LOG_OBJECT (self, "%s %" GST_PTR_FORMAT, handled ? "request:" : "ignored request:", event);
+    gst_event_unref (event);
+    return handled;
+  }
+  return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->src_event (aggregator, event);
 }
 
-static GstFlowReturn
-gst_stereo_depth_flush (GstAggregator *aggregator)
-{
-  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  priv->rois.restart ();
-  priv->core.reset ();
-  forget_pair (priv);
-  priv->gaps.reset ();
-  priv->discont = false;
-  GstClockTime begin, end;
-  priv->matcher->take_gap (begin, end);
-  std::lock_guard guard (priv->lock);
-  priv->earliest = GST_CLOCK_TIME_NONE;
-  return GST_FLOW_OK;
-}
+/* ---- pad third ---- */
 
 static GstAggregatorPad *
 gst_stereo_depth_create_new_pad (
     GstAggregator *aggregator, GstPadTemplate *pad_template, const gchar *, const GstCaps *)
 {
-  GstPad *there = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third");
-  if (there) {
-    gst_object_unref (there);
+  if (GstPad *existing = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third")) {
+    gst_object_unref (existing);
     return nullptr;
   }
   return GST_AGGREGATOR_PAD (g_object_new (GST_TYPE_AGGREGATOR_PAD, "name", "third", "direction",
@@ -628,38 +648,50 @@ gst_stereo_depth_release_pad (GstElement *element, GstPad *pad)
   GST_STEREO_DEPTH (element)->priv->third_released = true;
 }
 
-/* ---- life ---- */
+/* ---- lifecycle ---- */
 
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (element)->priv;
   std::lock_guard guard (priv->lock);
-  const guint64 lost = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
-  return {{.counters = {.frames = priv->frames,
-               .lost = lost + priv->dropped_third,
-               .late = priv->dropped_late}}};
+  const guint64 unpaired = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
+  return {{.counters = {.frames = priv->counters.frames,
+               .lost = unpaired + priv->counters.dropped_third,
+               .late = priv->counters.dropped_late}}};
 }
 
 static gboolean
 gst_stereo_depth_start (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  for (bool &have : priv->have_info)
-    have = false;
+  for (Input &input : priv->inputs)
+    input.info.reset ();
   priv->negotiate = true;
-  priv->third_changed = priv->third_released = false;
-  priv->said_unpaired = priv->discont = false;
-  priv->dropped_before = priv->head_start = 0;
-  priv->gaps.reset ();
+  priv->negotiate_third = priv->third_released = false;
+  priv->warned_unpaired = priv->discont = false;
+  priv->dropped_before_pair = priv->processing_time = 0;
   priv->matcher->reset ();
-  priv->rois.forget ();
+  priv->rois.reset ();
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
-  priv->frames = priv->restricted_frames = priv->third_frames = priv->dropped_third = 0;
-  priv->dropped_late = priv->match_time = 0;
+  priv->counters = {};
   priv->earliest = GST_CLOCK_TIME_NONE;
   return TRUE;
+}
+
+static GstFlowReturn
+gst_stereo_depth_flush (GstAggregator *aggregator)
+{
+  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  release_pair (priv);
+  priv->matcher->flush ();
+  priv->rois.restart_interval ();
+  priv->core.reset ();
+  priv->discont = false;
+  std::lock_guard guard (priv->lock);
+  priv->earliest = GST_CLOCK_TIME_NONE;
+  return GST_FLOW_OK;
 }
 
 static gboolean
@@ -668,69 +700,41 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   priv->reporter.stop ();
   drop_pool (priv->pool);
-  forget_pair (priv);
-  for (PictureReader &reader : priv->readers)
-    reader.reset ();
+  release_pair (priv);
+  for (Input &input : priv->inputs)
+    input.reader.reset ();
   return TRUE;
-}
-
-static void
-gst_stereo_depth_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
-  if (id == PROP_STATS_INTERVAL) {
-    priv->reporter.set_interval (g_value_get_uint (value));
-    return;
-  }
-  std::lock_guard guard (priv->lock);
-  if (!stereo_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
 make_stats (const GstStereoDepthPrivate *priv)
 {
+  const Counters &c = priv->counters;
   return gst_structure_new ("application/x-stereodepth-stats",          //
-      "frames", G_TYPE_UINT64, priv->frames,                            //
-      "restricted-frames", G_TYPE_UINT64, priv->restricted_frames,      //
-      "third-frames", G_TYPE_UINT64, priv->third_frames,                //
+      "frames", G_TYPE_UINT64, c.frames,                                //
+      "restricted-frames", G_TYPE_UINT64, c.restricted_frames,          //
+      "third-frames", G_TYPE_UINT64, c.third_frames,                    //
       "dropped-left", G_TYPE_UINT64, priv->matcher->dropped_first (),   //
       "dropped-right", G_TYPE_UINT64, priv->matcher->dropped_second (), //
-      "dropped-third", G_TYPE_UINT64, priv->dropped_third,              //
-      "dropped-late", G_TYPE_UINT64, priv->dropped_late,                //
-      "match-time", G_TYPE_UINT64, priv->match_time, nullptr);
-}
-
-static void
-gst_stereo_depth_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value, make_stats (priv));
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!stereo_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+      "dropped-third", G_TYPE_UINT64, c.dropped_third,                  //
+      "dropped-late", G_TYPE_UINT64, c.dropped_late,                    //
+      "match-time", G_TYPE_UINT64, c.match_time, nullptr);
 }
 
 static void
 gst_stereo_depth_finalize (GObject *object)
 {
-  GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (object)->priv;
-  drop_pool (priv->pool);
-  delete priv;
+  delete GST_STEREO_DEPTH (object)->priv;
   G_OBJECT_CLASS (gst_stereo_depth_parent_class)->finalize (object);
 }
 
 static void
 gst_stereo_depth_init (GstStereoDepth *self)
 {
-  self->priv = new GstStereoDepthPrivate;
-  self->priv->pads[0] = gstrange::add_sink_pad (GST_ELEMENT (self), "left");
-  self->priv->pads[1] = gstrange::add_sink_pad (GST_ELEMENT (self), "right");
-  self->priv->matcher =
-      std::make_unique<gstrange::PairMatcher> (self->priv->pads[0], self->priv->pads[1]);
+  auto priv = self->priv = new GstStereoDepthPrivate;
+  priv->left = add_sink_pad (GST_ELEMENT (self), kPadNames[kLeft]);
+  priv->right = add_sink_pad (GST_ELEMENT (self), kPadNames[kRight]);
+  priv->matcher.emplace (priv->left, priv->right, GST_CAT_DEFAULT);
 }
 
 static void
@@ -740,14 +744,12 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->set_property = gst_stereo_depth_set_property;
-  object_class->get_property = gst_stereo_depth_get_property;
+  GST_DEBUG_CATEGORY_INIT (gst_stereo_depth_debug, "stereodepth", 0, "Stereo depth");
+
   object_class->finalize = gst_stereo_depth_finalize;
-  stereo_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstStereoDepth, stereo_properties, make_stats> (object_class,
       "Counters since the element was started: frames, restricted-frames, third-frames, "
       "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template :
       {&left_template, &right_template, &third_template, &src_template})
@@ -757,18 +759,17 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
       "Computes range images from a stereo pair of cameras, or from three cameras",
       "gst-rangecast");
 
-  element_class->release_pad = gst_stereo_depth_release_pad;
-  aggregator_class->start = gst_stereo_depth_start;
-  aggregator_class->stop = gst_stereo_depth_stop;
-  aggregator_class->flush = gst_stereo_depth_flush;
-  aggregator_class->sink_event = gst_stereo_depth_sink_event;
-  aggregator_class->src_event = gst_stereo_depth_src_event;
-  aggregator_class->update_src_caps = gst_stereo_depth_update_src_caps;
-  aggregator_class->create_new_pad = gst_stereo_depth_create_new_pad;
-  aggregator_class->clip = gstrange::clip_to_segment;
-  aggregator_class->aggregate = gst_stereo_depth_aggregate;
-  aggregator_class->get_next_time = gst_stereo_depth_get_next_time;
-  aggregator_class->propose_allocation = gst_stereo_depth_propose_allocation;
-
-  GST_DEBUG_CATEGORY_INIT (gst_stereo_depth_debug, "stereodepth", 0, "Stereo depth");
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_release_pad);
+  aggregator_class->start = GST_DEBUG_FUNCPTR (gst_stereo_depth_start);
+  aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_stereo_depth_stop);
+  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_stereo_depth_flush);
+  aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_event);
+  aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_query);
+  aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_src_event);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_stereo_depth_update_src_caps);
+  aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_create_new_pad);
+  aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
+  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_stereo_depth_aggregate);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_stereo_depth_get_next_time);
+  aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (propose_video_meta);
 }

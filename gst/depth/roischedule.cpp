@@ -7,31 +7,30 @@
 using rangecast::Roi;
 
 bool
-RoiSchedule::take_event (const GstStructure *event, int view_id)
+RoiSchedule::handle_event (const GstStructure *event, int view_id)
 {
   guint id, x, y, width, height;
   if (!gst_structure_get (event, "view-id", G_TYPE_UINT, &id, "x", G_TYPE_UINT, &x, "y",
           G_TYPE_UINT, &y, "width", G_TYPE_UINT, &width, "height", G_TYPE_UINT, &height, nullptr))
     return false;
-  const guint most = rangecast::kMaxImageSide;
-  if (int (id) != view_id || x > most || y > most || width > most || height > most)
+  if (int (id) != view_id || std::max ({x, y, width, height}) > guint (rangecast::kMaxImageSide))
     return false;
   std::lock_guard guard (lock_);
-  wanted_ = {int (x), int (y), int (width), int (height)};
+  requested_ = {int (x), int (y), int (width), int (height)};
   return true;
 }
 
 void
-RoiSchedule::forget ()
+RoiSchedule::reset ()
 {
   std::lock_guard guard (lock_);
-  wanted_ = {};
+  requested_ = {};
 }
 
-/* What the counter of frames since a full picture begins with. Hosts of one rig that see something
- * new all match full pictures at that moment; so that they do not go on doing so together, and keep
- * each other waiting, views count from different numbers: the golden ratio's multiples keep any
- * number of them apart. View 0 counts from 0. */
+/* The count of frames with which a view starts after an unscheduled full image. All hosts of a rig
+ * match full images at the moment when something new appears; different start counts keep them from
+ * doing so together from then on, and from waiting for each other. Multiples of the golden ratio
+ * spread any number of views evenly. View 0 starts at 0. */
 static int
 refresh_phase (int view_id, int interval)
 {
@@ -48,7 +47,7 @@ RoiSchedule::next (rangecast::StereoDepth &core, int interval, bool &restricted)
   Roi roi;
   {
     std::lock_guard guard (lock_);
-    roi = wanted_;
+    roi = requested_;
   }
   roi.width = std::min (roi.width, full.width - roi.x);
   roi.height = std::min (roi.height, full.height - roi.y);

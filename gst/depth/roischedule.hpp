@@ -5,28 +5,27 @@
 
 #include <mutex>
 #include <rangecast/geometry/range_image.hpp>
-#include <rangecast/geometry/rig.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 
-/** Which part of a stereo pair is matched: what downstream asks for with GstRangeRoi events, and
- *  every so often all of it. */
+/** Decides which region of each stereo pair is matched: the one that downstream requests with
+ *  GstRangeRoi events, and the full image at regular intervals or when something else changes. */
 class RoiSchedule {
 public:
-  /** From any thread.
-   *  @return false if it is no GstRangeRoi of that view, or beyond any picture */
-  bool take_event (const GstStructure *event, int view_id);
-  /** Everything is wanted until somebody asks again. Any thread. */
-  void forget ();
+  /** Any thread.
+   *  @return false if the event is malformed, of another view, or larger than any image */
+  bool handle_event (const GstStructure *event, int view_id);
+  /** Full images until the next event. Any thread. */
+  void reset ();
 
-  /** Counts from 0 again. Streaming thread, as next(). */
-  void restart () { since_refresh_ = 0; }
-  /** What to match of the pair that `core` has taken.
-   *  @param interval  frames from one whole picture to the next; 0: always the whole
-   *  @param[out] restricted  whether less than the whole is asked for */
+  /** Restarts the refresh interval. Streaming thread. */
+  void restart_interval () { since_refresh_ = 0; }
+  /** The region of the pair that `core` has rectified. Streaming thread.
+   *  @param interval  frames from one full image to the next; 0: always full images
+   *  @param[out] restricted  whether it is less than the full image */
   rangecast::Roi next (rangecast::StereoDepth &core, int interval, bool &restricted);
 
 private:
-  std::mutex lock_;       // guards what follows; a leaf: nothing is called under it
-  rangecast::Roi wanted_; // empty: everything
-  int since_refresh_ = 0; // streaming thread only
+  std::mutex lock_;          // guards requested_; nothing is called with it held
+  rangecast::Roi requested_; // empty: the full image
+  int since_refresh_ = 0;    // streaming thread
 };

@@ -3,7 +3,8 @@
 
 using rangecast::Cue;
 
-GType
+#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())
+static GType
 gst_roi_extract_cue_get_type (void)
 {
   static const GType type = [] {
@@ -56,8 +57,7 @@ roi_properties ()
           0, 1000, kControllable),
       P::number<&S::segmentation, &Segmentation::fringe> ("fringe", "Fringe width",
           "Minimum width in pixels of a region that is nearer than the background but looks like "
-          "it "
-          "(0 = trust depth at silhouettes, for cameras with exact depth edges)",
+          "it (0 = trust depth at silhouettes, for cameras with exact depth edges)",
           0, 99, kControllable),
       P::number<&S::margin> ("margin", "Margin", "Margin added to each side of the ROI in pixels",
           0, 1000, kControllable),

@@ -8,19 +8,15 @@
 
 #include "common/properties.hpp"
 
-/** What an application wants of roiextract. Any thread, under the element's lock. */
+/** roiextract's properties. Guarded by the element's lock. */
 struct RoiSettings {
-  int background_frames = 30; ///< of the empty scene, from which a background is learnt
-  int settle_frames = 0;      ///< at the start, from which nothing is learnt
+  int background_frames = 30; ///< frames of the empty scene to learn the background from
+  int settle_frames = 0;      ///< frames to skip before learning
   std::string background_file, save_background; ///< empty: none
   rangecast::SegmentationSettings segmentation;
-  int margin = 0;           ///< around what is left, pixels
-  int n_threads = 0;        ///< 0 = as many as there are cores
+  int margin = 0;           ///< around the foreground, pixels
+  int n_threads = 0;        ///< 0 = one per core
   double adapt_time_s = 30; ///< seconds; 0 = never
 };
 
-/** Their properties. */
 PropertyTable<RoiSettings> &roi_properties ();
-
-GType gst_roi_extract_cue_get_type (void);
-#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())

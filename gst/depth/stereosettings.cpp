@@ -2,17 +2,14 @@
 #include "stereosettings.hpp"
 
 #include <rangecast/geometry/range_image.hpp>
-#include <rangecast/rigfile/rig_file.hpp>
 
 using rangecast::MatchAlgorithm;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
-using Settings = StereoDepthSettings;
 
-static constexpr double kDefaultNear = 0.3, kDefaultFar = 3.0;
-
-GType
+#define GST_TYPE_STEREO_DEPTH_ALGORITHM (gst_stereo_depth_algorithm_get_type ())
+static GType
 gst_stereo_depth_algorithm_get_type (void)
 {
   static const GType type = [] {
@@ -30,35 +27,34 @@ PropertyTable<StereoDepthSettings> &
 stereo_properties ()
 {
   using S = StereoDepthSettings;
+  using V = ViewSettings;
   using Core = rangecast::StereoSettings;
   using Match = rangecast::MatchSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::number<&S::focal_length> ("focal-length", "Focal length",
+      P::number<&S::view, &V::focal_length> ("focal-length", "Focal length",
           "Focal length of rectified input in pixels, without a rig (0 = unset)", 0, 1e6,
           kMutableReady),
       P::number<&S::baseline> ("baseline", "Baseline",
           "Distance of the left and right cameras in metres, without a rig (0 = unset)", 0, 1e4,
           kMutableReady),
-      P::number<&S::principal_x> ("principal-x", "Principal point x",
+      P::number<&S::view, &V::principal_x> ("principal-x", "Principal point x",
           "Horizontal principal point of the left camera in pixels, without a rig (-1 = centre)",
           -1, 1e6, kMutableReady),
-      P::number<&S::principal_y> ("principal-y", "Principal point y",
+      P::number<&S::view, &V::principal_y> ("principal-y", "Principal point y",
           "Vertical principal point of both cameras in pixels, without a rig (-1 = centre)", -1,
           1e6, kMutableReady),
       P::number<&S::principal_offset> ("principal-offset", "Principal point offset",
           "Horizontal principal point of the right camera minus that of the left in pixels, "
-          "without "
-          "a rig (Middlebury's doffs)",
+          "without a rig (Middlebury's doffs)",
           -1e5, 1e5, kMutableReady),
-      P::number<&S::near> ("near", "Near",
+      P::number<&S::view, &V::near> ("near", "Near",
           "Minimum depth to match in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
-      P::number<&S::far> ("far", "Far",
+      P::number<&S::view, &V::far> ("far", "Far",
           "Maximum depth to output in metres (0 = from the rig, or 3)", 0, 1e4, kMutableReady),
-      P::number<&S::depth_unit> ("depth-unit", "Depth unit",
+      P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
           "Metres per depth unit of the output (0 = from the rig, or 0.0001, larger if far "
-          "requires "
-          "it)",
+          "requires it)",
           0, 1, kMutableReady),
       P::number<&S::core, &Core::flying_pixel_step> ("flying-pixel-step", "Flying pixel step",
           "Clear points that fewer than 4 of their 8 neighbours support within this fraction of "
@@ -75,8 +71,8 @@ stereo_properties ()
       P::number<&S::core, &Core::steady> ("steady", "Temporal smoothing",
           "Temporal smoothing of depth where nothing moves (0 = off, 1 = strongest)", 0, 1,
           kMutableReady),
-      P::number<&S::view_id> ("view-id", "View ID", "View of the rig, and view-id of the output", 0,
-          rangecast::kMaxViews - 1, kMutableReady),
+      P::number<&S::view, &V::view_id> ("view-id", "View ID",
+          "View of the rig, and view-id of the output", 0, rangecast::kMaxViews - 1, kMutableReady),
       P::number<&S::core, &Core::match, &Match::block_size> ("block-size", "Block size",
           "Width of the matching block in pixels, odd (0 = 15 for bm, 3 for sgbm and sgbm-3way; "
           "ignored by sgm)",
@@ -88,8 +84,7 @@ stereo_properties ()
       P::number<&S::core, &Core::match, &Match::speckle_window_size> ("speckle-window-size",
           "Speckle window size",
           "Minimum size in pixels of a region of similar disparity; smaller regions are cleared (0 "
-          "= "
-          "off)",
+          "= off)",
           0, 100000, kMutableReady),
       P::number<&S::core, &Core::match, &Match::speckle_range> ("speckle-range", "Speckle range",
           "Maximum disparity difference within a region in pixels, for speckle-window-size", 0,
@@ -97,13 +92,11 @@ stereo_properties ()
       P::number<&S::core, &Core::match, &Match::left_right_max_difference> (
           "left-right-max-difference", "Left-right check",
           "Maximum difference in pixels between left-to-right and right-to-left disparities (-1 = "
-          "no "
-          "check)",
+          "no check)",
           -1, 1000, kMutableReady),
       P::number<&S::core, &Core::silhouette_radius> ("silhouette-radius", "Silhouette radius",
           "Radius in pixels around depth edges in which points with the colour of the surface "
-          "behind "
-          "are cleared (0 = off)",
+          "behind are cleared (0 = off)",
           0, 64, kMutableReady),
       P::number<&S::core, &Core::gap_width> ("gap-width", "Gap width",
           "Maximum width in pixels of gaps within one surface that are filled (0 = off)", 0, 1000,
@@ -115,12 +108,11 @@ stereo_properties ()
           kMutableReady),
       P::number<&S::refresh_interval> ("refresh-interval", "Refresh interval",
           "Interval in frames between full images when downstream requests only a region (0 = "
-          "always "
-          "match full images)",
+          "always match full images)",
           0, 100000, kMutableReady),
       P::number<&S::core, &Core::n_threads> ("n-threads", "Threads",
           "Number of matching threads (0 = one per CPU core)", 0, 64, kMutableReady),
-      P::text<&S::rig> ("rig", "Rig",
+      P::text<&S::view, &V::rig> ("rig", "Rig",
           "Rig file with the stereo pair view-id (unset = focal-length and baseline)",
           kMutableReady),
       P::enumeration<&S::core, &Core::match, &Match::algorithm> ("algorithm", "Algorithm",
@@ -131,62 +123,25 @@ stereo_properties ()
   return table;
 }
 
-/* ---- the view ---- */
-
-static Status
-view_from_rig (const Settings &p, int width, int height, View &view)
-{
-  rangecast::Rig rig;
-  if (Status s = rangecast::load_rig (p.rig, rig); !s.ok ())
-    return s;
-  const View *found = rig.find (p.view_id);
-  if (!found)
-    return {
-        StatusCode::kNotFound, p.rig + ": has no view with view-id " + std::to_string (p.view_id)};
-  view = *found;
-  const Status scaled = rangecast::scale_view (view, width, height);
-  return scaled.ok () ? scaled : Status{scaled.code (), p.rig + ": " + scaled.message ()};
-}
-
-static Status
-view_from_properties (const Settings &p, int width, int height, View &view)
-{
-  if (p.focal_length <= 0 || p.baseline <= 0)
-    return {StatusCode::kNotFound,
-        "no calibration: expected property rig, or focal-length and baseline for rectified "
-        "pictures"};
-  view = {};
-  view.id = p.view_id;
-  view.width = width;
-  view.height = height;
-  view.world_from_view.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* level, looking along -z */
-  view.near_m = kDefaultNear;
-  view.far_m = kDefaultFar;
-  view.intrinsics = {p.focal_length, p.focal_length,
-      p.principal_x >= 0 ? p.principal_x : (width - 1) / 2.0,
-      p.principal_y >= 0 ? p.principal_y : (height - 1) / 2.0};
-  rangecast::PartnerCamera right;
-  right.intrinsics = view.intrinsics;
-  right.intrinsics.cx += p.principal_offset;
-  right.partner_from_left.translation.x = -p.baseline;
-  view.right = right;
-  return {};
-}
-
 Status
-make_stereo_view (const Settings &p, int width, int height, View &view)
+make_stereo_view (const StereoDepthSettings &settings, int width, int height, View &view)
 {
-  Status status = p.rig.empty () ? view_from_properties (p, width, height, view)
-                                 : view_from_rig (p, width, height, view);
-  if (!status.ok ())
-    return status;
-  if (p.depth_unit > 0)
-    view.depth_unit_m = p.depth_unit;
-  if (p.near > 0)
-    view.near_m = p.near;
-  if (p.far > 0)
-    view.far_m = p.far;
-  if (view.far_m >= 65535 * view.depth_unit_m && p.depth_unit <= 0)
-    view.depth_unit_m = view.far_m / 65000; /* far scenes get a coarser unit by themselves */
+  const ViewSettings &v = settings.view;
+  if (!v.rig.empty ()) {
+    if (Status s = load_view (v.rig, v.view_id, width, height, view); !s.ok ())
+      return s;
+  } else if (v.focal_length <= 0 || settings.baseline <= 0) {
+    return {StatusCode::kNotFound,
+        "no calibration: expected property rig, or focal-length and baseline for rectified images"};
+  } else {
+    view = make_pinhole_view (v, v.focal_length, width, height);
+    view.right.emplace ();
+    view.right->intrinsics = view.intrinsics;
+    view.right->intrinsics.cx += settings.principal_offset;
+    view.right->partner_from_left.translation.x = -settings.baseline;
+  }
+  set_depth_range (v, view);
+  if (view.far_m >= 65535 * view.depth_unit_m && v.depth_unit <= 0)
+    view.depth_unit_m = view.far_m / 65000; /* make far fit 16 bits */
   return rangecast::validate ({{view}});
 }

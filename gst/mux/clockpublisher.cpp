@@ -46,7 +46,7 @@ ClockPublisher::open (int port, GstClock *clock)
   /* A provider needs a clock: without one it is inactive, but has the port. */
   GstClock *provided = clock ? GST_CLOCK (gst_object_ref (clock)) : gst_system_clock_obtain ();
   GError *error = nullptr;
-  const PromptThread prompt; /* for the provider's thread: delays of it are errors of the clients */
+  const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
   provider_ = GST_NET_TIME_PROVIDER (g_initable_new (GST_TYPE_NET_TIME_PROVIDER, nullptr, &error,
       "clock", provided, "port", port, "active", gboolean (clock != nullptr), nullptr));
   gst_object_unref (provided);

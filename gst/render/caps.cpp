@@ -5,10 +5,10 @@
 
 #include "outputschedule.hpp"
 
-static constexpr int kMaxPicturesASecond = PictureGrid::kMaxRate;
+namespace {
 
-/* The frame rate of caps that are one structure, else nullptr. */
-static const GValue *
+/* The frame rate of caps with one structure, else nullptr. */
+const GValue *
 frame_rate (const GstCaps *caps)
 {
   return gst_caps_get_size (caps) == 1
@@ -16,7 +16,7 @@ frame_rate (const GstCaps *caps)
              : nullptr;
 }
 
-static GstCaps *
+GstCaps *
 filtered (GstCaps *caps, GstCaps *filter)
 {
   if (!filter)
@@ -26,21 +26,25 @@ filtered (GstCaps *caps, GstCaps *filter)
   return result;
 }
 
-/* One structure, and the input's rate chosen at last: elements downstream that simplify caps make
- * of two that differ in their rates alone what is no longer a subset of them (GStreamer 1.22). */
+} // namespace
+
+/* One structure; fixation prefers the input's rate. Two structures that differ only in their rates
+ * would be merged by elements downstream that simplify caps, into caps that are no longer a subset
+ * of ours (GStreamer 1.22). */
 GstCaps *
 strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filter)
 {
   GstCaps *output = gst_caps_copy (output_template);
   const GValue *rate = frame_rate (input);
-  const bool too_fast = rate && GST_VALUE_HOLDS_FRACTION (rate) &&
-                        gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
-                            gst_value_get_fraction_denominator (rate), kMaxPicturesASecond, 1) > 0;
+  const bool too_fast =
+      rate && GST_VALUE_HOLDS_FRACTION (rate) &&
+      gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
+          gst_value_get_fraction_denominator (rate), OutputSchedule::kMaxRate, 1) > 0;
   if (too_fast)
     gst_caps_set_value (output, "framerate", rate);
   else
     gst_caps_set_simple (
-        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxPicturesASecond, 1, nullptr);
+        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, OutputSchedule::kMaxRate, 1, nullptr);
   return filtered (output, filter);
 }
 
@@ -56,8 +60,10 @@ strip_input_caps (const GstCaps *output, GstCaps *input_template, GstCaps *filte
   return filtered (input, filter);
 }
 
-/* The input's, or near it; 30 if the input has none and downstream wants one. */
-static void
+namespace {
+
+/* The input's, or near it; 30 if the input has none and downstream requires one. */
+void
 fixate_rate (GstStructure *s, const GstCaps *input)
 {
   int n = 0, d = 1;
@@ -73,7 +79,7 @@ fixate_rate (GstStructure *s, const GstCaps *input)
 }
 
 /* Width and height for both eyes together. */
-static void
+void
 fixate_size (GstStructure *s)
 {
   const gchar *mode = gst_structure_get_string (s, "multiview-mode");
@@ -85,6 +91,8 @@ fixate_size (GstStructure *s)
   gst_structure_fixate_field_nearest_int (s, "width", wide ? 1280 : 640);
   gst_structure_fixate_field_nearest_int (s, "height", high ? 960 : 480);
 }
+
+} // namespace
 
 GstCaps *
 strip_fixate_output (GstCaps *caps, const GstCaps *input)

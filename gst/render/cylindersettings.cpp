@@ -6,6 +6,24 @@
 GST_DEBUG_CATEGORY_EXTERN (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
 
+rangecast::AgreementSettings
+CylinderFilterSettings::agreement () const
+{
+  const auto checks = [this] (GstCylinderFilterAgree check) { return (consistency & check) != 0; };
+  return {checks (GST_CYLINDER_FILTER_AGREE_POSES), checks (GST_CYLINDER_FILTER_AGREE_DEPTH),
+      checks (GST_CYLINDER_FILTER_AGREE_VIEWS), checks (GST_CYLINDER_FILTER_AGREE_POINTS),
+      core.threads};
+}
+
+rangecast::ColourSettings
+CylinderFilterSettings::colours () const
+{
+  return {balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
+      mode == GST_CYLINDER_FILTER_BLEND ? blend_width_m : 0, core.threads};
+}
+
+/* ---- GTypes ---- */
+
 #define GST_TYPE_CYLINDER_FILTER_MODE (gst_cylinder_filter_mode_get_type ())
 static GType
 gst_cylinder_filter_mode_get_type (void)
@@ -68,7 +86,11 @@ gst_cylinder_filter_axis_get_type (void)
   return type;
 }
 
-static bool
+/* ---- vectors as GstValueArray ---- */
+
+namespace {
+
+bool
 get_vector (const GValue *value, rangecast::Vec3 &vector)
 {
   double v[3];
@@ -86,18 +108,7 @@ get_vector (const GValue *value, rangecast::Vec3 &vector)
   return true;
 }
 
-void
-set_vector (GValue *array, const rangecast::Vec3 &vector)
-{
-  for (double number : {vector.x, vector.y, vector.z}) {
-    GValue value = G_VALUE_INIT;
-    g_value_init (&value, G_TYPE_DOUBLE);
-    g_value_set_double (&value, number);
-    gst_value_array_append_and_take_value (array, &value);
-  }
-}
-
-static GParamSpec *
+GParamSpec *
 vector_spec (const char *name, const char *nick, const char *blurb)
 {
   return gst_param_spec_array (name, nick, blurb,
@@ -106,7 +117,7 @@ vector_spec (const char *name, const char *nick, const char *blurb)
       kMutablePlaying);
 }
 
-static void
+void
 set_axis_position (CylinderFilterSettings &settings, const GValue *value)
 {
   rangecast::Vec3 position;
@@ -116,7 +127,7 @@ set_axis_position (CylinderFilterSettings &settings, const GValue *value)
     GST_WARNING ("axis-position: expected three numbers, a length below 1e6; not changed");
 }
 
-static void
+void
 set_axis_direction (CylinderFilterSettings &settings, const GValue *value)
 {
   rangecast::Vec3 direction;
@@ -125,6 +136,19 @@ set_axis_direction (CylinderFilterSettings &settings, const GValue *value)
   else
     GST_WARNING (
         "axis-direction: expected three numbers, a length from 1e-6 to below 1e6; not changed");
+}
+
+} // namespace
+
+void
+set_vector (GValue *array, const rangecast::Vec3 &vector)
+{
+  for (double number : {vector.x, vector.y, vector.z}) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, G_TYPE_DOUBLE);
+    g_value_set_double (&value, number);
+    gst_value_array_append_and_take_value (array, &value);
+  }
 }
 
 PropertyTable<CylinderFilterSettings> &

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <rangecast/alignment/view_agreement.hpp>
+#include <rangecast/overlap/colour_match.hpp>
 #include <rangecast/overlap/cylinder_filter.hpp>
 
 #include "common/properties.hpp"
@@ -18,11 +20,10 @@ enum GstCylinderFilterAgree {
 };
 enum GstCylinderFilterBalance { GST_CYLINDER_FILTER_BALANCE_OFF, GST_CYLINDER_FILTER_BALANCE_AUTO };
 
-/** What an application wants of cylinderfilter. Any thread, under the element's lock. */
+/** cylinderfilter's properties. Any thread, under the element's lock. */
 struct CylinderFilterSettings {
   GstCylinderFilterMode mode = GST_CYLINDER_FILTER_WINNER;
   rangecast::CylinderSettings core; ///< with an overlap for blending and a thread per core
-
   GstCylinderFilterBalance balance = GST_CYLINDER_FILTER_BALANCE_AUTO;
   double blend_width_m = 0.02;
   guint consistency = GST_CYLINDER_FILTER_AGREE_POSES | GST_CYLINDER_FILTER_AGREE_VIEWS |
@@ -33,9 +34,11 @@ struct CylinderFilterSettings {
     core.overlap = 8;
     core.threads = 0;
   }
+  [[nodiscard]] rangecast::AgreementSettings agreement () const;
+  [[nodiscard]] rangecast::ColourSettings colours () const;
 };
 
-/** Their properties. */
+/** Their table. */
 PropertyTable<CylinderFilterSettings> &cylinder_properties ();
 
 /** Writes x, y and z into a GstValueArray of doubles. */

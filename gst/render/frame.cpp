@@ -2,13 +2,28 @@
 #include <algorithm>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <rangecast/base/guarded.hpp>
+#include <utility>
 
 #include "striprenderprivate.hpp"
 
+using rangecast::RangeImage;
 using rangecast::Status;
 
-/* Time since the first picture, where auto-orbit began; a flush begins it anew. */
-static guint64
+namespace {
+
+/* Controlled properties take their values of the picture's time. The first frame set after a seek
+ * to between two of them has none: values stay. */
+void
+sync_values (GstStripRender *self, GstClockTime pts)
+{
+  const GstClockTime time = strip_stream_time (self, pts);
+  if (GST_CLOCK_TIME_IS_VALID (time))
+    gst_object_sync_values (GST_OBJECT (self), time);
+}
+
+/* Time since the first picture, for auto-orbit; starts again after a flush. */
+guint64
 orbit_time (GstStripRenderPrivate *priv, GstClockTime running)
 {
   if (!GST_CLOCK_TIME_IS_VALID (running))
@@ -18,71 +33,21 @@ orbit_time (GstStripRenderPrivate *priv, GstClockTime running)
   return running - priv->first_running;
 }
 
-GstClockTime
-strip_running_time (GstStripRender *self, GstClockTime pts)
-{
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
-  if (segment.format != GST_FORMAT_TIME) /* then nothing has a time */
-    return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
-}
-
-GstClockTime
-strip_stream_time (GstStripRender *self, GstClockTime pts)
-{
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
-  if (segment.format != GST_FORMAT_TIME)
-    return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
-}
-
-/* Running time of the clock, or GST_CLOCK_TIME_NONE. */
-GstClockTime
-strip_running_now (GstStripRender *self)
-{
-  GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
-  if (!clock)
-    return GST_CLOCK_TIME_NONE;
-  const GstClockTime now = gst_clock_get_time (clock);
-  const GstClockTime base_time = gst_element_get_base_time (GST_ELEMENT (self));
-  gst_object_unref (clock);
-  return now > base_time ? now - base_time : 0;
-}
-
-/* Has the statistics' panel ready. @return whether it is another one than before */
-static bool
-update_panel (GstStripRender *self, std::size_t views, GstClockTime frame_set_pts)
+/* The images that view-mask selects. */
+std::span<const RangeImage>
+visible_images (GstStripRender *self, std::span<const RangeImage> images, guint64 view_mask)
 {
   GstStripRenderPrivate *priv = self->priv;
-  GstClockTime latency = GST_CLOCK_TIME_NONE;
-  const GstClockTime now = strip_running_now (self),
-                     taken = strip_running_time (self, frame_set_pts);
-  if (priv->live && GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (taken))
-    latency = now > taken ? now - taken : 0;
-  RenderStats stats;
-  {
-    std::lock_guard guard (priv->lock);
-    stats = priv->stats;
-  }
-  priv->scene.count_into (stats);
-  if (!priv->stats_text.update (stats, views, latency, g_get_monotonic_time ()))
-    return false;
-  priv->stats_panel.draw (priv->stats_text.lines ());
-  return true;
-}
-
-/* The images of the views that are to be drawn. */
-static std::span<const rangecast::RangeImage>
-visible_images (
-    GstStripRenderPrivate *priv, std::span<const rangecast::RangeImage> images, guint64 view_mask)
-{
   const auto end = std::ranges::copy_if (images, priv->visible.begin (),
-      [view_mask] (const rangecast::RangeImage &image) { return view_mask >> image.view_id & 1; });
+      [view_mask] (const RangeImage &image) { return view_mask >> image.view_id & 1; });
+  if (end.out == priv->visible.begin ())
+    GST_DEBUG_OBJECT (
+        self, "nothing to draw: view-mask selects none of %u views", guint (images.size ()));
   return {priv->visible.begin (), end.out};
 }
 
-/* Where the camera's home is. */
-static const rangecast::SceneFrame &
+/* The camera's default position. */
+const rangecast::SceneFrame &
 home_frame (GstStripRenderPrivate *priv, const StripRenderSettings &settings,
     const rangecast::Orbit &orbit, GstClockTime pts)
 {
@@ -90,75 +55,117 @@ home_frame (GstStripRenderPrivate *priv, const StripRenderSettings &settings,
     priv->fit.reset ();
     return priv->scene.frame ();
   }
-  const EyePlaces eyes (priv->out);
+  const MultiviewLayout layout (priv->out);
   return priv->fit.update (
-      priv->scene, {orbit, eyes.all ().front ().aspect, pts, settings.camera.home_requests});
+      priv->scene, {orbit, layout.eyes ().front ().aspect, pts, settings.camera.home_requests});
 }
 
-/* May throw. */
-static GstFlowReturn
-draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
+/* Updates the panel of show-stats. @return whether it differs from the last one */
+bool
+update_panel (GstStripRender *self, GstClockTime frame_set_pts)
 {
   GstStripRenderPrivate *priv = self->priv;
-  gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
-  Status status = frame.status ();
-  if (status.ok ())
-    status = priv->scene.check (frame.views ());
-  if (const auto flow = gst_range_flow_return (GST_ELEMENT (self), status); flow != GST_FLOW_OK)
-    return flow;
+  GstClockTime latency = GST_CLOCK_TIME_NONE;
+  const GstClockTime now = strip_running_now (self),
+                     captured = strip_running_time (self, frame_set_pts);
+  if (priv->live && GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (captured))
+    latency = now > captured ? now - captured : 0;
+  RenderStats stats;
+  {
+    std::lock_guard guard (priv->lock);
+    stats = priv->stats;
+  }
+  priv->scene.count_into (stats);
+  if (!priv->stats_text.update (
+          stats, priv->scene.layers ().size (), latency, g_get_monotonic_time ()))
+    return false;
+  priv->stats_panel.draw (priv->stats_text.lines ());
+  return true;
+}
+
+/* Makes a scene of the frame set and draws it. May throw.
+ * @param repeated  the last picture showed the same frame set */
+Status
+draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, bool repeated,
+    Renderer::Result &result)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  const gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
+  if (Status status = frame.status (); !status.ok ())
+    return status;
+  if (Status status = priv->scene.check (frame.views ()); !status.ok ())
+    return status;
   StripRenderSettings settings;
   {
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
-  if (!priv->drawing.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
+  if (!priv->renderer.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
     settings.strips.mode = rangecast::StripMode::kStrips;
-  const bool again = frame_set == priv->drawn;
+  const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
   priv->scene.build (
-      visible_images (priv, frame.views (), settings.view_mask), settings, orbit, again);
+      visible_images (self, frame.views (), settings.view_mask), settings, orbit, repeated);
   gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
-  StripDrawingJob job = {&priv->scene, &settings, &home, orbit};
+  RenderJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {
-    job.panel_changed =
-        update_panel (self, priv->scene.layers ().size (), GST_BUFFER_PTS (frame_set));
+    job.panel_changed = update_panel (self, GST_BUFFER_PTS (frame_set));
     job.panel = priv->stats_panel.picture ();
   }
-  const auto result = priv->drawing.draw (GST_GL_BASE_FILTER (self)->context, job, out);
+  result = priv->renderer.draw (GST_GL_BASE_FILTER (self)->context, job, out);
+  if (result.drawn) {
+    std::lock_guard guard (priv->lock);
+    priv->settings.camera.set_shown (result.matrices, home, result.width, result.height);
+  }
+  return {};
+}
+
+} // namespace
+
+GstFlowReturn
+strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  bool discont;
+  {
+    std::lock_guard guard (priv->lock);
+    discont = std::exchange (priv->discont, false);
+  }
+  if (discont)
+    GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
+  sync_values (self, GST_BUFFER_PTS (out));
+
+  const bool repeated = frame_set == priv->drawn;
+  Renderer::Result result;
+  const Status status = rangecast::guarded (
+      "striprender", [&] { return draw (self, frame_set, out, keep, repeated, result); });
+  if (!status.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), status);
   if (!result.drawn) {
     GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
         ("OpenGL could not draw into the output: %s", result.reason), (nullptr));
     return GST_FLOW_ERROR;
   }
-  if (!again)
+
+  if (!repeated)
     priv->reporter.passed (GST_ELEMENT (self), frame_set);
-  std::lock_guard guard (priv->lock);
-  priv->settings.camera.shown (result.matrices, home, result.width, result.height);
-  priv->scene.count_into (priv->stats);
-  priv->stats.uploaded_bytes = result.uploaded;
-  priv->stats.uploaded_total += result.uploaded;
-  priv->stats.points_total += priv->stats.points;
-  priv->stats.frames++;
-  priv->stats.repeated += again;
+  guint64 points;
+  {
+    std::lock_guard guard (priv->lock);
+    RenderStats &stats = priv->stats;
+    priv->scene.count_into (stats);
+    stats.uploaded_bytes = result.uploaded;
+    stats.uploaded_total += result.uploaded;
+    stats.points_total += stats.points;
+    stats.frames++;
+    stats.repeated += repeated;
+    points = stats.points;
+  }
+  GST_LOG_OBJECT (self,
+      "picture of %" GST_TIME_FORMAT " shows frame set of %" GST_TIME_FORMAT
+      "%s: %u views, %" G_GUINT64_FORMAT " points, %" G_GUINT64_FORMAT " bytes uploaded",
+      GST_TIME_ARGS (GST_BUFFER_PTS (out)), GST_TIME_ARGS (GST_BUFFER_PTS (frame_set)),
+      repeated ? " again" : "", guint (priv->scene.layers ().size ()), points, result.uploaded);
   return GST_FLOW_OK;
-}
-
-/* Draws a frame set as it is to be seen at `running`. */
-GstFlowReturn
-strip_draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, GstClockTime running, bool keep)
-{
-  return strip_guarded (self, [&] { return draw_frame (self, frame_set, out, running, keep); });
-}
-
-/* Gives controlled properties their values of that time. A time outside the segment, as of the
- * first frame set after a seek to between two of them, is no stream time: values stay. */
-void
-strip_sync_values (GstStripRender *self, GstClockTime pts)
-{
-  const GstClockTime time = strip_stream_time (self, pts);
-  if (GST_CLOCK_TIME_IS_VALID (time))
-    gst_object_sync_values (GST_OBJECT (self), time);
 }

@@ -5,9 +5,9 @@
  *
  * Removes redundant points: where several views of a frame set see the same surface, the points of
  * the view that faces it most directly stay and the others are cleared. Before that, pose errors
- * are corrected, views and points that contradict others are left out (#GstCylinderFilter:agree),
- * and colours are matched (#GstCylinderFilter:colour-balance). Points move only with
- * consistency=depth.
+ * are corrected, views and points that contradict others are left out
+ * (#GstCylinderFilter:consistency), and colours are matched (#GstCylinderFilter:colour-balance).
+ * Points move only with consistency=depth.
  *
  * ## Example launch line
  * |[
@@ -25,20 +25,22 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
-#include <rangecast/alignment/view_agreement.hpp>
 #include <rangecast/base/guarded.hpp>
-#include <rangecast/overlap/colour_match.hpp>
-#include <rangecast/overlap/cylinder_filter.hpp>
 
 #include "common/controlledvalues.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
 #include "cylindersettings.hpp"
 
+using rangecast::RangeImage;
+using rangecast::Status;
+
 GST_DEBUG_CATEGORY (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
+
+namespace {
 
 struct CylinderCounts {
   guint64 frames = 0, points_contradicted = 0, points_in = 0, points_out = 0, units = 0,
@@ -48,19 +50,24 @@ struct CylinderCounts {
   rangecast::Axis axis;
 };
 
+} // namespace
+
+/* Locks, in the order in which they are taken: the sink pad's stream lock, which the streaming
+ * thread holds; GstCylinderFilterPrivate::lock. */
 struct GstCylinderFilterPrivate {
-  std::mutex lock; /* guards all settings and counts; never held while working on a frame */
+  std::mutex lock; /* guards settings and counts; never held while working, pushing or posting */
   CylinderFilterSettings settings;
   CylinderCounts counts;
-  std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame */
+  std::vector<std::pair<int, rangecast::ViewConsistency>> views; /* by view-id; of the last frame
+                                                                    set; written when streaming */
   StatsReporter reporter;                                        /* has locks of its own */
 
-  /* Streaming thread only. */
+  /* With the sink pad's stream lock. */
   rangecast::ViewAgreement agreement;
   rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
   bool has_rig = false;     /* set_caps gave agreement, core and colours one */
-  bool rig_pending = false; /* the source's caps may have another one than agreement */
+  bool rig_pending = false; /* the source pad's caps may have another rig than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
   bool was_off = false;
   guint64 left_out = 0; /* views that a warning was posted for, a bit each */
@@ -80,63 +87,48 @@ G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
 
-/* ---- streaming ---- */
+/* ---- caps and events: what resets the state ---- */
 
-/* After a jump in time: people and light are others, the cameras stand where they stood. */
-static void
-gst_cylinder_filter_forget_moment (GstCylinderFilterPrivate *priv)
+namespace {
+
+/* After a jump in time: people and light are different, the cameras stay where they are. */
+void
+reset_scene (GstCylinderFilterPrivate *priv)
 {
   priv->core.reset ();
   priv->colours.reset ();
-  priv->last_pts = GST_CLOCK_TIME_NONE;
 }
 
-/* All that is of one stream. */
-static void
-gst_cylinder_filter_forget (GstCylinderFilterPrivate *priv)
+/* After the end of a stream. */
+void
+reset_stream (GstCylinderFilterPrivate *priv)
 {
-  gst_cylinder_filter_forget_moment (priv);
+  reset_scene (priv);
   priv->agreement.reset ();
   priv->rig_pending = true;
 }
 
-/* Gives the rig that the views have now to those who work with it, here and downstream. */
-static rangecast::Status
-gst_cylinder_filter_send_rig (GstCylinderFilter *self)
+Status
+set_rig (GstCylinderFilterPrivate *priv, const rangecast::Rig &rig)
 {
-  auto priv = self->priv;
-  rangecast::Status good = validate (priv->agreement.rig ());
-  if (!good.ok ())
-    GST_WARNING_OBJECT (self, "the rig stays as it came; corrected, %s", good.message ().c_str ());
-  const rangecast::Rig &rig = good.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
-  priv->rig_pending = false;
-  if (rangecast::Status status = priv->core.change_rig (rig); !status.ok ())
+  if (Status status = priv->agreement.set_rig (rig); !status.ok ())
     return status;
-  if (rangecast::Status status = priv->colours.change_rig (rig); !status.ok ())
+  if (Status status = priv->core.set_rig (rig); !status.ok ())
     return status;
-  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
-  GstCaps *present = gst_pad_get_current_caps (pad);
-  if (!present)
-    return {};
-  GstCaps *caps = gstrange::with_rig (present, rig);
-  if (!gst_caps_is_equal (caps, present)) {
-    GST_DEBUG_OBJECT (self, "poses of the rig change");
-    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
-      GST_DEBUG_OBJECT (self, "they were not taken downstream"); /* and the buffer says why */
-  }
-  gst_caps_unref (caps);
-  gst_caps_unref (present);
-  return {};
+  return priv->colours.set_rig (rig);
 }
+
+} // namespace
 
 static gboolean
 gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
 {
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
-  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+  GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, in);
+  const Status status = rangecast::guarded ("cylinderfilter", [&] {
     gstrange::RangeInfo info;
-    rangecast::Status result = gstrange::parse_caps (in, info);
+    Status result = gstrange::parse_caps (in, info);
     /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
     if (result.ok () && priv->has_rig &&
         encode_rig (info.rig) == encode_rig (priv->agreement.nominal_rig ())) {
@@ -144,7 +136,7 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
       return result;
     }
     priv->has_rig = false;
-    gst_cylinder_filter_forget (priv);
+    reset_stream (priv);
     priv->reporter.set_views (info.rig);
     {
       const std::lock_guard guard (priv->lock);
@@ -153,69 +145,148 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
         priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
     }
     if (result.ok ())
-      result = priv->agreement.set_rig (info.rig);
-    if (result.ok ())
-      result = priv->core.set_rig (info.rig);
-    if (result.ok ())
-      result = priv->colours.set_rig (info.rig);
+      result = set_rig (priv, info.rig);
     priv->has_rig = result.ok ();
     return result;
   });
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* DISCONT comes with every lost packet, too: the scene is another one only if time does not go on.
- */
-static bool
-gst_cylinder_filter_begins_anew (GstCylinderFilterPrivate *priv, GstBuffer *buffer)
+static gboolean
+gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
 {
-  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
-  if (!GST_BUFFER_IS_DISCONT (buffer))
-    return false;
-  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
-  return !known || now <= last || now - last > GST_SECOND / 2;
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  const gchar *stream_id = nullptr;
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_FLUSH_STOP: /* serialized with the buffers */
+      reset_scene (priv);
+      break;
+    case GST_EVENT_STREAM_START: {
+      gst_event_parse_stream_start (event, &stream_id);
+      gchar *last = gst_pad_get_stream_id (base->sinkpad); /* the pad stores this event later */
+      reset_scene (priv);
+      if (g_strcmp0 (last, stream_id) != 0)
+        reset_stream (priv);
+      g_free (last);
+      break;
+    }
+    case GST_EVENT_EOS:
+      priv->reporter.finish ();
+      break;
+    default:
+      break;
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
 }
 
-/* Every buffer comes by here, also those that are too late or pass untouched. */
+/* ---- a frame set, in the order in which these are called ---- */
+
+/* Gets every buffer, also those that are late or passed through. DISCONT comes with every lost
+ * packet, too: the scene is another one only if time jumps. */
 static GstFlowReturn
 gst_cylinder_filter_submit_input_buffer (
     GstBaseTransform *base, gboolean is_discont, GstBuffer *buffer)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
-  if (gst_cylinder_filter_begins_anew (priv, buffer)) {
-    gst_cylinder_filter_forget_moment (priv);
-    priv->last_pts = GST_BUFFER_PTS (buffer);
+  const GstClockTime last = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (buffer);
+  const bool known = GST_CLOCK_TIME_IS_VALID (last) && GST_CLOCK_TIME_IS_VALID (now);
+  if (GST_BUFFER_IS_DISCONT (buffer) && (!known || now <= last || now - last > GST_SECOND / 2)) {
+    GST_DEBUG_OBJECT (base, "time jumps from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+        GST_TIME_ARGS (last), GST_TIME_ARGS (now));
+    reset_scene (priv);
   }
   return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
       ->submit_input_buffer (base, is_discont, buffer);
 }
 
+namespace {
+
+/* Sets the corrected rig here, and downstream by caps. */
+Status
+send_rig (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  const Status valid = validate (priv->agreement.rig ());
+  if (!valid.ok ())
+    GST_WARNING_OBJECT (
+        self, "keeping the original rig; the corrected one: %s", valid.message ().c_str ());
+  const rangecast::Rig &rig = valid.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
+  priv->rig_pending = false;
+  if (Status status = priv->core.change_rig (rig); !status.ok ())
+    return status;
+  if (Status status = priv->colours.change_rig (rig); !status.ok ())
+    return status;
+  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
+  GstCaps *present = gst_pad_get_current_caps (pad);
+  if (!present)
+    return {};
+  GstCaps *caps = gstrange::with_rig (present, rig);
+  if (!gst_caps_is_equal (caps, present)) {
+    GST_DEBUG_OBJECT (self, "sending caps with other poses");
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "downstream refused them"); /* pushing the buffer returns why */
+  }
+  gst_caps_unref (caps);
+  gst_caps_unref (present);
+  return {};
+}
+
+} // namespace
+
 /* Controlled properties take their values of this buffer's time; the mode may be one of them. */
 static void
 gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
 {
-  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  auto self = GST_CYLINDER_FILTER (base);
+  auto priv = self->priv;
   sync_controlled_values (base, buffer);
-  std::unique_lock guard (priv->lock);
-  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
-  priv->counts.untouched += off;
-  guard.unlock ();
+  bool off;
+  {
+    const std::lock_guard guard (priv->lock);
+    off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
+    priv->counts.untouched += off;
+  }
   if (off)
-    priv->reporter.passed (GST_ELEMENT (base), buffer);
-  if (off && !priv->was_off) { /* nobody looks at what the scene does meanwhile */
-    gst_cylinder_filter_forget (priv);
-    priv->last_pts = GST_BUFFER_PTS (buffer);
-    const rangecast::Status status = rangecast::guarded ("cylinderfilter",
-        [&] { return gst_cylinder_filter_send_rig (GST_CYLINDER_FILTER (base)); });
+    priv->reporter.passed (GST_ELEMENT (self), buffer);
+  if (off && !priv->was_off) { /* the scene changes unseen meanwhile */
+    GST_DEBUG_OBJECT (self, "mode=off: passing frame sets through");
+    reset_stream (priv);
+    const Status status = rangecast::guarded ("cylinderfilter", [&] { return send_rig (self); });
     if (!status.ok ())
-      GST_WARNING_OBJECT (base, "%s", status.message ().c_str ());
+      GST_WARNING_OBJECT (self, "%s", status.message ().c_str ());
   }
   priv->was_off = off;
   gst_base_transform_set_passthrough (base, off);
 }
 
-static void
-gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
+namespace {
+
+/* Corrects poses, depth and colours, and removes redundant points. */
+Status
+process (GstCylinderFilter *self, std::span<const RangeImage> views,
+    const CylinderFilterSettings &settings, rangecast::CylinderResult &result)
+{
+  auto priv = self->priv;
+  const rangecast::ColourSettings colours = settings.colours ();
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
+  for (const RangeImage &view : views)
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
+  if (Status status = priv->agreement.process (views, settings.agreement ()); !status.ok ())
+    return status;
+  if (priv->rig_pending || priv->agreement.rig_changed ())
+    if (Status status = send_rig (self); !status.ok ())
+      return status;
+  if (Status status = priv->colours.before (views, colours); !status.ok ())
+    return status;
+  if (Status status = priv->core.process (views, settings.core, result); !status.ok ())
+    return status;
+  return priv->colours.after (views, colours);
+}
+
+void
+count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
 {
   const std::lock_guard guard (priv->lock);
   CylinderCounts &counts = priv->counts;
@@ -233,33 +304,9 @@ gst_cylinder_filter_count (GstCylinderFilterPrivate *priv, const rangecast::Cyli
     consistency = priv->agreement.view (view_id);
 }
 
-/* Works on the mapped views of a frame set. */
-static rangecast::Status
-gst_cylinder_filter_process (GstCylinderFilter *self, std::span<const rangecast::RangeImage> views,
-    const rangecast::AgreementSettings &agree, const rangecast::ColourSettings &colours,
-    const rangecast::CylinderSettings &settings, rangecast::CylinderResult &result)
-{
-  auto priv = self->priv;
-  const rangecast::ColourBalance &balance = priv->colours.balance ();
-  for (const rangecast::RangeImage &view : views)
-    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
-                                                 ? std::optional (balance.gains (view.view_id))
-                                                 : std::nullopt);
-  if (rangecast::Status status = priv->agreement.process (views, agree); !status.ok ())
-    return status;
-  if (priv->rig_pending || priv->agreement.rig_changed ())
-    if (rangecast::Status status = gst_cylinder_filter_send_rig (self); !status.ok ())
-      return status;
-  if (rangecast::Status status = priv->colours.before (views, colours); !status.ok ())
-    return status;
-  if (rangecast::Status status = priv->core.process (views, settings, result); !status.ok ())
-    return status;
-  return priv->colours.after (views, colours);
-}
-
-/* One warning for each view that is left out from now on. */
-static void
-gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
+/* Posts one warning for each view that is left out from now on. */
+void
+warn_left_out (GstCylinderFilter *self)
 {
   auto priv = self->priv;
   for (const auto &[view_id, view] : priv->views) {
@@ -276,68 +323,44 @@ gst_cylinder_filter_warn_left_out (GstCylinderFilter *self)
   }
 }
 
+} // namespace
+
 static GstFlowReturn
 gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
-  std::unique_lock guard (priv->lock);
-  const bool off = priv->settings.mode == GST_CYLINDER_FILTER_OFF;
-  const CylinderFilterSettings settings = priv->settings;
-  const rangecast::ColourSettings colours = {settings.balance == GST_CYLINDER_FILTER_BALANCE_AUTO,
-      settings.mode == GST_CYLINDER_FILTER_BLEND ? settings.blend_width_m : 0,
-      settings.core.threads};
-  const auto checks = [&] (GstCylinderFilterAgree check) {
-    return (settings.consistency & check) != 0;
-  };
-  const rangecast::AgreementSettings agree = {checks (GST_CYLINDER_FILTER_AGREE_POSES),
-      checks (GST_CYLINDER_FILTER_AGREE_DEPTH), checks (GST_CYLINDER_FILTER_AGREE_VIEWS),
-      checks (GST_CYLINDER_FILTER_AGREE_POINTS), settings.core.threads};
-  guard.unlock ();
-  if (off)
+  CylinderFilterSettings settings;
+  {
+    const std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  if (settings.mode == GST_CYLINDER_FILTER_OFF) /* since before_transform() */
     return GST_FLOW_OK;
-
   rangecast::CylinderResult result;
-  const rangecast::Status status = rangecast::guarded ("cylinderfilter", [&] {
+  const Status status = rangecast::guarded ("cylinderfilter", [&] {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    return frame.status ().ok () ? gst_cylinder_filter_process (
-                                       self, frame.views (), agree, colours, settings.core, result)
+    return frame.status ().ok () ? process (self, frame.views (), settings, result)
                                  : frame.status ();
   });
   if (status.ok ()) {
-    gst_cylinder_filter_count (priv, result);
-    gst_cylinder_filter_warn_left_out (self);
+    GST_LOG_OBJECT (self,
+        "frame set of %" GST_TIME_FORMAT ": %" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT
+        " points stay",
+        GST_TIME_ARGS (GST_BUFFER_PTS (buffer)), result.points_out, result.points_in);
+    count (priv, result);
+    warn_left_out (self);
   }
-  GST_LOG_OBJECT (self, "%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " points stay",
-      result.points_out, result.points_in);
   priv->reporter.passed (GST_ELEMENT (self), buffer);
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
-static gboolean
-gst_cylinder_filter_sink_event (GstBaseTransform *base, GstEvent *event)
-{
-  /* Serialised with the data: axis, winners and gains start anew after a seek, what is known of the
-   * rig with another stream. */
-  auto priv = GST_CYLINDER_FILTER (base)->priv;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    gst_cylinder_filter_forget_moment (priv);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START) {
-    const gchar *stream_id = nullptr;
-    gst_event_parse_stream_start (event, &stream_id);
-    gchar *last = gst_pad_get_stream_id (base->sinkpad); /* it takes this event afterwards */
-    gst_cylinder_filter_forget_moment (priv);
-    if (g_strcmp0 (last, stream_id) != 0)
-      gst_cylinder_filter_forget (priv);
-    g_free (last);
-  }
-  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
-    priv->reporter.finish ();
-  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)->sink_event (base, event);
-}
+/* ---- states ---- */
 
-static std::vector<StatsRow>
-gst_cylinder_filter_collect (GstElement *element)
+namespace {
+
+std::vector<StatsRow>
+collect_stats (GstElement *element)
 {
   auto priv = GST_CYLINDER_FILTER (element)->priv;
   const std::lock_guard guard (priv->lock);
@@ -345,35 +368,38 @@ gst_cylinder_filter_collect (GstElement *element)
                .points = priv->counts.points_out}}};
 }
 
+} // namespace
+
 static gboolean
 gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
-  gst_cylinder_filter_forget (priv);
+  reset_stream (priv);
+  priv->last_pts = GST_CLOCK_TIME_NONE;
   priv->was_off = false;
   priv->left_out = 0;
-  priv->reporter.start (GST_ELEMENT (base), gst_cylinder_filter_collect);
+  priv->reporter.start (GST_ELEMENT (base), collect_stats);
   const std::lock_guard guard (priv->lock);
   priv->counts = {};
   return TRUE;
 }
 
+/* Frees the memory that the stream needed. */
 static gboolean
 gst_cylinder_filter_stop (GstBaseTransform *base)
 {
-  GST_CYLINDER_FILTER (base)->priv->reporter.stop ();
+  auto priv = GST_CYLINDER_FILTER (base)->priv;
+  priv->reporter.stop ();
   const StreamLock lock (base);
-  /* With the stream its memory goes too. */
-  GST_CYLINDER_FILTER (base)->priv->has_rig = false;
-  GST_CYLINDER_FILTER (base)->priv->core = {};
-  GST_CYLINDER_FILTER (base)->priv->agreement = {};
-  GST_CYLINDER_FILTER (base)->priv->colours = {};
+  priv->has_rig = false;
+  priv->core = {};
+  priv->agreement = {};
+  priv->colours = {};
   return TRUE;
 }
 
 /* ---- properties ---- */
 
-/* A GstValueArray of three doubles. */
 static void
 gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
@@ -385,7 +411,9 @@ gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
-static void
+namespace {
+
+void
 add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
 {
   GValue array = G_VALUE_INIT;
@@ -403,8 +431,8 @@ add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
   gst_structure_take_value (stats, "views", &array);
 }
 
-static GstStructure *
-gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
+GstStructure *
+stats_structure (const GstCylinderFilterPrivate *priv)
 {
   const CylinderCounts &counts = priv->counts;
   GstStructure *stats =
@@ -426,20 +454,20 @@ gst_cylinder_filter_stats (const GstCylinderFilterPrivate *priv)
   return stats;
 }
 
+} // namespace
+
 static void
 gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
   auto priv = GST_CYLINDER_FILTER (object)->priv;
   const std::lock_guard guard (priv->lock);
   if (id == PROP_STATS)
-    g_value_take_boxed (value, gst_cylinder_filter_stats (priv));
+    g_value_take_boxed (value, stats_structure (priv));
   else if (id == PROP_STATS_INTERVAL)
     g_value_set_uint (value, priv->reporter.interval ());
   else if (!cylinder_properties ().get (priv->settings, id, value))
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
-
-/* ---- life ---- */
 
 static void
 gst_cylinder_filter_finalize (GObject *object)
@@ -462,6 +490,8 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
+  GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
+
   object_class->set_property = gst_cylinder_filter_set_property;
   object_class->get_property = gst_cylinder_filter_get_property;
   object_class->finalize = gst_cylinder_filter_finalize;
@@ -479,14 +509,13 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
       "Removes redundant points of overlapping views and matches the views' poses and colours",
       "gst-rangecast");
 
-  transform_class->set_caps = gst_cylinder_filter_set_caps;
-  transform_class->submit_input_buffer = gst_cylinder_filter_submit_input_buffer;
-  transform_class->before_transform = gst_cylinder_filter_before_transform;
-  transform_class->transform_ip = gst_cylinder_filter_transform_ip;
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_cylinder_filter_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_cylinder_filter_stop);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_cylinder_filter_set_caps);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_cylinder_filter_sink_event);
+  transform_class->submit_input_buffer =
+      GST_DEBUG_FUNCPTR (gst_cylinder_filter_submit_input_buffer);
+  transform_class->before_transform = GST_DEBUG_FUNCPTR (gst_cylinder_filter_before_transform);
+  transform_class->transform_ip = GST_DEBUG_FUNCPTR (gst_cylinder_filter_transform_ip);
   transform_class->transform_ip_on_passthrough = FALSE;
-  transform_class->sink_event = gst_cylinder_filter_sink_event;
-  transform_class->start = gst_cylinder_filter_start;
-  transform_class->stop = gst_cylinder_filter_stop;
-
-  GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
 }

@@ -28,7 +28,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_render_debug);
 
 struct _GstRangeRender {
   GstBin parent;
-  const char *missing; /* an element that could not be made */
+  const char *missing; /* factory of an element that could not be created */
 };
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
@@ -39,10 +39,12 @@ static GstStaticPadTemplate src_template =
             "memory:GLMemory", "RGBA") "; " GST_VIDEO_CAPS_MAKE ("RGBA")));
 
 G_DEFINE_TYPE (GstRangeRender, gst_range_render, GST_TYPE_BIN)
-/* SECONDARY is enough: nobody else decodes range images. */
+/* SECONDARY suffices: no other element decodes range images. */
 GST_ELEMENT_REGISTER_DEFINE (rangerender, "rangerender", GST_RANK_SECONDARY, GST_TYPE_RANGE_RENDER)
 
-static GstElement *
+namespace {
+
+GstElement *
 add (GstRangeRender *self, const char *factory, const char *name)
 {
   GstElement *element = gst_element_factory_make (factory, name);
@@ -53,36 +55,35 @@ add (GstRangeRender *self, const char *factory, const char *name)
   return element;
 }
 
-static gboolean
-keep_if_no_range_of_rates (GQuark field, GValue *value, gpointer)
+gboolean
+is_no_range_of_rates (GQuark field, GValue *value, gpointer)
 {
   return field != g_quark_from_static_string ("framerate") ||
          !GST_VALUE_HOLDS_FRACTION_RANGE (value);
 }
 
-/* Whether ranges of frame rates in the caps begin at 0 and end at the greatest number: together
- * they are no limit. */
-static bool
-all_rates_are_in (const GstCaps *caps)
+/* Whether the ranges of frame rates in the caps together reach from 0 to the maximum. */
+bool
+has_all_rates (const GstCaps *caps)
 {
   bool from_none = false, to_all = false;
   for (guint i = 0; i < gst_caps_get_size (caps); i++) {
     const GValue *rate = gst_structure_get_value (gst_caps_get_structure (caps, i), "framerate");
     if (!rate || !GST_VALUE_HOLDS_FRACTION_RANGE (rate))
       continue;
-    const GValue *least = gst_value_get_fraction_range_min (rate),
-                 *most = gst_value_get_fraction_range_max (rate);
-    from_none |= gst_value_get_fraction_numerator (least) == 0;
-    to_all |= gst_value_get_fraction_numerator (most) == G_MAXINT &&
-              gst_value_get_fraction_denominator (most) == 1;
+    const GValue *min = gst_value_get_fraction_range_min (rate),
+                 *max = gst_value_get_fraction_range_max (rate);
+    from_none |= gst_value_get_fraction_numerator (min) == 0;
+    to_all |= gst_value_get_fraction_numerator (max) == G_MAXINT &&
+              gst_value_get_fraction_denominator (max) == 1;
   }
   return from_none && to_all;
 }
 
-/* playsink's deinterlace takes frame rates [ 0, max/2 ] and others [ max/2, max ]. Put together,
- * as gldownload does, in GStreamer 1.22 that is no subset of [ 0, max ], and every GstBaseTransform
- * from here to the file warns of its neighbour. So without ranges where they are no limit. */
-static gboolean
+/* playsink's deinterlace accepts frame rates [ 0, max/2 ] and [ max/2, max ]. gldownload puts both
+ * together, which GStreamer 1.22 does not take for a subset of [ 0, max ], so that every
+ * GstBaseTransform upstream warns. Ranges that are no limit are therefore removed. */
+gboolean
 query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
 {
   const gboolean answered = gst_pad_query_default (pad, parent, query);
@@ -92,10 +93,10 @@ query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
   gst_query_parse_caps (query, &filter);
   gst_query_parse_caps_result (query, &caps);
   caps = gst_caps_copy (caps);
-  const bool unlimited = all_rates_are_in (caps);
+  const bool unlimited = has_all_rates (caps);
   for (guint i = 0; unlimited && i < gst_caps_get_size (caps); i++)
     gst_structure_filter_and_map_in_place (
-        gst_caps_get_structure (caps, i), keep_if_no_range_of_rates, nullptr);
+        gst_caps_get_structure (caps, i), is_no_range_of_rates, nullptr);
   if (filter) {
     GstCaps *wanted = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
     gst_caps_unref (caps);
@@ -106,17 +107,20 @@ query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
   return TRUE;
 }
 
-static GstPad *
-show_pad (GstRangeRender *self, GstElement *element, const char *name, GstStaticPadTemplate *shown)
+GstPad *
+add_ghost_pad (
+    GstRangeRender *self, GstElement *element, const char *name, GstStaticPadTemplate *ghost)
 {
   GstPad *target = gst_element_get_static_pad (element, name);
-  GstPadTemplate *pad_template = gst_static_pad_template_get (shown);
+  GstPadTemplate *pad_template = gst_static_pad_template_get (ghost);
   GstPad *pad = gst_ghost_pad_new_from_template (name, target, pad_template);
   gst_element_add_pad (GST_ELEMENT (self), pad);
   gst_object_unref (pad_template);
   gst_object_unref (target);
   return pad;
 }
+
+} // namespace
 
 static GstStateChangeReturn
 gst_range_render_change_state (GstElement *element, GstStateChange transition)
@@ -138,13 +142,13 @@ gst_range_render_init (GstRangeRender *self)
   GstElement *download = add (self, "gldownload", "download");
   if (self->missing)
     return;
-  g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for people to see */
+  g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for viewers */
   gst_element_link_many (cylinder, render, download, nullptr);
-  GstPad *sink = show_pad (self, cylinder, "sink", &sink_template);
-  GST_PAD_SET_ACCEPT_INTERSECT (sink); /* caps that lack a field are for cylinderfilter to refuse */
-  GstPad *src = show_pad (self, download, "src", &src_template);
+  GstPad *sink = add_ghost_pad (self, cylinder, "sink", &sink_template);
+  GST_PAD_SET_ACCEPT_INTERSECT (sink); /* cylinderfilter refuses caps that lack a field */
+  GstPad *src = add_ghost_pad (self, download, "src", &src_template);
   GstProxyPad *inner = gst_proxy_pad_get_internal (GST_PROXY_PAD (src));
-  gst_pad_set_query_function (GST_PAD (inner), query_downstream);
+  gst_pad_set_query_function (GST_PAD (inner), GST_DEBUG_FUNCPTR (query_downstream));
   gst_object_unref (inner);
 }
 
@@ -153,13 +157,13 @@ gst_range_render_class_init (GstRangeRenderClass *klass)
 {
   auto element_class = GST_ELEMENT_CLASS (klass);
 
+  GST_DEBUG_CATEGORY_INIT (gst_range_render_debug, "rangerender", 0, "Range image renderer");
+
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
-  /* decodebin looks for a Decoder; nothing else that turns something into raw video is tried. */
+  /* Of what converts something to raw video, decodebin tries only decoders. */
   gst_element_class_set_static_metadata (element_class, "Range image renderer",
       "Codec/Decoder/Video", "Renders range images as raw video, for playbin and decodebin",
       "gst-rangecast");
-  element_class->change_state = gst_range_render_change_state;
-
-  GST_DEBUG_CATEGORY_INIT (gst_range_render_debug, "rangerender", 0, "Range image renderer");
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_render_change_state);
 }

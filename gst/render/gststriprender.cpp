@@ -28,15 +28,13 @@
 #include <algorithm>
 #include <exception>
 #include <gstrange/gstrangestatus.hpp>
+#include <rangecast/base/guarded.hpp>
 #include <utility>
 
 #include "caps.hpp"
 #include "striprenderprivate.hpp"
 
 using rangecast::Status;
-
-GST_DEBUG_CATEGORY_STATIC (gst_strip_render_debug);
-#define GST_CAT_DEFAULT gst_strip_render_debug
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
@@ -72,8 +70,10 @@ gst_strip_render_fixate_caps (
   return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
 }
 
-/* Whether both rigs are of the same cameras, however well each of them is calibrated. */
-static bool
+namespace {
+
+/* Whether both rigs have the same cameras, in other poses perhaps. */
+bool
 has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
 {
   return std::ranges::equal (
@@ -82,51 +82,57 @@ has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
       });
 }
 
-/* Downstream may change its mind, or cylinderfilter correct poses, at any time: a fit outlasts
- * both. May throw. */
-static GstFlowReturn
-take_input_caps (GstStripRender *self, GstCaps *in)
+/* Downstream may renegotiate, or cylinderfilter correct poses, at any time: a fit outlasts both.
+ * Caps that were refused come again with each buffer: their error is posted once. */
+bool
+handle_input_caps (GstStripRender *self, GstCaps *caps)
 {
   GstStripRenderPrivate *priv = self->priv;
-  gstrange::RangeInfo info;
-  const bool same = priv->input && gst_caps_is_equal (in, priv->input);
-  const Status status = same ? Status () : gstrange::parse_caps (in, info);
-  const bool told = std::exchange (priv->caps_refused, !status.ok ()); /* they are tried again */
-  if (same)
-    return GST_FLOW_OK;
-  if (told && !status.ok ())
-    return GST_FLOW_ERROR;
-  if (status.ok ()) {
+  if (priv->input && gst_caps_is_equal (caps, priv->input)) {
+    priv->caps_refused = false;
+    return true;
+  }
+  const Status status = rangecast::guarded ("striprender", [&] {
+    gstrange::RangeInfo info;
+    Status parsed = gstrange::parse_caps (caps, info);
+    if (!parsed.ok ())
+      return parsed;
     if (!has_same_cameras (info.rig, priv->info.rig))
       priv->fit.reset ();
     gst_clear_caps (&priv->input); /* what follows may throw */
     priv->info = std::move (info);
     priv->scene.set_rig (priv->info.rig);
     priv->reporter.set_views (priv->info.rig);
-    gst_caps_replace (&priv->input, in);
-  }
-  return gst_range_flow_return (GST_ELEMENT (self), status);
+    gst_caps_replace (&priv->input, caps);
+    return parsed;
+  });
+  const bool posted = std::exchange (priv->caps_refused, !status.ok ());
+  if (!status.ok () && !posted)
+    gst_range_flow_return (GST_ELEMENT (self), status);
+  return status.ok ();
 }
+
+} // namespace
 
 static gboolean
 gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
+  GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, in, out);
   if (strip_has_flags_as_text (out)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
         ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
         (nullptr));
     return FALSE;
   }
-  if (strip_guarded (self, [&] { return take_input_caps (self, in); }) != GST_FLOW_OK ||
-      !gst_video_info_from_caps (&priv->out, out))
+  if (!handle_input_caps (self, in) || !gst_video_info_from_caps (&priv->out, out))
     return FALSE;
   {
     std::lock_guard guard (priv->lock);
     priv->rate = strip_output_rate (in, out);
   }
-  strip_apply_rate (self);
+  strip_select_regime (self);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
 }
 
@@ -137,20 +143,25 @@ gst_strip_render_get_unit_size (GstBaseTransform *, GstCaps *, gsize *size)
   return TRUE;
 }
 
-/* Our frame sets come from system memory; nobody upstream can use OpenGL's. */
+/* ---- allocation ---- */
+
+/* Frame sets are read on the CPU: upstream has no use for a pool of OpenGL memory. */
 static gboolean
 gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
 {
   return TRUE;
 }
 
+namespace {
+
 struct PoolSizes {
   guint size = 0, min = 0, max = 0; /* bytes of a buffer; numbers of buffers */
 };
 
-/* Has a pool make OpenGL's buffers of those caps. A pool may want more than it is asked for: it
- * then refuses, and has in its configuration what it would take. @return whether it will do */
-static bool
+/* Configures a pool for OpenGL buffers of the query's caps. A pool that wants more than it is asked
+ * for refuses, and has in its configuration what it would accept. @return whether it is configured
+ */
+bool
 configure_pool (GstBufferPool *pool, GstQuery *query, PoolSizes &sizes)
 {
   GstCaps *caps;
@@ -160,46 +171,42 @@ configure_pool (GstBufferPool *pool, GstQuery *query, PoolSizes &sizes)
   gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
   if (gst_query_find_allocation_meta (query, GST_GL_SYNC_META_API_TYPE, nullptr))
     gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_GL_SYNC_META);
-  bool taken = gst_buffer_pool_set_config (pool, config);
+  const bool accepted = gst_buffer_pool_set_config (pool, config);
   config = gst_buffer_pool_get_config (pool);
   const bool enough =
       gst_buffer_pool_config_validate_params (config, caps, sizes.size, sizes.min, sizes.max);
   gst_buffer_pool_config_get_params (config, nullptr, &sizes.size, &sizes.min, &sizes.max);
-  if (taken || !enough) {
+  if (accepted || !enough) {
     gst_structure_free (config);
-    return taken;
+    return accepted;
   }
   return gst_buffer_pool_set_config (pool, config);
 }
 
-/* Whether that pool's buffers can be drawn into from our context. */
-static bool
-is_usable (GstBufferPool *pool, GstGLContext *context)
-{
-  return pool && GST_IS_GL_BUFFER_POOL (pool) &&
-         gst_gl_context_can_share (GST_GL_BUFFER_POOL (pool)->context, context);
-}
-
-/* A pool of OpenGL's buffers: downstream's if it offers one that will do, else one of ours. */
-static bool
+/* Answers the query with downstream's pool of OpenGL buffers if that shares our context, else with
+ * a new one. */
+bool
 choose_pool (GstStripRender *self, GstQuery *query)
 {
   GstGLContext *context = GST_GL_BASE_FILTER (self)->context;
-  const guint least = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
+  const guint min_size = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
   GstBufferPool *pool = nullptr;
   PoolSizes offer;
   const bool offered = gst_query_get_n_allocation_pools (query) > 0;
   if (offered)
     gst_query_parse_nth_allocation_pool (query, 0, &pool, &offer.size, &offer.min, &offer.max);
-  offer.size = std::max (offer.size, least);
+  offer.size = std::max (offer.size, min_size);
   PoolSizes sizes = offer;
-  if (!is_usable (pool, context) || !configure_pool (pool, query, sizes)) {
+  const bool is_usable = pool && GST_IS_GL_BUFFER_POOL (pool) &&
+                         gst_gl_context_can_share (GST_GL_BUFFER_POOL (pool)->context, context);
+  if (!is_usable || !configure_pool (pool, query, sizes)) {
     if (pool)
       GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " cannot be used; creating a pool", pool);
     gst_clear_object (&pool);
     pool = gst_gl_buffer_pool_new (context);
-    sizes = {least, offer.min, 0};
+    sizes = {min_size, offer.min, 0};
     if (!configure_pool (pool, query, sizes)) {
+      GST_DEBUG_OBJECT (self, "no pool of OpenGL buffers for these caps");
       gst_object_unref (pool);
       return false;
     }
@@ -212,14 +219,17 @@ choose_pool (GstStripRender *self, GstQuery *query)
   return true;
 }
 
+} // namespace
+
 static gboolean
 gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
 {
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
-  if (priv->no_context) /* the base class has posted why */
-    return FALSE;
-  priv->no_context = !gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base));
+  if (!priv->no_context) /* else the base class has posted why */
+    priv->no_context = !gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base));
+  if (priv->no_context)
+    GST_DEBUG_OBJECT (self, "no OpenGL context");
   if (priv->no_context || !choose_pool (self, query) ||
       !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
     return FALSE;
@@ -231,17 +241,17 @@ gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
   return error == nullptr;
 }
 
-/* ---- OpenGL's life ---- */
+/* ---- OpenGL, on its thread ---- */
 
-/* TRUE even after a failure: the base class would post an error of its own, which does not say why.
- * decide_allocation posts ours. */
+/* TRUE even after a failure: the base class would post an error that does not say why;
+ * decide_allocation() posts one that does. */
 static gboolean
 gst_strip_render_gl_start (GstGLBaseFilter *filter)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   g_clear_error (&priv->gl_error);
   try {
-    if (priv->drawing.start (filter->context, &priv->gl_error) && !priv->drawing.can_blend ())
+    if (priv->renderer.start (filter->context, &priv->gl_error) && !priv->renderer.can_blend ())
       GST_WARNING_OBJECT (
           filter, "OpenGL cannot render to half-float textures: mode blend draws strips");
   } catch (const std::exception &error) {
@@ -254,7 +264,7 @@ gst_strip_render_gl_start (GstGLBaseFilter *filter)
 static void
 gst_strip_render_gl_stop (GstGLBaseFilter *filter)
 {
-  GST_STRIP_RENDER (filter)->priv->drawing.stop ();
+  GST_STRIP_RENDER (filter)->priv->renderer.stop ();
 }
 
 static gboolean
@@ -262,17 +272,16 @@ gst_strip_render_gl_set_caps (GstGLBaseFilter *filter, GstCaps *, GstCaps *)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   g_clear_error (&priv->output_error);
-  priv->drawing.set_output (filter->context, priv->out, &priv->output_error);
+  priv->renderer.set_output (filter->context, priv->out, &priv->output_error);
   return TRUE;
 }
+
+/* ---- drawing: when and of which frame set, see scheduling.cpp ---- */
 
 static GstFlowReturn
 gst_strip_render_transform (GstBaseTransform *base, GstBuffer *in, GstBuffer *out)
 {
-  auto self = GST_STRIP_RENDER (base);
-  strip_sync_values (self, GST_BUFFER_PTS (in));
-  strip_mark_discont (self, out);
-  return strip_draw_frame (self, in, out, strip_running_time (self, GST_BUFFER_PTS (in)), false);
+  return strip_draw_frame (GST_STRIP_RENDER (base), in, out, false);
 }
 
 static gboolean
@@ -281,128 +290,11 @@ gst_strip_render_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta,
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
-/* ---- input ---- */
+/* ---- events from downstream ---- */
 
-static bool
-negotiated (GstStripRender *self)
-{
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  if (self->priv->live && strip_has_own_rate (self))
-    return true; /* the thread sees to it */
-  StreamLocks locks (base);
-  strip_apply_rate (self);
-  return gst_base_transform_reconfigure (base) && gst_pad_has_current_caps (base->srcpad);
-}
+namespace {
 
-static GstFlowReturn
-gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffer *in)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  if (!negotiated (self)) {
-    gst_buffer_unref (in);
-    return GST_PAD_IS_FLUSHING (base->srcpad) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
-  }
-  {
-    std::lock_guard guard (priv->lock);
-    priv->stats.frame_sets++;
-  }
-  strip_learn_whether_live (self);
-  if (strip_has_own_rate (self))
-    return strip_hand_to_grid (self, in);
-  const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (in));
-  if (strip_is_late (self, running) || !strip_follows_grid (self, GST_BUFFER_PTS (in))) {
-    strip_drop_pictures (self, 1, GST_BUFFER_PTS (in), GST_BUFFER_DURATION (in), running);
-    gst_buffer_unref (in);
-    return GST_BASE_TRANSFORM_FLOW_DROPPED;
-  }
-  gst_clear_buffer (&base->queued_buf);
-  base->queued_buf = in;
-  return GST_FLOW_OK;
-}
-
-static GstFlowReturn
-gst_strip_render_generate_output (GstBaseTransform *base, GstBuffer **out)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  if (!strip_has_own_rate (self))
-    return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->generate_output (base, out);
-  *out = nullptr;
-  if (priv->live)
-    return GST_FLOW_OK;
-  GstClockTime until;
-  {
-    std::lock_guard guard (priv->lock);
-    until = priv->grid.known_until ();
-  }
-  return strip_draw_next (self, until, out);
-}
-
-/* ---- events and queries ---- */
-
-static bool
-is_other_input (GstBaseTransform *base, GstEvent *caps_event)
-{
-  GstCaps *caps, *current = gst_pad_get_current_caps (base->sinkpad);
-  gst_event_parse_caps (caps_event, &caps);
-  const bool other = !current || !gst_caps_is_equal (current, caps);
-  gst_clear_caps (&current);
-  return other;
-}
-
-static gboolean
-gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
-{
-  auto self = GST_STRIP_RENDER (base);
-  const auto pass = GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->sink_event;
-  if (!(gst_event_type_get_flags (GST_EVENT_TYPE (event)) & GST_EVENT_TYPE_SERIALIZED))
-    return pass (base, event);
-  StreamLocks locks (base);
-  switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_FLUSH_STOP:
-      strip_reset_rate (self);
-      break;
-    case GST_EVENT_CAPS:
-      if (is_other_input (base, event))
-        strip_drain (self);
-      break;
-    case GST_EVENT_SEGMENT:
-    case GST_EVENT_SEGMENT_DONE:
-    case GST_EVENT_STREAM_START:
-    case GST_EVENT_EOS:
-      strip_drain_and_reset (self);
-      if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
-        self->priv->reporter.finish ();
-      break;
-    case GST_EVENT_GAP:
-      if (strip_take_gap (self, event)) {
-        gst_event_unref (event);
-        return TRUE;
-      }
-      break;
-    default:
-      break;
-  }
-  return pass (base, event);
-}
-
-static gboolean
-gst_strip_render_query (GstBaseTransform *base, GstPadDirection direction, GstQuery *query)
-{
-  if (direction == GST_PAD_SRC && GST_QUERY_TYPE (query) == GST_QUERY_LATENCY)
-    return strip_answer_latency (GST_STRIP_RENDER (base), query);
-  const auto pass = GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->query;
-  if (direction != GST_PAD_SINK ||
-      !(gst_query_type_get_flags (GST_QUERY_TYPE (query)) & GST_QUERY_TYPE_SERIALIZED))
-    return pass (base, direction, query);
-  StreamLocks locks (base); /* the base class may negotiate */
-  if (GST_QUERY_TYPE (query) == GST_QUERY_DRAIN)
-    strip_give_back (GST_STRIP_RENDER (base));
-  return pass (base, direction, query);
-}
-
-static bool
+bool
 handle_navigation (GstStripRender *self, GstEvent *event)
 {
   GstStripRenderPrivate *priv = self->priv;
@@ -418,6 +310,8 @@ handle_navigation (GstStripRender *self, GstEvent *event)
   return handled;
 }
 
+} // namespace
+
 static gboolean
 gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 {
@@ -426,16 +320,16 @@ gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
     gst_event_unref (event);
     return TRUE;
   }
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS)
-    strip_take_qos (self, event);
-  else if (GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
-    strip_take_latency (self, event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS || GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
+    strip_handle_timing_event (self, event);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->src_event (base, event);
 }
 
-/* ---- life ---- */
+/* ---- states ---- */
 
-static std::vector<StatsRow>
+namespace {
+
+std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
@@ -446,6 +340,8 @@ collect_stats (GstElement *element)
                .bytes = stats.uploaded_total,
                .late = stats.dropped}}};
 }
+
+} // namespace
 
 static gboolean
 gst_strip_render_start (GstBaseTransform *base)
@@ -458,7 +354,7 @@ gst_strip_render_start (GstBaseTransform *base)
   priv->stats_text = {};
   priv->fit.reset ();
   gst_clear_caps (&priv->input);
-  strip_reset_rate (self);
+  strip_reset_stream (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   {
     std::lock_guard guard (priv->lock);
@@ -473,23 +369,25 @@ gst_strip_render_stop (GstBaseTransform *base)
 {
   auto self = GST_STRIP_RENDER (base);
   self->priv->reporter.stop ();
-  self->priv->thread.stop ();
-  strip_reset_rate (self);
+  self->priv->task.stop ();
+  strip_reset_stream (self);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->stop (base);
 }
 
 static GstStateChangeReturn
 gst_strip_render_change_state (GstElement *element, GstStateChange transition)
 {
-  PictureThread &thread = GST_STRIP_RENDER (element)->priv->thread;
+  OutputTask &task = GST_STRIP_RENDER (element)->priv->task;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
-    thread.set_playing (false);
+    task.set_playing (false);
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_strip_render_parent_class)->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING && result != GST_STATE_CHANGE_FAILURE)
-    thread.set_playing (true);
+    task.set_playing (true);
   return result;
 }
+
+/* ---- properties ---- */
 
 static void
 gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
@@ -509,10 +407,10 @@ gst_strip_render_set_property (GObject *object, guint id, const GValue *value, G
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     hold_changed = priv->settings.hold_time != before.hold_time;
     keep_changed = priv->settings.keep_rate != before.keep_rate;
-    priv->grid.set_hold (priv->settings.hold_time);
+    priv->schedule.set_hold (priv->settings.hold_time);
   }
-  if (hold_changed || keep_changed) /* without a thread, the next frame set sees to it */
-    priv->thread.wake ();
+  if (hold_changed || keep_changed) /* without a task they apply to the next frame set */
+    priv->task.wake ();
 }
 
 static void
@@ -548,21 +446,14 @@ gst_strip_render_init (GstStripRender *self)
 }
 
 static void
-describe_element (GstElementClass *element_class)
-{
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
-  gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
-      "Renders range images with OpenGL without building a mesh", "gst-rangecast");
-}
-
-static void
 gst_strip_render_class_init (GstStripRenderClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   auto filter_class = GST_GL_BASE_FILTER_CLASS (klass);
+
+  strip_render_category (); /* exists from here on, for GST_DEBUG */
 
   object_class->set_property = gst_strip_render_set_property;
   object_class->get_property = gst_strip_render_get_property;
@@ -575,30 +466,32 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
       "uploaded-bytes");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
-  describe_element (element_class);
-  element_class->change_state = gst_strip_render_change_state;
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &src_template);
+  gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
+      "Renders range images with OpenGL without building a mesh", "gst-rangecast");
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_strip_render_change_state);
 
-  transform_class->start = gst_strip_render_start;
-  transform_class->stop = gst_strip_render_stop;
-  transform_class->transform_caps = gst_strip_render_transform_caps;
-  transform_class->fixate_caps = gst_strip_render_fixate_caps;
-  transform_class->set_caps = gst_strip_render_set_caps;
-  transform_class->get_unit_size = gst_strip_render_get_unit_size;
-  transform_class->propose_allocation = gst_strip_render_propose_allocation;
-  transform_class->decide_allocation = gst_strip_render_decide_allocation;
-  transform_class->submit_input_buffer = gst_strip_render_submit_input_buffer;
-  transform_class->generate_output = gst_strip_render_generate_output;
-  transform_class->transform = gst_strip_render_transform;
-  transform_class->transform_meta = gst_strip_render_transform_meta;
-  transform_class->sink_event = gst_strip_render_sink_event;
-  transform_class->src_event = gst_strip_render_src_event;
-  transform_class->query = gst_strip_render_query;
+  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_strip_render_transform_caps);
+  transform_class->fixate_caps = GST_DEBUG_FUNCPTR (gst_strip_render_fixate_caps);
+  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_strip_render_set_caps);
+  transform_class->get_unit_size = GST_DEBUG_FUNCPTR (gst_strip_render_get_unit_size);
+  transform_class->propose_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_propose_allocation);
+  transform_class->decide_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_decide_allocation);
 
   filter_class->supported_gl_api =
       GstGLAPI (GST_GL_API_OPENGL | GST_GL_API_OPENGL3 | GST_GL_API_GLES2);
-  filter_class->gl_start = gst_strip_render_gl_start;
-  filter_class->gl_stop = gst_strip_render_gl_stop;
-  filter_class->gl_set_caps = gst_strip_render_gl_set_caps;
+  filter_class->gl_start = GST_DEBUG_FUNCPTR (gst_strip_render_gl_start);
+  filter_class->gl_stop = GST_DEBUG_FUNCPTR (gst_strip_render_gl_stop);
+  filter_class->gl_set_caps = GST_DEBUG_FUNCPTR (gst_strip_render_gl_set_caps);
 
-  GST_DEBUG_CATEGORY_INIT (gst_strip_render_debug, "striprender", 0, "Strip renderer");
+  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (gst_strip_render_submit_input_buffer);
+  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_strip_render_generate_output);
+  transform_class->transform = GST_DEBUG_FUNCPTR (gst_strip_render_transform);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_strip_render_transform_meta);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_strip_render_sink_event);
+  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_strip_render_src_event);
+  transform_class->query = GST_DEBUG_FUNCPTR (gst_strip_render_query);
+  transform_class->start = GST_DEBUG_FUNCPTR (gst_strip_render_start);
+  transform_class->stop = GST_DEBUG_FUNCPTR (gst_strip_render_stop);
 }

@@ -1,15 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "multisampler.hpp"
 
-#include <gst/gl/gstglfuncs.h>
-
 #include <algorithm>
 
-#include "glshader.hpp"
-
-#ifndef GL_DRAW_FRAMEBUFFER_BINDING
-#define GL_DRAW_FRAMEBUFFER_BINDING 0x8CA6
-#endif
 #ifndef GL_MAX_SAMPLES
 #define GL_MAX_SAMPLES 0x8D57
 #endif
@@ -17,16 +10,11 @@
 #define GL_READ_FRAMEBUFFER 0x8CA8
 #define GL_DRAW_FRAMEBUFFER 0x8CA9
 #endif
-#ifndef GL_RGBA8
-#define GL_RGBA8 0x8058
-#endif
-#ifndef GL_DEPTH_COMPONENT24
-#define GL_DEPTH_COMPONENT24 0x81A6
-#endif
+namespace {
 
-/* Means of opaque samples and of nothing are premultiplied by what they cover of the pixel. Laid
- * over the background they are divided by their alpha: straight again. */
-static const char *const kOverBackground = R"(
+/* Means of opaque samples and (0, 0, 0, 0) are premultiplied by the pixel's coverage. The result is
+ * divided by its alpha: straight again. */
+const char *const kOverBackground = R"(
 precision highp float;
 precision highp int;
 uniform sampler2D u_picture;
@@ -42,24 +30,17 @@ void main ()
 }
 )";
 
-/* What is laid over the background. */
+} // namespace
+
 bool
 Multisampler::make_resolved (int width, int height)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  GError *error = nullptr;
-  shader_ = make_shader (context_, kCoveringVertexShader, kOverBackground, &error);
-  if (!shader_) {
-    GST_WARNING ("%s", error ? error->message : "no shader");
-    g_clear_error (&error);
+  if (!over_background_.make (context_, kCoveringVertexShader, kOverBackground, "antialiasing"))
     return false;
-  }
-  gl->GenVertexArrays (1, &array_); /* OpenGL's core profile draws nothing without */
   gl->GenTextures (1, &texture_);
   gl->BindTexture (GL_TEXTURE_2D, texture_);
-  gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  gl->TexImage2D (GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  define_texture (gl, GL_RGBA8, width, height, GL_RGBA, GL_UNSIGNED_BYTE);
   gl->BindTexture (GL_TEXTURE_2D, 0);
   gl->GenFramebuffers (1, &resolved_);
   gl->BindFramebuffer (GL_FRAMEBUFFER, resolved_);
@@ -76,19 +57,19 @@ Multisampler::make (int width, int height, int samples)
       void (GSTGLAPI *) (guint target, gint samples, guint format, gint width, gint height);
   const auto storage = reinterpret_cast<Storage> (
       gst_gl_context_get_proc_address (context_, "glRenderbufferStorageMultisample"));
-  gint most = 0;
-  gl->GetIntegerv (GL_MAX_SAMPLES, &most);
-  if (!storage || most < 2 || !make_resolved (width, height))
+  gint max = 0;
+  gl->GetIntegerv (GL_MAX_SAMPLES, &max);
+  if (!storage || max < 2 || !make_resolved (width, height))
     return false;
   gl->GenFramebuffers (1, &framebuffer_);
   gl->GenRenderbuffers (2, buffers_);
   gl->BindFramebuffer (GL_FRAMEBUFFER, framebuffer_);
   const guint formats[] = {GL_RGBA8, GL_DEPTH_COMPONENT24};
-  const guint places[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
+  const guint attachments[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
   for (int i = 0; i < 2; i++) {
     gl->BindRenderbuffer (GL_RENDERBUFFER, buffers_[i]);
-    storage (GL_RENDERBUFFER, std::min (samples, most), formats[i], width, height);
-    gl->FramebufferRenderbuffer (GL_FRAMEBUFFER, places[i], GL_RENDERBUFFER, buffers_[i]);
+    storage (GL_RENDERBUFFER, std::min (samples, max), formats[i], width, height);
+    gl->FramebufferRenderbuffer (GL_FRAMEBUFFER, attachments[i], GL_RENDERBUFFER, buffers_[i]);
   }
   gl->BindRenderbuffer (GL_RENDERBUFFER, 0);
   return gl->CheckFramebufferStatus (GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
@@ -107,7 +88,7 @@ Multisampler::begin (GstGLContext *context, int width, int height, int samples)
   const GstGLFuncs *gl = context->gl_vtable;
   if (!same)
     stop ();
-  gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &before_);
+  gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &output_);
   if (same) {
     gl->BindFramebuffer (GL_FRAMEBUFFER, framebuffer_);
     return true;
@@ -118,22 +99,12 @@ Multisampler::begin (GstGLContext *context, int width, int height, int samples)
   samples_ = samples;
   failed_ = !make (width, height, samples);
   if (failed_) {
-    GST_WARNING ("no antialiasing: OpenGL has no framebuffer of %dx%d pixels with %d samples",
-        width, height, samples);
-    gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
+    GST_WARNING_OBJECT (context,
+        "no antialiasing: OpenGL has no framebuffer of %dx%d pixels with %d samples", width, height,
+        samples);
+    gl->BindFramebuffer (GL_FRAMEBUFFER, guint (output_));
   }
   return !failed_;
-}
-
-/* The means of the samples. */
-void
-Multisampler::blit (guint to)
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  gl->BindFramebuffer (GL_READ_FRAMEBUFFER, framebuffer_);
-  gl->BindFramebuffer (GL_DRAW_FRAMEBUFFER, to);
-  gl->BlitFramebuffer (
-      0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
 void
@@ -141,25 +112,27 @@ Multisampler::end (const float (&background)[4])
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const bool opaque = background[3] >= 1;
-  blit (opaque ? guint (before_) : resolved_);
-  gl->BindFramebuffer (GL_FRAMEBUFFER, guint (before_));
+  gl->BindFramebuffer (GL_READ_FRAMEBUFFER, framebuffer_);
+  gl->BindFramebuffer (GL_DRAW_FRAMEBUFFER, opaque ? guint (output_) : resolved_);
+  gl->BlitFramebuffer (
+      0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  gl->BindFramebuffer (GL_FRAMEBUFFER, guint (output_));
   if (opaque)
     return;
   gl->Viewport (0, 0, width_, height_);
-  gst_gl_shader_use (shader_);
+  GstGLShader *shader = over_background_.shader ();
+  gst_gl_shader_use (shader);
   gl->ActiveTexture (GL_TEXTURE0);
   gl->BindTexture (GL_TEXTURE_2D, texture_);
-  gst_gl_shader_set_uniform_1i (shader_, "u_picture", 0);
+  gst_gl_shader_set_uniform_1i (shader, "u_picture", 0);
   gst_gl_shader_set_uniform_4f (
-      shader_, "u_background", background[0], background[1], background[2], background[3]);
-  gl->BindVertexArray (array_);
-  gl->DrawArrays (GL_TRIANGLES, 0, 3);
-  gl->BindVertexArray (0);
+      shader, "u_background", background[0], background[1], background[2], background[3]);
+  draw_covering (gl, over_background_.array ());
   gl->BindTexture (GL_TEXTURE_2D, 0);
   gst_gl_context_clear_shader (context_);
 }
 
-/* OpenGL takes no notice of what was never made. */
+/* OpenGL ignores the names of objects that were not made. */
 void
 Multisampler::stop ()
 {
@@ -169,8 +142,7 @@ Multisampler::stop ()
     gl->DeleteFramebuffers (1, &resolved_);
     gl->DeleteRenderbuffers (2, buffers_);
     gl->DeleteTextures (1, &texture_);
-    gl->DeleteVertexArrays (1, &array_);
-    gst_clear_object (&shader_);
+    over_background_.stop ();
   }
   *this = {};
 }

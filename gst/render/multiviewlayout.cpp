@@ -4,14 +4,14 @@
 #include <cstring>
 #include <utility>
 
-EyePlaces::EyePlaces (const GstVideoInfo &info)
+MultiviewLayout::MultiviewLayout (const GstVideoInfo &info)
 {
   const int width = GST_VIDEO_INFO_WIDTH (&info), height = GST_VIDEO_INFO_HEIGHT (&info);
-  guint flags; /* copied: caps may have bits that are no value of the enumeration */
+  guint flags; /* copied: caps may have bits that are not in the enumeration */
   static_assert (sizeof flags == sizeof GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info));
   std::memcpy (&flags, &GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info), sizeof flags);
   const bool half = (flags & GST_VIDEO_MULTIVIEW_FLAGS_HALF_ASPECT) != 0;
-  EyePlace &first = places_[0], &second = places_[1];
+  EyeViewport &first = eyes_[0], &second = eyes_[1];
   first = {0, 0, 0, 0, width, height, 1};
   first.aspect = double (width) * GST_VIDEO_INFO_PAR_N (&info) /
                  (double (height) * GST_VIDEO_INFO_PAR_D (&info));

@@ -6,26 +6,26 @@
 #include <array>
 #include <span>
 
-/** The picture of one eye within an output buffer. */
-struct EyePlace {
+/** Where the picture of one eye lies in an output buffer. */
+struct EyeViewport {
   double side = 0;           ///< of the camera: -1 left, 1 right, 0 neither
   guint memory = 0;          ///< number of the buffer's memory
   int x = 0, y = 0;          ///< pixels of that memory's picture
   int width = 0, height = 0; ///< pixels
-  double aspect = 1;         ///< width / height as it is to be seen
+  double aspect = 1;         ///< width / height as displayed
 };
 
-/** One or two eyes' pictures, as the caps' multiview-mode and multiview-flags tell. */
-class EyePlaces {
+/** One or two eyes' pictures, from multiview-mode and multiview-flags of the caps. */
+class MultiviewLayout {
 public:
-  EyePlaces () = default;
-  explicit EyePlaces (const GstVideoInfo &info);
-  [[nodiscard]] std::span<const EyePlace> all () const { return {places_.data (), count_}; }
+  MultiviewLayout () = default;
+  explicit MultiviewLayout (const GstVideoInfo &info);
+  [[nodiscard]] std::span<const EyeViewport> eyes () const { return {eyes_.data (), count_}; }
 
 private:
-  std::array<EyePlace, 2> places_;
+  std::array<EyeViewport, 2> eyes_;
   std::size_t count_ = 0;
 };
 
-/** What multiview-mode may be, for caps. */
+/** Supported values of multiview-mode, for caps. */
 #define STRIP_MULTIVIEW_MODES "{ mono, left, right, side-by-side, top-bottom, separated }"

@@ -7,10 +7,22 @@
 
 using rangecast::Orbit;
 
-static constexpr double kZoomStep = 1.1;
-static constexpr double kKeyTurnDeg = 5;
-static constexpr double kSteepest = 89;   /* degrees */
-static constexpr double kFarthest = 1000; /* metres, as the properties allow */
+namespace {
+
+constexpr double kZoomStep = 1.1;
+constexpr double kKeyTurn_deg = 5;
+constexpr double kMaxElevation_deg = 89; /* as the property */
+constexpr double kMaxDistance_m = 1000;  /* as the properties */
+
+/* No screen is larger, and results for larger numbers may not be finite. */
+bool
+is_on_screen (double x, double y)
+{
+  constexpr double kMax = 1e6; /* pixels */
+  return std::abs (x) <= kMax && std::abs (y) <= kMax;
+}
+
+} // namespace
 
 Orbit
 OrbitControl::at (guint64 running_ns) const
@@ -21,8 +33,8 @@ OrbitControl::at (guint64 running_ns) const
 }
 
 void
-OrbitControl::shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
-    int width, int height)
+OrbitControl::set_shown (const rangecast::OrbitMatrices &matrices,
+    const rangecast::SceneFrame &scene, int width, int height)
 {
   home_distance_m_ = scene.distance_m;
   home_elevation_deg_ = scene.elevation_deg;
@@ -32,38 +44,22 @@ OrbitControl::shown (const rangecast::OrbitMatrices &matrices, const rangecast::
   height_ = height;
 }
 
-/* Keeps within what the properties allow and what is shown: all round, but not over the top, which
- * is less far where the first view itself looks down or up. */
+/* Stays within the ranges of the properties and below the vertical, which is nearer where the first
+ * view itself looks down or up. */
 void
 OrbitControl::turn (double azimuth_deg, double elevation_deg)
 {
   orbit.azimuth_deg = std::fmod (orbit.azimuth_deg + azimuth_deg, 360.0);
   orbit.elevation_deg = std::clamp (orbit.elevation_deg + elevation_deg,
-      std::max (-kSteepest, -kSteepest - home_elevation_deg_),
-      std::min (kSteepest, kSteepest - home_elevation_deg_));
+      std::max (-kMaxElevation_deg, -kMaxElevation_deg - home_elevation_deg_),
+      std::min (kMaxElevation_deg, kMaxElevation_deg - home_elevation_deg_));
 }
 
 void
 OrbitControl::zoom (double factor)
 {
   const double distance_m = orbit.distance_m > 0 ? orbit.distance_m : home_distance_m_;
-  orbit.distance_m = std::clamp (distance_m * factor, 0.01, kFarthest);
-}
-
-/* What hands have changed; the field of view they cannot. */
-void
-OrbitControl::go_back ()
-{
-  orbit = {.fov_deg = orbit.fov_deg, .pan = {}};
-  home_requests++;
-}
-
-/* Of the screen: nobody has one as large, and what follows of larger ones is no number any more. */
-static bool
-is_place (double x, double y)
-{
-  constexpr double kMax = 1e6; /* pixels */
-  return std::abs (x) <= kMax && std::abs (y) <= kMax;
+  orbit.distance_m = std::clamp (distance_m * factor, 0.01, kMaxDistance_m);
 }
 
 bool
@@ -72,11 +68,11 @@ OrbitControl::press (GstEvent *event)
   double x = 0, y = 0;
   gint button = 0;
   gst_navigation_event_parse_mouse_button_event (event, &button, &x, &y);
-  if (button == 4 || button == 5) { /* the wheel, of older sinks */
+  if (button == 4 || button == 5) { /* the wheel, from older sinks */
     zoom (button == 4 ? 1 / kZoomStep : kZoomStep);
     return true;
   }
-  if (!is_place (x, y))
+  if (!is_on_screen (x, y))
     return false;
   button_ = button;
   x_ = x;
@@ -84,19 +80,21 @@ OrbitControl::press (GstEvent *event)
   return true;
 }
 
-/* Turns half a circle over the width of the picture, a quarter over its height. */
+/* Half a circle over the width of the picture, a quarter over its height. */
 void
-OrbitControl::turn_by_hand (double dx, double dy)
+OrbitControl::orbit_by (double dx, double dy)
 {
   turn (-180 * dx / width_, 90 * dy / height_);
 }
 
-/* Moves as far as the hand does. */
+/* The scene follows the pointer. */
 void
-OrbitControl::move_by_hand (double dx, double dy)
+OrbitControl::pan_by (double dx, double dy)
 {
   const rangecast::Vec3 pan = orbit.pan - dx / width_ * pan_right_ - dy / height_ * pan_down_;
-  const auto limited = [] (double metres) { return std::clamp (metres, -kFarthest, kFarthest); };
+  const auto limited = [] (double metres) {
+    return std::clamp (metres, -kMaxDistance_m, kMaxDistance_m);
+  };
   orbit.pan = {limited (pan.x), limited (pan.y), limited (pan.z)};
 }
 
@@ -107,12 +105,12 @@ OrbitControl::drag (GstEvent *event)
     return false;
   double x = 0, y = 0;
   gst_navigation_event_parse_mouse_move_event (event, &x, &y);
-  if (!is_place (x, y))
+  if (!is_on_screen (x, y))
     return false;
   if (button_ == 1)
-    turn_by_hand (x - x_, y - y_);
+    orbit_by (x - x_, y - y_);
   else
-    move_by_hand (x - x_, y - y_);
+    pan_by (x - x_, y - y_);
   x_ = x;
   y_ = y;
   return true;
@@ -123,7 +121,7 @@ OrbitControl::touch_down (GstEvent *event)
 {
   Finger finger{true, 0, 0, 0};
   gst_navigation_event_parse_touch_event (event, &finger.identifier, &finger.x, &finger.y, nullptr);
-  if (!is_place (finger.x, finger.y))
+  if (!is_on_screen (finger.x, finger.y))
     return false;
   const auto free = std::ranges::find (fingers_, false, &Finger::down);
   if (free != fingers_.end ())
@@ -142,13 +140,13 @@ OrbitControl::touch_up (GstEvent *event)
   return true;
 }
 
-/* One finger turns; two move by where their middle goes, and zoom by their distance. */
+/* One finger orbits; two pan with their middle and zoom with their distance. */
 bool
 OrbitControl::touch_move (GstEvent *event)
 {
   Finger to;
   gst_navigation_event_parse_touch_event (event, &to.identifier, &to.x, &to.y, nullptr);
-  if (!is_place (to.x, to.y))
+  if (!is_on_screen (to.x, to.y))
     return false;
   for (Finger &finger : fingers_) {
     const Finger &other = &finger == &fingers_[0] ? fingers_[1] : fingers_[0];
@@ -158,11 +156,11 @@ OrbitControl::touch_move (GstEvent *event)
     if (other.down) {
       const double before = std::hypot (finger.x - other.x, finger.y - other.y);
       const double after = std::hypot (to.x - other.x, to.y - other.y);
-      move_by_hand (dx / 2, dy / 2);
+      pan_by (dx / 2, dy / 2);
       if (before > 1 && after > 1)
         zoom (before / after);
     } else {
-      turn_by_hand (dx, dy);
+      orbit_by (dx, dy);
     }
     finger.x = to.x;
     finger.y = to.y;
@@ -180,17 +178,18 @@ OrbitControl::scroll (GstEvent *event)
   return true;
 }
 
-/* Names are those of X11's keys; some windows tell them without Shift, so that + is equal. */
+/* Names are X11's keysyms; some windows send them without Shift, where + is equal. */
 bool
 OrbitControl::key (const char *name)
 {
   const std::string_view k = name;
-  if (k == "r" || k == "Home")
-    go_back ();
-  else if (k == "Left" || k == "Right")
-    turn (k == "Left" ? -kKeyTurnDeg : kKeyTurnDeg, 0);
+  if (k == "r" || k == "Home") {
+    orbit = {.fov_deg = orbit.fov_deg, .pan = {}}; /* no event changes the field of view */
+    home_requests++;
+  } else if (k == "Left" || k == "Right")
+    turn (k == "Left" ? -kKeyTurn_deg : kKeyTurn_deg, 0);
   else if (k == "Up" || k == "Down")
-    turn (0, k == "Up" ? kKeyTurnDeg : -kKeyTurnDeg);
+    turn (0, k == "Up" ? kKeyTurn_deg : -kKeyTurn_deg);
   else if (k == "plus" || k == "equal" || k == "KP_Add")
     zoom (1 / kZoomStep);
   else if (k == "minus" || k == "KP_Subtract")

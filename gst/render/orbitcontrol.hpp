@@ -6,27 +6,26 @@
 #include <array>
 #include <rangecast/surface/orbit.hpp>
 
-/** The orbit camera as mouse, fingers and keys (GstNavigation) and time move it. Holds no lock:
- * whoever shares it between threads does. */
+/** The orbit camera, moved by mouse, touch and keys (GstNavigation) and by time. Has no lock:
+ * callers share it between threads under theirs. */
 class OrbitControl {
 public:
-  rangecast::Orbit orbit;  ///< as properties show it; azimuth within 360 degrees either way
+  rangecast::Orbit orbit;  ///< as the properties; azimuth -360 to 360
   double auto_orbit = 0;   ///< degrees a second
-  guint home_requests = 0; ///< how often somebody asked for the first view
+  guint home_requests = 0; ///< how often the first view was requested
 
   /** @param running_ns   time since the first picture
    *  @return the orbit at that time */
   [[nodiscard]] rangecast::Orbit at (guint64 running_ns) const;
 
-  /** Tells what is on the screen, which is what a hand drags, and where the camera of the scene
-   *  stands while properties are 0. */
-  void shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
+  /** Sets what is on the screen, for drags, and the camera's position while properties are 0. */
+  void set_shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
       int width, int height);
 
-  /** @return whether the event meant something to us */
+  /** @return whether the event was handled */
   bool handle (GstEvent *event);
 
-  /** Forgets buttons and fingers that are down. */
+  /** Resets buttons and fingers that are down. */
   void release ()
   {
     button_ = 0;
@@ -41,11 +40,10 @@ private:
   bool touch_down (GstEvent *event);
   bool touch_up (GstEvent *event);
   bool touch_move (GstEvent *event);
-  void turn_by_hand (double dx, double dy);
-  void move_by_hand (double dx, double dy);
+  void orbit_by (double dx, double dy);
+  void pan_by (double dx, double dy);
   void turn (double azimuth_deg, double elevation_deg);
   void zoom (double factor);
-  void go_back ();
 
   struct Finger {
     bool down = false;
@@ -54,8 +52,8 @@ private:
   };
 
   int button_ = 0;                /* that is down; 0: none */
-  double x_ = 0, y_ = 0;          /* where the mouse was, pixels */
-  std::array<Finger, 2> fingers_; /* further ones do nothing */
+  double x_ = 0, y_ = 0;          /* last position of the mouse, pixels */
+  std::array<Finger, 2> fingers_; /* more are ignored */
   double home_distance_m_ = 1, home_elevation_deg_ = 0;
   rangecast::Vec3 pan_right_, pan_down_;
   int width_ = 640, height_ = 480;

@@ -1,32 +1,26 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <gst/gl/gl.h>
-
 #include <rangecast/geometry/image_view.hpp>
 
-/** Lays a small picture over a larger one with OpenGL (core 3.3 or GLES 3.0), opaque, in its upper
- *  left corner. All functions in the GL thread. */
+#include "glhelpers.hpp"
+
+/** Lays a small opaque picture, as that of show-stats, over the upper left corner of a larger one.
+ *  All functions on the OpenGL thread. */
 class PanelPainter {
 public:
-  /** Draws into the bound framebuffer; makes what it needs when first called.
+  /** Draws into the bound framebuffer; nothing if OpenGL has no shader for it.
    *  @param panel    R, G, B, unused; at most 4096 pixels wide and high
-   *  @param changed  it is another one than the last time
-   *  @param x, y     pixels, where the picture begins that it is laid over
-   *  @param scale    pixels a pixel of the panel becomes, each way
+   *  @param changed  it differs from the last one
+   *  @param x, y     pixels: the origin of the picture below
+   *  @param scale    output pixels per pixel of the panel, each way
    *  @return bytes uploaded */
   guint64 draw (GstGLContext *context, const rangecast::ImageView<const rangecast::Rgbx> &panel,
       bool changed, int x, int y, int scale);
-  /** Deletes everything that OpenGL holds for us. */
+  /** Deletes everything that OpenGL has of it. */
   void stop ();
 
 private:
-  bool start (GstGLContext *context);
-  guint64 upload (const rangecast::ImageView<const rangecast::Rgbx> &panel);
-
-  GstGLContext *context_ = nullptr;
-  GstGLShader *shader_ = nullptr;
-  bool failed_ = false; /* to make the shader: not to be tried for each picture */
-  bool uploaded_ = false;
-  guint texture_ = 0, array_ = 0;
+  LazyShader shader_;
+  guint texture_ = 0;
 };

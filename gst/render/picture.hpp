@@ -6,25 +6,25 @@
 #include <rangecast/surface/strips.hpp>
 #include <span>
 
-/** What the painters draw: one picture of a frame set. */
+/** What StripPainter and BlendPainter draw: one picture of a frame set. */
 struct RenderPicture {
   rangecast::Mat4 clip_from_world;
   float background[4];        ///< R, G, B, A
-  float background_shade = 0; ///< see BackgroundPainter::draw()
-  float point_size;           ///< of a pixel's footprint
+  float background_shade = 0; ///< see set_background_uniforms()
+  float point_size;           ///< in footprints of a pixel
   float pixels_per_unit;      ///< pixels that a length of 1 at a distance of 1 covers
   rangecast::StripMode mode;
   double depth_step;
-  bool back_faces = false;   ///< mode strips: where no front is; mode blend shows all
-  std::size_t rig_views = 1; ///< that a frame set may have
-  bool keeps_depth = false; ///< mode blend: the surfaces' depth is written, for what is drawn later
-  rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and one more on
-                               ///< each side
+  bool back_faces = false;     ///< mode strips: where no front is; mode blend shows all
+  std::size_t rig_views = 1;   ///< that a frame set may have
+  bool keeps_depth = false;    ///< mode blend: writes the surfaces' depth, for what is drawn later
+  rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and a margin of
+                               ///< one pixel
 
-  /** Metres by which what a view draws moves away from the viewer, times 1 - cos of the angle
-   *  between the two's directions. */
+  /** Metres by which a view's surfaces are moved away from the viewer, times 1 - cosine of the
+   * angle between the two's directions; not in mode blend. */
   double view_gap_m = 0.012;
-  /** Mode blend: metres by which what a pixel shows may lie behind the nearest surface. */
+  /** Mode blend: metres behind the nearest surface within which views are blended. */
   double blend_range_m = 0.02;
   int width, height;   ///< of the framebuffer, pixels
   rangecast::Roi part; ///< of it that the picture fills

@@ -43,21 +43,7 @@ StripScene::check (std::span<const RangeImage> images) const
   return {};
 }
 
-bool
-StripScene::is_built (std::size_t images, const StripRenderSettings &settings) const
-{
-  return complete_ && count_ == images && built_with_ == settings.strips_serial;
-}
-
-void
-StripScene::surround ()
-{
-  hull_.clear ();
-  for (const StripPainter::Layer &layer : layers ())
-    rangecast::append_hull (layer.image, *layer.view, hull_);
-}
-
-/* The views, by number of their images, that look against the viewer while another one does not. */
+/* The views, by number of their image, that look against the viewer while another one does not. */
 guint64
 StripScene::views_against (std::span<const RangeImage> images, const StripRenderSettings &settings,
     const rangecast::Orbit &orbit) const
@@ -76,15 +62,14 @@ StripScene::views_against (std::span<const RangeImage> images, const StripRender
   return any_along ? against : 0;
 }
 
-/* Quarters of a pixel that surfaces reach beyond their last pixels. */
-static constexpr int kReach = 2;
-
 void
 StripScene::build_view (std::size_t which, const StripRenderSettings &settings)
 {
   ViewMemory &memory = memory_[which];
   const rangecast::ConstRangeImage &image = views_[which].image;
   const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
+  const bool is_reduced = reduced_ >> which & 1;
+  const int reach = is_reduced ? 1 : 2; /* beyond the last pixels, quarters of a pixel */
   results_[which] = {};
   if (blends)
     rangecast::make_blend_planes (
@@ -92,9 +77,9 @@ StripScene::build_view (std::size_t which, const StripRenderSettings &settings)
   rangecast::build_strips (
       image, settings.strips, memory.vertices, results_[which], blends ? &memory.planes : nullptr);
   if (blends)
-    rangecast::make_blend_vertices (image, memory.planes, memory.vertices,
-        (reduced_ >> which & 1) ? kReach / 2 : kReach, memory.blend_vertices);
-  if (reduced_ >> which & 1)
+    rangecast::make_blend_vertices (
+        image, memory.planes, memory.vertices, reach, memory.blend_vertices);
+  if (is_reduced)
     results_[which].points = memory.reduced.points ();
 }
 
@@ -103,9 +88,10 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
     const rangecast::Orbit &orbit, bool same_frame_set)
 {
   const guint64 reduced = views_against (images, settings, orbit);
-  const bool built = same_frame_set && reduced == reduced_ && is_built (images.size (), settings);
+  const bool built = same_frame_set && reduced == reduced_ && complete_ &&
+                     count_ == images.size () && built_with_ == settings.strips_serial;
   const bool blends = settings.strips.mode == rangecast::StripMode::kBlend;
-  complete_ = false; /* memory may end halfway */
+  complete_ = false; /* what follows may throw */
   count_ = images.size ();
   reduced_ = reduced;
   for (std::size_t i = 0; i < images.size (); i++) {
@@ -113,7 +99,7 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
     if (built && is_reduced)
       continue;
     const rangecast::View *view = rig_->find (images[i].view_id);
-    rangecast::ConstRangeImage image = images[i]; /* the same one may be mapped elsewhere by now */
+    rangecast::ConstRangeImage image = images[i]; /* may be mapped elsewhere than last time */
     if (settings.tint_views && built)
       image.colour = views_[i].image.colour;
     else if (settings.tint_views)
@@ -133,7 +119,9 @@ StripScene::build (std::span<const RangeImage> images, const StripRenderSettings
       layers_[i].vertices = memory_[i].vertices;
   }
   if (!built) {
-    surround ();
+    hull_.clear ();
+    for (const RenderLayer &layer : layers ())
+      rangecast::append_hull (layer.image, *layer.view, hull_);
     serial_++;
   }
   built_with_ = settings.strips_serial;

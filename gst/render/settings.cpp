@@ -86,8 +86,7 @@ strip_properties ()
           0, 1000, kControllable),
       P::boolean<&S::fit> ("fit", "Fit to content",
           "Fit the view to the content at the start of the stream and on the keys r and Home; "
-          "camera "
-          "properties then count from that view",
+          "camera properties then count from that view",
           kControllable),
       P::boolean<&S::show_cameras> ("show-cameras", "Show cameras",
           "Draw the rig's cameras and their frusta from near to far", kControllable),

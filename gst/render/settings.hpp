@@ -8,14 +8,13 @@
 #include "common/properties.hpp"
 #include "orbitcontrol.hpp"
 
-/** What an application wants of striprender. Any thread, under the element's lock. */
+/** striprender's properties. Any thread, under the element's lock. */
 struct StripRenderSettings {
-
   OrbitControl camera;
   guint background = 0xff20242a;   ///< ARGB
   double background_shade = 0;     ///< share, of opaque backgrounds
-  double point_size = 1;           ///< footprints of a pixel
-  bool fit = false;                ///< to what is drawn
+  double point_size = 1;           ///< in footprints of a pixel
+  bool fit = false;                ///< to the content
   guint64 view_mask = G_MAXUINT64; ///< bit n: view-id n is drawn
   bool show_cameras = false;
   bool back_faces = false;
@@ -24,17 +23,17 @@ struct StripRenderSettings {
   int samples = 0; ///< a pixel; below 2: no antialiasing
   bool tint_views = false;
   bool show_stats = false;
-  double eye_distance_m = 0.063;                ///< that of most people
-  double convergence_m = 0;                     ///< 0: the target's distance
-  bool keep_rate = false;                       ///< the output's, even if it is the input's
+  double eye_distance_m = 0.063;                ///< most people's
+  double convergence_m = 0;                     ///< 0: the camera target's distance
+  bool keep_rate = false;                       ///< even if it is the input's
   GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
   rangecast::StripSettings strips;
-  guint strips_serial = 0; ///< another one after each change but the camera's
+  guint strips_serial = 0; ///< changes with each property but the camera's
 };
 
-/** The properties of the camera, which need no new strips when they change. */
+/** The camera's properties: strips do not depend on them. */
 PropertyTable<OrbitControl> &camera_properties ();
-/** All others. */
+/** The other properties. */
 PropertyTable<StripRenderSettings> &strip_properties ();
 
 GType gst_strip_render_mode_get_type (void);

@@ -14,14 +14,18 @@ RenderStats::to_structure () const
       G_TYPE_UINT64, uploaded_total, nullptr);
 }
 
+namespace {
+
 template <typename... Values>
-static void
+void
 print_line (std::string &line, const char *format, Values... values)
 {
   char text[96];
   std::snprintf (text, sizeof text, format, values...);
   line = text;
 }
+
+} // namespace
 
 bool
 StatsText::update (const RenderStats &stats, std::size_t views, GstClockTime latency, gint64 now_us)

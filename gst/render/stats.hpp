@@ -7,13 +7,13 @@
 #include <span>
 #include <string>
 
-/** What striprender counts: the property `stats`. */
+/** striprender's property `stats`. */
 struct RenderStats {
   /* since start */
   guint64 frames = 0;         ///< pictures drawn
-  guint64 frame_sets = 0;     ///< that came in
+  guint64 frame_sets = 0;     ///< received
   guint64 repeated = 0;       ///< pictures of a frame set that an earlier one showed
-  guint64 dropped = 0;        ///< pictures left out because they would have been late
+  guint64 dropped = 0;        ///< pictures not drawn because they would have been late
   guint64 uploaded_total = 0; ///< bytes
   guint64 points_total = 0;   ///< drawn
   /* of the last picture */
@@ -23,13 +23,13 @@ struct RenderStats {
   [[nodiscard]] GstStructure *to_structure () const;
 };
 
-/** Statistics as lines of text, new ones twice a second: faster nobody reads. */
+/** Statistics as lines of text, updated twice a second to be legible. */
 class StatsText {
 public:
   /** @param views    of the last frame set
    *  @param latency  ns from the frame set's time to its drawing; GST_CLOCK_TIME_NONE: unknown
    *  @param now_us   any clock, microseconds
-   *  @return whether the lines are others than before */
+   *  @return whether the lines have changed */
   bool update (const RenderStats &stats, std::size_t views, GstClockTime latency, gint64 now_us);
   [[nodiscard]] std::span<const std::string> lines () const { return lines_; }
 

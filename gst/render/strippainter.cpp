@@ -2,10 +2,7 @@
 #include "strippainter.hpp"
 
 #include <algorithm>
-#include <rangecast/surface/view_matrices.hpp>
 #include <string>
-
-#include "glshader.hpp"
 
 using rangecast::Mat4;
 using rangecast::StripMode;
@@ -24,26 +21,25 @@ using rangecast::StripVertex;
 #define GL_PROGRAM_POINT_SIZE 0x8642
 #endif
 
-/* A vertex names its pixel; depth and colour are fetched here, and the pixel's ray unprojected.
- * Vertices that lie beside their pixel follow the surface that it and its neighbours make. */
-static const char *const kVertexShader = R"(
-precision highp float;
+namespace {
+
+/* A vertex is the number of its pixel, whose depth and colour are fetched here. Vertices beside
+ * their pixel follow the surface of it and its neighbours. */
+const char *const kVertexShader = R"(
 precision highp int;
 precision highp usampler2D;
 uniform usampler2D u_depth;
 uniform sampler2D u_colour;
 uniform ivec2 u_size; /* of the ROI; beyond it the textures hold older frames */
-uniform mat4 u_clip_from_pixel; /* column, row and 1, all times depth, and 1 */
 uniform float u_focal; /* pixels */
 uniform float u_unit;
 uniform float u_step;
 uniform float u_point_size;
-uniform vec2 u_behind;
 layout (location = 0) in uint a_vertex;
 out vec3 v_colour;
 
 #if WITH_OFFSETS
-/* What depth grows by on the way from a neighbour, if there is one on the surface. */
+/* The growth of depth from the neighbour before `p`, if that is on the same surface. */
 bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
 {
   ivec2 from = clamp (p - way, ivec2 (0), u_size - 1);
@@ -51,21 +47,21 @@ bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
   rise = depth - before;
   return from != p && before > 0.0 && abs (rise) <= u_step * depth;
 }
-/* Edges of a surface go on no steeper than 45 degrees: where it is seen at a grazing angle, depth
- * rises too fast there to be trusted, and spikes would stand out from it. */
-const float kSteepest = 1.0;
+/* Surfaces are extended beyond their edges at 45 degrees at most: where they are seen at a grazing
+ * angle, depth rises too fast to be trusted, and the extensions would be spikes. */
+const float kMaxSlope = 1.0;
 float slope (ivec2 p, ivec2 way, float offset, float depth)
 {
-  float most = kSteepest * depth / u_focal, rise;
+  float limit = kMaxSlope * depth / u_focal, rise;
 #if BOTH_SIDES
   float fall;
   bool has_before = has_rise (p, way, depth, rise), has_after = has_rise (p, -way, depth, fall);
   if (has_before && has_after)
     return (rise - fall) * 0.5;
-  return clamp (has_before ? rise : has_after ? -fall : 0.0, -most, most);
+  return clamp (has_before ? rise : has_after ? -fall : 0.0, -limit, limit);
 #else
   int outward = offset > 0.0 ? 1 : -1;
-  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -most, most) : 0.0;
+  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -limit, limit) : 0.0;
 #endif
 }
 #endif
@@ -84,23 +80,31 @@ void main ()
   if (offset.y != 0.0)
     depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
 #endif
-  gl_Position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
-  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
-  gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
+  gl_Position = clip_position (at, depth);
   gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
   v_colour = texelFetch (u_colour, pixel, 0).rgb;
 }
 )";
 
-/* What shaders have beyond pixels in their places: bands reach beyond their ends, in the direction
- * away from them; rectangles have all four sides. */
-static const char *const kVariants[] = {
+/* Strips extend beyond their ends, away from them; rectangles on all four sides; points do not. */
+const char *const kVariants[] = {
     "#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
     "#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
     "#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
 };
 static_assert (int (StripMode::kStrips) == 1 && int (StripMode::kRectangles) == 2 &&
-               int (StripMode::kPoints) == 3); /* draw() counts on it */
+               int (StripMode::kPoints) == 3); /* the order in draw() */
+
+/* Textures grow in steps, so that a ROI that follows a person does not need new ones in each
+ * picture. */
+int
+texture_side (int pixels, int max)
+{
+  constexpr int kStep = 64;
+  return std::min ((pixels + kStep - 1) / kStep * kStep, max);
+}
+
+} // namespace
 
 bool
 StripPainter::start (GstGLContext *context, GError **error)
@@ -120,10 +124,10 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
-  if (BlendTargets::is_supported (context) && !blend_painter_.start (context, error))
+  if (BlendPainter::is_supported (context) && !blend_painter_.start (context, error))
     return false;
   for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string vertex = std::string (kVariants[i]) + kVertexShader;
+    const std::string vertex = std::string (kVariants[i]) + kPositionFunction + kVertexShader;
     shaders_[i] = make_shader (context, vertex.c_str (), kColourFragmentShader, error);
     if (!shaders_[i])
       return false;
@@ -154,20 +158,13 @@ StripPainter::stop ()
 }
 
 bool
-StripPainter::fits (std::span<const Layer> layers) const
+StripPainter::fits (std::span<const RenderLayer> layers) const
 {
-  return std::ranges::all_of (layers, [&] (const Layer &layer) { /* mode blend has no textures */
-    return layer.vertices.empty () ||
-           std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
-  });
-}
-
-/* A ROI that follows somebody about shall not cost new textures in each picture. */
-static int
-rounded_up (int pixels, int most)
-{
-  constexpr int kStep = 64;
-  return std::min ((pixels + kStep - 1) / kStep * kStep, most);
+  return std::ranges::all_of (
+      layers, [&] (const RenderLayer &layer) { /* mode blend has no textures */
+        return layer.vertices.empty () ||
+               std::max (layer.image.depth.width, layer.image.depth.height) <= largest_;
+      });
 }
 
 /* Makes the objects of a view, or larger textures, which stay that large. */
@@ -187,22 +184,16 @@ StripPainter::prepare (ViewObjects &objects, int width, int height)
   }
   if (objects.width >= width && objects.height >= height)
     return;
-  objects.width = width = std::max (objects.width, rounded_up (width, largest_));
-  objects.height = height = std::max (objects.height, rounded_up (height, largest_));
-  const auto allocate = [&] (guint texture, guint internal, guint format, guint type) {
-    gl->BindTexture (GL_TEXTURE_2D, texture);
-    gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    gl->TexParameteri (GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    gl->TexImage2D (GL_TEXTURE_2D, 0, gint (internal), width, height, 0, format, type, nullptr);
-  };
-  allocate (objects.depth, GL_R16UI, GL_RED_INTEGER, GL_UNSIGNED_SHORT);
-  allocate (objects.colour, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
+  objects.width = width = std::max (objects.width, texture_side (width, largest_));
+  objects.height = height = std::max (objects.height, texture_side (height, largest_));
+  gl->BindTexture (GL_TEXTURE_2D, objects.depth);
+  define_texture (gl, GL_R16UI, width, height, GL_RED_INTEGER, GL_UNSIGNED_SHORT);
+  gl->BindTexture (GL_TEXTURE_2D, objects.colour);
+  define_texture (gl, GL_RGBA8, width, height, GL_RGBA, GL_UNSIGNED_BYTE);
 }
 
 guint64
-StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
+StripPainter::upload_layer (ViewObjects &objects, const RenderLayer &layer)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   const auto &depth = layer.image.depth;
@@ -226,20 +217,36 @@ StripPainter::upload_layer (ViewObjects &objects, const Layer &layer)
   return guint64 (depth.width) * guint64 (depth.height) * 6 + layer.vertices.size_bytes ();
 }
 
+guint64
+StripPainter::upload (std::span<const RenderLayer> layers)
+{
+  if (std::ranges::any_of (
+          layers, [] (const RenderLayer &l) { return !l.blend_vertices.empty (); }))
+    return blend_painter_.upload (layers);
+  guint64 uploaded = 0;
+  turn_ = (turn_ + 1) % objects_.size ();
+  context_->gl_vtable->ActiveTexture (GL_TEXTURE0);
+  for (const RenderLayer &layer : layers)
+    if (!layer.vertices.empty ())
+      uploaded += upload_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer);
+  return uploaded;
+}
+
 void
-StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture,
-    GstGLShader *shader, Side side)
+StripPainter::draw_layer (const ViewObjects &objects, const RenderLayer &layer,
+    const RenderPicture &picture, bool back) const
 {
   const GstGLFuncs *gl = context_->gl_vtable;
+  GstGLShader *shader = shaders_[std::size_t (picture.mode) - 1];
   Mat4 matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
   if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
-    matrix = rangecast::in_half_of_depths (matrix, side == Side::kBack);
-  /* Where two views see one surface, the one that looks more as the viewer does is before the
-   * other: what it sees has more pixels there, and noise must not let both shine through. */
-  const auto shift = rangecast::depth_shift (matrix, picture.clip_from_world,
-      picture.view_gap_m * (1 - view_alignment (picture.clip_from_world, *layer.view)));
-  gst_gl_shader_set_uniform_matrix_4fv (shader, "u_clip_from_pixel", 1, FALSE, matrix.data ());
-  gst_gl_shader_set_uniform_2f (shader, "u_behind", shift.b * shift.g, shift.g);
+    matrix = rangecast::in_half_of_depths (matrix, back);
+  /* Where two views see one surface, the one that looks more as the viewer does is in front: it has
+   * more pixels there, and noise must not let both show. */
+  const double gap_m =
+      picture.view_gap_m * (1 - view_alignment (picture.clip_from_world, *layer.view));
+  set_position_uniforms (
+      shader, matrix, rangecast::depth_shift (matrix, picture.clip_from_world, gap_m));
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (
@@ -253,89 +260,53 @@ StripPainter::draw_layer (const ViewObjects &objects, const Layer &layer, const 
       GLsizei (layer.vertices.size ()));
 }
 
-/* Lets through one side of all surfaces. */
-static void
-show_side (const GstGLFuncs *gl, const Mat4 &clip_from_world, bool back)
+/* Draws the surfaces' fronts, or their backs. Only strips have sides: noise turns many a single
+ * rectangle over. */
+void
+StripPainter::draw_side (
+    std::span<const RenderLayer> layers, const RenderPicture &picture, bool back) const
 {
-  gl->Enable (GL_CULL_FACE);
-  gl->CullFace (rangecast::mirrors (clip_from_world) != back ? GL_FRONT : GL_BACK);
+  const GstGLFuncs *gl = context_->gl_vtable;
+  if (picture.mode == StripMode::kStrips) {
+    gl->Enable (GL_CULL_FACE);
+    gl->CullFace (rangecast::mirrors (picture.clip_from_world) != back ? GL_FRONT : GL_BACK);
+  }
+  for (const RenderLayer &layer : layers)
+    if (!layer.vertices.empty ())
+      draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, back);
 }
 
-/* What all shaders of views share. */
-void
-StripPainter::begin (const Picture &picture, GstGLShader *shader)
+bool
+StripPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
+  if (picture.mode == StripMode::kBlend)
+    return blend_painter_.draw (picture, layers);
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const bool gles = is_gles (context_); /* where the shader always sets the size of points */
+  const float *c = picture.background;
+  gl->Viewport (0, 0, picture.width, picture.height);
+  gl->ClearColor (c[0], c[1], c[2], c[3]);
+  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  gl->Enable (GL_DEPTH_TEST);
+  if (!gles)
+    gl->Enable (GL_PROGRAM_POINT_SIZE);
+  GstGLShader *shader = shaders_[std::size_t (picture.mode) - 1];
   gst_gl_shader_use (shader);
   gst_gl_shader_set_uniform_1i (shader, "u_depth", 0);
   gst_gl_shader_set_uniform_1i (shader, "u_colour", 1);
   gst_gl_shader_set_uniform_1f (shader, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
       shader, "u_point_size", picture.point_size * picture.pixels_per_unit);
-}
-
-void
-StripPainter::end ()
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
+  draw_side (layers, picture, false);
+  if (picture.back_faces && picture.mode == StripMode::kStrips)
+    draw_side (layers, picture, true);
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gl->Disable (GL_DEPTH_TEST);
   gl->Disable (GL_CULL_FACE);
   gl->CullFace (GL_BACK);
-  if (!is_gles (context_))
+  if (!gles)
     gl->Disable (GL_PROGRAM_POINT_SIZE);
   gst_gl_context_clear_shader (context_);
-}
-
-guint64
-StripPainter::upload (std::span<const Layer> layers)
-{
-  if (std::ranges::any_of (layers, [] (const Layer &l) { return !l.blend_vertices.empty (); }))
-    return blend_painter_.upload (layers);
-  guint64 uploaded = 0;
-  turn_ = (turn_ + 1) % objects_.size ();
-  context_->gl_vtable->ActiveTexture (GL_TEXTURE0);
-  for (const Layer &layer : layers)
-    if (!layer.vertices.empty ())
-      uploaded += upload_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer);
-  return uploaded;
-}
-
-void
-StripPainter::draw_layers (
-    std::span<const Layer> layers, const Picture &picture, GstGLShader *shader)
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  /* Noise turns many a single rectangle over: they have two sides, as points have. */
-  const bool sided = picture.mode == StripMode::kStrips;
-  const auto draw_all = [&] (Side side) {
-    if (sided)
-      show_side (gl, picture.clip_from_world, side == Side::kBack);
-    for (const Layer &layer : layers)
-      if (!layer.vertices.empty ())
-        draw_layer (
-            objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, shader, side);
-  };
-  begin (picture, shader);
-  draw_all (Side::kFront);
-  if (sided && picture.back_faces)
-    draw_all (Side::kBack);
-}
-
-bool
-StripPainter::draw (const Picture &picture, std::span<const Layer> layers)
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  const float *c = picture.background;
-  if (picture.mode == StripMode::kBlend)
-    return blend_painter_.draw (picture, layers);
-  gl->Viewport (0, 0, picture.width, picture.height);
-  gl->ClearColor (c[0], c[1], c[2], c[3]);
-  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  gl->Enable (GL_DEPTH_TEST);
-  if (!is_gles (context_)) /* OpenGL ES always takes it from the shader */
-    gl->Enable (GL_PROGRAM_POINT_SIZE);
-  draw_layers (layers, picture, shaders_[std::size_t (picture.mode) - 1]);
-  end ();
   return true;
 }

@@ -1,35 +1,30 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <gst/gl/gl.h>
-#include <gst/gl/gstglfuncs.h>
-
 #include <array>
 #include <span>
 
 #include "blendpainter.hpp"
 
-/** Draws range images with OpenGL (core 3.3 or GLES 3.0), in mode blend through BlendPainter. All
- * functions in the GL thread. */
+/** Draws range images with OpenGL 3.3 or OpenGL ES 3.0: strips, rectangles and points itself, mode
+ *  blend through BlendPainter. All functions on the OpenGL thread. */
 class StripPainter {
 public:
   /** Compiles the shader. Errors come with the shader's log. */
   bool start (GstGLContext *context, GError **error);
-  /** Deletes everything that OpenGL holds for us. */
+  /** Deletes everything that OpenGL has of it. */
   void stop ();
 
-  using Picture = RenderPicture;
-  using Layer = RenderLayer;
   /** Whether OpenGL's textures can be as large as the layers' ROIs. */
-  [[nodiscard]] bool fits (std::span<const Layer> layers) const;
-  /** Hands a frame set to OpenGL: depth, colour and vertices of its layers, which must fit.
+  [[nodiscard]] bool fits (std::span<const RenderLayer> layers) const;
+  /** Uploads a frame set: depth, colour and vertices of its layers, which must fit.
    *  @return their bytes */
-  guint64 upload (std::span<const Layer> layers);
+  guint64 upload (std::span<const RenderLayer> layers);
   /** Draws one picture of what was uploaded last into the bound framebuffer. May be called as often
    *  as there are pictures of it: of two eyes, or of a camera that moves.
    *  @param layers  those that were uploaded; of images only the ROI's place and size are read
    *  @return false if OpenGL has no float framebuffer of that size, for mode blend */
-  bool draw (const Picture &picture, std::span<const Layer> layers);
+  bool draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */
@@ -37,13 +32,11 @@ private:
     int width = 0, height = 0; /* of the textures, pixels */
   };
   void prepare (ViewObjects &objects, int width, int height);
-  guint64 upload_layer (ViewObjects &objects, const Layer &layer);
-  void begin (const Picture &picture, GstGLShader *shader);
-  void end ();
-  enum class Side { kFront, kBack };
-  void draw_layer (const ViewObjects &objects, const Layer &layer, const Picture &picture,
-      GstGLShader *shader, Side side);
-  void draw_layers (std::span<const Layer> layers, const Picture &picture, GstGLShader *shader);
+  guint64 upload_layer (ViewObjects &objects, const RenderLayer &layer);
+  void draw_layer (const ViewObjects &objects, const RenderLayer &layer,
+      const RenderPicture &picture, bool back) const;
+  void draw_side (
+      std::span<const RenderLayer> layers, const RenderPicture &picture, bool back) const;
 
   /* glVertexAttribIPointer, which GStreamer's table of functions lacks */
   using AttributePointer = void (GSTGLAPI *) (
@@ -54,7 +47,7 @@ private:
   gint largest_ = 0;                       /* side of a texture, pixels */
   std::array<GstGLShader *, 3> shaders_{}; /* of strips, rectangles and points */
   BlendPainter blend_painter_;
-  /* In turns: what pictures of one frame set read may be in use while the next one is written. */
+  /* In turns: OpenGL may still read those of one frame set while the next one is uploaded. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;
 };

@@ -7,35 +7,19 @@
 using rangecast::SceneFrame;
 using rangecast::Vec3;
 
-static constexpr GstClockTime kSettleTime = GST_SECOND / 2;
-static constexpr GstClockTime kPatience = 5 * GST_SECOND; /* with views that have no points */
-static constexpr std::size_t kMaxPoints = 16384;          /* of all views: enough for a fit */
-static constexpr std::size_t kMinPoints = 16;
+namespace {
 
-bool
-ViewFit::is_due (GstClockTime pts) const
-{
-  if (!fitted_)
-    return true;
-  return !settled_ && (pts < tried_ || pts - tried_ >= kSettleTime);
-}
-
-/* Whoever chooses a place for the camera wants it to stay there. */
-bool
-ViewFit::is_moved_by_hand (const rangecast::Orbit &orbit) const
-{
-  const rangecast::Orbit &before = picture_.orbit;
-  return fitted_ &&
-         (orbit.distance_m != before.distance_m || orbit.elevation_deg != before.elevation_deg ||
-             norm (orbit.pan - before.pan) > 0);
-}
+constexpr GstClockTime kInterval = GST_SECOND / 2;
+constexpr GstClockTime kMaxWait = 5 * GST_SECOND; /* for views that have no points */
+constexpr std::size_t kMaxPoints = 16384;         /* of all views: enough for a fit */
+constexpr std::size_t kMinPoints = 16;
 
 /* @return in how many views the points are; 0 if they are too few */
-static std::size_t
-take_points (const StripScene &scene, std::vector<Vec3> &points)
+std::size_t
+sample_points (const StripScene &scene, std::vector<Vec3> &points)
 {
   std::size_t count = 0, views = 0;
-  for (const StripPainter::Layer &layer : scene.layers ()) {
+  for (const RenderLayer &layer : scene.layers ()) {
     const std::size_t of_view = rangecast::count_points (layer.image);
     count += of_view;
     views += of_view > 0;
@@ -44,19 +28,30 @@ take_points (const StripScene &scene, std::vector<Vec3> &points)
     return 0;
   points.clear ();
   points.reserve (kMaxPoints + rangecast::kMaxViews);
-  for (const StripPainter::Layer &layer : scene.layers ())
+  for (const RenderLayer &layer : scene.layers ())
     rangecast::append_points (layer.image, *layer.view, count / kMaxPoints + 1, points);
   return views;
+}
+
+} // namespace
+
+bool
+ViewFit::user_moved_camera (const rangecast::Orbit &orbit) const
+{
+  const rangecast::Orbit &before = picture_.orbit;
+  return fitted_ &&
+         (orbit.distance_m != before.distance_m || orbit.elevation_deg != before.elevation_deg ||
+             norm (orbit.pan - before.pan) > 0);
 }
 
 void
 ViewFit::refit (const StripScene &scene, const Picture &picture)
 {
-  const std::size_t views = take_points (scene, candidates_);
+  const std::size_t views = sample_points (scene, candidates_);
   tried_ = picture.pts;
   if (views >= views_ || picture.pts < complete_)
     complete_ = picture.pts;
-  if (views == 0 || (views < views_ && picture.pts - complete_ < kPatience))
+  if (views == 0 || (views < views_ && picture.pts - complete_ < kMaxWait))
     return;
   const SceneFrame frame =
       rangecast::fitted_frame (scene.frame (), picture.orbit, picture.aspect, candidates_);
@@ -79,9 +74,9 @@ ViewFit::update (const StripScene &scene, const Picture &picture)
     fitted_ = settled_ = false;
     views_ = 0;
   }
-  if (is_moved_by_hand (picture.orbit))
+  if (user_moved_camera (picture.orbit))
     settled_ = true;
-  if (is_due (picture.pts))
+  if (!fitted_ || (!settled_ && (picture.pts < tried_ || picture.pts - tried_ >= kInterval)))
     refit (scene, picture);
   if (points_.empty ())
     return scene.frame ();

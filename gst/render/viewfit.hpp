@@ -8,38 +8,37 @@
 
 #include "scene.hpp"
 
-/** Fits the camera to the first frame sets of a stream: to the first one that has points, then
- * again every half second until the view stays about the same and every view that had points still
- * has some, or some have had none for five seconds. From then on the fit holds, so that the picture
- * never follows movements. Streaming thread.
- */
+/** Fits the camera to the first frame sets of a stream: to the first one with points, then every
+ * half second until two fits agree and every view that had points still has some, or some have had
+ * none for five seconds. From then on the fit holds, so that the camera does not follow movements.
+ * For one thread at a time. */
 class ViewFit {
 public:
-  /** What a fit is made for. */
+  /** What a fit depends on. */
   struct Picture {
     rangecast::Orbit orbit;
     double aspect = 1;                      ///< width / height
     GstClockTime pts = GST_CLOCK_TIME_NONE; ///< of the frame set
-    guint home_requests = 0;                ///< another number asks for a new fit
+    guint home_requests = 0;                ///< a change requests a new fit
   };
 
   /** Forgets the fit. */
   void reset () { *this = {}; }
-  /** The frame in which to draw the scene, which must be built; its own as long as it has no
-   * points. A picture of another shape or field of view has the same points fitted anew. */
+  /** The camera's default position for a scene that is built; the scene's own before the first fit.
+   *  A picture of another shape or field of view has the same points fitted again. */
   [[nodiscard]] const rangecast::SceneFrame &update (
       const StripScene &scene, const Picture &picture);
 
 private:
-  [[nodiscard]] bool is_due (GstClockTime pts) const;
-  [[nodiscard]] bool is_moved_by_hand (const rangecast::Orbit &orbit) const;
+  [[nodiscard]] bool user_moved_camera (const rangecast::Orbit &orbit) const;
   void refit (const StripScene &scene, const Picture &picture);
 
   bool fitted_ = false, settled_ = false;
-  GstClockTime tried_ = GST_CLOCK_TIME_NONE; /* PTS of the last frame set that was looked at */
-  GstClockTime complete_ = 0;                /* PTS of the last one with points in all `views_` */
+  GstClockTime tried_ = GST_CLOCK_TIME_NONE; /* PTS of the last frame set that was examined */
+  GstClockTime complete_ = 0;                /* PTS of the last one with points in `views_` views */
   std::size_t views_ = 0;                    /* with points */
-  std::vector<rangecast::Vec3> points_, candidates_; /* of the fit; of the frame set looked at */
-  Picture picture_;                                  /* that the fit is for */
+  std::vector<rangecast::Vec3> points_,
+      candidates_;  /* of the fit; of the frame set that is examined */
+  Picture picture_; /* that the fit is for */
   rangecast::SceneFrame frame_;
 };

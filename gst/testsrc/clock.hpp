@@ -5,67 +5,70 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <optional>
+#include <rangecast/sync/ticks.hpp>
 
-/** When a picture is taken. */
-struct AvatarMoment {
+#include "common/clockwait.hpp"
+
+/** When a frame is captured. */
+struct FrameTime {
   GstClockTime pts, duration, capture_time;
-  guint64 index; ///< pictures before it: in the stream, or (not live, after a seek) from time 0
-  guint64 tick;  ///< number of the frame period that capture_time begins, at the present rate
+  guint64 index; ///< frames before it: in the stream, or (not live, after a seek) from time 0
+  guint64 tick;  ///< number of the frame period that begins at capture_time, at the present rate
   bool discont;
 };
 
-/** Tells the streaming thread when the next picture is due: at once, frame after frame, or, live,
- *  at the multiples of the frame period of the pipeline's clock. */
-class AvatarClock {
+/** Tells the streaming thread when the next frame is due: at once, frame after frame, or, live, at
+ *  the multiples of the frame period on the pipeline clock. */
+class FrameClock {
 public:
   /* Streaming thread, or while it stands still. */
 
-  /** Forgets the stream. */
+  /** Begins a stream at time 0. */
   void start ();
   /** next() goes on with the frame that is shown at this time. */
   void seek (GstClockTime position);
-  /** Time goes on where the old rate left it. @return whether the rate is another one */
+  /** Time goes on where the old rate left it. @return whether the rate has changed */
   bool set_rate (int fps_n, int fps_d);
-  /** The frame after the last one, at once. */
-  AvatarMoment next ();
-  /** Waits for the next multiple of the frame period. Those that have passed are skipped, but the
-   *  one after the last is taken until half a period behind it.
-   *  @return false if woken before it came: look why, and call again */
-  bool wait (GstElement *element, AvatarMoment &moment);
+  /** The frame after the last one. */
+  FrameTime next ();
+  /** Waits for the next multiple of the frame period. Those that have passed are skipped, except
+   *  that the one after the last frame is due until half a period after it.
+   *  @return false if interrupted: look why, and call again */
+  bool wait (GstElement *element, FrameTime &frame);
 
   /* Any thread. */
 
-  /** A live picture is taken only while the element plays. */
+  /** Live frames are captured only while the element plays. */
   void set_playing (bool playing);
-  /** The thread rests: ticks from now to the next picture are none that it missed. */
-  void note_rest ();
-  /** Ends wait() now, and at once until resume(). */
+  /** The thread pauses: ticks from now to the next frame do not count as skipped. */
+  void pause ();
+  /** Ends wait(), and all later ones until resume(). */
   void interrupt ();
   void resume ();
   /** Nanoseconds; 0 while the rate is not known. */
   GstClockTime period ();
-  /** Multiples that passed without a picture while the element played. */
+  /** Ticks that passed without a frame while the element played. */
   guint64 skipped ();
 
 private:
-  static constexpr guint64 kNone = G_MAXUINT64;
+  [[nodiscard]] std::int64_t next_tick (GstClockTime now, GstClockTime base) const;
+  [[nodiscard]] GstClockTime time_of (std::int64_t tick) const
+  {
+    return static_cast<GstClockTime> (rate_.time_of (tick));
+  }
 
-  [[nodiscard]] GstClockTime time_of (guint64 frame) const;
-  [[nodiscard]] guint64 next_tick (GstClockTime now, GstClockTime base);
-  bool wait_until (GstClock *clock, GstClockTime time);
-  void take_tick (guint64 tick, AvatarMoment &moment);
-
-  std::mutex lock_; /* guards all down to the blank line, and fps_* against period() */
-  std::condition_variable wake_;
+  std::mutex lock_; /* guards all; taken before the element's and the clock's */
+  std::condition_variable changed_;
+  ClockWait clock_wait_;
   bool playing_ = false, interrupted_ = false, paused_since_tick_ = false;
-  GstClockID waiting_ = nullptr;
   guint64 skipped_ = 0;
-
-  int fps_n_ = 0, fps_d_ = 1;
+  rangecast::TickRate rate_;
   guint64 index_ = 0;
   bool discont_ = true;
-  /* not live: PTS = since_ + time_of (frame_) */
-  guint64 frame_ = 0;
-  GstClockTime since_ = 0, position_ = GST_CLOCK_TIME_NONE;
-  guint64 last_tick_ = kNone;
+
+  std::int64_t frame_ = 0; ///< not live: the next one has PTS since_ + time_of (frame_)
+  GstClockTime since_ = 0; ///< not live: when the rate changed
+  GstClockTime position_ = GST_CLOCK_TIME_NONE; ///< not live: where to seek to
+  std::optional<std::int64_t> last_tick_;       ///< live
 };

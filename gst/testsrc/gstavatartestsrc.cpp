@@ -34,7 +34,7 @@
 #include "settings.hpp"
 #include "stream.hpp"
 
-GST_DEBUG_CATEGORY (gst_avatar_test_src_debug); /* avatarstream.cpp logs to it too */
+GST_DEBUG_CATEGORY (gst_avatar_test_src_debug); /* for stream.cpp, too */
 
 enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 
@@ -73,7 +73,7 @@ gst_avatar_test_src_query (GstPad *pad, GstObject *parent, GstQuery *query)
 {
   AvatarStream &stream = GST_AVATAR_TEST_SRC (parent)->priv->stream;
   switch (GST_QUERY_TYPE (query)) {
-    case GST_QUERY_LATENCY: { /* a picture is sent when its time has come, and lasts one frame */
+    case GST_QUERY_LATENCY: { /* a frame is sent when it is captured, and lasts one period */
       const bool live = stream.is_live ();
       gst_query_set_latency (query, live, live ? stream.period () : 0, GST_CLOCK_TIME_NONE);
       return TRUE;
@@ -98,11 +98,11 @@ gst_avatar_test_src_event (GstPad *, GstObject *parent, GstEvent *event)
     case GST_EVENT_SEEK:
       handled = GST_AVATAR_TEST_SRC (parent)->priv->stream.seek (event);
       break;
-    case GST_EVENT_RECONFIGURE: /* has marked the pad already; a new link says it, too */
+    case GST_EVENT_RECONFIGURE: /* GstPad has marked the pad; the task may be paused */
       GST_AVATAR_TEST_SRC (parent)->priv->stream.pad_linked ();
       handled = true;
       break;
-    case GST_EVENT_QOS: /* these two ask for nothing that we could do */
+    case GST_EVENT_QOS: /* frames are neither dropped nor delayed on request */
     case GST_EVENT_LATENCY:
       handled = true;
       break;
@@ -137,26 +137,21 @@ gst_avatar_test_src_send_event (GstElement *element, GstEvent *event)
 
 /* ---- request pads ---- */
 
-static AvatarPadKind
-kind_of (const gchar *name)
-{
-  return g_str_equal (name, "left")    ? AvatarPadKind::kLeft
-         : g_str_equal (name, "right") ? AvatarPadKind::kRight
-         : g_str_equal (name, "third") ? AvatarPadKind::kThird
-                                       : AvatarPadKind::kRange;
-}
-
 static GstPad *
 gst_avatar_test_src_request_new_pad (
     GstElement *element, GstPadTemplate *pad_template, const gchar *, const GstCaps *)
 {
   const gchar *name = GST_PAD_TEMPLATE_NAME_TEMPLATE (pad_template);
   GstPad *pad = gst_pad_new_from_template (pad_template, name);
-  gst_pad_set_query_function (pad, gst_avatar_test_src_query);
-  gst_pad_set_event_function (pad, gst_avatar_test_src_event);
-  if (!gst_element_add_pad (element, pad)) /* the name is taken; says so itself */
+  gst_pad_set_query_function (pad, GST_DEBUG_FUNCPTR (gst_avatar_test_src_query));
+  gst_pad_set_event_function (pad, GST_DEBUG_FUNCPTR (gst_avatar_test_src_event));
+  if (!gst_element_add_pad (element, pad)) /* warns that the name is taken */
     return nullptr;
-  GST_AVATAR_TEST_SRC (element)->priv->stream.add_pad (pad, kind_of (name));
+  const AvatarPadKind kind = g_str_equal (name, "left")    ? AvatarPadKind::kLeft
+                             : g_str_equal (name, "right") ? AvatarPadKind::kRight
+                             : g_str_equal (name, "third") ? AvatarPadKind::kThird
+                                                           : AvatarPadKind::kRange;
+  GST_AVATAR_TEST_SRC (element)->priv->stream.add_pad (pad, kind);
   return pad;
 }
 
@@ -168,7 +163,7 @@ gst_avatar_test_src_release_pad (GstElement *element, GstPad *pad)
   gst_element_remove_pad (element, pad);
 }
 
-/* ---- life ---- */
+/* ---- state changes ---- */
 
 static bool
 start (GstAvatarTestSrc *self)
@@ -191,7 +186,7 @@ gst_avatar_test_src_change_state (GstElement *element, GstStateChange transition
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     stream.set_playing (false);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
-    stream.ask_to_stop ();
+    stream.request_stop ();
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_avatar_test_src_parent_class)->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
@@ -263,10 +258,10 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
       "Renders a moving head and shoulders as seen by a rig of stereo cameras, with exact depth",
       "gst-rangecast");
 
-  element_class->request_new_pad = gst_avatar_test_src_request_new_pad;
-  element_class->release_pad = gst_avatar_test_src_release_pad;
-  element_class->send_event = gst_avatar_test_src_send_event;
-  element_class->change_state = gst_avatar_test_src_change_state;
+  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_avatar_test_src_request_new_pad);
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_avatar_test_src_release_pad);
+  element_class->send_event = GST_DEBUG_FUNCPTR (gst_avatar_test_src_send_event);
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_avatar_test_src_change_state);
 
   GST_DEBUG_CATEGORY_INIT (gst_avatar_test_src_debug, "avatartestsrc", 0, "Avatar test source");
 }

@@ -5,6 +5,22 @@
 
 #include <gstrange/gstrangebufferpool.h>
 
+namespace {
+
+/* Raw video goes into any pool of the peer, range images only into pools that know their layout. */
+GstBufferPool *
+pool_of_peer (GstQuery *query, bool range)
+{
+  GstBufferPool *pool = nullptr;
+  if (gst_query_get_n_allocation_pools (query) > 0)
+    gst_query_parse_nth_allocation_pool (query, 0, &pool, nullptr, nullptr, nullptr);
+  if (pool && range && !GST_IS_RANGE_BUFFER_POOL (pool))
+    gst_clear_object (&pool);
+  return pool;
+}
+
+} // namespace
+
 AvatarPad::AvatarPad (GstPad *pad, AvatarPadKind kind)
     : pad_ (GST_PAD (gst_object_ref (pad))), kind_ (kind)
 {
@@ -12,7 +28,7 @@ AvatarPad::AvatarPad (GstPad *pad, AvatarPadKind kind)
 
 AvatarPad::~AvatarPad ()
 {
-  take_pool (nullptr);
+  set_pool (nullptr);
   gst_object_unref (pad_);
 }
 
@@ -35,30 +51,18 @@ AvatarPad::peer_caps () const
   return peer;
 }
 
-/* Raw pictures go into any pool of the peer's, frame sets into pools that know how they lie. */
-static GstBufferPool *
-pool_of_peer (GstQuery *query, bool range)
-{
-  GstBufferPool *pool = nullptr;
-  if (gst_query_get_n_allocation_pools (query) > 0)
-    gst_query_parse_nth_allocation_pool (query, 0, &pool, nullptr, nullptr, nullptr);
-  if (pool && range && !GST_IS_RANGE_BUFFER_POOL (pool))
-    gst_clear_object (&pool);
-  return pool;
-}
-
 bool
 AvatarPad::configure (GstBufferPool *pool, GstQuery *query, GstCaps *caps, guint size)
 {
-  guint least = 0, min = 0, max = 0;
+  guint min_size = 0, min = 0, max = 0;
   GstAllocator *allocator = nullptr;
   GstAllocationParams params;
   gst_allocation_params_init (&params);
   if (gst_query_get_n_allocation_pools (query) > 0)
-    gst_query_parse_nth_allocation_pool (query, 0, nullptr, &least, &min, &max);
+    gst_query_parse_nth_allocation_pool (query, 0, nullptr, &min_size, &min, &max);
   if (gst_query_get_n_allocation_params (query) > 0)
     gst_query_parse_nth_allocation_param (query, 0, &allocator, &params);
-  size = MAX (size, least);
+  size = MAX (size, min_size);
   GstStructure *config = gst_buffer_pool_get_config (pool);
   gst_buffer_pool_config_set_params (config, caps, size, min, max);
   gst_buffer_pool_config_set_allocator (config, allocator, &params);
@@ -67,7 +71,7 @@ AvatarPad::configure (GstBufferPool *pool, GstQuery *query, GstCaps *caps, guint
   gst_clear_object (&allocator);
   if (gst_buffer_pool_set_config (pool, config))
     return true;
-  /* The pool may have changed what it cannot do; small changes we can live with. */
+  /* the pool has replaced what it cannot do; accept it if size and counts suffice */
   config = gst_buffer_pool_get_config (pool);
   if (gst_buffer_pool_config_validate_params (config, caps, size, min, max))
     return gst_buffer_pool_set_config (pool, config);
@@ -92,7 +96,7 @@ AvatarPad::make_pool (GstCaps *caps, GstQuery *query)
 }
 
 void
-AvatarPad::take_pool (GstBufferPool *pool)
+AvatarPad::set_pool (GstBufferPool *pool)
 {
   GstBufferPool *old;
   {
@@ -114,7 +118,7 @@ AvatarPad::negotiate (GstCaps *caps)
   const bool same = old && gst_caps_is_equal (old, caps);
   gst_clear_caps (&old);
   if (same && negotiated_)
-    return true; /* another pad asked for it */
+    return true; /* another pad needed it */
   negotiated_ = peer_ended_ = false;
   if (gst_caps_is_empty (caps))
     return false;
@@ -122,16 +126,18 @@ AvatarPad::negotiate (GstCaps *caps)
     return false;
   if (kind_ != AvatarPadKind::kRange && !gst_video_info_from_caps (&video_, caps))
     return false;
-  take_pool (nullptr); /* the peer may offer the one that we had */
+  set_pool (nullptr); /* the peer may offer the same one again */
   GstQuery *query = gst_query_new_allocation (caps, TRUE);
   gst_pad_peer_query (pad_, query);
-  take_pool (make_pool (caps, query));
+  set_pool (make_pool (caps, query));
   gst_query_unref (query);
   negotiated_ = pool_ != nullptr;
   return negotiated_;
 }
 
-static GstCaps *
+namespace {
+
+GstCaps *
 sizes_of (GstCaps *caps)
 {
   GstCaps *sizes = gst_caps_new_empty ();
@@ -146,7 +152,7 @@ sizes_of (GstCaps *caps)
   return sizes;
 }
 
-static GstCaps *
+GstCaps *
 common_sizes (const AvatarPads &pads)
 {
   GstCaps *common = gst_caps_from_string ("size, width=(int)[16,4096], height=(int)[16,4096], "
@@ -161,6 +167,8 @@ common_sizes (const AvatarPads &pads)
   }
   return common;
 }
+
+} // namespace
 
 bool
 avatar_choose_format (const AvatarPads &pads, AvatarFormat &format)
@@ -231,7 +239,7 @@ AvatarPad::push_segment (const GstSegment &segment, guint32 seqnum)
 void
 AvatarPad::push_end (GstEvent *event)
 {
-  if (ended_ || !gst_pad_is_linked (pad_)) { /* a pad that is linked later is told then */
+  if (ended_ || !gst_pad_is_linked (pad_)) { /* a pad that is linked later gets it then */
     gst_event_unref (event);
     return;
   }
@@ -239,7 +247,7 @@ AvatarPad::push_end (GstEvent *event)
   gst_pad_push_event (pad_, event);
 }
 
-/* ---- life ---- */
+/* ---- state ---- */
 
 void
 AvatarPad::restart ()
@@ -251,7 +259,7 @@ AvatarPad::restart ()
 void
 AvatarPad::stop ()
 {
-  take_pool (nullptr);
+  set_pool (nullptr);
   restart ();
   needs_start_ = true;
   negotiated_ = false;

@@ -9,8 +9,8 @@
 
 enum class AvatarPadKind { kLeft, kRight, kThird, kRange };
 
-/** One request pad of avatartestsrc and its stream. For the streaming thread, or for
- *  whoever has made it stand still; but set_flushing(), pad() and kind() for any. */
+/** One request pad of avatartestsrc and its stream. For the streaming thread, or while it is
+ *  paused; set_flushing(), pad() and kind() for any thread. */
 class AvatarPad {
 public:
   AvatarPad (GstPad *pad, AvatarPadKind kind);
@@ -23,26 +23,27 @@ public:
   /** Of negotiated raw video. */
   [[nodiscard]] const GstVideoInfo &video () const { return video_; }
 
-  /** Asks once a frame: takes the pad's mark of RECONFIGURE away. */
+  /** Call once a frame: resets the pad's RECONFIGURE flag. */
   bool needs_negotiation ();
-  /** What the peer takes of our formats. */
+  /** The formats of the template that the peer accepts. Transfer full. */
   [[nodiscard]] GstCaps *peer_caps () const;
-  /** Sends fixed caps, if they are others than the last, and takes buffers as the peer wants them.
-   *  @param caps  empty: the peer takes none */
+  /** Sends fixed caps, if they have changed, and sets up a buffer pool.
+   *  @param caps  empty: the peer accepts none
+   *  @return false if the peer refuses them */
   bool negotiate (GstCaps *caps);
 
-  /** GST_FLOW_NOT_LINKED, GST_FLOW_EOS: the peer wants none. */
+  /** @return GST_FLOW_NOT_LINKED, GST_FLOW_EOS: the peer takes no more */
   GstFlowReturn acquire (GstBuffer **buffer);
   GstFlowReturn push (GstBuffer *buffer);
 
-  /** Each but once in a stream. */
+  /** Each does nothing if the stream has had it. push_end() takes the event. */
   void push_stream_start (GstElement *element, guint group_id);
   void push_segment (const GstSegment &segment, guint32 seqnum);
   void push_end (GstEvent *event);
 
-  /** The stream goes on elsewhere: a segment is due. */
+  /** The stream goes on with a new segment. */
   void restart ();
-  /** There is no stream any more. */
+  /** The stream has ended. */
   void stop ();
 
   /** Any thread. While true, acquire() does not wait for a buffer to come back. */
@@ -51,7 +52,7 @@ public:
 private:
   bool configure (GstBufferPool *pool, GstQuery *query, GstCaps *caps, guint size);
   GstBufferPool *make_pool (GstCaps *caps, GstQuery *query);
-  void take_pool (GstBufferPool *pool);
+  void set_pool (GstBufferPool *pool);
 
   GstPad *pad_;
   AvatarPadKind kind_;
@@ -66,12 +67,12 @@ private:
 
 using AvatarPads = std::vector<std::shared_ptr<AvatarPad>>;
 
-/** What all pads have in common. */
+/** Size and rate of all pads. */
 struct AvatarFormat {
   int width, height; ///< pixels
   int fps_n, fps_d;  ///< frames a second
 };
 
-/** The size and rate that all peers take, nearest to 320 x 240 at 30/s.
+/** The size and rate that all peers accept, nearest to 320 x 240 at 30/s.
  *  @return false if there is none */
 bool avatar_choose_format (const AvatarPads &pads, AvatarFormat &format);

@@ -22,11 +22,11 @@ AvatarPainter::start (const AvatarSettings &settings)
 {
   settings_ = settings;
   scene_.reset ();
-  forget_loop ();
+  clear_loops ();
 }
 
 void
-AvatarPainter::forget_loop ()
+AvatarPainter::clear_loops ()
 {
   for (Loop &loop : loops_)
     loop = {};
@@ -43,7 +43,7 @@ AvatarPainter::set_size (int width, int height)
     return {};
   s.width = width;
   s.height = height;
-  forget_loop ();
+  clear_loops ();
   scene_.reset (); /* a model and its rooms are large: not two at a time */
   if (Status status = Scene::create (s, scene_); !status.ok ())
     return status;
@@ -70,7 +70,9 @@ AvatarPainter::make_raw_caps (int fps_n, int fps_d) const
       nullptr);
 }
 
-static PixelFormat
+namespace {
+
+PixelFormat
 pixel_format (const GstVideoInfo &info)
 {
   switch (GST_VIDEO_INFO_FORMAT (&info)) {
@@ -87,11 +89,13 @@ pixel_format (const GstVideoInfo &info)
   }
 }
 
-static double
+double
 seconds (GstClockTime time)
 {
   return static_cast<double> (time) / GST_SECOND;
 }
+
+} // namespace
 
 Status
 AvatarPainter::make_loop (SceneCamera camera)
@@ -116,7 +120,7 @@ AvatarPainter::make_loop (SceneCamera camera)
 
 /* Forwards, and back again without showing either end twice. */
 Status
-AvatarPainter::find_looped (SceneCamera camera, const AvatarMoment &moment, double period_s,
+AvatarPainter::find_looped (SceneCamera camera, const FrameTime &time, double period_s,
     rangecast::ImageView<const Rgbx> &found)
 {
   Loop &loop = loops_[int (camera)];
@@ -124,7 +128,7 @@ AvatarPainter::find_looped (SceneCamera camera, const AvatarMoment &moment, doub
     if (Status s = make_loop (camera); !s.ok ())
       return s;
   const int width = settings_.scene.width, height = settings_.scene.height;
-  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : moment.tick % (2 * n - 2),
+  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : time.tick % (2 * n - 2),
                 i = at < n ? at : 2 * n - 2 - at;
   const rangecast::ImageView<Rgbx> picture{
       loop.pictures.data () + i * std::size_t (width) * std::size_t (height), width, height,
@@ -140,14 +144,14 @@ AvatarPainter::find_looped (SceneCamera camera, const AvatarMoment &moment, doub
 }
 
 Status
-AvatarPainter::render (SceneCamera camera, const AvatarMoment &moment, double period_s,
-    rangecast::ImageView<Rgbx> picture)
+AvatarPainter::render (
+    SceneCamera camera, const FrameTime &time, double period_s, rangecast::ImageView<Rgbx> picture)
 {
-  if (settings_.loop_frames == 0 || empty_at (moment))
-    return scene_->render (MAX (settings_.view_id, 0), camera, seconds (moment.capture_time),
-        empty_at (moment), picture, {}, {});
+  if (settings_.loop_frames == 0 || empty_at (time))
+    return scene_->render (MAX (settings_.view_id, 0), camera, seconds (time.capture_time),
+        empty_at (time), picture, {}, {});
   rangecast::ImageView<const Rgbx> from;
-  if (Status s = find_looped (camera, moment, period_s, from); !s.ok ())
+  if (Status s = find_looped (camera, time, period_s, from); !s.ok ())
     return s;
   for (int y = 0; y < picture.height; y++)
     std::copy_n (from.row (y), picture.width, picture.row (y));
@@ -156,7 +160,7 @@ AvatarPainter::render (SceneCamera camera, const AvatarMoment &moment, double pe
 
 Status
 AvatarPainter::draw_raw (
-    SceneCamera camera, const GstVideoInfo &video, const AvatarMoment &moment, GstBuffer *buffer)
+    SceneCamera camera, const GstVideoInfo &video, const FrameTime &time, GstBuffer *buffer)
 {
   GstVideoFrame frame;
   if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
@@ -170,7 +174,7 @@ AvatarPainter::draw_raw (
       direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
       direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
   const double period_s = double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video);
-  const Status status = render (camera, moment, period_s, picture);
+  const Status status = render (camera, time, period_s, picture);
   if (status.ok () && !direct)
     rangecast::convert_pixels (picture, format, pixels, stride);
   gst_video_frame_unmap (&frame);
@@ -178,12 +182,12 @@ AvatarPainter::draw_raw (
 }
 
 Status
-AvatarPainter::draw_range (const AvatarMoment &moment, GstBuffer *buffer)
+AvatarPainter::draw_range (const FrameTime &time, GstBuffer *buffer)
 {
   for (const auto &view : scene_->range_rig ().views)
     if (settings_.view_id == AvatarSettings::kAllViews || settings_.view_id == view.id)
       if (Status s = gstrange::add_view (
-              buffer, view.id, {0, 0, view.width, view.height}, moment.capture_time);
+              buffer, view.id, {0, 0, view.width, view.height}, time.capture_time);
           !s.ok ())
         return s;
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
@@ -191,8 +195,8 @@ AvatarPainter::draw_range (const AvatarMoment &moment, GstBuffer *buffer)
     return frame.status ();
   std::array<Roi, rangecast::kMaxViews> boxes;
   const std::size_t count = frame.views ().size ();
-  const Status status = scene_->render_range (frame.views (), seconds (moment.capture_time),
-      empty_at (moment), {boxes.data (), count}, settings_.n_threads);
+  const Status status = scene_->render_range (frame.views (), seconds (time.capture_time),
+      empty_at (time), {boxes.data (), count}, settings_.n_threads);
   for (std::size_t i = 0; status.ok () && settings_.person_only && i < count; i++)
     frame.crop (i, boxes[i]);
   return status;

@@ -13,37 +13,37 @@
 /** Draws the scene into buffers. Streaming thread only. */
 class AvatarPainter {
 public:
-  /** Forgets the scene. */
+  /** Drops the scene. */
   void start (const AvatarSettings &settings);
-  /** Makes the scene, if its size is another one, and writes its rig file. */
+  /** Creates the scene, if its size has changed, and writes its rig file. */
   rangecast::Status set_size (int width, int height);
-  /** Its pictures are drawn again: for a new frame rate. */
-  void forget_loop ();
+  /** Draws looped pictures again, for a new frame rate. */
+  void clear_loops ();
 
-  /** Fixed but for the pixel format of raw pictures. */
+  /** Fixed except for the pixel format of raw video. Transfer full. */
   [[nodiscard]] GstCaps *make_range_caps (int fps_n, int fps_d) const;
   [[nodiscard]] GstCaps *make_raw_caps (int fps_n, int fps_d) const;
 
   rangecast::Status draw_raw (rangecast::SceneCamera camera, const GstVideoInfo &video,
-      const AvatarMoment &moment, GstBuffer *buffer);
+      const FrameTime &time, GstBuffer *buffer);
   /** @param buffer  of a GstRangeBufferPool */
-  rangecast::Status draw_range (const AvatarMoment &moment, GstBuffer *buffer);
+  rangecast::Status draw_range (const FrameTime &time, GstBuffer *buffer);
 
 private:
-  /* What one camera shows again and again. */
+  /* The pictures that one camera repeats. */
   struct Loop {
     std::vector<rangecast::Rgbx> pictures; // one below the other; none before the first is shown
     std::vector<bool> drawn;               // each when it is first shown
   };
 
-  rangecast::Status render (rangecast::SceneCamera camera, const AvatarMoment &moment,
-      double period_s, rangecast::ImageView<rangecast::Rgbx> picture);
+  rangecast::Status render (rangecast::SceneCamera camera, const FrameTime &time, double period_s,
+      rangecast::ImageView<rangecast::Rgbx> picture);
   rangecast::Status make_loop (rangecast::SceneCamera camera);
-  rangecast::Status find_looped (rangecast::SceneCamera camera, const AvatarMoment &moment,
+  rangecast::Status find_looped (rangecast::SceneCamera camera, const FrameTime &time,
       double period_s, rangecast::ImageView<const rangecast::Rgbx> &found);
-  [[nodiscard]] bool empty_at (const AvatarMoment &moment) const
+  [[nodiscard]] bool empty_at (const FrameTime &time) const
   {
-    return moment.index < settings_.empty_frames;
+    return time.index < settings_.empty_frames;
   }
 
   AvatarSettings settings_;

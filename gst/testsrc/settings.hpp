@@ -8,20 +8,19 @@
 
 #include "common/properties.hpp"
 
-/** What the application wants of avatartestsrc; all of it may change in NULL and READY. */
+/** Property values of avatartestsrc, which may change in NULL and READY. */
 struct AvatarSettings {
   static constexpr int kAllViews = -1;
 
-  rangecast::SceneSettings scene; ///< all but the size, which the caps decide
+  rangecast::SceneSettings scene; ///< except the size, which the caps decide
   int view_id = kAllViews;
   guint empty_frames = 0;
-  guint loop_frames = 0; ///< 0: each picture is drawn
+  guint loop_frames = 0; ///< 0: every frame is drawn
   int num_buffers = -1;  ///< frames; -1: no end
   bool is_live = false;
   std::string rig_export; ///< file; empty: none
   bool person_only = false;
-  int n_threads = 0; ///< 0: one a core
+  int n_threads = 0; ///< 0: one per core
 };
 
-/** Their properties. */
 PropertyTable<AvatarSettings> &avatar_properties ();

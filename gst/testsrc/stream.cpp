@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* In the order of a frame: pads, the task, negotiation, pushing, the end; then flushes and seeks,
+ * and state changes. */
 #include "stream.hpp"
 
 #include <algorithm>
@@ -9,7 +11,7 @@
 GST_DEBUG_CATEGORY_EXTERN (gst_avatar_test_src_debug);
 #define GST_CAT_DEFAULT gst_avatar_test_src_debug
 
-/* Negotiation was overtaken by a new wish of downstream. */
+/* Downstream asked for something else meanwhile: negotiate again. */
 static constexpr GstFlowReturn kAgain = GST_FLOW_CUSTOM_SUCCESS;
 
 AvatarStream::AvatarStream (GstElement *element) : element_ (element)
@@ -23,27 +25,6 @@ AvatarStream::~AvatarStream ()
   g_rec_mutex_clear (&task_lock_);
 }
 
-AvatarPads
-AvatarStream::pads ()
-{
-  std::lock_guard guard (lock_);
-  return pads_;
-}
-
-bool
-AvatarStream::is_live ()
-{
-  std::lock_guard guard (lock_);
-  return is_live_;
-}
-
-guint64
-AvatarStream::frames ()
-{
-  std::lock_guard guard (lock_);
-  return frames_;
-}
-
 /* ---- pads ---- */
 
 void
@@ -52,14 +33,14 @@ AvatarStream::add_pad (GstPad *pad, AvatarPadKind kind)
   std::lock_guard guard (lock_);
   pads_.push_back (std::make_shared<AvatarPad> (pad, kind));
   gst_flow_combiner_add_pad (combiner_, pad);
-  /* RECONFIGURE says it too, but for links that are made without. */
+  /* links made with GST_PAD_LINK_CHECK_NO_RECONFIGURE send no RECONFIGURE event */
   g_signal_connect (pad, "linked",
       G_CALLBACK (+[] (GstPad *linked, GstPad *, AvatarStream *stream) {
         gst_pad_mark_reconfigure (linked);
         stream->pad_linked ();
       }),
       this);
-  run_task ();
+  start_task ();
 }
 
 void
@@ -75,6 +56,19 @@ AvatarStream::remove_pad (GstPad *pad)
   gst_flow_combiner_remove_pad (combiner_, pad);
 }
 
+void
+AvatarStream::pad_linked ()
+{
+  std::lock_guard guard (lock_);
+  start_task ();
+}
+
+bool
+AvatarStream::has_pad (const AvatarPad &pad) const
+{
+  return std::ranges::any_of (pads_, [&] (const auto &entry) { return entry.get () == &pad; });
+}
+
 bool
 AvatarStream::any_linked () const
 {
@@ -82,95 +76,109 @@ AvatarStream::any_linked () const
       pads_, [] (const auto &entry) { return gst_pad_is_linked (entry->pad ()); });
 }
 
+/* ---- the task ---- */
+
 /* A pad that is requested while the element runs is linked only a moment later: that is no error.
  */
 bool
-AvatarStream::rests () const
+AvatarStream::must_pause () const
 {
   const bool over = eos_wanted_ || ended_;
   return !running_ || holds_ > 0 || pads_.empty () || (!over && !any_linked ());
 }
 
-bool
-AvatarStream::all_unlinked ()
+void
+AvatarStream::start_task ()
 {
-  std::lock_guard guard (lock_);
-  return !any_linked ();
+  if (must_pause ())
+    return;
+  if (!task_) {
+    task_ = gst_task_new (loop, this, nullptr);
+    gst_task_set_lock (task_, &task_lock_);
+  }
+  gst_task_start (task_);
+}
+
+/* A task that was stopped must not be paused: it would never end. */
+void
+AvatarStream::pause_task ()
+{
+  if (running_ && task_)
+    gst_task_pause (task_);
 }
 
 void
-AvatarStream::pad_linked ()
+AvatarStream::loop (gpointer stream)
 {
-  std::lock_guard guard (lock_);
-  run_task ();
+  auto self = static_cast<AvatarStream *> (stream);
+  AvatarPads pads;
+  bool over;
+  {
+    std::lock_guard guard (self->lock_);
+    if (self->must_pause ()) {
+      GST_DEBUG_OBJECT (self->element_, "pausing: no linked pad, a flush or a seek");
+      self->pause_task (); /* whatever changes that starts it again */
+      self->clock_.pause ();
+      return;
+    }
+    pads = self->pads_;
+    over = self->eos_wanted_ || self->ended_;
+  }
+  over |= self->num_buffers_ >= 0 && self->sent_ >= static_cast<guint64> (self->num_buffers_);
+  const GstFlowReturn flow = over ? GST_FLOW_EOS : self->output_frame (pads);
+  if (flow != GST_FLOW_OK && flow != kAgain)
+    self->end_stream (pads, flow);
 }
 
+namespace {
+
 bool
-AvatarStream::knows (const AvatarPad &pad) const
+any_needs_negotiation (const AvatarPads &pads)
 {
-  return std::ranges::any_of (pads_, [&] (const auto &entry) { return entry.get () == &pad; });
+  bool needed = false;
+  for (const auto &pad : pads)
+    needed |= pad->needs_negotiation (); /* resets each pad's mark */
+  return needed;
+}
+
+} // namespace
+
+GstFlowReturn
+AvatarStream::output_frame (const AvatarPads &pads)
+{
+  GstFlowReturn flow = any_needs_negotiation (pads) ? negotiate (pads) : GST_FLOW_OK;
+  if (flow != GST_FLOW_OK)
+    return flow;
+  FrameTime time{};
+  if (!is_live_)
+    time = clock_.next ();
+  else if (!clock_.wait (element_, time))
+    return kAgain;
+  if (any_needs_negotiation (pads)) /* pads may have been linked anew during the wait */
+    flow = negotiate (pads);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (GST_CLOCK_TIME_IS_VALID (segment_.stop) && time.pts >= segment_.stop)
+    return GST_FLOW_EOS;
+  flow = push_frame (pads, time);
+  if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED) {
+    bool linked;
+    {
+      std::lock_guard guard (lock_);
+      linked = any_linked ();
+    }
+    return !linked || any_needs_negotiation (pads) ? kAgain : flow;
+  }
+  if (flow != GST_FLOW_OK)
+    return flow;
+  segment_.position = time.pts + time.duration;
+  sent_++;
+  std::lock_guard guard (lock_);
+  frames_++;
+  return flow;
 }
 
 /* ---- negotiation: one size and frame rate for all pads ---- */
-
-GstCaps *
-AvatarStream::caps_for (const AvatarPad &pad, const AvatarFormat &format) const
-{
-  GstCaps *wanted = pad.kind () == AvatarPadKind::kRange
-                        ? painter_.make_range_caps (format.fps_n, format.fps_d)
-                        : painter_.make_raw_caps (format.fps_n, format.fps_d);
-  GstCaps *peer = pad.peer_caps ();
-  GstCaps *both = gst_caps_intersect_full (peer, wanted, GST_CAPS_INTERSECT_FIRST);
-  gst_caps_unref (peer);
-  gst_caps_unref (wanted);
-  return gst_caps_is_empty (both) ? both : gst_caps_fixate (both);
-}
-
-GstFlowReturn
-AvatarStream::negotiate_pad (AvatarPad &pad, const AvatarFormat &format)
-{
-  if (!gst_pad_is_linked (pad.pad ()))
-    return GST_FLOW_OK;
-  GstCaps *caps = caps_for (pad, format);
-  const bool good = pad.negotiate (caps);
-  GST_DEBUG_OBJECT (pad.pad (), "%s %" GST_PTR_FORMAT, good ? "takes" : "refuses", caps);
-  gst_caps_unref (caps);
-  return good ? GST_FLOW_OK : refused (pad);
-}
-
-GstFlowReturn
-AvatarStream::refused (const AvatarPad &pad)
-{
-  {
-    std::lock_guard guard (lock_);
-    if (!knows (pad) || !gst_pad_is_linked (pad.pad ()))
-      return GST_FLOW_OK; /* it went away meanwhile */
-  }
-  if (GST_PAD_IS_FLUSHING (pad.pad ()))
-    return GST_FLOW_FLUSHING;
-  if (GST_PAD_NEEDS_RECONFIGURE (pad.pad ()))
-    return kAgain; /* the peer wants something else since the format was chosen */
-  GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
-      ("pad %s: the peer accepts none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }",
-          GST_PAD_NAME (pad.pad ())),
-      (nullptr));
-  return GST_FLOW_ERROR;
-}
-
-GstFlowReturn
-AvatarStream::no_common_format ()
-{
-  {
-    std::lock_guard guard (lock_);
-    if (!running_)
-      return GST_FLOW_FLUSHING;
-  }
-  GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
-      ("the peers of the pads have no size and frame rate in common (16 to 4096 pixels, 1/1000 to "
-       "1000 frames per second)"),
-      (nullptr));
-  return GST_FLOW_ERROR;
-}
 
 GstFlowReturn
 AvatarStream::negotiate (const AvatarPads &pads)
@@ -178,25 +186,87 @@ AvatarStream::negotiate (const AvatarPads &pads)
   for (const auto &pad : pads)
     pad->push_stream_start (element_, group_id_);
   AvatarFormat format{};
-  if (!avatar_choose_format (pads, format))
-    return no_common_format ();
+  if (!avatar_choose_format (pads, format)) {
+    {
+      std::lock_guard guard (lock_);
+      if (!running_)
+        return GST_FLOW_FLUSHING;
+    }
+    GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
+        ("the peers of the pads have no size and frame rate in common (16 to 4096 pixels, 1/1000 "
+         "to 1000 frames per second)"),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
   GstFlowReturn flow =
       gst_range_flow_return (element_, painter_.set_size (format.width, format.height));
   const bool new_rate = clock_.set_rate (format.fps_n, format.fps_d);
   if (new_rate)
-    painter_.forget_loop ();
+    painter_.clear_loops ();
   for (const auto &pad : pads)
-    if (flow == GST_FLOW_OK)
+    if (flow == GST_FLOW_OK && gst_pad_is_linked (pad->pad ()))
       flow = negotiate_pad (*pad, format);
   if (flow == GST_FLOW_OK && new_rate && is_live_)
     gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
   return flow;
 }
 
-/* ---- the streaming thread ---- */
+GstFlowReturn
+AvatarStream::negotiate_pad (AvatarPad &pad, const AvatarFormat &format)
+{
+  GstCaps *wanted = pad.kind () == AvatarPadKind::kRange
+                        ? painter_.make_range_caps (format.fps_n, format.fps_d)
+                        : painter_.make_raw_caps (format.fps_n, format.fps_d);
+  GstCaps *peer = pad.peer_caps ();
+  GstCaps *caps = gst_caps_intersect_full (peer, wanted, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (peer);
+  gst_caps_unref (wanted);
+  if (!gst_caps_is_empty (caps))
+    caps = gst_caps_fixate (caps);
+  const bool accepted = pad.negotiate (caps);
+  GST_INFO_OBJECT (pad.pad (), "caps %" GST_PTR_FORMAT "%s", caps, accepted ? "" : " refused");
+  gst_caps_unref (caps);
+  if (accepted)
+    return GST_FLOW_OK;
+  {
+    std::lock_guard guard (lock_);
+    if (!has_pad (pad) || !gst_pad_is_linked (pad.pad ()))
+      return GST_FLOW_OK; /* released or unlinked meanwhile */
+  }
+  if (GST_PAD_IS_FLUSHING (pad.pad ()))
+    return GST_FLOW_FLUSHING;
+  if (GST_PAD_NEEDS_RECONFIGURE (pad.pad ()))
+    return kAgain;
+  GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
+      ("pad %s: the peer accepts none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }",
+          GST_PAD_NAME (pad.pad ())),
+      (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+/* ---- frames ---- */
 
 GstFlowReturn
-AvatarStream::push_picture (AvatarPad &pad, const AvatarMoment &moment)
+AvatarStream::push_frame (const AvatarPads &pads, const FrameTime &time)
+{
+  GST_LOG_OBJECT (element_, "frame %" G_GUINT64_FORMAT " at %" GST_TIME_FORMAT, time.index,
+      GST_TIME_ARGS (time.pts));
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (const auto &pad : pads) {
+    const GstFlowReturn pushed = push_picture (*pad, time);
+    {
+      std::lock_guard guard (lock_); /* a pad that was released does not count */
+      flow = has_pad (*pad) ? gst_flow_combiner_update_pad_flow (combiner_, pad->pad (), pushed)
+                            : GST_FLOW_OK;
+    }
+    if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* that counts when all were pushed */
+      return flow;
+  }
+  return flow;
+}
+
+GstFlowReturn
+AvatarStream::push_picture (AvatarPad &pad, const FrameTime &time)
 {
   GstBuffer *buffer = nullptr;
   GstFlowReturn flow = pad.acquire (&buffer);
@@ -207,114 +277,22 @@ AvatarStream::push_picture (AvatarPad &pad, const AvatarMoment &moment)
     return flow;
   flow = gst_range_flow_return (
       element_, pad.kind () == AvatarPadKind::kRange
-                    ? painter_.draw_range (moment, buffer)
+                    ? painter_.draw_range (time, buffer)
                     : painter_.draw_raw (static_cast<rangecast::SceneCamera> (pad.kind ()),
-                          pad.video (), moment, buffer));
+                          pad.video (), time, buffer));
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (buffer);
     return flow;
   }
-  GST_BUFFER_PTS (buffer) = moment.pts;
-  GST_BUFFER_DURATION (buffer) = moment.duration;
-  GST_BUFFER_OFFSET (buffer) = moment.index;
-  GST_BUFFER_OFFSET_END (buffer) = moment.index + 1;
-  if (moment.discont)
+  GST_BUFFER_PTS (buffer) = time.pts;
+  GST_BUFFER_DURATION (buffer) = time.duration;
+  GST_BUFFER_OFFSET (buffer) = time.index;
+  GST_BUFFER_OFFSET_END (buffer) = time.index + 1;
+  if (time.discont)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-  gst_range_buffer_set_capture_time (buffer, moment.capture_time);
+  gst_range_buffer_set_capture_time (buffer, time.capture_time);
   pad.push_segment (segment_, segment_seqnum_);
   return pad.push (buffer);
-}
-
-/* A pad that was released meanwhile says nothing about the others. */
-GstFlowReturn
-AvatarStream::combine (const AvatarPad &pad, GstFlowReturn flow)
-{
-  std::lock_guard guard (lock_);
-  return knows (pad) ? gst_flow_combiner_update_pad_flow (combiner_, pad.pad (), flow)
-                     : GST_FLOW_OK;
-}
-
-GstFlowReturn
-AvatarStream::push_pictures (const AvatarPads &pads, const AvatarMoment &moment)
-{
-  GstFlowReturn flow = GST_FLOW_OK;
-  for (const auto &pad : pads) {
-    const GstFlowReturn pushed = push_picture (*pad, moment);
-    flow = combine (*pad, pushed);
-    if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* that counts when all are asked */
-      return flow;
-  }
-  return flow;
-}
-
-bool
-AvatarStream::any_stale (const AvatarPads &pads)
-{
-  bool stale = false;
-  for (const auto &pad : pads)
-    stale |= pad->needs_negotiation ();
-  return stale;
-}
-
-GstFlowReturn
-AvatarStream::negotiate_if_stale (const AvatarPads &pads)
-{
-  return any_stale (pads) ? negotiate (pads) : GST_FLOW_OK;
-}
-
-GstFlowReturn
-AvatarStream::one_frame (const AvatarPads &pads)
-{
-  GstFlowReturn flow = negotiate_if_stale (pads);
-  if (flow != GST_FLOW_OK)
-    return flow == kAgain ? GST_FLOW_OK : flow;
-  AvatarMoment moment{};
-  if (!is_live_)
-    moment = clock_.next ();
-  else if (!clock_.wait (element_, moment))
-    return GST_FLOW_OK;             /* the loop looks why */
-  flow = negotiate_if_stale (pads); /* pads may have been linked anew during the wait */
-  if (flow != GST_FLOW_OK)
-    return flow == kAgain ? GST_FLOW_OK : flow;
-  if (GST_CLOCK_TIME_IS_VALID (segment_.stop) && moment.pts >= segment_.stop)
-    return GST_FLOW_EOS;
-  flow = push_pictures (pads, moment);
-  if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED)
-    return all_unlinked () || any_stale (pads) ? GST_FLOW_OK : flow; /* overtaken, too */
-  if (flow != GST_FLOW_OK)
-    return flow;
-  segment_.position = moment.pts + moment.duration;
-  sent_++;
-  std::lock_guard guard (lock_);
-  frames_++;
-  return flow;
-}
-
-/* A task that was told to stop must not be told to pause: it would never end. */
-void
-AvatarStream::pause_task ()
-{
-  if (running_ && task_)
-    gst_task_pause (task_);
-}
-
-GstEvent *
-AvatarStream::end_event () const
-{
-  GstEvent *event = (segment_.flags & GST_SEGMENT_FLAG_SEGMENT) != 0
-                        ? gst_event_new_segment_done (GST_FORMAT_TIME, segment_.position)
-                        : gst_event_new_eos ();
-  gst_event_set_seqnum (event, segment_seqnum_);
-  return event;
-}
-
-void
-AvatarStream::post_segment_done ()
-{
-  GstMessage *message =
-      gst_message_new_segment_done (GST_OBJECT (element_), GST_FORMAT_TIME, segment_.position);
-  gst_message_set_seqnum (message, segment_seqnum_);
-  gst_element_post_message (element_, message);
 }
 
 void
@@ -332,50 +310,24 @@ AvatarStream::end_stream (const AvatarPads &pads, GstFlowReturn flow)
     return;
   if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED)
     GST_ELEMENT_FLOW_ERROR (element_, flow);
-  if (!again && (segment_.flags & GST_SEGMENT_FLAG_SEGMENT) != 0)
-    post_segment_done ();
+  const bool segment_seek = (segment_.flags & GST_SEGMENT_FLAG_SEGMENT) != 0;
+  if (segment_seek && !again) {
+    GstMessage *message =
+        gst_message_new_segment_done (GST_OBJECT (element_), GST_FORMAT_TIME, segment_.position);
+    gst_message_set_seqnum (message, segment_seqnum_);
+    gst_element_post_message (element_, message);
+  }
   for (const auto &pad : pads) {
+    GstEvent *event = segment_seek ? gst_event_new_segment_done (GST_FORMAT_TIME, segment_.position)
+                                   : gst_event_new_eos ();
+    gst_event_set_seqnum (event, segment_seqnum_);
     pad->push_stream_start (element_, group_id_);
     pad->push_segment (segment_, segment_seqnum_);
-    pad->push_end (end_event ());
+    pad->push_end (event);
   }
 }
 
-void
-AvatarStream::loop (gpointer stream)
-{
-  auto self = static_cast<AvatarStream *> (stream);
-  AvatarPads pads;
-  bool over;
-  {
-    std::lock_guard guard (self->lock_);
-    if (self->rests ()) {
-      self->pause_task (); /* whoever changes that starts it again */
-      self->clock_.note_rest ();
-      return;
-    }
-    pads = self->pads_;
-    over = self->eos_wanted_ || self->ended_;
-  }
-  over |= self->num_buffers_ >= 0 && self->sent_ >= static_cast<guint64> (self->num_buffers_);
-  const GstFlowReturn flow = over ? GST_FLOW_EOS : self->one_frame (pads);
-  if (flow != GST_FLOW_OK)
-    self->end_stream (pads, flow);
-}
-
-void
-AvatarStream::run_task ()
-{
-  if (rests ())
-    return;
-  if (!task_) {
-    task_ = gst_task_new (loop, this, nullptr);
-    gst_task_set_lock (task_, &task_lock_);
-  }
-  gst_task_start (task_);
-}
-
-/* ---- flushes and seeks ---- */
+/* ---- EOS, flushes and seeks ---- */
 
 bool
 AvatarStream::end ()
@@ -384,11 +336,18 @@ AvatarStream::end ()
   eos_wanted_ = running_;
   if (running_)
     clock_.interrupt ();
-  run_task ();
+  start_task ();
   return running_;
 }
 
-/* Makes the streaming thread stand still soon; hold task_lock_ to know that it does. */
+AvatarPads
+AvatarStream::pads ()
+{
+  std::lock_guard guard (lock_);
+  return pads_;
+}
+
+/* Pauses the task soon; lock task_lock_ to know that it is paused. */
 void
 AvatarStream::hold_task ()
 {
@@ -398,29 +357,7 @@ AvatarStream::hold_task ()
   clock_.interrupt ();
 }
 
-void
-AvatarStream::push_flush_start (guint32 seqnum)
-{
-  for (const auto &pad : pads ()) {
-    GstEvent *event = gst_event_new_flush_start ();
-    gst_event_set_seqnum (event, seqnum);
-    gst_pad_push_event (pad->pad (), event);
-    pad->set_flushing (true);
-  }
-}
-
-void
-AvatarStream::push_flush_stop (guint32 seqnum, bool reset_time)
-{
-  for (const auto &pad : pads ()) {
-    GstEvent *event = gst_event_new_flush_stop (reset_time);
-    gst_event_set_seqnum (event, seqnum);
-    gst_pad_push_event (pad->pad (), event);
-    pad->set_flushing (false);
-  }
-}
-
-/* Lets the thread go on in the segment. */
+/* Lets the task go on in a new segment. */
 void
 AvatarStream::release_task (guint32 seqnum)
 {
@@ -433,7 +370,18 @@ AvatarStream::release_task (guint32 seqnum)
   if (--holds_ > 0 || !running_)
     return;
   clock_.resume ();
-  run_task ();
+  start_task ();
+}
+
+void
+AvatarStream::push_flush (bool start, guint32 seqnum, bool reset_time)
+{
+  for (const auto &pad : pads ()) {
+    GstEvent *event = start ? gst_event_new_flush_start () : gst_event_new_flush_stop (reset_time);
+    gst_event_set_seqnum (event, seqnum);
+    gst_pad_push_event (pad->pad (), event);
+    pad->set_flushing (start);
+  }
 }
 
 bool
@@ -446,16 +394,8 @@ AvatarStream::flush_start (GstEvent *event)
     app_flush_ = true;
   }
   hold_task ();
-  push_flush_start (gst_event_get_seqnum (event));
+  push_flush (true, gst_event_get_seqnum (event), false);
   return true;
-}
-
-/* Running time starts anew, with the next frame. */
-void
-AvatarStream::restart_time ()
-{
-  segment_.start = segment_.time = segment_.position;
-  segment_.base = segment_.offset = 0;
 }
 
 bool
@@ -470,9 +410,11 @@ AvatarStream::flush_stop (GstEvent *event)
     app_flush_ = false;
   }
   g_rec_mutex_lock (&task_lock_);
-  push_flush_stop (gst_event_get_seqnum (event), reset_time);
-  if (reset_time && !is_live_)
-    restart_time ();
+  push_flush (false, gst_event_get_seqnum (event), reset_time);
+  if (reset_time && !is_live_) { /* running time starts anew, with the next frame */
+    segment_.start = segment_.time = segment_.position;
+    segment_.base = segment_.offset = 0;
+  }
   clock_.seek (segment_.position);
   release_task (gst_event_get_seqnum (event));
   g_rec_mutex_unlock (&task_lock_);
@@ -480,7 +422,7 @@ AvatarStream::flush_stop (GstEvent *event)
 }
 
 bool
-AvatarStream::seek_segment (GstEvent *event)
+AvatarStream::seek (GstEvent *event)
 {
   gdouble rate;
   GstFormat format;
@@ -488,59 +430,41 @@ AvatarStream::seek_segment (GstEvent *event)
   GstSeekType start_type, stop_type;
   gint64 start, stop;
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  GstSegment segment = segment_;
-  if (!gst_segment_do_seek (
-          &segment, rate, format, flags, start_type, start, stop_type, stop, nullptr))
-    return false;
-  segment_ = segment;
-  clock_.seek (segment.position);
-  return true;
-}
-
-/* Every sink of a pipeline hands on the same seek: all but the first find it done. */
-AvatarStream::SeekAnswer
-AvatarStream::admit_seek (GstEvent *event)
-{
-  gdouble rate;
-  GstFormat format;
-  GstSeekFlags flags;
-  gst_event_parse_seek (event, &rate, &format, &flags, nullptr, nullptr, nullptr, nullptr);
-  std::lock_guard guard (lock_);
-  if (!running_ || is_live_ || format != GST_FORMAT_TIME || rate <= 0 ||
-      (flags & GST_SEEK_FLAG_INSTANT_RATE_CHANGE) != 0)
-    return SeekAnswer::kNo;
-  if (last_seek_ == gst_event_get_seqnum (event))
-    return SeekAnswer::kDone;
-  last_seek_ = gst_event_get_seqnum (event);
-  return (flags & GST_SEEK_FLAG_FLUSH) != 0 ? SeekAnswer::kFlush : SeekAnswer::kContinue;
-}
-
-bool
-AvatarStream::seek (GstEvent *event)
-{
   const guint32 seqnum = gst_event_get_seqnum (event);
-  const SeekAnswer answer = admit_seek (event);
-  if (answer == SeekAnswer::kNo || answer == SeekAnswer::kDone)
-    return answer == SeekAnswer::kDone;
+  {
+    std::lock_guard guard (lock_);
+    if (!running_ || is_live_ || format != GST_FORMAT_TIME || rate <= 0 ||
+        (flags & GST_SEEK_FLAG_INSTANT_RATE_CHANGE) != 0)
+      return false;
+    if (last_seek_ == seqnum) /* every sink of a pipeline sends the same seek upstream */
+      return true;
+    last_seek_ = seqnum;
+  }
+  const bool flush = (flags & GST_SEEK_FLAG_FLUSH) != 0;
   hold_task ();
-  if (answer == SeekAnswer::kFlush)
-    push_flush_start (seqnum);
+  if (flush)
+    push_flush (true, seqnum, false);
   g_rec_mutex_lock (&task_lock_);
-  if (answer == SeekAnswer::kFlush)
-    push_flush_stop (seqnum, true);
-  const bool done = seek_segment (event);
+  if (flush)
+    push_flush (false, seqnum, true);
+  GstSegment segment = segment_;
+  const bool done = gst_segment_do_seek (
+      &segment, rate, format, flags, start_type, start, stop_type, stop, nullptr);
+  if (done) {
+    segment_ = segment;
+    clock_.seek (segment.position);
+  }
   release_task (seqnum);
   g_rec_mutex_unlock (&task_lock_);
   return done;
 }
 
-/* ---- life ---- */
+/* ---- state changes ---- */
 
-/* With no pad there is nothing to stream, but the rig file is written all the same. */
 bool
 AvatarStream::start (const AvatarSettings &settings)
 {
-  bool idle;
+  bool has_pads;
   {
     std::lock_guard guard (lock_);
     is_live_ = settings.is_live;
@@ -548,7 +472,7 @@ AvatarStream::start (const AvatarSettings &settings)
     eos_wanted_ = ended_ = false;
     last_seek_ = GST_SEQNUM_INVALID;
     gst_flow_combiner_reset (combiner_);
-    idle = pads_.empty ();
+    has_pads = !pads_.empty ();
   }
   clock_.start ();
   painter_.start (settings);
@@ -557,9 +481,9 @@ AvatarStream::start (const AvatarSettings &settings)
   group_id_ = gst_util_group_id_next ();
   segment_seqnum_ = gst_util_seqnum_next ();
   gst_segment_init (&segment_, GST_FORMAT_TIME);
-  if (!idle || settings.rig_export.empty ())
-    return true;
-  return gst_range_flow_return (element_, painter_.set_size (320, 240)) == GST_FLOW_OK;
+  /* without a pad there is nothing to stream, but the rig file is written */
+  return has_pads || settings.rig_export.empty () ||
+         gst_range_flow_return (element_, painter_.set_size (320, 240)) == GST_FLOW_OK;
 }
 
 void
@@ -567,11 +491,11 @@ AvatarStream::run ()
 {
   std::lock_guard guard (lock_);
   running_ = true;
-  run_task ();
+  start_task ();
 }
 
 void
-AvatarStream::ask_to_stop ()
+AvatarStream::request_stop ()
 {
   std::lock_guard guard (lock_);
   running_ = false;
@@ -595,9 +519,23 @@ AvatarStream::stop ()
   if (task)
     gst_task_join (task);
   gst_clear_object (&task);
-  g_rec_mutex_lock (&task_lock_); /* a seek may be on its way */
+  g_rec_mutex_lock (&task_lock_); /* a seek may be in progress */
   painter_.start ({});
   for (const auto &pad : pads ())
     pad->stop ();
   g_rec_mutex_unlock (&task_lock_);
+}
+
+bool
+AvatarStream::is_live ()
+{
+  std::lock_guard guard (lock_);
+  return is_live_;
+}
+
+guint64
+AvatarStream::frames ()
+{
+  std::lock_guard guard (lock_);
+  return frames_;
 }

@@ -4,9 +4,9 @@
  * @title: libgstrange
  * @short_description: Read and write range frame sets in applications
  *
- * A video/x-range buffer is one frame set: depth and colour of one or more views, taken at one
- * capture time. Each view has a #GstRangeMeta that says where its planes lie. To read a buffer
- * that an appsink gave:
+ * A video/x-range buffer is one frame set: depth and colour of one or more views, captured at the
+ * same time. Each view has a #GstRangeMeta that describes the layout of its planes. To read a
+ * buffer from an appsink:
  *
  * |[<!-- language="C" -->
  * gpointer state = NULL;
@@ -20,7 +20,8 @@
  * }
  * ]|
  *
- * gst_range_caps_get_camera() gives what turns a pixel and its depth into a point in the world.
+ * gst_range_caps_get_camera() returns the calibration that maps a pixel and its depth to a point in
+ * the world.
  *
  * Since: 0.1
  */

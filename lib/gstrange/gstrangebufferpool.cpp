@@ -2,12 +2,12 @@
 /**
  * SECTION:gstrangebufferpool
  * @title: GstRangeBufferPool
- * @short_description: Recycles the buffers of frame sets
+ * @short_description: Buffer pool for frame sets
  *
- * Gives buffers with room for the full image of each of the caps' views: one #GstMemory a view, or,
- * above gst_buffer_get_max_memory() of them, which GStreamer would merge, one for all. The memories
- * come with a size of 0; gst_range_buffer_add_view() lays a view of any ROI into the next one,
- * which grows by what that ROI needs. On the way back to the pool the views are forgotten.
+ * Allocates buffers for the full images of all views of the caps: one #GstMemory for each view, or
+ * a single one for more views than gst_buffer_get_max_memory(), because GStreamer would merge them.
+ * The memories have size 0 at first; gst_range_buffer_add_view() places a view in the next one,
+ * which grows to the size of its ROI. The pool removes the views from returned buffers.
  *
  * Since: 0.1
  */
@@ -23,14 +23,15 @@ struct _GstRangeBufferPool {
   GstBufferPool parent;
 
   guint views;
-  gsize view_size;             /* bytes of the full image of one view */
-  gboolean waits_for_memories; /* while max-buffers does not make others wait for each buffer */
-  GstAtomicQueue *shared;      /* buffers that came back before their memories did */
+  gsize view_size; /* bytes of the full image of one view */
+  gboolean
+      waits_for_memories; /* no max-buffers, so nobody waits for a buffer that is in `shared` */
+  GstAtomicQueue *shared; /* buffers that were released before their memories */
 };
 
 G_DEFINE_TYPE (GstRangeBufferPool, gst_range_buffer_pool, GST_TYPE_BUFFER_POOL)
 
-/* Rows of both planes begin at multiples of this many bytes, for vector loads. */
+/* Row alignment of both planes in bytes, for vector loads. */
 static constexpr gsize kRowAlign = 16;
 
 static gsize
@@ -51,7 +52,7 @@ has_one_memory_for_all (guint views)
   return views > gst_buffer_get_max_memory ();
 }
 
-/* On a memory for all views: how many they are. */
+/* Qdata of a memory for several views: their number. */
 static GQuark
 views_quark ()
 {
@@ -67,7 +68,7 @@ views_that_fit (GstMemory *memory)
   return MAX (views, 1);
 }
 
-/* Caps and callers may ask for anything. */
+/* The limits of rigs apply to untrusted caps, too. */
 static bool
 within_limits (gint64 views, gint64 width, gint64 height)
 {
@@ -76,7 +77,7 @@ within_limits (gint64 views, gint64 width, gint64 height)
          views * width * height <= kMaxRigPixels;
 }
 
-/* GStreamer's own allocator ends the process where memory is short. */
+/* Unlike GStreamer's system allocator, does not abort when out of memory. */
 static GstMemory *
 try_system_memory (gsize size, const GstAllocationParams &params)
 {
@@ -105,7 +106,7 @@ try_memory (GstAllocator *wanted, gsize size, GstAllocationParams params)
   return memory;
 }
 
-/* nullptr where memory is short */
+/* @return nullptr when out of memory */
 static GstBuffer *
 try_buffer (
     GstAllocator *allocator, const GstAllocationParams &params, guint views, gsize view_size)
@@ -180,7 +181,7 @@ gst_range_buffer_pool_alloc_buffer (
   return *buffer ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/* The base class keeps a buffer only if it comes back with the size that it had at first. */
+/* The base class keeps a released buffer only if it has its original size. */
 static void
 reset_whole (GstBufferPool *pool, GstBuffer *buffer)
 {
@@ -196,7 +197,7 @@ reset_whole (GstBufferPool *pool, GstBuffer *buffer)
   GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->reset_buffer (pool, buffer);
 }
 
-/* See release_buffer(), which comes next. */
+/* For buffers in release_buffer(), which follows. */
 static void
 gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
 {
@@ -204,9 +205,9 @@ gst_range_buffer_pool_reset_buffer (GstBufferPool *pool, GstBuffer *buffer)
     reset_whole (pool, buffer);
 }
 
-/* A buffer whose memories went into another one (gst_range_buffer_append()) comes back by that
- * one's GstParentBufferMeta, which GStreamer 1.22 frees before the memories: at that moment they
- * are shared still, and the base class would throw the buffer away, each time. It waits for them
+/* A buffer whose memories are also in another one (gst_range_buffer_append()) is released by that
+ * one's GstParentBufferMeta, which GStreamer 1.22 frees before the memories. They are still shared
+ * then, and the base class would free the buffer each time. It is kept until the next acquire
  * instead. */
 static void
 gst_range_buffer_pool_release_buffer (GstBufferPool *pool, GstBuffer *buffer)
@@ -221,7 +222,7 @@ gst_range_buffer_pool_release_buffer (GstBufferPool *pool, GstBuffer *buffer)
   GST_BUFFER_POOL_CLASS (gst_range_buffer_pool_parent_class)->release_buffer (pool, buffer);
 }
 
-/* Those that are shared even now go. */
+/* Returns the kept buffers to the pool; the base class frees those that are still shared. */
 static void
 release_shared (GstBufferPool *pool)
 {
@@ -280,7 +281,7 @@ gst_range_buffer_pool_class_init (GstRangeBufferPoolClass *klass)
 /**
  * gst_range_buffer_pool_new:
  *
- * Returns: (transfer full): a pool, to be configured with video/x-range caps
+ * Returns: (transfer full): a new pool; configure it with gst_range_buffer_pool_configure()
  */
 GstBufferPool *
 gst_range_buffer_pool_new (void)
@@ -294,10 +295,12 @@ gst_range_buffer_pool_new (void)
  * gst_range_buffer_pool_configure:
  * @pool: an inactive pool
  * @caps: fixed video/x-range caps
- * @min_buffers: how many buffers to allocate at once
- * @max_buffers: how many at most, 0 = no limit
+ * @min_buffers: number of buffers to allocate in advance
+ * @max_buffers: maximum number of buffers, 0 = unlimited
  *
- * Returns: %FALSE if the caps have no size or number of views, or are larger than any rig may be
+ * Configures the pool for frame sets of these caps.
+ *
+ * Returns: %FALSE if the caps lack size or number of views, or exceed the limits of a rig
  */
 gboolean
 gst_range_buffer_pool_configure (
@@ -310,14 +313,14 @@ gst_range_buffer_pool_configure (
 
 /**
  * gst_range_buffer_new:
- * @views: how many views shall fit
- * @width: of the largest ROI, pixels
- * @height: of the largest ROI, pixels
+ * @views: maximum number of views
+ * @width: width of the largest ROI, pixels
+ * @height: height of the largest ROI, pixels
  *
- * The same as a buffer of a #GstRangeBufferPool, without a pool.
+ * Allocates a buffer like those of a #GstRangeBufferPool, without a pool.
  *
- * Returns: (transfer full) (nullable): a buffer without views; %NULL if that is larger than any rig
- *   may be, or memory is short
+ * Returns: (transfer full) (nullable): a buffer without views; %NULL if it would exceed the limits
+ * of a rig, or when out of memory
  */
 GstBuffer *
 gst_range_buffer_new (guint views, guint width, guint height)
@@ -335,19 +338,18 @@ gst_range_buffer_new (guint views, guint width, guint height)
 /**
  * gst_range_buffer_add_view:
  * @buffer: a writable buffer of a #GstRangeBufferPool or gst_range_buffer_new()
- * @view_id: 0 to 63, which the buffer does not have yet
+ * @view_id: 0 to 63, not in the buffer yet
  * @x: left edge of the ROI, pixels
  * @y: top edge of the ROI, pixels
- * @width: of the ROI, pixels; 0 for an empty one
- * @height: of the ROI, pixels; 0 for an empty one
+ * @width: width of the ROI, pixels; 0 for an empty one
+ * @height: height of the ROI, pixels; 0 for an empty one
  * @capture_time: ns on the clock that the camera hosts share
  *
- * Lays a view behind the buffer's other ones: into its next memory, or into the next bytes of the
- * one that is for all views, with an empty ROI for a view that is missing. The pixels are not
- * touched.
+ * Adds a view to the buffer, in its next memory or behind the other views in the common one. A view
+ * that is missing gets an empty ROI. Does not write pixels.
  *
- * Returns: (transfer none) (nullable): where its planes lie, or %NULL if the buffer has the view,
- *   has room for no more, or the ROI does not fit
+ * Returns: (transfer none) (nullable): the layout of the planes, or %NULL if the buffer has a view
+ * of that id, has no room for another view, or the ROI is too large
  */
 GstRangeMeta *
 gst_range_buffer_add_view (GstBuffer *buffer, guint view_id, guint x, guint y, guint width,

@@ -12,27 +12,39 @@ G_BEGIN_DECLS
   "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "                                      \
   "framerate = (fraction) [ 0/1, 2147483647/1 ], views = (int) [ 1, 64 ]"
 
-/** Raw frame sets. Fixed caps also carry rig = (buffer), the binary form of the rig: range views
- *  only, one for each view-id that can occur. */
+/**
+ * GST_RANGE_CAPS:
+ *
+ * Raw frame sets. Fixed caps also have rig = (buffer), the binary form of the rig, with one range
+ * view for each view-id that can occur.
+ */
 #define GST_RANGE_CAPS GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, " GST_RANGE_SIZE_CAPS_
 
-/** Coded frame sets, as elements exchange them. Fixed caps also carry rig = (buffer). */
+/**
+ * GST_NEIGHBOUR_CODE_CAPS:
+ *
+ * Coded frame sets between elements. Fixed caps also have rig = (buffer).
+ */
 #define GST_NEIGHBOUR_CODE_CAPS                                                                    \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
   ", version = (int) 1, "                                                                          \
   "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS_
 
-/** Coded frame sets as files hold them: not framed, the rig inside. For typefind and parsers. */
+/**
+ * GST_NEIGHBOUR_CODE_STREAM_CAPS:
+ *
+ * Coded frame sets in files: an unframed byte stream that contains the rig.
+ */
 #define GST_NEIGHBOUR_CODE_STREAM_CAPS                                                             \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 1, alignment = (string) byte-stream"
 
 /**
  * GstRangeCamera:
  * @view_id: 0 to 63
- * @width: full image, pixels
- * @height: full image, pixels
- * @fx: focal length, pixels
- * @fy: focal length, pixels
+ * @width: width of the full image, pixels
+ * @height: height of the full image, pixels
+ * @fx: horizontal focal length, pixels
+ * @fy: vertical focal length, pixels
  * @cx: principal point, pixels; (0, 0) is the centre of the top-left pixel
  * @cy: principal point, pixels
  * @world_from_view: rows of the 3x4 matrix [R | t]; X_world = R * X_view + t, metres
@@ -40,7 +52,7 @@ G_BEGIN_DECLS
  * @near: nearest depth of interest, metres
  * @far: farthest depth of interest, metres
  *
- * The camera of one view. Pixel (u, v) with depth d is the point
+ * Calibration of one view. Pixel (u, v) with depth d is the point
  * z = d * depth_unit, X_view = ((u - cx) / fx * z, (v - cy) / fy * z, z): x right, y down, z
  * forward.
  */

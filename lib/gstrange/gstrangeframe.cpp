@@ -24,7 +24,7 @@ Status
 make_pool (GstCaps *caps, GstBufferPool *&pool)
 {
   pool = gst_range_buffer_pool_new ();
-  /* None ahead: caps from a network may name sizes of which no frame set ever comes. */
+  /* Allocates none in advance: caps from a network may claim any size. */
   if (gst_range_buffer_pool_configure (pool, caps, 0, 0) && gst_buffer_pool_set_active (pool, TRUE))
     return {};
   gst_clear_object (&pool);

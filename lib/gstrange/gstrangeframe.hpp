@@ -10,25 +10,25 @@
 
 namespace gstrange {
 
-/** An active pool for frame sets of these caps.
- *  @return kNoSpace, and no pool, if memory is short or the caps are larger than any rig may be */
+/** Creates an active pool for frame sets of these caps.
+ *  @param[out] pool  transfer full; null on failure
+ *  @return kNoSpace when out of memory, or if the caps exceed the limits of a rig */
 GST_RANGE_API rangecast::Status make_pool (GstCaps *caps, GstBufferPool *&pool);
 
-/** Takes a buffer. Where memory is short it posts the element's one error for it. */
+/** Acquires a buffer. Posts an error when out of memory. */
 GST_RANGE_API GstFlowReturn acquire (GstElement *element, GstBufferPool *pool, GstBuffer **buffer);
 
-/** gst_range_buffer_add_view(). @return kNoSpace if the buffer has no room for that view */
+/** gst_range_buffer_add_view() with a Status. @return kNoSpace if the view does not fit */
 GST_RANGE_API rangecast::Status add_view (
     GstBuffer *buffer, int view_id, const rangecast::Roi &roi, GstClockTime capture_time);
 
-/** Adds the metas of `views` to a frame set: what gst_range_buffer_append() does, but for the
- * bytes, which shall lie `base` bytes behind the beginning.
- *  @return false, and nothing is added, if both have a view of the same view-id */
+/** Adds the metas of `views` to a frame set like gst_range_buffer_append(), without its memories.
+ *  @param base  offset in `frame_set` of the bytes of `views`
+ *  @return false, and nothing is added, if both contain the same view-id */
 GST_RANGE_API bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
 
-/** Maps all views of a frame set, for as long as it lives. Lives on the stack, allocates nothing.
- *  After a failure views() is empty and status() says which view is at fault.
- *  crop() changes a view's ROI in its meta, without touching pixels. */
+/** Maps all views of a frame set during its lifetime, without allocations. After a failure views()
+ * is empty and status() names the view. */
 class GST_RANGE_API RangeFrameMap {
 public:
   RangeFrameMap (GstBuffer *buffer, GstMapFlags flags);
@@ -37,14 +37,15 @@ public:
   RangeFrameMap &operator= (const RangeFrameMap &) = delete;
 
   [[nodiscard]] const rangecast::Status &status () const { return status_; }
-  /** In the order of the buffer's metas. Read-only maps must not be written through. */
+  /** In the order of the buffer's metas. Do not write to views that are mapped for reading. */
   [[nodiscard]] std::span<const rangecast::RangeImage> views () const
   {
     return {images_.data (), count_};
   }
 
-  /** Shrinks view number `index` (not view-id) to `roi`, given in full-image pixels, which must
-   *  lie inside its present ROI (or be empty). The buffer must be writable. */
+  /** Changes the ROI of a view in its meta, without moving pixels. The buffer must be writable.
+   *  @param index  in views()
+   *  @param roi    pixels of the full image; inside the current ROI, or empty */
   void crop (std::size_t index, const rangecast::Roi &roi);
 
 private:

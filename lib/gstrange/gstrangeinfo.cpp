@@ -163,10 +163,10 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
 /**
  * gst_range_caps_get_camera:
  * @caps: fixed video/x-range or application/x-neighbour-code caps
- * @view_id: which view
- * @camera: (out caller-allocates): its camera
+ * @view_id: 0 to 63
+ * @camera: (out caller-allocates): the view's calibration
  *
- * Returns: %FALSE if the caps have no valid rig or the rig no such view
+ * Returns: %FALSE if the caps have no valid rig, or the rig lacks the view
  */
 gboolean
 gst_range_caps_get_camera (const GstCaps *caps, guint view_id, GstRangeCamera *camera)

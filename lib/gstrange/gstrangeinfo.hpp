@@ -7,10 +7,10 @@
 
 namespace gstrange {
 
-/** What the caps of a stream of frame sets say, raw or coded. */
+/** The contents of the caps of frame sets, raw or coded. */
 struct RangeInfo {
-  int width = 0;  ///< pixels, the widest view's full image
-  int height = 0; ///< pixels, the highest view's full image
+  int width = 0;  ///< pixels, full image of the widest view
+  int height = 0; ///< pixels, full image of the highest view
   int fps_n = 0;  ///< frame rate; 0/1 = variable or unknown
   int fps_d = 1;
   rangecast::Rig rig; ///< range views only
@@ -20,26 +20,28 @@ struct RangeInfo {
   [[nodiscard]] GST_RANGE_API GstClockTime frame_duration () const;
 };
 
-/** Reads fixed caps; the message of an error names the field. The rig is a must, its number of
- *  views agrees with `views`, no view is larger than width x height, and all are range views. */
+/** Parses fixed caps. The rig is required; it must have as many views as the caps, all of them
+ * range views no larger than width x height.
+ *  @param[out] info  unchanged on failure
+ *  @return kNotFound, kBadValue, kBadSize, or the error of decode_rig(); the message names the
+ * field */
 GST_RANGE_API rangecast::Status parse_caps (const GstCaps *caps, RangeInfo &info);
 
-/** Info of a rig: width and height are those of its largest views. */
+/** Width and height are those of the rig's largest views. */
 GST_RANGE_API RangeInfo make_info (rangecast::Rig rig, int fps_n, int fps_d);
 
 /** video/x-range. Returns: (transfer full) */
 GST_RANGE_API GstCaps *make_range_caps (const RangeInfo &info);
 
-/** The same caps with another rig. Returns: (transfer full) */
+/** Copies caps and replaces their rig. Returns: (transfer full) */
 GST_RANGE_API GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 
 /** application/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
  */
 GST_RANGE_API GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
 
-/** What an encoder or decoder has on its other side for `caps`: the same sizes, frame rates, views
- * and rig, as video/x-range or, if `coded`, as application/x-neighbour-code with any alignment that
- *  holds frame sets. For GstBaseTransform's transform_caps. Returns: (transfer full) */
+/** transform_caps() of encoder and decoder: the same fields as video/x-range or, if `coded`, as
+ *  application/x-neighbour-code with any alignment but byte-stream. Returns: (transfer full) */
 GST_RANGE_API GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
 
 } // namespace gstrange

@@ -30,7 +30,7 @@ gst_range_meta_copy_fields (GstRangeMeta *to, const GstRangeMeta *from)
   to->meta = meta;
 }
 
-/* Copies stay true as long as the bytes stay where they are: a copy of the whole buffer. */
+/* Offsets are valid only in copies of the whole buffer. */
 static gboolean
 gst_range_meta_transform (GstBuffer *dest, GstMeta *meta, GstBuffer *, GQuark type, gpointer data)
 {
@@ -79,9 +79,9 @@ gst_buffer_iterate_range_meta (GstBuffer *buffer, gpointer *state)
 /**
  * gst_buffer_get_range_meta:
  * @buffer: a frame set
- * @view_id: which view
+ * @view_id: 0 to 63
  *
- * Returns: (transfer none) (nullable): that view, or %NULL if the frame set is without it
+ * Returns: (transfer none) (nullable): the view, or %NULL if the frame set does not contain it
  */
 GstRangeMeta *
 gst_buffer_get_range_meta (GstBuffer *buffer, guint view_id)
@@ -98,7 +98,7 @@ gst_buffer_get_range_meta (GstBuffer *buffer, guint view_id)
  * gst_buffer_n_range_metas:
  * @buffer: a frame set
  *
- * Returns: how many views it has
+ * Returns: the number of views
  */
 guint
 gst_buffer_n_range_metas (GstBuffer *buffer)
@@ -127,13 +127,13 @@ gstrange::append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
 /**
  * gst_range_buffer_append:
  * @frame_set: a writable buffer
- * @views: (transfer none): a frame set whose views shall be added
+ * @views: (transfer none): the frame set whose views are added
  *
  * Adds the views of one buffer to another without copying pixels: the memories are shared, and
- * @views stays alive as long as @frame_set does, so that its pool gets it back afterwards.
- * (Above gst_buffer_get_max_memory() memories GStreamer itself merges them, which copies.)
+ * @frame_set keeps a reference to @views, which then returns to its pool. (Beyond
+ * gst_buffer_get_max_memory() memories GStreamer merges them, which copies.)
  *
- * Returns: %FALSE, with @frame_set untouched, if both have a view of the same view-id
+ * Returns: %FALSE, and @frame_set is unchanged, if both contain the same view-id
  */
 gboolean
 gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)
@@ -145,7 +145,7 @@ gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)
   return TRUE;
 }
 
-/* The bytes [begin, end) of the buffer that a plane covers; false if the layout is absurd. */
+/* Extends [begin, end) by the bytes of a plane. @return false if they are not in the buffer */
 static bool
 plane_extent (gsize offset, gsize stride, gsize row_bytes, gsize rows, gsize buffer_size,
     gsize *begin, gsize *end)
@@ -160,8 +160,8 @@ plane_extent (gsize offset, gsize stride, gsize row_bytes, gsize rows, gsize buf
   return true;
 }
 
-/* The bytes [begin, end) of the buffer that both planes of a view cover, which is not empty; false
- * if the layout is absurd. */
+/* The bytes [begin, end) of both planes of a view that is not empty.
+ * @return false if the layout is invalid */
 static bool
 view_extent (const GstRangeMeta *meta, gsize buffer_size, gsize *begin, gsize *end)
 {
@@ -181,12 +181,11 @@ view_extent (const GstRangeMeta *meta, gsize buffer_size, gsize *begin, gsize *e
  * @frame_set: a frame set
  * @meta: one of its views
  *
- * The inverse of gst_range_buffer_append(): a buffer of one view, without copying pixels. The
- * memory is shared, and @frame_set stays alive as long as the new buffer does. Flags, times and
- * capture time are not set.
+ * Creates a buffer of one view without copying pixels, the inverse of gst_range_buffer_append().
+ * The memory is shared, and the new buffer keeps a reference to @frame_set. Flags, timestamps and
+ * capture time are not copied.
  *
- * Returns: (transfer full) (nullable): the view, or %NULL if its planes do not lie inside the
- * buffer
+ * Returns: (transfer full) (nullable): the view, or %NULL if its planes are not inside the buffer
  */
 GstBuffer *
 gst_range_buffer_copy_view (GstBuffer *frame_set, const GstRangeMeta *meta)
@@ -195,7 +194,7 @@ gst_range_buffer_copy_view (GstBuffer *frame_set, const GstRangeMeta *meta)
   gsize begin = 0, end = 0;
   if (!empty && !view_extent (meta, gst_buffer_get_size (frame_set), &begin, &end))
     return nullptr;
-  begin -= begin % 4; /* planes stay aligned, counted from the buffer's start */
+  begin -= begin % 4; /* keeps the planes' alignment relative to the buffer */
   GstBuffer *view = gst_buffer_new ();
   if (!empty) {
     gst_buffer_copy_into (view, frame_set, GST_BUFFER_COPY_MEMORY, begin, end - begin);
@@ -219,11 +218,10 @@ capture_time_reference ()
 /**
  * gst_range_buffer_set_capture_time:
  * @buffer: a writable buffer, raw or coded
- * @time: ns on the clock that the camera hosts share; %GST_CLOCK_TIME_NONE (not known): nothing is
- * set, and what was there goes
+ * @time: ns on the clock that the camera hosts share, or %GST_CLOCK_TIME_NONE if unknown
  *
- * Sets (or replaces) the buffer's #GstReferenceTimestampMeta with the reference
- * `timestamp/x-range-capture`.
+ * Sets the buffer's #GstReferenceTimestampMeta with the reference `timestamp/x-range-capture`, or
+ * removes it if @time is %GST_CLOCK_TIME_NONE.
  */
 void
 gst_range_buffer_set_capture_time (GstBuffer *buffer, GstClockTime time)
@@ -243,7 +241,7 @@ gst_range_buffer_set_capture_time (GstBuffer *buffer, GstClockTime time)
  * gst_range_buffer_get_capture_time:
  * @buffer: a buffer, raw or coded
  *
- * Returns: the capture time, or %GST_CLOCK_TIME_NONE if the buffer does not tell
+ * Returns: the capture time, or %GST_CLOCK_TIME_NONE if the buffer has none
  */
 GstClockTime
 gst_range_buffer_get_capture_time (GstBuffer *buffer)
@@ -261,14 +259,14 @@ gst_range_buffer_get_capture_time (GstBuffer *buffer)
 /**
  * gst_range_view_map:
  * @view: (out caller-allocates): the mapped view
- * @buffer: the buffer that @meta belongs to
- * @meta: which view
+ * @buffer: the buffer with @meta
+ * @meta: the view to map
  * @flags: for reading, writing or both
  *
- * Maps one view. A view with an empty ROI maps to %NULL planes.
+ * Maps one view. The planes of a view with an empty ROI are %NULL.
  *
- * Returns: %FALSE if the planes do not lie inside the buffer or cannot be mapped; there is then
- *   nothing to unmap
+ * Returns: %FALSE if the planes are not inside the buffer or cannot be mapped; there is nothing to
+ *   unmap then
  */
 gboolean
 gst_range_view_map (

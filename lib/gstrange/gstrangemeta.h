@@ -14,16 +14,17 @@ G_BEGIN_DECLS
  * @view_id: 0 to 63, unique in the buffer
  * @x: left edge of the ROI in the view's full image, pixels
  * @y: top edge of the ROI, pixels
- * @width: width of the ROI, pixels; 0 if nothing of this view is left
- * @height: height of the ROI, pixels; 0 if nothing of this view is left
+ * @width: width of the ROI, pixels; 0 for an empty view
+ * @height: height of the ROI, pixels; 0 for an empty view
  * @depth_offset: bytes from the start of the buffer to the first depth (uint16 little-endian, in
  *   the view's depth units, 0 = invalid); even
  * @depth_stride: bytes from one row of depth to the next; even
  * @colour_offset: bytes from the start of the buffer to the first pixel (R, G, B, unused)
  * @colour_stride: bytes from one row of colour to the next; a multiple of 4
- * @capture_time: when the view was taken, ns on the clock that the camera hosts share
+ * @capture_time: capture time, ns on the clock that the camera hosts share
  *
- * One view of a frame set. Both planes of a view lie in one #GstMemory. Only the ROI is stored.
+ * Layout of one view of a frame set. Only the ROI is stored; both planes of a view are in one
+ * #GstMemory.
  */
 typedef struct {
   GstMeta meta;

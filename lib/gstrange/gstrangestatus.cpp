@@ -4,12 +4,14 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
+namespace {
+
 struct ErrorDomain {
   GQuark domain;
   gint code;
 };
 
-static ErrorDomain
+ErrorDomain
 domain_of (StatusCode code)
 {
   switch (code) {
@@ -29,14 +31,31 @@ domain_of (StatusCode code)
   }
 }
 
-static void
+void
 post (GstElement *element, const Status &status, GstMessageType type,
     const std::source_location &caller)
 {
+  const GstDebugLevel level = type == GST_MESSAGE_ERROR ? GST_LEVEL_ERROR : GST_LEVEL_WARNING;
+  if (level <= _gst_debug_min)
+    gst_debug_log (gst_range_debug_category (element), level, caller.file_name (),
+        caller.function_name (), gint (caller.line ()), G_OBJECT (element), "%s",
+        status.message ().c_str ());
   const ErrorDomain error = domain_of (status.code ());
   gst_element_message_full (element, type, error.domain, error.code,
       g_strdup (status.message ().c_str ()), nullptr, caller.file_name (), caller.function_name (),
       gint (caller.line ()));
+}
+
+} // namespace
+
+GstDebugCategory *
+gst_range_debug_category (GstElement *element)
+{
+  GstElementFactory *factory = gst_element_get_factory (element);
+  GstDebugCategory *category = nullptr;
+  if (factory)
+    GST_DEBUG_CATEGORY_GET (category, GST_OBJECT_NAME (factory));
+  return category ? category : GST_CAT_DEFAULT;
 }
 
 GstFlowReturn

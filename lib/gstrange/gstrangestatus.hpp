@@ -6,15 +6,20 @@
 
 #include "gstrange-prelude.h"
 
-/** Posts the one error message of an element for a core status and gives the flow return for it:
- *  GST_FLOW_OK for kOk, else GST_FLOW_ERROR. Call without any lock held.
- *  kNotFound becomes RESOURCE/NOT_FOUND, kBadValue and kBadSize become LIBRARY/SETTINGS, foreign
- *  bytes STREAM/DECODE, kNoSpace RESOURCE/NO_SPACE_LEFT, kInternal LIBRARY/FAILED.
- *  @param caller  where the message says that it comes from */
+/** Posts an element's error message for a status, logs it in the element's debug category, and
+ *  returns the flow return: GST_FLOW_OK for kOk, else GST_FLOW_ERROR. Call without locks held.
+ *  kNotFound becomes RESOURCE/NOT_FOUND, kBadValue and kBadSize LIBRARY/SETTINGS, kNoSpace
+ *  RESOURCE/NO_SPACE_LEFT, kUnsupported STREAM/WRONG_TYPE, kInternal LIBRARY/FAILED, all others
+ *  STREAM/DECODE.
+ *  @param caller  source location for the message */
 GST_RANGE_API GstFlowReturn gst_range_flow_return (GstElement *element,
     const rangecast::Status &status,
     std::source_location caller = std::source_location::current ());
 
-/** The same as a warning; the element goes on. */
+/** Posts and logs a warning for a status that is not kOk. Call without locks held. */
 GST_RANGE_API void gst_range_post_warning (GstElement *element, const rangecast::Status &status,
     std::source_location caller = std::source_location::current ());
+
+/** The debug category with the name of the element's factory, for code that several elements share;
+ *  GStreamer's default category if there is none. */
+GST_RANGE_API GstDebugCategory *gst_range_debug_category (GstElement *element);

@@ -13,13 +13,15 @@
 #include <string>
 #include <vector>
 
+namespace {
+
 using rangecast::BoardKind;
 using rangecast::BoardSpec;
 
-static constexpr int kSquarePx = 256;
+constexpr int kSquarePx = 256;
 
 /* All of the text is a number. */
-static bool
+bool
 read_number (const std::string &text, double &value)
 {
   char *end = nullptr;
@@ -27,7 +29,7 @@ read_number (const std::string &text, double &value)
   return !text.empty () && *end == 0 && std::isfinite (value);
 }
 
-static bool
+bool
 read_number (const std::string &text, int &value)
 {
   const auto [end, error] = std::from_chars (text.data (), text.data () + text.size (), value);
@@ -35,7 +37,7 @@ read_number (const std::string &text, int &value)
 }
 
 /* @return what is wrong with the value, or nullptr */
-static const char *
+const char *
 set (BoardSpec &board, const std::string &name, const std::string &value)
 {
   if (name == "board") {
@@ -61,7 +63,7 @@ set (BoardSpec &board, const std::string &name, const std::string &value)
 }
 
 /* The words after the file name. @return false if one is wrong, which is then said */
-static bool
+bool
 read_properties (const std::vector<std::string> &words, BoardSpec &board)
 {
   std::set<std::string> names;
@@ -81,7 +83,7 @@ read_properties (const std::vector<std::string> &words, BoardSpec &board)
 }
 
 /* The black pixels as rectangles: runs of a row, as high as the rows that are like it. */
-static bool
+bool
 write_svg (const char *path, const BoardSpec &board, const std::vector<std::uint8_t> &pixels)
 {
   std::FILE *file = std::fopen (path, "w");
@@ -113,9 +115,11 @@ write_svg (const char *path, const BoardSpec &board, const std::vector<std::uint
   return std::fclose (file) == 0;
 }
 
-static constexpr char kUsage[] =
+constexpr char kUsage[] =
     "usage: draw-board FILE.svg [board=chessboard|charuco] [columns=9] [rows=6] "
     "[square-size=0.025] [marker-size=M] [dictionary=4x4-50]\n";
+
+} // namespace
 
 int
 main (int argc, char **argv)

@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+namespace {
+
 using rangecast::PartnerCamera;
 using rangecast::Rig;
 using rangecast::Status;
@@ -37,14 +39,14 @@ struct Camera {
 
 /* ---- what there is ---- */
 
-static std::string
+std::string
 name_of (const View &view)
 {
   const std::string number = "view " + std::to_string (view.id);
   return number + (view.name.empty () || view.name == number ? "" : " " + view.name);
 }
 
-static View
+View
 plain_view (View view, int id)
 {
   view.id = id;
@@ -55,7 +57,7 @@ plain_view (View view, int id)
 }
 
 /* Partners are drawn small: their view's frustum says what the pair sees. */
-static void
+void
 add_partner (const View &view, const std::optional<PartnerCamera> &partner, const char *which,
     std::vector<Camera> &cameras)
 {
@@ -69,7 +71,7 @@ add_partner (const View &view, const std::optional<PartnerCamera> &partner, cons
   cameras.push_back ({name_of (view) + " " + which, drawn});
 }
 
-static std::vector<Camera>
+std::vector<Camera>
 cameras_of (const Rig &rig)
 {
   std::vector<Camera> cameras;
@@ -85,25 +87,25 @@ cameras_of (const Rig &rig)
 
 /* ---- tables ---- */
 
-static double
+double
 degrees (double radians)
 {
   return radians * 180 / M_PI;
 }
 
-static double
+double
 angle_deg (Vec3 a, Vec3 b)
 {
   return degrees (std::acos (std::clamp (dot (a, b) / (norm (a) * norm (b)), -1.0, 1.0)));
 }
 
-static Vec3
+Vec3
 axis_of (const View &view)
 {
   return view.world_from_view.rotation * Vec3{0, 0, 1};
 }
 
-static void
+void
 print_cameras (const std::vector<Camera> &cameras, Vec3 target)
 {
   std::printf ("%-24s %-7s %-10s %-15s %-24s %s\n", "camera", "colour", "size", "field of view",
@@ -122,7 +124,7 @@ print_cameras (const std::vector<Camera> &cameras, Vec3 target)
   }
 }
 
-static void
+void
 print_pair (const View &view, const PartnerCamera &partner, const char *which)
 {
   const Vec3 t = partner.partner_from_left.translation;
@@ -136,7 +138,7 @@ print_pair (const View &view, const PartnerCamera &partner, const char *which)
       step_mm (view.far_m), view.far_m);
 }
 
-static void
+void
 print_pairs (const Rig &rig)
 {
   bool any = false;
@@ -152,7 +154,7 @@ print_pairs (const Rig &rig)
   }
 }
 
-static void
+void
 print_views (const Rig &rig)
 {
   if (rig.views.size () < 2)
@@ -173,7 +175,7 @@ print_views (const Rig &rig)
 }
 
 /* What stereodepth would refuse. @return how many views */
-static int
+int
 print_problems (const Rig &rig)
 {
   int problems = 0;
@@ -191,9 +193,9 @@ print_problems (const Rig &rig)
 
 /* ---- the picture ---- */
 
-static const char *const kPicture = "appsrc name=in format=time ! striprender name=view "
-                                    "show-cameras=true ! capsfilter name=size ! gldownload "
-                                    "! videoconvert ! pngenc ! filesink name=out";
+const char *const kPicture = "appsrc name=in format=time ! striprender name=view "
+                             "show-cameras=true ! capsfilter name=size ! gldownload "
+                             "! videoconvert ! pngenc ! filesink name=out";
 
 /* Where the picture is taken from. */
 struct Outlook {
@@ -205,7 +207,7 @@ constexpr double kFieldDeg = 45;
 
 /* Elements make room for all pixels of a rig, and with partners there may be more than a rig can
  * have. What is drawn does not depend on how many there are. */
-static View
+View
 with_few_pixels (View view)
 {
   constexpr int kMax = 1024;
@@ -218,7 +220,7 @@ with_few_pixels (View view)
 }
 
 /* The corners of all frustums, and where they begin. */
-static std::vector<Vec3>
+std::vector<Vec3>
 corners_of (const Rig &drawn)
 {
   std::vector<Vec3> points;
@@ -239,7 +241,7 @@ struct Frame {
   [[nodiscard]] double half_size () const { return std::max (right - left, top - bottom) / 2; }
 };
 
-static Frame
+Frame
 frame_of (const std::vector<Vec3> &points, const rangecast::Mat4 &m)
 {
   Frame frame;
@@ -263,7 +265,7 @@ frame_of (const std::vector<Vec3> &points, const rangecast::Mat4 &m)
 /* All frustums fill the picture. striprender turns about where the axes meet, which for a single
  * pair is nowhere in particular, so what it looks at is moved. Perspective makes this a search:
  * each step centres what is seen and corrects the distance. */
-static Outlook
+Outlook
 look_at_all (const Rig &drawn, const Options &options)
 {
   constexpr double kFilled = 0.94;
@@ -287,7 +289,7 @@ look_at_all (const Rig &drawn, const Options &options)
   return {orbit.pan, orbit.distance_m};
 }
 
-static void
+void
 set_up (GstElement *pipeline, const Options &options, const Rig &drawn)
 {
   GstElement *view = gst_bin_get_by_name (GST_BIN (pipeline), "view");
@@ -318,7 +320,7 @@ set_up (GstElement *pipeline, const Options &options, const Rig &drawn)
     gst_object_unref (element);
 }
 
-static bool
+bool
 draw (const Options &options, const Rig &drawn)
 {
   GError *error = nullptr;
@@ -349,7 +351,7 @@ draw (const Options &options, const Rig &drawn)
   return drawn_well;
 }
 
-static bool
+bool
 check_rig (const Options &options)
 {
   Rig rig;
@@ -379,7 +381,7 @@ check_rig (const Options &options)
 
 /* What is wrong with the options, or nullptr. Angles and distances are those that striprender
  * takes. */
-static const char *
+const char *
 complaint_of (const Options &o)
 {
   const auto is_within = [] (double x, double least, double most) {
@@ -396,7 +398,7 @@ complaint_of (const Options &o)
   return is_within (o.distance_m, 0, 1000) ? nullptr : "--distance: expected 0 to 1000 metres";
 }
 
-static bool
+bool
 parse_arguments (int *argc, char ***argv, Options &options)
 {
   const GOptionEntry entries[] = {
@@ -426,6 +428,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
   g_option_context_free (context);
   return parsed;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

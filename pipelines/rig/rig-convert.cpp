@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+namespace {
+
 using rangecast::Intrinsics;
 using rangecast::PartnerCamera;
 using rangecast::Pose;
@@ -39,13 +41,13 @@ struct BadInput {
   int exit_status = 1;
 };
 
-static constexpr int kWrongUsage = 2;
+constexpr int kWrongUsage = 2;
 
 /* Level at the world's origin, looking along -z with y up. */
-static const Pose kLevel = {{1, 0, 0, 0, -1, 0, 0, 0, -1}, {}};
+const Pose kLevel = {{1, 0, 0, 0, -1, 0, 0, 0, -1}, {}};
 
 /* To whole pixels, as pictures are scaled; rangecast::validate() says whether the size will do. */
-static void
+void
 scale_view (View &view, double scale)
 {
   const int width = int (std::lround (view.width * scale)),
@@ -59,7 +61,7 @@ scale_view (View &view, double scale)
 
 /* ---- files that OpenCV reads ---- */
 
-static cv::FileStorage
+cv::FileStorage
 open_storage (const std::string &path)
 {
   if (const rangecast::Status s = rangecast::check_storage (path); !s.ok ())
@@ -79,7 +81,7 @@ struct OpencvFiles : std::vector<cv::FileStorage> {
 };
 
 /* A matrix that goes by one of several names in one of the files. */
-static cv::Mat
+cv::Mat
 find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names, const char *what)
 {
   for (const cv::FileStorage &file : files)
@@ -92,7 +94,7 @@ find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names
   throw BadInput{files.names + ": no " + what + " (" + *names.begin () + ")"};
 }
 
-static Intrinsics
+Intrinsics
 intrinsics_of (const cv::Mat &k)
 {
   if (k.rows != 3 || k.cols != 3)
@@ -100,13 +102,13 @@ intrinsics_of (const cv::Mat &k)
   return {k.at<double> (0, 0), k.at<double> (1, 1), k.at<double> (0, 2), k.at<double> (1, 2)};
 }
 
-static rangecast::Distortion
+rangecast::Distortion
 distortion_of (const cv::Mat &d)
 {
   return {d.begin<double> (), d.end<double> ()};
 }
 
-static Pose
+Pose
 pose_of (const cv::Mat &r, const cv::Mat &t, double unit_m)
 {
   if (r.rows != 3 || r.cols != 3 || t.total () != 3)
@@ -118,7 +120,7 @@ pose_of (const cv::Mat &r, const cv::Mat &t, double unit_m)
   return pose;
 }
 
-static void
+void
 read_size (const OpencvFiles &files, const Options &options, View &view)
 {
   for (const cv::FileStorage &file : files)
@@ -139,7 +141,7 @@ read_size (const OpencvFiles &files, const Options &options, View &view)
 }
 
 /* What samples/cpp/stereo_calib.cpp writes: M1, D1, M2, D2 in one file, R, T in the other. */
-static View
+View
 read_opencv (const std::vector<std::string> &paths, const Options &options)
 {
   OpencvFiles files;
@@ -166,7 +168,7 @@ read_opencv (const std::vector<std::string> &paths, const Options &options)
 
 /* ---- Luxonis ---- */
 
-static std::vector<double>
+std::vector<double>
 numbers_of (const cv::FileNode &node)
 {
   std::vector<double> values;
@@ -179,7 +181,7 @@ numbers_of (const cv::FileNode &node)
   return values;
 }
 
-static cv::FileNode
+cv::FileNode
 luxonis_camera (const cv::FileNode &cameras, int socket)
 {
   for (const cv::FileNode &entry : cameras)
@@ -188,7 +190,7 @@ luxonis_camera (const cv::FileNode &cameras, int socket)
   throw BadInput{"no camera of socket " + std::to_string (socket)};
 }
 
-static Intrinsics
+Intrinsics
 luxonis_intrinsics (const cv::FileNode &camera)
 {
   const std::vector<double> k = numbers_of (camera["intrinsicMatrix"]);
@@ -199,7 +201,7 @@ luxonis_intrinsics (const cv::FileNode &camera)
 
 /* The stereo pair that stereoRectificationData names. Lengths are centimetres, distortion has 14
  * coefficients in OpenCV's order. */
-static View
+View
 read_luxonis (const std::vector<std::string> &paths, const Options &)
 {
   const cv::FileStorage file = open_storage (paths[0]);
@@ -238,7 +240,7 @@ read_luxonis (const std::vector<std::string> &paths, const Options &)
 using Values = std::map<std::string, std::vector<double>>;
 
 /* Lines of name=number or name=[a b c; d e f; g h i]. */
-static Values
+Values
 read_values (const std::string &path)
 {
   std::ifstream file (path);
@@ -260,7 +262,7 @@ read_values (const std::string &path)
   return values;
 }
 
-static std::vector<double>
+std::vector<double>
 value_of (const Values &values, const char *name, std::size_t count)
 {
   const auto found = values.find (name);
@@ -270,7 +272,7 @@ value_of (const Values &values, const char *name, std::size_t count)
   return found->second;
 }
 
-static int
+int
 side_of (const Values &values, const char *name)
 {
   const double side = value_of (values, name, 1)[0];
@@ -282,7 +284,7 @@ side_of (const Values &values, const char *name)
 
 /* Rectified pairs; the baseline is in millimetres, disparities lie between vmin and vmax, or below
  * ndisp. */
-static View
+View
 read_middlebury (const std::vector<std::string> &paths, const Options &)
 {
   const Values values = read_values (paths[0]);
@@ -315,10 +317,10 @@ struct Format {
   std::size_t least_inputs, most_inputs;
   View (*read) (const std::vector<std::string> &paths, const Options &options);
 };
-static const Format kFormats[] = {{"opencv", 1, 2, read_opencv}, {"luxonis", 1, 1, read_luxonis},
+const Format kFormats[] = {{"opencv", 1, 2, read_opencv}, {"luxonis", 1, 1, read_luxonis},
     {"middlebury", 1, 1, read_middlebury}};
 
-static void
+void
 check (const Status &status, const std::string &about = "")
 {
   if (!status.ok ())
@@ -326,7 +328,7 @@ check (const Status &status, const std::string &about = "")
 }
 
 /* Whatever is wrong, the message begins with the file or the option. */
-static View
+View
 read_named (const Format &format, const std::vector<std::string> &paths, const Options &options)
 {
   try {
@@ -343,7 +345,7 @@ read_named (const Format &format, const std::vector<std::string> &paths, const O
 }
 
 /* Lengths in board squares, centimetres or millimetres that were taken for metres. */
-static void
+void
 warn_if_wide (const View &view)
 {
   constexpr double kWideM = 1;
@@ -354,7 +356,7 @@ warn_if_wide (const View &view)
         baseline_m);
 }
 
-static void
+void
 convert (const Options &options)
 {
   std::vector<std::string> words;
@@ -396,7 +398,7 @@ convert (const Options &options)
   check (rangecast::save_rig (rig_path, rig));
 }
 
-static bool
+bool
 parse_arguments (int *argc, char ***argv, Options &options)
 {
   const GOptionEntry entries[] = {
@@ -434,6 +436,8 @@ parse_arguments (int *argc, char ***argv, Options &options)
   g_option_context_free (context);
   return parsed;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

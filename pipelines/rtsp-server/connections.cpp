@@ -6,28 +6,32 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 
-/* Connections that are no viewers: those that ask only, or have not got so far. */
-static constexpr rlim_t kSpare = 32, kMinSpare = 8;
-/* Files that the server and its launch string have open. With one of avatartestsrc they are 27,
- * with multicast 34. */
-static constexpr rlim_t kOwnFiles = 256, kMinOwnFiles = 40;
-/* Where a launch string has more than that: connections leave so many to it. */
-static constexpr int kKeptFiles = 16;
-/* Those that were closed are freed, files and all, by the threads that serve them, which may wait
- * for a first frame set meanwhile. Of kOwnFiles. */
-static constexpr std::size_t kMaxClosing = 128;
-/* A thread that serves them may be at work for one. */
-static constexpr gulong kEndTurn_us = 10000;
-static constexpr int kEndTurns = 300, kTurnsPerClosing = 50;
-/* Its file is free when its thread has closed it, which is at once unless that is at work. */
-static constexpr int kClosingTurns = 5;
-static constexpr gulong kClosing_us = 2000;
-/* The socket stays readable where nobody can be taken. */
-static constexpr gulong kNoFiles_us = 20000;
+namespace {
+
+/* Connections that are no viewers: only DESCRIBE, or no SETUP yet. */
+constexpr rlim_t kSpare = 32, kMinSpare = 8;
+/* Files of the server and its launch string: 27 with avatartestsrc, 34 with multicast. */
+constexpr rlim_t kOwnFiles = 256, kMinOwnFiles = 40;
+/* Left to a launch string that opens more than that. */
+constexpr int kKeptFiles = 16;
+/* Of kOwnFiles: closed connections keep their files until the threads that serve them free them,
+ * and these may wait for a first frame set. */
+constexpr std::size_t kMaxClosing = 128;
+/* end() waits in turns. */
+constexpr gulong kEndTurn_us = 10000;
+constexpr int kEndTurns = 300, kTurnsPerClosing = 50;
+/* accept() waits for the file of the connection that it closed. */
+constexpr int kClosingTurns = 5;
+constexpr gulong kClosing_us = 2000;
+/* The socket stays readable while nothing can be accepted. */
+constexpr gulong kNoFiles_us = 20000;
+
+} // namespace
 
 std::optional<std::size_t>
-fit_connections (int max_viewers)
+max_connections (int max_viewers)
 {
   const auto viewers = rlim_t (max_viewers);
   struct rlimit files = {};
@@ -51,8 +55,10 @@ fit_connections (int max_viewers)
   return viewers + std::clamp (others, kMinSpare, kSpare);
 }
 
-/* A new file gets the lowest number that is free, so connections never have the uppermost ones. */
-static bool
+namespace {
+
+/* New files get the lowest free number, so the uppermost numbers stay free of connections. */
+bool
 are_files_short (GSocket *socket)
 {
   struct rlimit files = {};
@@ -63,7 +69,68 @@ are_files_short (GSocket *socket)
   return getrlimit (RLIMIT_NOFILE, &files) == 0 && rlim_t (next + kKeptFiles) >= files.rlim_cur;
 }
 
-/* ---- what each does; in threads that serve connections ---- */
+} // namespace
+
+/* ---- the threads that serve them ---- */
+
+/* A thread pool that reports which thread a connection gets, before that serves it. */
+G_BEGIN_DECLS
+struct ConnectionThreads {
+  GstRTSPThreadPool parent;
+  Connections *owner;
+};
+struct ConnectionThreadsClass {
+  GstRTSPThreadPoolClass parent_class;
+};
+G_END_DECLS
+G_DEFINE_TYPE (ConnectionThreads, connection_threads, GST_TYPE_RTSP_THREAD_POOL)
+
+static GstRTSPThread *
+connection_threads_get_thread (
+    GstRTSPThreadPool *pool, GstRTSPThreadType type, GstRTSPContext *context)
+{
+  GstRTSPThread *thread = GST_RTSP_THREAD_POOL_CLASS (connection_threads_parent_class)
+                              ->get_thread (pool, type, context);
+  if (thread && type == GST_RTSP_THREAD_TYPE_CLIENT && context && context->client)
+    reinterpret_cast<ConnectionThreads *> (pool)->owner->record_thread (context->client, thread);
+  return thread;
+}
+
+static void
+connection_threads_init (ConnectionThreads *)
+{
+}
+
+static void
+connection_threads_class_init (ConnectionThreadsClass *klass)
+{
+  GST_RTSP_THREAD_POOL_CLASS (klass)->get_thread = connection_threads_get_thread;
+}
+
+Connections::Connections (
+    GstRTSPServer *server, int n_threads, std::size_t max_connections, bool has_tls)
+    : server_ (server), max_connections_ (max_connections), has_tls_ (has_tls)
+{
+  auto threads =
+      static_cast<ConnectionThreads *> (g_object_new (connection_threads_get_type (), nullptr));
+  threads->owner = this;
+  gst_rtsp_thread_pool_set_max_threads (GST_RTSP_THREAD_POOL (threads), n_threads);
+  gst_rtsp_server_set_thread_pool (server, GST_RTSP_THREAD_POOL (threads));
+  g_object_unref (threads);
+}
+
+Connections::~Connections ()
+{
+  /* gst_rtsp_thread_pool_cleanup() ends the GThreadPool of its own class, not that of this one. */
+  auto klass =
+      static_cast<GstRTSPThreadPoolClass *> (g_type_class_peek (connection_threads_get_type ()));
+  if (klass->pool)
+    g_thread_pool_free (std::exchange (klass->pool, nullptr), FALSE, TRUE);
+  std::lock_guard guard (lock_); /* synchronises with what the threads wrote */
+  connections_.clear ();
+}
+
+/* ---- what each asks for; in the threads that serve them ---- */
 
 void
 Connections::on_gone (gpointer connections, GObject *client)
@@ -71,11 +138,11 @@ Connections::on_gone (gpointer connections, GObject *client)
   auto self = static_cast<Connections *> (connections);
   std::unique_lock guard (self->lock_);
   const auto gone = self->connections_.extract (reinterpret_cast<GstRTSPClient *> (client));
-  guard.unlock (); /* before its socket and its thread go */
+  guard.unlock (); /* before its socket and its thread are released */
 }
 
 void
-Connections::note_media (GstRTSPClient *client, const GstRTSPMedia *media)
+Connections::record_media (GstRTSPClient *client, const GstRTSPMedia *media)
 {
   std::lock_guard guard (lock_);
   const auto found = connections_.find (client);
@@ -86,7 +153,7 @@ Connections::note_media (GstRTSPClient *client, const GstRTSPMedia *media)
 }
 
 void
-Connections::note_viewer (GstRTSPClient *client, GstRTSPSession *session)
+Connections::record_viewer (GstRTSPClient *client, GstRTSPSession *session)
 {
   const std::string id = gst_rtsp_session_get_sessionid (session);
   std::lock_guard guard (lock_);
@@ -99,26 +166,20 @@ Connections::note_viewer (GstRTSPClient *client, GstRTSPSession *session)
 }
 
 bool
-Connections::was_told_of (GstRTSPClient *client, const GstRTSPMedia *media)
+Connections::asked_for (GstRTSPClient *client, const GstRTSPMedia *media)
 {
   std::lock_guard guard (lock_);
   const auto found = connections_.find (client);
   return found != connections_.end () && found->second.media == media;
 }
 
-/* ---- too many of them; in the main loop ---- */
-
-Connections::~Connections ()
-{
-  std::lock_guard guard (lock_); /* with which the threads wrote to it */
-  connections_.clear ();
-}
+/* ---- closing; main loop ---- */
 
 void
 Connections::add (GstRTSPClient *client)
 {
   g_object_weak_ref (G_OBJECT (client), on_gone, this);
-  taken_++;
+  accepted_++;
   GstRTSPConnection *connection = gst_rtsp_client_get_connection (client);
   std::lock_guard guard (lock_);
   Connection &added = connections_[client];
@@ -128,25 +189,27 @@ Connections::add (GstRTSPClient *client)
 }
 
 void
-Connections::note_thread (GstRTSPClient *client, GstRTSPThread *thread)
+Connections::record_thread (GstRTSPClient *client, GstRTSPThread *thread)
 {
   std::lock_guard guard (lock_);
   connections_[client].thread.reset (gst_rtsp_thread_ref (thread));
 }
 
+namespace {
+
 struct Closing {
   GstRTSPClient *client;
-  GstRTSPThread *thread; /* of gst_rtsp_thread_reuse(), which takes a reference */
+  GstRTSPThread *thread; /* with a use that gst_rtsp_thread_stop() ends */
 };
 
-static gboolean
+gboolean
 close_client (gpointer closing)
 {
   gst_rtsp_client_close (static_cast<Closing *> (closing)->client);
   return G_SOURCE_REMOVE;
 }
 
-static void
+void
 delete_closing (gpointer user_data)
 {
   auto closing = static_cast<Closing *> (user_data);
@@ -155,24 +218,26 @@ delete_closing (gpointer user_data)
   delete closing;
 }
 
-/* In its thread, unless that ends, and the connection with it. */
-static void
+/* Unless the thread, and so the connection, is ending. */
+void
 close_in_its_thread (GstRTSPClient *client, GstRTSPThread *thread)
 {
   if (!gst_rtsp_thread_reuse (thread))
     return;
   GSource *source = g_idle_source_new ();
-  g_source_set_priority (source, G_PRIORITY_HIGH); /* before what it still asks for */
+  g_source_set_priority (source, G_PRIORITY_HIGH); /* before requests that have arrived */
   g_source_set_callback (source, close_client,
       new Closing{GST_RTSP_CLIENT (g_object_ref (client)), thread}, delete_closing);
   g_source_attach (source, thread->context);
   g_source_unref (source);
 }
 
-/* The library (1.22) can close a connection only in the thread that serves it: else that one may
- * read from it for ever. With TLS it loses the descriptor and the memory of a connection that it
- * closes before its handshake is over; but not of those that end by themselves. One that goes on
- * is closed when it has been idle for so long again. */
+} // namespace
+
+/* gst-rtsp-server 1.22 must close a connection in the thread that serves it, which may otherwise
+ * read from it for ever. Closing a TLS connection before the end of its handshake leaks its
+ * descriptor and memory, but shutting down its socket, as a peer would, does not. A connection that
+ * survives this is closed when it has been idle again. */
 void
 Connections::close (GstRTSPClient *client)
 {
@@ -196,14 +261,13 @@ Connections::close (GstRTSPClient *client)
     close_in_its_thread (client, thread.get ());
 }
 
-/* All that are of this one, or just all. */
 void
 Connections::close_all (const GstRTSPMedia *media)
 {
   GList *clients = gst_rtsp_server_client_filter (server_, nullptr, nullptr);
   for (GList *item = clients; item; item = item->next) {
     auto client = GST_RTSP_CLIENT (item->data);
-    if (!media || was_told_of (client, media))
+    if (!media || asked_for (client, media))
       close (client);
   }
   g_list_free_full (clients, g_object_unref);
@@ -213,13 +277,13 @@ void
 Connections::end ()
 {
   for (int turn = 0; turn < kEndTurns && count (false) + count (true) > 0; turn++) {
-    if (turn % kTurnsPerClosing == 0) /* with TLS, who goes on after the first time */
+    if (turn % kTurnsPerClosing == 0) /* TLS connections may survive the first time */
       close_all (nullptr);
     g_usleep (kEndTurn_us);
   }
 }
 
-/* Of a session that there still is. */
+/* Its session may have ended. */
 bool
 Connections::is_viewer (GstRTSPClient *client)
 {
@@ -244,9 +308,9 @@ Connections::is_viewer (GstRTSPClient *client)
 }
 
 void
-Connections::close_idle (gint64 patience_us)
+Connections::close_idle (gint64 max_idle_us)
 {
-  const gint64 until_us = g_get_monotonic_time () - patience_us;
+  const gint64 until_us = g_get_monotonic_time () - max_idle_us;
   GList *clients = gst_rtsp_server_client_filter (server_, nullptr, nullptr);
   for (GList *item = clients; item; item = item->next) {
     auto client = GST_RTSP_CLIENT (item->data);
@@ -268,8 +332,7 @@ Connections::count (bool closing)
       [=] (const auto &one) { return one.second.is_closing == closing; }));
 }
 
-/* Of those that are no viewers.
- * @return whether there was one */
+/* @return whether there was one that is no viewer */
 bool
 Connections::close_oldest ()
 {
@@ -294,14 +357,14 @@ Connections::close_oldest ()
   return oldest != nullptr;
 }
 
-/* Each connection is a file descriptor, whoever is behind it. A crowd that says nothing must not
- * keep others out, nor take the files that the stream needs. */
+/* Many idle connections must neither keep viewers out nor use up the files that the stream needs.
+ */
 bool
 Connections::make_room (GSocket *socket)
 {
   if (count (true) >= kMaxClosing)
     return false;
-  if (count (false) < most_ && !are_files_short (socket))
+  if (count (false) < max_connections_ && !are_files_short (socket))
     return true;
   if (!close_oldest ())
     return false;
@@ -311,15 +374,15 @@ Connections::make_room (GSocket *socket)
 }
 
 void
-Connections::take (GSocket *socket)
+Connections::accept (GSocket *socket)
 {
-  const guint64 before = taken_;
+  const guint64 before = accepted_;
   GSocket *refused = nullptr;
   if (make_room (socket))
-    gst_rtsp_server_io_func (socket, G_IO_IN, server_); /* which calls add(), if it can */
+    gst_rtsp_server_io_func (socket, G_IO_IN, server_); /* calls add() on success */
   else
     refused = g_socket_accept (socket, nullptr, nullptr);
-  if (!refused && taken_ == before)
+  if (!refused && accepted_ == before)
     g_usleep (kNoFiles_us);
   g_clear_object (&refused);
 }

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The connections of an RTSP server: which of them are viewers, and how many there may be. */
+/* The connections of an RTSP server: the threads that serve them, which of them are viewers, and
+ * how many there may be. gst-rtsp-server 1.22 limits sessions only: idle connections use up the
+ * file descriptors of the process. */
 #pragma once
 
 #include <gst/rtsp-server/rtsp-server.h>
@@ -10,46 +12,42 @@
 #include <optional>
 #include <string>
 
-/** How many connections there may be at a time, of which so many are viewers, beside the files that
- *  the server itself and its launch string have open. Raises the limit of this process on open
- *  files where it must and may.
- *  @return nothing after saying that the limit is too low */
-[[nodiscard]] std::optional<std::size_t> fit_connections (int max_viewers);
+/** The connections that the limit on open files allows beside the files of the server and its
+ *  launch string: max_viewers and some that are no viewers. Raises the soft limit as needed.
+ *  @return nothing after reporting that the limit is too low */
+[[nodiscard]] std::optional<std::size_t> max_connections (int max_viewers);
 
-/** A viewer is a connection that sent SETUP or PLAY, of those with one session only the last one.
- *  Anybody can name a session, so that makes nobody a viewer. Others are closed to make room, the
- *  oldest first. Any thread, where nothing else is said. */
+/** A viewer is a connection that sent SETUP or PLAY; of several that named the same session, the
+ *  last one, since anybody can name a session. Other connections are closed to make room, the
+ *  oldest first. Any thread, unless a function says otherwise. */
 class Connections {
 public:
-  /** @param most  at a time, viewers and others */
-  Connections (GstRTSPServer *server, std::size_t most, bool has_tls)
-      : server_ (server), most_ (most), has_tls_ (has_tls)
-  {
-  }
-  /** All connections must be gone. */
+  /** Sets the server's thread pool.
+   *  @param n_threads        that serve the connections
+   *  @param max_connections  viewers and others */
+  Connections (GstRTSPServer *server, int n_threads, std::size_t max_connections, bool has_tls);
+  /** All connections and medias must be gone. Returns when all threads of the pool have ended. */
   ~Connections ();
   Connections (const Connections &) = delete;
 
-  /** Forgets it by itself when it is gone. Main loop, as what says so below. */
+  /** Main loop. Removed by itself when the client is finalized. */
   void add (GstRTSPClient *client);
-  /** It is served by that thread. */
-  void note_thread (GstRTSPClient *client, GstRTSPThread *thread);
-  /** It asks for something. */
-  void note_media (GstRTSPClient *client, const GstRTSPMedia *media);
-  /** It is the viewer of a session from now on. */
-  void note_viewer (GstRTSPClient *client, GstRTSPSession *session);
-  /** @return whether it was told of that media last */
-  bool was_told_of (GstRTSPClient *client, const GstRTSPMedia *media);
+  /** The connection is served by that thread. Main loop, with the server's lock. */
+  void record_thread (GstRTSPClient *client, GstRTSPThread *thread);
+  /** The connection asked for that media, and was not idle. */
+  void record_media (GstRTSPClient *client, const GstRTSPMedia *media);
+  /** The connection is the viewer of that session from now on. */
+  void record_viewer (GstRTSPClient *client, GstRTSPSession *session);
 
-  /** Main loop. Closes those that are no viewers and have not asked for anything for so long. */
-  void close_idle (gint64 patience_us);
-  /** Main loop. Closes those that were told of the media last, or all. */
+  /** Main loop. Closes connections that are no viewers and were idle for so long. */
+  void close_idle (gint64 max_idle_us);
+  /** Main loop. Closes connections that asked for that media last; nullptr: all. */
   void close_all (const GstRTSPMedia *media);
-  /** Main loop. Closes all, and waits until they are gone, some seconds at most. */
+  /** Main loop. Closes all, and waits until they are gone, 3 s at most. */
   void end ();
-  /** Main loop. Takes the connection that waits, and closes the oldest that is no viewer where
-   *  there would be too many. Where there is none it is refused. */
-  void take (GSocket *socket);
+  /** Main loop. Accepts the next connection. Where there would be too many it closes the oldest
+   * that is no viewer; where all are viewers it refuses the new one. */
+  void accept (GSocket *socket);
 
 private:
   struct Unref {
@@ -60,13 +58,14 @@ private:
   using ThreadRef = std::unique_ptr<GstRTSPThread, Unref>;
   struct Connection {
     gint64 since_us = 0;                 /* monotonic */
-    const GstRTSPMedia *media = nullptr; /* that it was told of last; only to compare with */
+    const GstRTSPMedia *media = nullptr; /* that it asked for last; only to compare with */
     std::string session;                 /* that it is the viewer of; empty: none */
-    bool is_closing = false;             /* soon, in its thread */
+    bool is_closing = false;             /* in its thread */
     ThreadRef thread = nullptr;          /* that serves it */
     SocketRef socket = nullptr;          /* with TLS, until it is shut down */
   };
   static void on_gone (gpointer connections, GObject *client);
+  bool asked_for (GstRTSPClient *client, const GstRTSPMedia *media);
   bool is_viewer (GstRTSPClient *client);
   std::size_t count (bool closing);
   void close (GstRTSPClient *client);
@@ -74,9 +73,9 @@ private:
   bool make_room (GSocket *socket);
 
   GstRTSPServer *server_;
-  const std::size_t most_;
+  const std::size_t max_connections_;
   const bool has_tls_;
-  guint64 taken_ = 0; /* ever; main loop */
-  std::mutex lock_; /* guards what follows; not held while anything is called; after the server's */
+  guint64 accepted_ = 0; /* ever; main loop */
+  std::mutex lock_; /* guards what follows; no calls with it; taken after GstRTSPServer's lock */
   std::map<GstRTSPClient *, Connection> connections_;
 };

@@ -4,36 +4,55 @@
 #include <algorithm>
 #include <chrono>
 
-#include "transports.hpp"
+#include "glue.hpp"
 
-static const char kGateKey[] = "rangecast-join-gate";
-static constexpr gsize kRtpHeader = 12; /* bytes */
+namespace {
+
+const char kGateKey[] = "rangecast-join-gate";
+constexpr gsize kRtpHeader = 12; /* bytes */
 
 using Gate = std::shared_ptr<JoinGate>;
 
-static void
-delete_gate (gpointer gate)
-{
-  delete static_cast<Gate *> (gate);
-}
-
-static void
-delete_gate_of_signal (gpointer gate, GClosure *)
-{
-  delete_gate (gate);
-}
-
-static JoinGate &
+JoinGate &
 gate_of (gpointer gate)
 {
   return **static_cast<Gate *> (gate);
 }
 
-/* ---- while a viewer by TCP is put in ---- */
+bool
+has_tcp_viewer (GstRTSPSessionMedia *media)
+{
+  return !transports_of (media, GST_RTSP_LOWER_TRANS_TCP).empty ();
+}
 
-static constexpr gint64 kLongestPause_us = 50000;
-static constexpr gint64 kBetweenPauses_us = 100000;
-static constexpr gulong kUnderWay_us = 5000; /* from the payloader to the viewers */
+GstBuffer *
+first_buffer (GstPadProbeInfo *info)
+{
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER)
+    return GST_PAD_PROBE_INFO_BUFFER (info);
+  GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
+  return gst_buffer_list_length (list) > 0 ? gst_buffer_list_get (list, 0) : nullptr;
+}
+
+void
+watch_pad (GstElement *element, const char *name, GstPadProbeCallback callback, const Gate &gate)
+{
+  GstPad *pad = gst_element_get_static_pad (element, name);
+  if (!pad)
+    return;
+  gst_pad_add_probe (pad,
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), callback,
+      new Gate (gate), delete_data<Gate>);
+  gst_object_unref (pad);
+}
+
+/* ---- while a TCP viewer gets its queue ---- */
+
+constexpr gint64 kMaxPause_us = 50000;
+constexpr gint64 kMinPauseInterval_us = 100000;
+constexpr gulong kInFlight_us = 5000; /* from the payloader to the transports */
+
+} // namespace
 
 void
 ShortPause::begin ()
@@ -41,13 +60,13 @@ ShortPause::begin ()
   {
     std::lock_guard guard (lock_);
     const gint64 now = g_get_monotonic_time ();
-    if (now < since_us_ + kBetweenPauses_us)
+    if (now < since_us_ + kMinPauseInterval_us)
       return;
     since_us_ = now;
     n_ = now < until_us_ ? n_ + 1 : 1;
-    until_us_ = now + kLongestPause_us;
+    until_us_ = now + kMaxPause_us;
   }
-  g_usleep (kUnderWay_us);
+  g_usleep (kInFlight_us);
 }
 
 void
@@ -62,7 +81,7 @@ void
 ShortPause::wait ()
 {
   std::unique_lock guard (lock_);
-  const gint64 until_us = g_get_monotonic_time () + kLongestPause_us;
+  const gint64 until_us = g_get_monotonic_time () + kMaxPause_us;
   while (n_ > 0) {
     const gint64 left_us = std::min (until_us, until_us_) - g_get_monotonic_time ();
     if (left_us <= 0)
@@ -71,34 +90,17 @@ ShortPause::wait ()
   }
 }
 
-static bool
-has_tcp_viewer (GstRTSPSessionMedia *media)
-{
-  return !transports_of (media, GST_RTSP_LOWER_TRANS_TCP).empty ();
-}
-
 /* ---- which packets begin a key frame set ---- */
 
-/* RFC 3550, 5.1. False for reports, whose packet types are 192 to 223 (RFC 5761, 4). */
-bool
-JoinGate::read_start (GstBuffer *packet, Start &start)
+std::optional<RtpStart>
+read_rtp_start (GstBuffer *packet)
 {
   guint8 header[kRtpHeader];
   if (!packet || gst_buffer_extract (packet, 0, header, sizeof header) != sizeof header)
-    return false;
+    return std::nullopt;
   if (header[0] >> 6 != 2 || (header[1] >= 192 && header[1] <= 223))
-    return false;
-  start = {GST_READ_UINT32_BE (header + 4), GST_READ_UINT16_BE (header + 2)};
-  return true;
-}
-
-static GstBuffer *
-first_buffer (GstPadProbeInfo *info)
-{
-  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER)
-    return GST_PAD_PROBE_INFO_BUFFER (info);
-  GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
-  return gst_buffer_list_length (list) > 0 ? gst_buffer_list_get (list, 0) : nullptr;
+    return std::nullopt;
+  return RtpStart{GST_READ_UINT32_BE (header + 4), GST_READ_UINT16_BE (header + 2)};
 }
 
 GstPadProbeReturn
@@ -113,39 +115,34 @@ GstPadProbeReturn
 JoinGate::on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   JoinGate &gate = gate_of (user_data);
-  Start start;
-  if (!read_start (first_buffer (info), start))
+  const auto start = read_rtp_start (first_buffer (info));
+  if (!start)
     return GST_PAD_PROBE_OK;
-  const bool begins = !gate.has_last_ || start.timestamp != gate.last_timestamp_;
+  const bool begins = !gate.has_last_ || start->timestamp != gate.last_timestamp_;
   gate.has_last_ = true;
-  gate.last_timestamp_ = start.timestamp;
+  gate.last_timestamp_ = start->timestamp;
   if (begins)
     gate.pause_.wait ();
   if (begins && gate.is_key_) {
     std::lock_guard guard (gate.lock_);
-    gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = start;
+    gate.starts_[gate.n_starts_++ % gate.starts_.size ()] = *start;
   }
   return GST_PAD_PROBE_OK;
 }
 
 bool
-JoinGate::begins_key_frame_set (GstBuffer *packet)
+JoinGate::begins_key_frame_set (const RtpStart &packet)
 {
-  Start start;
-  if (!read_start (packet, start))
-    return false;
   std::lock_guard guard (lock_);
   const auto end = starts_.begin () + gint (std::min (n_starts_, starts_.size ()));
-  return std::any_of (starts_.begin (), end, [&] (const Start &known) {
-    return known.timestamp == start.timestamp && known.sequence == start.sequence;
-  });
+  return std::find (starts_.begin (), end, packet) != end;
 }
 
 /* ---- viewers by UDP ---- */
 
-/* Those that wait at this sink, if a key frame set begins or they waited too long. */
+/* Adds the viewers that wait at this sink, if a key frame set begins or they waited too long. */
 void
-JoinGate::let_in (GstElement *sink, bool is_key)
+JoinGate::add_waiting (GstElement *sink, bool is_key)
 {
   const gint64 now = g_get_monotonic_time ();
   std::vector<Joiner> ready;
@@ -167,13 +164,13 @@ JoinGate::let_in (GstElement *sink, bool is_key)
     gpointer transport = g_weak_ref_get (joiner.transport.get ());
     if (transport)
       g_signal_emit_by_name (sink, "add", joiner.host.c_str (), joiner.port);
-    if (has_left (joiner) && transport) /* between the two, and the library took nobody away */
+    if (has_left (joiner) && transport) /* meanwhile, when there was no client to remove */
       g_signal_emit_by_name (sink, "remove", joiner.host.c_str (), joiner.port);
     g_clear_object (&transport);
   }
 }
 
-/* One of entering_ is in now. */
+/* Of a joiner in entering_, which has been added; removes it from there. */
 bool
 JoinGate::has_left (const Joiner &entered)
 {
@@ -192,15 +189,15 @@ JoinGate::before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer user_data
   JoinGate &gate = gate_of (user_data);
   if (gate.waiting_ > 0) {
     GstElement *sink = gst_pad_get_parent_element (pad);
+    const auto start = read_rtp_start (first_buffer (info));
     if (sink)
-      gate.let_in (sink, gate.begins_key_frame_set (first_buffer (info)));
+      gate.add_waiting (sink, start && gate.begins_key_frame_set (*start));
     gst_clear_object (&sink);
   }
   return GST_PAD_PROBE_OK;
 }
 
-/* In the thread that puts it in, before the sink sends anything more, but for a few instructions.
- */
+/* "client-added", in the thread that adds the client. */
 void
 JoinGate::on_client (GstElement *sink, gchar *host, gint port, gpointer user_data)
 {
@@ -226,17 +223,13 @@ JoinGate::on_element (GstBin *, GstElement *element, gpointer user_data)
     return;
   const Gate &gate = *static_cast<Gate *> (user_data);
   g_signal_connect_data (element, "client-added", G_CALLBACK (on_client), new Gate (gate),
-      delete_gate_of_signal, GConnectFlags (0));
-  GstPad *pad = gst_element_get_static_pad (element, "sink");
-  gst_pad_add_probe (pad,
-      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), before_sending,
-      new Gate (gate), delete_gate);
-  gst_object_unref (pad);
+      delete_closure_data<Gate>, GConnectFlags (0));
+  watch_pad (element, "sink", before_sending, gate);
 }
 
-/* ---- what the server tells ---- */
+/* ---- requests ---- */
 
-/* Under the lock, with each UDP viewer's address. */
+/* Calls `use` with the lock for the address of each UDP transport. */
 void
 JoinGate::for_each_address (GstRTSPSessionMedia *media, const UseAddress &use)
 {
@@ -263,14 +256,14 @@ JoinGate::hold_back (GstRTSPSessionMedia *media, bool pauses)
     std::erase_if (joiners_, [&] (const Joiner &joiner) { /* whose PLAY failed */
       return !joiner.parked && (now >= joiner.until_us || joiner.is_to (to));
     });
-    joiners_.push_back ({weak, to.destination, to.client_port.min, now + kLongestHold_us});
+    joiners_.push_back ({weak, to.destination, to.client_port.min, now + kMaxHold_us});
   });
   if (pauses && has_tcp_viewer (media))
     pause_.begin ();
 }
 
 void
-JoinGate::note_playing (GstRTSPSessionMedia *media)
+JoinGate::handle_playing (GstRTSPSessionMedia *media)
 {
   for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *) {
     std::erase_if (
@@ -281,25 +274,13 @@ JoinGate::note_playing (GstRTSPSessionMedia *media)
 }
 
 void
-JoinGate::forget (GstRTSPSessionMedia *media)
+JoinGate::remove (GstRTSPSessionMedia *media)
 {
   for_each_address (media, [this] (const GstRTSPTransport &to, GstRTSPStreamTransport *) {
     std::erase_if (joiners_, [&] (const Joiner &joiner) { return joiner.is_to (to); });
     for (Joiner &joiner : entering_)
       joiner.left = joiner.left || joiner.is_to (to);
   });
-}
-
-static void
-watch_pad (GstElement *element, const char *name, GstPadProbeCallback callback, const Gate &gate)
-{
-  GstPad *pad = gst_element_get_static_pad (element, name);
-  if (!pad)
-    return;
-  gst_pad_add_probe (pad,
-      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST), callback,
-      new Gate (gate), delete_gate);
-  gst_object_unref (pad);
 }
 
 void
@@ -309,8 +290,8 @@ JoinGate::install (GstRTSPMedia *media, GstElement *pipeline, GstElement *payloa
   watch_pad (payloader, "sink", on_frame_set, gate);
   watch_pad (payloader, "src", on_payload, gate);
   g_signal_connect_data (pipeline, "element-added", G_CALLBACK (on_element), new Gate (gate),
-      delete_gate_of_signal, GConnectFlags (0));
-  g_object_set_data_full (G_OBJECT (media), kGateKey, new Gate (gate), delete_gate);
+      delete_closure_data<Gate>, GConnectFlags (0));
+  g_object_set_data_full (G_OBJECT (media), kGateKey, new Gate (gate), delete_data<Gate>);
 }
 
 std::shared_ptr<JoinGate>

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A viewer that joins gets its first packets when a key frame set begins: what differs from frame
- * sets that it never had would show scraps. Nobody else waits for that key frame set.
+/* gst-rtsp-server sends to a viewer from PLAY on. Frame sets that refer to earlier ones, which the
+ * viewer never got, decode to fragments, so here its first packet is the first one of a key frame
+ * set; other viewers do not wait for it.
  *
- * How: a viewer by UDP is one client of a multiudpsink that all share. It is taken out in the
- * moment that it is put in, and put in again by the thread that sends, just before the first packet
- * of a key frame set. A viewer by TCP has a queue of its own (rtsp-tcp-viewer), which asks
- * begins_key_frame_set(); until the library has put it in and that has taken its place, no frame
- * set begins. Multicast is shared: who joins takes what comes. */
+ * UDP viewers are clients of one multiudpsink. A new client is removed from it in "client-added",
+ * and added again by the streaming thread just before the first packet of a key frame set. TCP
+ * viewers have a queue of their own (tcp-viewer.cpp), which asks begins_key_frame_set(); no frame
+ * set begins between gst-rtsp-server's adding its transport and the queue's replacing it. Multicast
+ * viewers share what is sent. */
 #pragma once
 
 #include <gst/rtsp-server/rtsp-server.h>
@@ -17,71 +18,78 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
-/* So long a viewer waits at most: sources that make no key frame set when asked (recordings). */
-inline constexpr gint64 kLongestHold_us = 2 * G_USEC_PER_SEC;
+/* Recordings make no key frame set on request: a viewer waits no longer than this. */
+inline constexpr gint64 kMaxHold_us = 2 * G_USEC_PER_SEC;
 
-/** Nothing passes while somebody is at work that takes some milliseconds. Any thread. */
+/** Holds the stream for some milliseconds while transports change. Any thread. */
 class ShortPause {
 public:
-  /** Returns when what has passed before has got to the viewers, if the machine is not too busy.
-   *  Does nothing where the last one is not long ago: who joins must not slow the others down. */
+  /** Also waits for packets that passed before to reach the transports. Does nothing within 100 ms
+   * of the last pause, so that many joining viewers do not slow the others down. */
   void begin ();
   void end ();
-  /** Waits for the end, 50 ms at most: who began may have failed, or begin again and again. */
+  /** Streaming thread: waits for end(), 50 ms at most, since a PLAY may fail. */
   void wait ();
 
 private:
   std::mutex lock_; /* guards what follows */
   std::condition_variable changed_;
-  int n_ = 0;           /* at work */
+  int n_ = 0;           /* begun, not ended */
   gint64 since_us_ = 0; /* monotonic; when the last one began */
   gint64 until_us_ = 0; /* monotonic */
 };
 
+/** What identifies a packet. */
+struct RtpStart {
+  guint32 timestamp;
+  guint16 sequence;
+
+  bool operator== (const RtpStart &) const = default;
+};
+
+/** RFC 3550, 5.1; nothing for RTCP, whose packet types are 192 to 223 (RFC 5761, 4). */
+std::optional<RtpStart> read_rtp_start (GstBuffer *packet);
+
 /** Of one media with one stream. Any thread. */
 class JoinGate {
 public:
-  /** Installs one; to be called when the media is made, before it runs.
+  /** For a media that is not prepared yet.
    *  @param pipeline   of the media
-   *  @param payloader  whose buffers say which frame sets are key frame sets */
+   *  @param payloader  gets frame sets; those without DELTA_UNIT are key frame sets */
   static void install (GstRTSPMedia *media, GstElement *pipeline, GstElement *payloader);
   /** @return nullptr if the media has none */
   static std::shared_ptr<JoinGate> of (GstRTSPMedia *media);
 
   /** @param packet  of RTP */
-  bool begins_key_frame_set (GstBuffer *packet);
+  bool begins_key_frame_set (const RtpStart &packet);
 
-  /** A session is about to play. Its UDP viewers wait from now on.
-   *  @param pauses  TCP viewers have no queues yet, and frame sets come */
+  /** Before PLAY: UDP viewers of the session wait from now on.
+   *  @param pauses  the media plays, and TCP viewers of the session have no queues yet */
   void hold_back (GstRTSPSessionMedia *media, bool pauses);
-  /** It plays, and its TCP viewers have their queues. Those that were let in before need not wait.
+  /** After PLAY: TCP viewers have their queues; UDP viewers that were added before need not wait.
    */
-  void note_playing (GstRTSPSessionMedia *media);
-  /** It left. To be called before the library takes it away. */
-  void forget (GstRTSPSessionMedia *media);
+  void handle_playing (GstRTSPSessionMedia *media);
+  /** Before gst-rtsp-server removes its transports. */
+  void remove (GstRTSPSessionMedia *media);
 
 private:
-  struct Start {
-    guint32 timestamp; /* of RTP */
-    guint16 sequence;
-  };
   struct Joiner {
     std::shared_ptr<GWeakRef> transport;
     std::string host;
     int port;
     gint64 until_us;              /* monotonic */
-    GstElement *parked = nullptr; /* multiudpsink that it was taken out of; not owned */
-    bool left = false;            /* while it was entering */
+    GstElement *parked = nullptr; /* multiudpsink that it was removed from; not owned */
+    bool left = false;            /* while it was being added again */
 
     bool is_to (const GstRTSPTransport &to) const
     {
       return port == to.client_port.min && host == to.destination;
     }
   };
-  static bool read_start (GstBuffer *packet, Start &start);
   static GstPadProbeReturn on_frame_set (GstPad *, GstPadProbeInfo *info, gpointer gate);
   static GstPadProbeReturn on_payload (GstPad *, GstPadProbeInfo *info, gpointer gate);
   static GstPadProbeReturn before_sending (GstPad *pad, GstPadProbeInfo *info, gpointer gate);
@@ -89,18 +97,18 @@ private:
   static void on_client (GstElement *sink, gchar *host, gint port, gpointer gate);
   using UseAddress = std::function<void (const GstRTSPTransport &, GstRTSPStreamTransport *)>;
   void for_each_address (GstRTSPSessionMedia *media, const UseAddress &use);
-  void let_in (GstElement *sink, bool is_key);
+  void add_waiting (GstElement *sink, bool is_key);
   bool has_left (const Joiner &entered);
 
-  std::atomic<bool> is_key_ = true; /* what the payloader is at; its thread writes */
-  guint32 last_timestamp_ = 0;      /* thread of the payloader */
+  std::atomic<bool> is_key_ = true; /* the frame set in the payloader; written by its thread */
+  guint32 last_timestamp_ = 0;      /* payloader's thread */
   bool has_last_ = false;
   std::atomic<int> waiting_ = 0; /* joiners */
   ShortPause pause_;             /* before a frame set begins */
 
-  std::mutex lock_; /* guards what follows; not held while anything is called */
-  std::array<Start, 8> starts_ = {};
+  std::mutex lock_; /* guards what follows; no calls with it */
+  std::array<RtpStart, 8> starts_ = {};
   std::size_t n_starts_ = 0; /* ever */
   std::vector<Joiner> joiners_;
-  std::vector<Joiner> entering_; /* that are being put in again */
+  std::vector<Joiner> entering_; /* that are being added again */
 };

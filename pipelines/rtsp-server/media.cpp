@@ -3,19 +3,24 @@
 
 #include <gst/video/video.h>
 
+#include "dump-graph.hpp"
+#include "glue.hpp"
 #include "join.hpp"
 #include "tcp-viewer.hpp"
 
-static const char kCodedType[] = "application/x-neighbour-code";
-static const char kLiveKey[] = "rangecast-live"; /* of a media: gives frame sets as they come */
-/* EOS waits so long for the last frame set's time, and then for it to be sent. */
-static constexpr gint64 kLongestEnd_us = 2 * G_USEC_PER_SEC;
-static constexpr GstClockTime kSending = 100 * GST_MSECOND;
+namespace {
+
+const char kCodedType[] = "application/x-neighbour-code";
+/* Object data of a media: it has its first frame set; it is live. */
+const char kPreparedKey[] = "rangecast-prepared", kLiveKey[] = "rangecast-live";
+/* EOS waits so long for the time of the last frame set, and then for its packets to be sent. */
+constexpr gint64 kMaxEosWait_us = 2 * G_USEC_PER_SEC;
+constexpr GstClockTime kSendTime = 100 * GST_MSECOND;
 
 /* ---- the launch string ---- */
 
-/* test-launch of gst-rtsp-server wants parentheses, so people write them. */
-static std::string
+/* test-launch of gst-rtsp-server needs parentheses, so users write them. */
+std::string
 without_parentheses (const std::string &launch)
 {
   if (launch.size () < 2 || launch.front () != '(' || launch.back () != ')')
@@ -23,7 +28,7 @@ without_parentheses (const std::string &launch)
   return launch.substr (1, launch.size () - 2);
 }
 
-static bool
+bool
 may_give (GstPad *pad, const char *media_type)
 {
   GstCaps *caps = gst_pad_query_caps (pad, nullptr);
@@ -34,13 +39,13 @@ may_give (GstPad *pad, const char *media_type)
   return may;
 }
 
-static void
+void
 set_error (GError **error, const std::string &text)
 {
   g_set_error_literal (error, GST_PARSE_ERROR, GST_PARSE_ERROR_LINK, text.c_str ());
 }
 
-static bool
+bool
 add_payloader (GstBin *bin, GError **error)
 {
   GstPad *end = gst_bin_find_unlinked_pad (bin, GST_PAD_SRC);
@@ -73,6 +78,8 @@ add_payloader (GstBin *bin, GError **error)
   return added;
 }
 
+} // namespace
+
 GstElement *
 make_stream_bin (const std::string &launch, GError **error)
 {
@@ -90,6 +97,8 @@ make_stream_bin (const std::string &launch, GError **error)
   return nullptr;
 }
 
+namespace {
+
 /* ---- the media ---- */
 
 struct Stage {
@@ -97,14 +106,14 @@ struct Stage {
   StreamEnd on_end;
 };
 
-/* Who hears what a media says; it may say its last when it is gone already. */
+/* Reports the end of a media, whose elements may outlive it. */
 struct Listener {
   Listener (GstRTSPMedia *media, const StreamEnd &on_end) : on_end_ (on_end)
   {
     g_weak_ref_init (&media_, media);
   }
   ~Listener () { g_weak_ref_clear (&media_); }
-  void tell (bool is_over, const std::string &why)
+  void report (bool is_over, const std::string &why)
   {
     auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
     if (!media)
@@ -113,7 +122,7 @@ struct Listener {
     g_object_unref (media);
   }
 
-  /* Of a media that has its first frame set. */
+  /* Once the media has its first frame set. */
   bool is_live ()
   {
     auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&media_));
@@ -127,27 +136,18 @@ private:
   StreamEnd on_end_;
 };
 
-static void
-delete_listener_of_signal (gpointer listener, GClosure *)
-{
-  delete static_cast<Listener *> (listener);
-}
-
-static void
-delete_stage (gpointer stage, GClosure *)
-{
-  delete static_cast<Stage *> (stage);
-}
-
-static void
+void
 on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &listener = *static_cast<Listener *> (user_data);
   GError *error = nullptr;
   gchar *details = nullptr;
+  dump_graph (message, "rtsp-server");
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_STATE_CHANGED)
+    return;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS) {
     if (GST_IS_PIPELINE (message->src))
-      listener.tell (true, "");
+      listener.report (true, "");
     return;
   }
   const bool is_error = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR;
@@ -157,31 +157,31 @@ on_bus_message (GstBus *, GstMessage *message, gpointer user_data)
     gst_message_parse_warning (message, &error, nullptr);
   const std::string text = std::string (GST_OBJECT_NAME (message->src)) + ": " + error->message;
   if (is_error)
-    listener.tell (true, details ? text + "\n" + details : text);
+    listener.report (true, details ? text + "\n" + details : text);
   else
     g_printerr ("rtsp-server: warning: %s\n", text.c_str ());
   g_free (details);
   g_error_free (error);
 }
 
-static void
-note_packet (StreamCounts &counts, GstBuffer *packet)
+void
+count_packet (StreamCounts &counts, GstBuffer *packet)
 {
   counts.bytes += gst_buffer_get_size (packet);
   if (GST_BUFFER_FLAG_IS_SET (packet, GST_BUFFER_FLAG_MARKER))
     counts.frame_sets++;
 }
 
-static GstPadProbeReturn
+GstPadProbeReturn
 on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   StreamCounts &counts = *static_cast<StreamCounts *> (user_data);
   if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) {
     GstBufferList *list = GST_PAD_PROBE_INFO_BUFFER_LIST (info);
     for (guint i = 0; i < gst_buffer_list_length (list); i++)
-      note_packet (counts, gst_buffer_list_get (list, i));
+      count_packet (counts, gst_buffer_list_get (list, i));
   } else if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER) {
-    note_packet (counts, GST_PAD_PROBE_INFO_BUFFER (info));
+    count_packet (counts, GST_PAD_PROBE_INFO_BUFFER (info));
   } else if (gst_video_event_is_force_key_unit (GST_PAD_PROBE_INFO_EVENT (info))) {
     counts.key_requests++;
   }
@@ -189,7 +189,7 @@ on_payload (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 }
 
 /* The one pay0, or the first of several. */
-static GstPad *
+GstPad *
 payload_pad (GstRTSPMedia *media)
 {
   GstElement *bin = gst_rtsp_media_get_element (media);
@@ -200,9 +200,7 @@ payload_pad (GstRTSPMedia *media)
   return pad;
 }
 
-static const char kPreparedKey[] = "rangecast-prepared"; /* of a media: has its first frame set */
-
-static bool
+bool
 is_live (GstRTSPMedia *media)
 {
   GstQuery *query = gst_query_new_latency ();
@@ -216,54 +214,58 @@ is_live (GstRTSPMedia *media)
   return live;
 }
 
-static void
+void
 on_prepared (GstRTSPMedia *media, gpointer)
 {
   g_object_set_data (G_OBJECT (media), kPreparedKey, media);
   g_object_set_data (G_OBJECT (media), kLiveKey, is_live (media) ? media : nullptr);
-  send_as_they_come (media);
+  disable_live_sync (media);
 }
 
-/* Of which the library's switch says nothing. */
-static void
-free_udp_sinks (GstRTSPMedia *media)
+/* gst_rtsp_media_set_rate_control() of 1.22 leaves multiudpsink out. */
+void
+disable_udp_sync (GstRTSPMedia *media)
 {
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
-    GstIterator *sinks =
-        gst_bin_iterate_elements (GST_BIN (pipeline)); /* not those of the launch string */
-    const auto free_sink = [] (const GValue *sink, gpointer) {
-      auto element = GST_ELEMENT (g_value_get_object (sink));
-      GstElementFactory *factory = gst_element_get_factory (element);
-      if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
-        g_object_set (element, "sync", FALSE, nullptr);
-    };
-    while (gst_iterator_foreach (sinks, free_sink, nullptr) == GST_ITERATOR_RESYNC)
-      gst_iterator_resync (sinks);
-    gst_iterator_free (sinks);
-    gst_object_unref (pipeline);
-  }
-  gst_object_unref (bin);
+  GstElement *pipeline = pipeline_of (media);
+  if (!pipeline)
+    return;
+  GstIterator *elements =
+      gst_bin_iterate_elements (GST_BIN (pipeline)); /* not of the launch string */
+  const auto disable = [] (const GValue *value, gpointer) {
+    auto element = GST_ELEMENT (g_value_get_object (value));
+    GstElementFactory *factory = gst_element_get_factory (element);
+    if (factory && g_str_equal (GST_OBJECT_NAME (factory), "multiudpsink"))
+      g_object_set (element, "sync", FALSE, nullptr);
+  };
+  while (gst_iterator_foreach (elements, disable, nullptr) == GST_ITERATOR_RESYNC)
+    gst_iterator_resync (elements);
+  gst_iterator_free (elements);
+  gst_object_unref (pipeline);
 }
+
+} // namespace
 
 void
-send_as_they_come (GstRTSPMedia *media)
+disable_live_sync (GstRTSPMedia *media)
 {
   if (!g_object_get_data (G_OBJECT (media), kLiveKey))
     return;
   gst_rtsp_media_set_rate_control (media, FALSE);
-  free_udp_sinks (media);
+  disable_udp_sync (media);
   for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++) {
     GObject *session = gst_rtsp_stream_get_rtpsession (gst_rtsp_media_get_stream (media, i));
     if (!session)
       continue;
-    g_object_set (session, "disable-sr-timestamp", FALSE, nullptr); /* the library set it */
+    /* gst_rtsp_media_set_rate_control() has set it. */
+    g_object_set (session, "disable-sr-timestamp", FALSE, nullptr);
     g_object_unref (session);
   }
 }
 
-/* The library's class has none of its own. */
-static GstRTSPStatusCode
+namespace {
+
+/* GstRTSPClientClass::adjust_play_mode, which is unset in 1.22. */
+GstRTSPStatusCode
 adjust_play_mode (GstRTSPClient *, GstRTSPContext *context, GstRTSPTimeRange **, GstSeekFlags *,
     gdouble *, GstClockTime *, gboolean *enable_rate_control)
 {
@@ -272,8 +274,10 @@ adjust_play_mode (GstRTSPClient *, GstRTSPContext *context, GstRTSPTimeRange **,
   return GST_RTSP_STS_OK;
 }
 
+} // namespace
+
 void
-let_live_media_play ()
+disable_live_sync_at_play ()
 {
   auto klass = static_cast<GstRTSPClientClass *> (g_type_class_ref (GST_TYPE_RTSP_CLIENT));
   if (!klass->adjust_play_mode)
@@ -290,6 +294,8 @@ request_key_frame_set (GstRTSPMedia *media)
   }
 }
 
+namespace {
+
 /* ---- the end of the stream ---- */
 
 struct EndWatch {
@@ -297,14 +303,8 @@ struct EndWatch {
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* streaming thread */
 };
 
-static void
-delete_end_watch (gpointer watch)
-{
-  delete static_cast<EndWatch *> (watch);
-}
-
-/* Of the pad's element; NONE where there is none. */
-static GstClockTime
+/* The clock time of a PTS at a pad; NONE without a segment. */
+GstClockTime
 clock_time_of (GstPad *pad, GstElement *element, GstClockTime pts)
 {
   GstClockTime running_time = GST_CLOCK_TIME_NONE;
@@ -319,17 +319,17 @@ clock_time_of (GstPad *pad, GstElement *element, GstClockTime pts)
   return gst_element_get_base_time (element) + running_time;
 }
 
-/* The RTP session says goodbye to the viewers as soon as it has EOS, when the last frame sets still
- * wait in the sinks for their time; and players end there. So EOS waits for them. */
-static void
+/* rtpbin sends RTCP BYE as soon as it gets EOS, while the last frame sets still wait in the sinks
+ * for the clock, and players stop at BYE. So EOS waits for the sinks. */
+void
 wait_for_sinks (GstPad *pad, GstClockTime last_pts)
 {
   GstElement *element = gst_pad_get_parent_element (pad);
   GstClock *clock = element ? gst_element_get_clock (element) : nullptr;
   if (clock && GST_CLOCK_TIME_IS_VALID (last_pts)) {
     const GstClockTime due = clock_time_of (pad, element, last_pts);
-    const gint64 until_us = g_get_monotonic_time () + kLongestEnd_us;
-    while (GST_CLOCK_TIME_IS_VALID (due) && gst_clock_get_time (clock) < due + kSending &&
+    const gint64 until_us = g_get_monotonic_time () + kMaxEosWait_us;
+    while (GST_CLOCK_TIME_IS_VALID (due) && gst_clock_get_time (clock) < due + kSendTime &&
            !GST_PAD_IS_FLUSHING (pad) && g_get_monotonic_time () < until_us)
       g_usleep (10000);
   }
@@ -337,9 +337,8 @@ wait_for_sinks (GstPad *pad, GstClockTime last_pts)
   gst_clear_object (&element);
 }
 
-/* Viewers are told of the end when the payloader has passed it; the sinks, and so the bus, come to
- * it only when the last frame set's time is over. */
-static GstPadProbeReturn
+/* EOS is on the bus only when the last frame set has had its duration, but viewers get BYE now. */
+GstPadProbeReturn
 on_payload_end (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
 {
   auto &watch = *static_cast<EndWatch *> (user_data);
@@ -351,12 +350,14 @@ on_payload_end (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
     if (gst_buffer_list_length (list) > 0)
       watch.last_pts = GST_BUFFER_PTS (gst_buffer_list_get (list, 0));
   } else if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS) {
-    watch.listener.tell (false, "");
+    watch.listener.report (false, "");
     if (!watch.listener.is_live ())
       wait_for_sinks (pad, watch.last_pts);
   }
   return GST_PAD_PROBE_OK;
 }
+
+} // namespace
 
 /* ---- the factory ---- */
 
@@ -364,7 +365,7 @@ G_BEGIN_DECLS
 struct LaunchFactory {
   GstRTSPMediaFactory parent;
   gint run;        /* atomic */
-  gint ends;       /* atomic: the server does */
+  gint is_ending;  /* atomic; the server */
   GWeakRef latest; /* media */
 };
 struct LaunchFactoryClass {
@@ -386,7 +387,7 @@ launch_factory_create_element (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
   return bin;
 }
 
-/* Whatever port or query a viewer asks with, it gets the one run. */
+/* All viewers share a run, whatever port or query their URL has. */
 static gchar *
 launch_factory_gen_key (GstRTSPMediaFactory *factory, const GstRTSPUrl *)
 {
@@ -421,73 +422,76 @@ launch_factory_class_init (LaunchFactoryClass *klass)
   GST_RTSP_MEDIA_FACTORY_CLASS (klass)->gen_key = launch_factory_gen_key;
 }
 
-/* Who waits for its first frame set waits no longer: the library takes an error so, and waits up to
- * 20 seconds otherwise. */
-static void
-fail (GstRTSPMedia *media)
+namespace {
+
+/* gst_rtsp_media_prepare() cannot be cancelled, but returns on an error. */
+void
+post_error (GstRTSPMedia *media)
 {
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
+  if (GstElement *pipeline = pipeline_of (media)) {
     GError *error = g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server ends");
     gst_element_post_message (
-        GST_ELEMENT (pipeline), gst_message_new_error (pipeline, error, nullptr));
+        pipeline, gst_message_new_error (GST_OBJECT (pipeline), error, nullptr));
     g_error_free (error);
     gst_object_unref (pipeline);
   }
-  gst_object_unref (bin);
 }
+
+} // namespace
 
 void
 end_waiting (GstRTSPMediaFactory *factory)
 {
   auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
-  g_atomic_int_set (&launch_factory->ends, 1);
+  g_atomic_int_set (&launch_factory->is_ending, 1);
   auto media = static_cast<GstRTSPMedia *> (g_weak_ref_get (&launch_factory->latest));
   if (!media)
     return;
   if (!g_object_get_data (G_OBJECT (media), kPreparedKey))
-    fail (media);
+    post_error (media);
   g_object_unref (media);
 }
 
-static void
+namespace {
+
+void
 on_media_configure (GstRTSPMediaFactory *factory, GstRTSPMedia *media, gpointer user_data)
 {
   auto stage = static_cast<Stage *> (user_data);
   auto launch_factory = reinterpret_cast<LaunchFactory *> (factory);
-  GstElement *bin = gst_rtsp_media_get_element (media);
+  const bool has_one_stream = gst_rtsp_media_n_streams (media) == 1;
   prepare_tcp_queues (media);
-  if (GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin))) {
-    GstBus *bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+  if (GstElement *pipeline = pipeline_of (media)) {
+    GstBus *bus = gst_element_get_bus (pipeline);
     gst_bus_enable_sync_message_emission (bus);
-    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos"})
+    for (const char *signal : {"sync-message::error", "sync-message::warning", "sync-message::eos",
+             "sync-message::state-changed"})
       g_signal_connect_data (bus, signal, G_CALLBACK (on_bus_message),
-          new Listener (media, stage->on_end), delete_listener_of_signal, GConnectFlags (0));
+          new Listener (media, stage->on_end), delete_closure_data<Listener>, GConnectFlags (0));
     gst_object_unref (bus);
-    GstElement *payloader = gst_bin_get_by_name (GST_BIN (bin), "pay0");
-    if (payloader && gst_rtsp_media_n_streams (media) == 1)
-      JoinGate::install (media, GST_ELEMENT (pipeline), payloader);
+    GstElement *payloader = gst_bin_get_by_name (GST_BIN (pipeline), "pay0");
+    if (payloader && has_one_stream)
+      JoinGate::install (media, pipeline, payloader);
     gst_clear_object (&payloader);
     gst_object_unref (pipeline);
   }
-  gst_object_unref (bin);
   if (GstPad *pad = payload_pad (media)) {
     gst_pad_add_probe (pad,
         GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_BUFFER_LIST |
                          GST_PAD_PROBE_TYPE_EVENT_UPSTREAM),
         on_payload, stage->counts, nullptr);
-    if (gst_rtsp_media_n_streams (media) == 1) /* of several, others may go on */
+    if (has_one_stream) /* of several streams, others may go on */
       gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, on_payload_end,
-          new EndWatch{{media, stage->on_end}}, delete_end_watch);
+          new EndWatch{{media, stage->on_end}}, delete_data<EndWatch>);
     gst_object_unref (pad);
   }
   g_signal_connect (media, "prepared", G_CALLBACK (on_prepared), nullptr);
   g_weak_ref_set (&launch_factory->latest, media);
-  if (g_atomic_int_get (&launch_factory->ends))
-    fail (media);
+  if (g_atomic_int_get (&launch_factory->is_ending))
+    post_error (media);
 }
 
-static void
+void
 set_multicast (GstRTSPMediaFactory *factory, const MulticastRange &range)
 {
   GstRTSPAddressPool *pool = gst_rtsp_address_pool_new ();
@@ -498,6 +502,8 @@ set_multicast (GstRTSPMediaFactory *factory, const MulticastRange &range)
   g_object_unref (pool);
 }
 
+} // namespace
+
 GstRTSPMediaFactory *
 make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end)
 {
@@ -505,13 +511,13 @@ make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end
   gst_rtsp_media_factory_set_launch (factory, options.launch.c_str ());
   gst_rtsp_media_factory_set_shared (factory, TRUE);
   gst_rtsp_media_factory_set_suspend_mode (factory, GST_RTSP_SUSPEND_MODE_NONE);
-  /* AVPF: viewers ask for key frame sets and lost packets at once. With AVP beside it the SDP would
-   * have two streams, and players take both. */
+  /* AVPF, for immediate PLI and NACK. With AVP beside it the SDP would have two streams, and
+   * players set up both. */
   const bool is_clear = options.tcp && !options.udp && options.multicast.first.empty ();
   gst_rtsp_media_factory_set_profiles (factory, options.certificate_file.empty () || is_clear
                                                     ? GST_RTSP_PROFILE_AVPF
                                                     : GST_RTSP_PROFILE_SAVPF);
-  int protocols = GST_RTSP_LOWER_TRANS_TCP; /* for the holder in any case */
+  int protocols = GST_RTSP_LOWER_TRANS_TCP; /* always, for MediaKeepAlive */
   if (options.udp)
     protocols |= GST_RTSP_LOWER_TRANS_UDP;
   if (!options.multicast.first.empty ()) {
@@ -524,11 +530,10 @@ make_factory (const RtspOptions &options, StreamCounts &counts, StreamEnd on_end
     gst_rtsp_media_factory_set_retransmission_time (
         factory, guint64 (options.retransmission_ms) * GST_MSECOND);
   }
-  /* One role for all who may watch: a role's name is that of a GstStructure, a user's need not be.
-   */
+  /* One role for all users: it must be a GstStructure name, which a user name need not be. */
   gst_rtsp_media_factory_add_role (factory, kViewerRole, "media.factory.access", G_TYPE_BOOLEAN,
       TRUE, "media.factory.construct", G_TYPE_BOOLEAN, TRUE, nullptr);
   g_signal_connect_data (factory, "media-configure", G_CALLBACK (on_media_configure),
-      new Stage{&counts, std::move (on_end)}, delete_stage, GConnectFlags (0));
+      new Stage{&counts, std::move (on_end)}, delete_closure_data<Stage>, GConnectFlags (0));
   return factory;
 }

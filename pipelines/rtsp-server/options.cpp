@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <cstring>
 
-static bool
+namespace {
+
+bool
 bad_option (const char *option, const char *expected, const std::string &got)
 {
   g_printerr ("rtsp-server: %s: expected %s, got '%s'\n", option, expected, got.c_str ());
@@ -17,7 +19,7 @@ bad_option (const char *option, const char *expected, const std::string &got)
 /* ---- who may watch ---- */
 
 /* What it has instead of NAME:PASSWORD; never shows what may be a password. */
-static std::string
+std::string
 fault_of_user (const std::string &text)
 {
   const auto colon = text.find (':');
@@ -28,7 +30,7 @@ fault_of_user (const std::string &text)
 }
 
 /* @param place  the option or its line, for messages */
-static bool
+bool
 add_user (const std::string &text, const std::string &place, RtspOptions &options)
 {
   const auto colon = text.find (':');
@@ -49,7 +51,7 @@ add_user (const std::string &text, const std::string &place, RtspOptions &option
 }
 
 /* A line for each: NAME:PASSWORD. Empty ones and those with # first are none. */
-static bool
+bool
 read_users (const char *path, RtspOptions &options)
 {
   gchar *text = nullptr;
@@ -79,7 +81,7 @@ read_users (const char *path, RtspOptions &options)
 }
 
 /* Other users of this machine can read the arguments of a process. */
-static void
+void
 wipe_passwords (int argc, char **argv)
 {
   for (int i = 1; i < argc && std::strcmp (argv[i], "--") != 0; i++) {
@@ -95,7 +97,7 @@ wipe_passwords (int argc, char **argv)
 
 /* ---- where to ---- */
 
-static bool
+bool
 is_multicast (const std::string &text)
 {
   GInetAddress *address = g_inet_address_new_from_string (text.c_str ());
@@ -105,7 +107,7 @@ is_multicast (const std::string &text)
 }
 
 /* Whether they are of one kind, and the last is not before the first. */
-static bool
+bool
 is_range (const MulticastRange &range)
 {
   GInetAddress *first = g_inet_address_new_from_string (range.first.c_str ());
@@ -120,7 +122,7 @@ is_range (const MulticastRange &range)
 }
 
 /* ADDRESS[-ADDRESS]:PORT-PORT[/TTL], both of IPv4: an IPv6 address has colons of its own. */
-static bool
+bool
 parse_multicast (const char *text, MulticastRange &range)
 {
   static const char kExpected[] =
@@ -147,7 +149,7 @@ parse_multicast (const char *text, MulticastRange &range)
          bad_option ("--multicast", "the first address before the second", text);
 }
 
-static bool
+bool
 parse_transports (const char *text, RtspOptions &options)
 {
   gchar **names = g_strsplit (text, ",", -1);
@@ -187,7 +189,7 @@ struct Strings {
   }
 };
 
-static bool
+bool
 check_numbers (const RtspOptions &options)
 {
   struct {
@@ -208,7 +210,7 @@ check_numbers (const RtspOptions &options)
   return true;
 }
 
-static bool
+bool
 take_strings (const Strings &strings, RtspOptions &options)
 {
   const auto take = [] (const gchar *from, std::string &to) {
@@ -253,6 +255,8 @@ take_strings (const Strings &strings, RtspOptions &options)
   g_free (launch);
   return true;
 }
+
+} // namespace
 
 bool
 parse_arguments (int argc, char **argv, RtspOptions &options)

@@ -1,131 +1,91 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "tcp-viewer.hpp"
 
-#include <gst/rtp/rtp.h>
-
 #include <algorithm>
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
+#include "glue.hpp"
 #include "join.hpp"
-#include "transports.hpp"
 
-static constexpr std::size_t kMaxFrameSets = 4;
+namespace {
+
+constexpr std::size_t kMaxFrameSets = 4;
 /* Frame sets of many slices may come as one packet each; reports are few. */
-static constexpr std::size_t kMaxMessages = 65536;
+constexpr std::size_t kMaxMessages = 65536;
 
-struct Message {
-  GstBuffer *buffer;   /* or */
-  GstBufferList *list; /* packets */
-  bool is_rtp;
-  guint32 timestamp; /* of RTP */
+struct MiniObjectUnref {
+  void operator() (GstMiniObject *object) const { gst_mini_object_unref (object); }
 };
 
-/* Locks: `sending`, then `lock`, then a JoinGate's. Nothing but the gate is called while `lock` is
- * held. */
-/* Behind the callbacks of transports; shared, since those may run while it is closed. */
+struct Message {
+  std::unique_ptr<GstMiniObject, MiniObjectUnref> packets; /* GstBuffer or GstBufferList */
+  std::optional<RtpStart> rtp;                             /* of the first packet; RTCP has none */
+
+  [[nodiscard]] GstBuffer *first_packet () const
+  {
+    return GST_IS_BUFFER_LIST (packets.get ())
+               ? gst_buffer_list_get (GST_BUFFER_LIST (packets.get ()), 0)
+               : GST_BUFFER (packets.get ());
+  }
+};
+
+/* The packets that wait for one TCP viewer. Shared with the callbacks of transports, which may run
+ * while it is closed. Locks: `sending_`, then `lock_`, then that of a JoinGate, which is all that
+ * is called with `lock_`. */
 class TcpQueue : public std::enable_shared_from_this<TcpQueue> {
 public:
   /** @param gate  nullptr: nothing is held back */
   TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
       std::atomic<guint64> &left_out, std::shared_ptr<JoinGate> gate);
   ~TcpQueue ();
-  void take (const Message &message);
+  /** @param packets  a GstBuffer or GstBufferList of packets */
+  void push (GstMiniObject *packets);
   void send_waiting ();
-  void note_sent ();
+  void handle_sent ();
   void keep_alive ();
   void close ();
 
 private:
-  bool is_held_back (const Message &message);
-  void leave_out_all ();
+  bool is_before_key (const Message &message);
+  void drop_frame_sets ();
   bool pop (Message &message);
   bool hand_over (const Message &message);
   void wake ();
 
-  GWeakRef transport_; /* of the library */
+  GWeakRef transport_; /* of gst-rtsp-server */
   GMainContext *context_;
   std::atomic<guint64> &left_out_;
   std::mutex sending_;    /* held while a message is handed over */
-  const gint64 until_us_; /* monotonic; held back no longer */
+  const gint64 until_us_; /* monotonic; when it stops waiting for a key frame set */
 
   std::mutex lock_;                /* guards all below */
   std::shared_ptr<JoinGate> gate_; /* until a key frame set begins */
   std::deque<Message> waiting_;
   std::size_t frame_sets_ = 0; /* among them */
-  bool busy_ = false;          /* a message is on its way */
+  bool busy_ = false;          /* a message is being sent */
   bool draining_ = false;      /* in send_waiting() */
-  bool woken_ = false;
+  bool woken_ = false;         /* send_waiting() is scheduled */
   bool closed_ = false;
 };
 
 using Handle = std::shared_ptr<TcpQueue>;
 
-static void
-delete_handle (gpointer handle)
-{
-  delete static_cast<Handle *> (handle);
-}
-
-static TcpQueue &
+TcpQueue &
 queue_of (gpointer handle)
 {
   return **static_cast<Handle *> (handle);
 }
 
-static void
-forget (const Message &message)
+/* Callback of our transport, for RTP and RTCP; streaming thread. */
+template <typename Packets>
+gboolean
+on_packets (Packets *packets, guint8, gpointer handle)
 {
-  if (message.buffer)
-    gst_buffer_unref (message.buffer);
-  if (message.list)
-    gst_buffer_list_unref (message.list);
-}
-
-static guint32
-timestamp_of (GstBuffer *packet)
-{
-  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
-  guint32 timestamp = 0;
-  if (packet && gst_rtp_buffer_map (packet, GST_MAP_READ, &rtp)) {
-    timestamp = gst_rtp_buffer_get_timestamp (&rtp);
-    gst_rtp_buffer_unmap (&rtp);
-  }
-  return timestamp;
-}
-
-/* ---- what the stream gives, in its own thread ---- */
-
-static gboolean
-take_rtp (GstBuffer *packet, guint8, gpointer handle)
-{
-  queue_of (handle).take ({gst_buffer_ref (packet), nullptr, true, timestamp_of (packet)});
-  return TRUE;
-}
-
-static gboolean
-take_rtcp (GstBuffer *packet, guint8, gpointer handle)
-{
-  queue_of (handle).take ({gst_buffer_ref (packet), nullptr, false, 0});
-  return TRUE;
-}
-
-static gboolean
-take_rtp_list (GstBufferList *list, guint8, gpointer handle)
-{
-  if (gst_buffer_list_length (list) > 0)
-    queue_of (handle).take (
-        {nullptr, gst_buffer_list_ref (list), true, timestamp_of (gst_buffer_list_get (list, 0))});
-  return TRUE;
-}
-
-static gboolean
-take_rtcp_list (GstBufferList *list, guint8, gpointer handle)
-{
-  if (gst_buffer_list_length (list) > 0)
-    queue_of (handle).take ({nullptr, gst_buffer_list_ref (list), false, 0});
+  queue_of (handle).push (GST_MINI_OBJECT (packets));
   return TRUE;
 }
 
@@ -134,27 +94,24 @@ take_rtcp_list (GstBufferList *list, guint8, gpointer handle)
 TcpQueue::TcpQueue (GstRTSPStreamTransport *transport, GMainContext *context,
     std::atomic<guint64> &left_out, std::shared_ptr<JoinGate> gate)
     : context_ (g_main_context_ref (context)), left_out_ (left_out),
-      until_us_ (g_get_monotonic_time () + kLongestHold_us), gate_ (std::move (gate))
+      until_us_ (g_get_monotonic_time () + kMaxHold_us), gate_ (std::move (gate))
 {
   g_weak_ref_init (&transport_, transport);
 }
 
 TcpQueue::~TcpQueue ()
 {
-  for (const Message &message : waiting_)
-    forget (message);
   g_weak_ref_clear (&transport_);
   g_main_context_unref (context_);
 }
 
 /* With the lock. */
 bool
-TcpQueue::is_held_back (const Message &message)
+TcpQueue::is_before_key (const Message &message)
 {
-  if (!gate_ || !message.is_rtp)
+  if (!gate_ || !message.rtp)
     return false;
-  GstBuffer *first = message.list ? gst_buffer_list_get (message.list, 0) : message.buffer;
-  if (!gate_->begins_key_frame_set (first) && g_get_monotonic_time () < until_us_)
+  if (!gate_->begins_key_frame_set (*message.rtp) && g_get_monotonic_time () < until_us_)
     return true;
   gate_ = nullptr;
   return false;
@@ -162,45 +119,39 @@ TcpQueue::is_held_back (const Message &message)
 
 /* With the lock. */
 void
-TcpQueue::leave_out_all ()
+TcpQueue::drop_frame_sets ()
 {
-  std::deque<Message> reports;
-  for (const Message &message : waiting_)
-    if (message.is_rtp)
-      forget (message);
-    else
-      reports.push_back (message);
-  waiting_.swap (reports);
+  std::erase_if (waiting_, [] (const Message &message) { return message.rtp.has_value (); });
   left_out_ += frame_sets_;
   frame_sets_ = 0;
 }
 
 void
-TcpQueue::take (const Message &message)
+TcpQueue::push (GstMiniObject *packets)
 {
-  std::unique_lock guard (lock_);
-  if (closed_ || waiting_.size () >= kMaxMessages || is_held_back (message)) {
-    guard.unlock ();
-    forget (message);
+  Message message{{gst_mini_object_ref (packets), {}}, {}};
+  if (GST_IS_BUFFER_LIST (packets) && gst_buffer_list_length (GST_BUFFER_LIST (packets)) == 0)
     return;
-  }
-  if (message.is_rtp) {
-    const Message *last = nullptr;
-    for (auto it = waiting_.rbegin (); it != waiting_.rend () && !last; ++it)
-      if (it->is_rtp)
-        last = &*it;
-    if (!last || last->timestamp != message.timestamp) {
+  message.rtp = read_rtp_start (message.first_packet ());
+  std::unique_lock guard (lock_);
+  if (closed_ || waiting_.size () >= kMaxMessages || is_before_key (message))
+    return;
+  if (message.rtp) {
+    const auto last = std::find_if (waiting_.rbegin (), waiting_.rend (),
+        [] (const Message &other) { return other.rtp.has_value (); });
+    if (last == waiting_.rend () || last->rtp->timestamp != message.rtp->timestamp) {
       if (frame_sets_ >= kMaxFrameSets)
-        leave_out_all ();
+        drop_frame_sets ();
       frame_sets_++;
     }
   }
-  waiting_.push_back (message);
+  waiting_.push_back (std::move (message));
   guard.unlock ();
   wake ();
 }
 
-/* Sends in the thread of the connection, so that it does not end meanwhile. */
+/* Schedules send_waiting() in the thread that serves the connection, which must not end during it.
+ */
 void
 TcpQueue::wake ()
 {
@@ -219,12 +170,12 @@ TcpQueue::wake ()
     queue_of (handle).send_waiting ();
     return G_SOURCE_REMOVE;
   };
-  g_source_set_callback (source, send, new Handle (std::move (handle)), delete_handle);
+  g_source_set_callback (source, send, new Handle (std::move (handle)), delete_data<Handle>);
   g_source_attach (source, context_);
   g_source_unref (source);
 }
 
-/* The next message, if one may be sent now. */
+/* @return false if nothing waits, or a message is being sent */
 bool
 TcpQueue::pop (Message &message)
 {
@@ -233,16 +184,15 @@ TcpQueue::pop (Message &message)
   draining_ = !busy_ && !closed_ && !waiting_.empty ();
   if (!draining_)
     return false;
-  message = waiting_.front ();
+  message = std::move (waiting_.front ());
   waiting_.pop_front ();
-  if (message.is_rtp) {
-    const auto is_next = [&] (const Message &other) {
-      return other.is_rtp && other.timestamp == message.timestamp;
-    };
-    const bool has_more = std::any_of (waiting_.begin (), waiting_.end (), is_next);
+  if (message.rtp) {
+    const bool has_more = std::ranges::any_of (waiting_, [&] (const Message &other) {
+      return other.rtp && other.rtp->timestamp == message.rtp->timestamp;
+    });
     frame_sets_ -= !has_more && frame_sets_ > 0;
   }
-  busy_ = true; /* until note_sent(), which may come from within */
+  busy_ = true; /* until handle_sent(), maybe within hand_over() */
   return true;
 }
 
@@ -252,13 +202,15 @@ TcpQueue::hand_over (const Message &message)
   auto transport = static_cast<GstRTSPStreamTransport *> (g_weak_ref_get (&transport_));
   if (!transport)
     return false;
+  GstMiniObject *packets = message.packets.get ();
   gboolean sent = FALSE;
-  if (message.is_rtp)
-    sent = message.list ? gst_rtsp_stream_transport_send_rtp_list (transport, message.list)
-                        : gst_rtsp_stream_transport_send_rtp (transport, message.buffer);
+  if (GST_IS_BUFFER_LIST (packets))
+    sent = (message.rtp
+                ? gst_rtsp_stream_transport_send_rtp_list
+                : gst_rtsp_stream_transport_send_rtcp_list) (transport, GST_BUFFER_LIST (packets));
   else
-    sent = message.list ? gst_rtsp_stream_transport_send_rtcp_list (transport, message.list)
-                        : gst_rtsp_stream_transport_send_rtcp (transport, message.buffer);
+    sent = (message.rtp ? gst_rtsp_stream_transport_send_rtp
+                        : gst_rtsp_stream_transport_send_rtcp) (transport, GST_BUFFER (packets));
   g_object_unref (transport);
   return sent;
 }
@@ -270,13 +222,12 @@ TcpQueue::send_waiting ()
   std::lock_guard sending (sending_);
   while (pop (message)) {
     if (!hand_over (message))
-      note_sent (); /* it never will be: the connection is closing */
-    forget (message);
+      handle_sent (); /* the connection is closing: there is no callback */
   }
 }
 
 void
-TcpQueue::note_sent ()
+TcpQueue::handle_sent ()
 {
   {
     std::lock_guard guard (lock_);
@@ -288,15 +239,13 @@ TcpQueue::note_sent ()
 void
 TcpQueue::close ()
 {
-  std::lock_guard sending (sending_); /* what is being sent ends before */
+  std::lock_guard sending (sending_); /* after what is being sent */
   std::lock_guard guard (lock_);
   closed_ = true;
-  for (const Message &message : waiting_)
-    forget (message);
   waiting_.clear ();
 }
 
-/* The viewer reported; its session lives on. */
+/* The viewer sent RTCP. */
 void
 TcpQueue::keep_alive ()
 {
@@ -309,148 +258,137 @@ TcpQueue::keep_alive ()
 
 /* ---- transports ---- */
 
-class Taps;
+class MediaQueues;
 
-/* What a transport of the library has of ours. */
-struct Tap {
+/* The replacement of one transport. */
+struct Replacement {
   Handle queue;
   GstRTSPStream *stream;
   GstRTSPStreamTransport *ours;
-  std::shared_ptr<Taps> taps; /* of the media */
+  std::shared_ptr<MediaQueues> queues; /* of the media */
 };
 
-/* Those of one media. A stream that still has a transport cannot leave the pipeline (the library
- * says so and goes on: the elements are freed while they run), and a closed connection frees its
- * transports when its thread comes to it. So they leave the stream when the media ends. */
-class Taps {
+/* The replacements of one media. When a media ends, gst-rtsp-server 1.22 warns of a stream that
+ * still has transports and frees its elements while they run; and a closed connection frees its
+ * transports when its thread gets to it. So all are removed from their streams when the media ends.
+ */
+class MediaQueues {
 public:
   /* False if the media is ending. */
-  bool add (Tap *tap)
+  bool add (Replacement *replacement)
   {
     std::lock_guard guard (lock_);
     if (ended_)
       return false;
-    gst_rtsp_stream_add_transport (tap->stream, tap->ours);
-    taps_.push_back (tap);
+    gst_rtsp_stream_add_transport (replacement->stream, replacement->ours);
+    replacements_.push_back (replacement);
     return true;
   }
-  void remove (Tap *tap)
+  void remove (Replacement *replacement)
   {
     std::lock_guard guard (lock_);
-    if (std::erase (taps_, tap) > 0)
-      gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
+    if (std::erase (replacements_, replacement) > 0)
+      gst_rtsp_stream_remove_transport (replacement->stream, replacement->ours);
   }
   void end ()
   {
     std::lock_guard guard (lock_);
     ended_ = true;
-    for (Tap *tap : taps_)
-      gst_rtsp_stream_remove_transport (tap->stream, tap->ours);
-    taps_.clear ();
+    for (Replacement *replacement : replacements_)
+      gst_rtsp_stream_remove_transport (replacement->stream, replacement->ours);
+    replacements_.clear ();
   }
   std::vector<Handle> queues ()
   {
     std::lock_guard guard (lock_);
     std::vector<Handle> queues;
-    for (const Tap *tap : taps_)
-      queues.push_back (tap->queue);
+    for (const Replacement *replacement : replacements_)
+      queues.push_back (replacement->queue);
     return queues;
   }
 
 private:
   std::mutex lock_; /* taken before that of a stream */
   bool ended_ = false;
-  std::vector<Tap *> taps_; /* in their streams */
+  std::vector<Replacement *> replacements_; /* in their streams */
 };
 
-using TapsHandle = std::shared_ptr<Taps>;
+using QueuesHandle = std::shared_ptr<MediaQueues>;
 
-static const char kTapKey[] = "rangecast-tcp-queue";   /* of a transport: its Tap */
-static const char kTapsKey[] = "rangecast-tcp-queues"; /* of a media: a TapsHandle */
+const char kReplacementKey[] = "rangecast-tcp-queue"; /* of a transport: its Replacement */
+const char kQueuesKey[] = "rangecast-tcp-queues";     /* object data of a media: a QueuesHandle */
 
-/* Maybe in hand_over(), which drops the last reference: so it does not close the queue. */
-static void
-delete_tap (gpointer user_data)
+/* Does not close the queue, since hand_over() may drop the last reference. */
+void
+delete_replacement (gpointer user_data)
 {
-  auto tap = static_cast<Tap *> (user_data);
-  tap->taps->remove (tap);
-  g_object_unref (tap->ours);
-  g_object_unref (tap->stream);
-  delete tap;
+  auto replacement = static_cast<Replacement *> (user_data);
+  replacement->queues->remove (replacement);
+  g_object_unref (replacement->ours);
+  g_object_unref (replacement->stream);
+  delete replacement;
 }
 
-/* ---- reports of the stream ---- */
+/* ---- RTCP of the stream ---- */
 
-/* RFC 3550, 6.1; RFC 5761, 4: by its type. */
-static bool
-is_report (GstBuffer *packet)
-{
-  guint8 header[2];
-  return gst_buffer_extract (packet, 0, header, sizeof header) == sizeof header &&
-         header[0] >> 6 == 2 && header[1] >= 192 && header[1] <= 223;
-}
-
-/* Frame sets and reports each come to an appsink, which holds one. The library's one thread (1.22)
- * that takes them from there sends a report first, where there are both, and then sleeps until the
- * next comes: but no frame set comes while one waits, and the stream stands still for all viewers.
- * So reports go to the queues from here. */
-static GstPadProbeReturn
-on_report (GstPad *, GstPadProbeInfo *info, gpointer taps)
+/* gst-rtsp-server 1.22 has an appsink of one buffer each for RTP and for RTCP, and one thread that
+ * sends from both. Where both have a buffer, the thread sends RTCP and then sleeps until the next
+ * buffer comes; but RTP cannot come while its appsink is full, so the stream stops for all TCP
+ * viewers. Therefore RTCP goes to the queues from here and never gets to its appsink. */
+GstPadProbeReturn
+on_appsink_buffer (GstPad *, GstPadProbeInfo *info, gpointer queues)
 {
   GstBuffer *packet = GST_PAD_PROBE_INFO_BUFFER (info);
-  if (!is_report (packet))
+  if (read_rtp_start (packet))
     return GST_PAD_PROBE_OK;
-  for (const Handle &queue : (*static_cast<TapsHandle *> (taps))->queues ())
-    queue->take ({gst_buffer_ref (packet), nullptr, false, 0});
+  for (const Handle &queue : (*static_cast<QueuesHandle *> (queues))->queues ())
+    queue->push (GST_MINI_OBJECT (packet));
   return GST_PAD_PROBE_DROP;
 }
 
-static void
-delete_taps (gpointer taps)
-{
-  delete static_cast<TapsHandle *> (taps);
-}
-
-static void
-on_element (GstBin *, GstElement *element, gpointer taps)
+void
+on_element (GstBin *, GstElement *element, gpointer queues)
 {
   GstElementFactory *factory = gst_element_get_factory (element);
   if (!factory || !g_str_equal (GST_OBJECT_NAME (factory), "appsink"))
     return;
   GstPad *pad = gst_element_get_static_pad (element, "sink");
-  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, on_report,
-      new TapsHandle (*static_cast<TapsHandle *> (taps)), delete_taps);
+  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, on_appsink_buffer,
+      new QueuesHandle (*static_cast<QueuesHandle *> (queues)), delete_data<QueuesHandle>);
   gst_object_unref (pad);
 }
 
-/* Comes before the streams leave the pipeline. */
-static void
+/* Before the streams leave the pipeline. */
+void
 on_target_state (GstRTSPMedia *media, GstState state, gpointer)
 {
   if (state == GST_STATE_NULL)
-    (*static_cast<TapsHandle *> (g_object_get_data (G_OBJECT (media), kTapsKey)))->end ();
+    (*static_cast<QueuesHandle *> (g_object_get_data (G_OBJECT (media), kQueuesKey)))->end ();
 }
+
+} // namespace
 
 void
 prepare_tcp_queues (GstRTSPMedia *media)
 {
-  auto taps = new TapsHandle (std::make_shared<Taps> ());
-  g_object_set_data_full (G_OBJECT (media), kTapsKey, taps, delete_taps);
-  GstElement *bin = gst_rtsp_media_get_element (media);
-  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (bin));
-  if (pipeline && gst_rtsp_media_n_streams (media) == 1) /* of several each has its own viewers */
-    g_signal_connect_data (
-        pipeline, "element-added", G_CALLBACK (on_element), new TapsHandle (*taps),
-        [] (gpointer own, GClosure *) { delete_taps (own); }, GConnectFlags (0));
+  auto queues = new QueuesHandle (std::make_shared<MediaQueues> ());
+  g_object_set_data_full (G_OBJECT (media), kQueuesKey, queues, delete_data<QueuesHandle>);
+  GstElement *pipeline = pipeline_of (media);
+  if (pipeline &&
+      gst_rtsp_media_n_streams (media) == 1) /* of several streams, each has its own viewers */
+    g_signal_connect_data (pipeline, "element-added", G_CALLBACK (on_element),
+        new QueuesHandle (*queues), delete_closure_data<QueuesHandle>, GConnectFlags (0));
   gst_clear_object (&pipeline);
-  gst_object_unref (bin);
   g_signal_connect (media, "target-state", G_CALLBACK (on_target_state), nullptr);
 }
 
-static const char kHandleKey[] = "rangecast-tcp-queue-handle"; /* of ours */
+namespace {
 
-/* A transport of ours in its place. The stream finds it by the address, too, when reports come. */
-static GstRTSPStreamTransport *
+const char kHandleKey[] = "rangecast-tcp-queue-handle"; /* object data of our transport */
+
+/* The transport that gets the packets instead, with the same address, by which the stream
+ * attributes RTCP. */
+GstRTSPStreamTransport *
 make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
 {
   const GstRTSPTransport *to = gst_rtsp_stream_transport_get_transport (transport);
@@ -468,38 +406,40 @@ make_transport (GstRTSPStreamTransport *transport, const Handle &queue)
   GstRTSPStreamTransport *ours =
       gst_rtsp_stream_transport_new (gst_rtsp_stream_transport_get_stream (transport), copy);
   gst_rtsp_stream_transport_set_callbacks (
-      ours, take_rtp, take_rtcp, new Handle (queue), delete_handle);
-  /* The library (1.22) frees what belongs to the other callbacks, but never what belongs to these.
+      ours, on_packets<GstBuffer>, on_packets<GstBuffer>, new Handle (queue), delete_data<Handle>);
+  /* gst-rtsp-server 1.22 never calls the destroy notify of list callbacks, hence the object data.
    */
   auto handle = new Handle (queue);
-  g_object_set_data_full (G_OBJECT (ours), kHandleKey, handle, delete_handle);
+  g_object_set_data_full (G_OBJECT (ours), kHandleKey, handle, delete_data<Handle>);
   gst_rtsp_stream_transport_set_list_callbacks (
-      ours, take_rtp_list, take_rtcp_list, handle, nullptr);
+      ours, on_packets<GstBufferList>, on_packets<GstBufferList>, handle, nullptr);
   gst_rtsp_stream_transport_set_keepalive (
       ours, [] (gpointer handle) { queue_of (handle).keep_alive (); }, new Handle (queue),
-      delete_handle);
+      delete_data<Handle>);
   return ours;
 }
 
-static void
-tap_transport (GstRTSPStreamTransport *transport, GstRTSPMedia *media, GMainContext *context,
+void
+replace_transport (GstRTSPStreamTransport *transport, GstRTSPMedia *media, GMainContext *context,
     std::atomic<guint64> &left_out, const std::shared_ptr<JoinGate> &gate)
 {
   GstRTSPStream *stream = gst_rtsp_stream_transport_get_stream (transport);
-  auto taps = static_cast<TapsHandle *> (g_object_get_data (G_OBJECT (media), kTapsKey));
+  auto queues = static_cast<QueuesHandle *> (g_object_get_data (G_OBJECT (media), kQueuesKey));
   auto queue = std::make_shared<TcpQueue> (transport, context, left_out, gate);
-  auto tap = new Tap{
-      queue, GST_RTSP_STREAM (g_object_ref (stream)), make_transport (transport, queue), *taps};
+  auto replacement = new Replacement{
+      queue, GST_RTSP_STREAM (g_object_ref (stream)), make_transport (transport, queue), *queues};
   gst_rtsp_stream_remove_transport (stream, transport);
-  if (!(*taps)->add (tap)) {
-    delete_tap (tap);
+  if (!(*queues)->add (replacement)) {
+    delete_replacement (replacement);
     return;
   }
   gst_rtsp_stream_transport_set_message_sent (
-      transport, [] (gpointer handle) { queue_of (handle).note_sent (); }, new Handle (queue),
-      delete_handle);
-  g_object_set_data_full (G_OBJECT (transport), kTapKey, tap, delete_tap);
+      transport, [] (gpointer handle) { queue_of (handle).handle_sent (); }, new Handle (queue),
+      delete_data<Handle>);
+  g_object_set_data_full (G_OBJECT (transport), kReplacementKey, replacement, delete_replacement);
 }
+
+} // namespace
 
 void
 queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out, bool holds_back)
@@ -510,10 +450,10 @@ queue_tcp_transports (GstRTSPSessionMedia *media, std::atomic<guint64> &left_out
   GstRTSPMedia *whole = gst_rtsp_session_media_get_media (media);
   for (const TransportRef &ref : transports_of (media, GST_RTSP_LOWER_TRANS_TCP)) {
     GstRTSPStreamTransport *transport = ref.get ();
-    if (!g_object_get_data (G_OBJECT (transport), kTapKey))
-      tap_transport (transport, whole, g_source_get_context (source), left_out,
+    if (!g_object_get_data (G_OBJECT (transport), kReplacementKey))
+      replace_transport (transport, whole, g_source_get_context (source), left_out,
           holds_back ? JoinGate::of (whole) : nullptr);
-    else /* each PLAY puts it in again */
+    else /* which PLAY has added again */
       gst_rtsp_stream_remove_transport (
           gst_rtsp_stream_transport_get_stream (transport), transport);
   }
@@ -523,22 +463,27 @@ bool
 has_tcp_queues (GstRTSPSessionMedia *media)
 {
   const auto has = [] (const TransportRef &ref) {
-    return g_object_get_data (G_OBJECT (ref.get ()), kTapKey) != nullptr;
+    return g_object_get_data (G_OBJECT (ref.get ()), kReplacementKey) != nullptr;
   };
   return std::ranges::any_of (transports_of (media, GST_RTSP_LOWER_TRANS_TCP), has);
 }
 
-static GstRTSPFilterResult
+namespace {
+
+GstRTSPFilterResult
 drop_media (GstRTSPSession *, GstRTSPSessionMedia *media, gpointer)
 {
   for (const TransportRef &ref : transports_of (media, GST_RTSP_LOWER_TRANS_TCP)) {
     GstRTSPStreamTransport *transport = ref.get ();
-    if (auto tap = static_cast<Tap *> (g_object_get_data (G_OBJECT (transport), kTapKey)))
-      tap->queue->close ();
-    g_object_set_data (G_OBJECT (transport), kTapKey, nullptr);
+    if (auto replacement =
+            static_cast<Replacement *> (g_object_get_data (G_OBJECT (transport), kReplacementKey)))
+      replacement->queue->close ();
+    g_object_set_data (G_OBJECT (transport), kReplacementKey, nullptr);
   }
   return GST_RTSP_FILTER_KEEP;
 }
+
+} // namespace
 
 void
 drop_tcp_transports (GstRTSPSession *session)

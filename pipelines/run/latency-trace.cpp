@@ -8,12 +8,14 @@
 #include <cinttypes>
 #include <cstdio>
 
+namespace {
+
 /* Capture time of the frame set that this thread had last: packets have none of their own, but the
  * thread that makes them has just had their frame set. */
-static thread_local GstClockTime last_capture = GST_CLOCK_TIME_NONE;
-static thread_local gint64 last_rtp_time = -1;
+thread_local GstClockTime last_capture = GST_CLOCK_TIME_NONE;
+thread_local gint64 last_rtp_time = -1;
 
-static gint64
+gint64
 thread_cpu_ns ()
 {
   timespec now{};
@@ -21,7 +23,7 @@ thread_cpu_ns ()
   return gint64 (now.tv_sec) * 1000000000 + now.tv_nsec;
 }
 
-static GstBuffer *
+GstBuffer *
 first_buffer (GstPadProbeInfo *info)
 {
   if (!(info->type & GST_PAD_PROBE_TYPE_BUFFER_LIST))
@@ -30,7 +32,7 @@ first_buffer (GstPadProbeInfo *info)
   return gst_buffer_list_length (list) > 0 ? gst_buffer_list_get (list, 0) : nullptr;
 }
 
-static bool
+bool
 carries_rtp (GstPad *pad)
 {
   GstCaps *caps = gst_pad_get_current_caps (pad);
@@ -39,6 +41,8 @@ carries_rtp (GstPad *pad)
   gst_clear_caps (&caps);
   return rtp;
 }
+
+} // namespace
 
 GstPadProbeReturn
 LatencyTrace::note (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)

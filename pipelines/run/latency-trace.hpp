@@ -23,8 +23,8 @@ public:
   LatencyTrace &operator= (const LatencyTrace &) = delete;
 
   /** A line a buffer: factory, element.pad, capture time of its frame set (or of the last one on
-   *  that thread; -1: none), RTP time (-1: none), when it passed, thread, CPU time of the thread;
-   * ns.
+   *  that thread; -1: none), RTP time (-1: none), when it passed, thread, CPU time of the
+   *  thread; ns.
    *  @return false if the file cannot be written. After the pipeline has stopped. */
   bool write (const char *path) const;
 

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <utility>
 
+namespace {
+
 /* ---- reading elements ---- */
 
-static guint64
+guint64
 stat_of (GstElement *element, const char *field)
 {
   GstStructure *stats = nullptr;
@@ -23,7 +25,7 @@ stat_of (GstElement *element, const char *field)
   return value;
 }
 
-static void
+void
 add_jitterbuffer (const GValue *item, gpointer user_data)
 {
   auto stats = static_cast<StreamStats *> (user_data);
@@ -36,7 +38,7 @@ add_jitterbuffer (const GValue *item, gpointer user_data)
   stats->rtp_lost += lost;
 }
 
-static void
+void
 read_cylinder (GstBin *bin, StreamStats &stats)
 {
   GstElement *cylinder = gst_bin_get_by_name (bin, "cylinder");
@@ -48,7 +50,7 @@ read_cylinder (GstBin *bin, StreamStats &stats)
   gst_object_unref (cylinder);
 }
 
-static void
+void
 read_decoder (GstBin *bin, StreamStats &stats)
 {
   GstElement *decoder = gst_bin_get_by_name (bin, "decoder");
@@ -67,6 +69,8 @@ read_decoder (GstBin *bin, StreamStats &stats)
   gst_object_unref (pad);
   gst_object_unref (decoder);
 }
+
+} // namespace
 
 StreamStats
 RunMeasure::stats ()
@@ -114,8 +118,8 @@ RunMeasure::whole_of (guint64 frames)
 
 /* ---- probes, on streaming threads ---- */
 
-/* Until all views see somebody (the hosts are still learning their backgrounds) nothing is drawn,
- * recorded or counted. A view that has nobody in it is not waited for for ever. */
+/* While camera hosts learn their backgrounds, not all views have points, and nothing is drawn,
+ * recorded or counted; for a limited time, since a view may see no person. */
 GstPadProbeReturn
 RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
@@ -146,7 +150,7 @@ RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 /* @param[out] frames  that have passed, with this one
  * @return false if there are enough already */
 bool
-RunMeasure::note_rendered (GstClockTime capture, gint &frames)
+RunMeasure::record_rendered (GstClockTime capture, gint &frames)
 {
   GstClock *clock = gst_element_get_clock (pipeline_);
   const GstClockTime now = clock ? gst_clock_get_time (clock) : gst_util_get_timestamp ();
@@ -192,7 +196,7 @@ RunMeasure::count_rendered (GstPad *pad, GstPadProbeInfo *info, gpointer user_da
 {
   auto self = static_cast<RunMeasure *> (user_data);
   gint frames = 0;
-  if (!self->note_rendered (
+  if (!self->record_rendered (
           gst_range_buffer_get_capture_time (GST_PAD_PROBE_INFO_BUFFER (info)), frames))
     return GST_PAD_PROBE_DROP;
   self->keep_if_whole (pad, GST_PAD_PROBE_INFO_BUFFER (info));

@@ -30,8 +30,7 @@ public:
   RunMeasure (const RunMeasure &) = delete;
   RunMeasure &operator= (const RunMeasure &) = delete;
 
-  /** Begins a file with a line a frame. @return false if it cannot be written, which has been said
-   */
+  /** Writes a line a frame to a file. @return false after reporting that it cannot be opened */
   bool log_frames (const char *path);
   /** Adds the probes; before the pipeline runs. */
   void start ();
@@ -51,7 +50,7 @@ private:
   static GstPadProbeReturn count_views (GstPad *, GstPadProbeInfo *info, gpointer self);
   static GstPadProbeReturn count_rendered (GstPad *, GstPadProbeInfo *info, gpointer self);
   void add_probe (const char *element_name, GstPadProbeCallback probe);
-  bool note_rendered (GstClockTime capture, gint &frames);
+  bool record_rendered (GstClockTime capture, gint &frames);
   void keep_if_whole (GstPad *pad, GstBuffer *picture);
 
   GstElement *pipeline_;

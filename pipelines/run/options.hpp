@@ -3,7 +3,7 @@
 
 #include <glib.h>
 
-/** What rangecast-run is told; --help says what each one is. */
+/** The command line of rangecast-run; --help describes the options. */
 struct RunOptions {
   gint64 base_time = -1; ///< ns, < 0: the pipeline's own
   gint frames = 0;
@@ -27,6 +27,6 @@ struct RunOptions {
   RunOptions &operator= (const RunOptions &) = delete;
 
   /** Reads the command line, and initialises GStreamer.
-   *  @return false if there is something wrong with it, which has been said */
+   *  @return false after reporting what is wrong */
   bool parse (int *argc, char ***argv);
 };

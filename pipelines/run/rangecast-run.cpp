@@ -14,10 +14,13 @@
 #include <memory>
 #include <string>
 
+#include "dump-graph.hpp"
 #include "latency-trace.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
+
+namespace {
 
 struct Runner {
   RunOptions options;
@@ -30,7 +33,7 @@ struct Runner {
   bool ending = false;
 };
 
-static gboolean
+gboolean
 send_eos (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
@@ -40,12 +43,13 @@ send_eos (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-static gboolean
+gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
   GError *error = nullptr;
   gchar *details = nullptr;
+  dump_graph (message, "rangecast-run");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       gst_message_parse_error (message, &error, &details);
@@ -81,9 +85,9 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-/* Where the pipeline does not start. Some elements fail without a message. */
-static void
-tell_failure (Runner &runner, GstBus *bus)
+/* The pipeline did not start. Some elements fail without a message. */
+void
+report_failure (Runner &runner, GstBus *bus)
 {
   runner.failed = true;
   if (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
@@ -94,7 +98,7 @@ tell_failure (Runner &runner, GstBus *bus)
   }
 }
 
-static gboolean
+gboolean
 on_timeout (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
@@ -104,8 +108,8 @@ on_timeout (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* What happens by time and by signals while the pipeline runs. */
-static void
+/* Timers and signals of the main loop. */
+void
 add_sources (Runner &runner)
 {
   g_unix_signal_add (SIGINT, send_eos, &runner);
@@ -126,7 +130,7 @@ add_sources (Runner &runner)
     g_timeout_add_seconds (5, memory, &runner);
 }
 
-static void
+void
 remove_empty (const char *path)
 {
   GStatBuf file;
@@ -134,8 +138,8 @@ remove_empty (const char *path)
     g_remove (path);
 }
 
-/* After the loop: what was asked for, from a pipeline that still has it, and its end. */
-static void
+/* Reads the results while the pipeline still has them, and stops it. */
+void
 finish (Runner &runner)
 {
   const RunOptions &options = runner.options;
@@ -152,7 +156,7 @@ finish (Runner &runner)
   }
 }
 
-static void
+void
 play (Runner &runner)
 {
   runner.loop = g_main_loop_new (nullptr, FALSE);
@@ -168,7 +172,7 @@ play (Runner &runner)
     runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
-    tell_failure (runner, bus);
+    report_failure (runner, bus);
   else
     g_main_loop_run (runner.loop);
   finish (runner);
@@ -177,8 +181,8 @@ play (Runner &runner)
   g_main_loop_unref (runner.loop);
 }
 
-/* @return false if there is something wrong with the address */
-static bool
+/* @return false after reporting a wrong address */
+bool
 open_stats (Runner &runner)
 {
   const char *address = runner.options.stats ? runner.options.stats : g_getenv ("RANGECAST_STATS");
@@ -192,8 +196,8 @@ open_stats (Runner &runner)
   return runner.stats != nullptr;
 }
 
-/* @return transfer full; null if the launch string is none, which has been said */
-static GstElement *
+/* @return transfer full; nullptr after reporting what is wrong with it */
+GstElement *
 parse_pipeline (gchar **launch)
 {
   GError *error = nullptr;
@@ -211,8 +215,8 @@ parse_pipeline (gchar **launch)
   return pipeline;
 }
 
-/* Gives the pipeline up. @return false if it failed, which has been said */
-static bool
+/* Releases the pipeline. @return false after reporting an error */
+bool
 run (Runner &runner)
 {
   const RunOptions &options = runner.options;
@@ -228,6 +232,8 @@ run (Runner &runner)
   gst_object_unref (runner.pipeline);
   return !runner.failed;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
-static double
+namespace {
+
+double
 cpu_seconds ()
 {
   rusage usage;
@@ -20,11 +22,13 @@ cpu_seconds ()
          1e-6 * (usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-static double
+double
 per_frame (guint64 total, guint64 frames)
 {
   return frames ? double (total) / double (frames) : 0;
 }
+
+} // namespace
 
 void
 print_progress (RunMeasure &measure)
@@ -69,11 +73,13 @@ write_report (RunMeasure &measure, const char *path)
   return false;
 }
 
+namespace {
+
 /* ---- the last picture ---- */
 
 /* One with all views, if there was one. @return transfer full; null if there is none, or it cannot
  * be converted */
-static GstSample *
+GstSample *
 last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GError **error)
 {
   GstSample *sample = measure.last_whole_picture ();
@@ -94,6 +100,8 @@ last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GErro
     g_printerr ("rangecast-run: %s: %s\n", path, (*error)->message);
   return converted;
 }
+
+} // namespace
 
 bool
 write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path)
@@ -127,7 +135,9 @@ log_memory (const char *path)
                                       << (heap.uordblks + heap.hblkhd) / 1024 << '\n';
 }
 
-static std::vector<std::string>
+namespace {
+
+std::vector<std::string>
 other_threads ()
 {
   std::vector<std::string> names;
@@ -141,6 +151,8 @@ other_threads ()
   }
   return names;
 }
+
+} // namespace
 
 bool
 write_threads_left (const char *path)

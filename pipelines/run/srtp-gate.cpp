@@ -28,7 +28,7 @@ struct Known {
   gint64 opened_us = 0;             /* when the last one did */
   guint64 use = 0;
 
-  /* Or somebody sends again what it sent: then it may come back. */
+  /* Or a replay of its packets: the sender may come back. */
   [[nodiscard]] bool began_anew () const { return index < peak; }
 };
 
@@ -39,10 +39,10 @@ struct Gate {
   }
   ~Gate () { gst_buffer_unref (key); }
 
-  GstElement *element; /* whose gate it is */
+  GstElement *element; /* the srtpdec behind it */
   GstBuffer *key;
   /* The two sinks may have threads of their own. srtpdec asks for keys with its object lock held,
-   * and takes that when it is asked to forget: never with `lock` held. */
+   * and takes that lock in clear-keys, which is never called with `lock` held. */
   std::mutex trial_lock;
   SrtpTrial trial; /* under trial_lock */
   std::mutex lock; /* guards what follows */
@@ -60,7 +60,7 @@ struct Before {
   guint roll_over = 0; /* probably */
 };
 
-/* Nothing if it is no packet of that kind. RFC 5761, 4: how RTP and RTCP are told apart. */
+/* Nothing for other packets. RFC 5761, 4 distinguishes RTP and RTCP. */
 std::optional<guint32>
 ssrc_of (GstBuffer *buffer, bool is_rtcp)
 {
@@ -98,10 +98,10 @@ find (Gate &gate, guint32 ssrc)
   return known == gate.known.end () ? nullptr : &*known;
 }
 
-/* The srtpdec gives no memory back but all at once: then it asks for the keys again. Of replays it
- * has forgotten, too, so nothing that is older than now may follow. */
+/* Only clear-keys frees memory of srtpdec, which then asks for all keys again. It also loses the
+ * replay windows, so packets before the largest index are dropped from now on. */
 void
-forget (Gate &gate, std::size_t kept)
+remove_idle (Gate &gate, std::size_t kept)
 {
   {
     const std::lock_guard guard (gate.lock);
@@ -155,7 +155,7 @@ welcome (Gate &gate, guint32 ssrc, std::optional<gint64> index, bool may_be_old)
     many = !known && gate.known.size () >= kMaxKnown;
   }
   if (again || many)
-    forget (gate, many ? kKept : kMaxKnown);
+    remove_idle (gate, many ? kKept : kMaxKnown);
   const std::lock_guard guard (gate.lock);
   Known *known = find (gate, ssrc);
   if (!known)

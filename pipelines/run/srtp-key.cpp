@@ -9,7 +9,7 @@
 namespace {
 
 constexpr std::size_t kKeyBytes = 30;       /* of AES-128 in counter mode, RFC 3711 */
-constexpr guint kClosedPackets = 20;        /* in a row, before somebody is told, ... */
+constexpr guint kClosedPackets = 20;        /* in a row, before it is reported, ... */
 constexpr gint64 kClosedTimeUs = 3'000'000; /* ... and for so long: a flood is no wrong key */
 
 /** What goes into a srtpdec and comes out of it; its streaming threads count. */
@@ -17,7 +17,7 @@ struct Watched {
   std::string name, path;
   std::atomic<guint> closed = 0;           /* packets in a row that did not open */
   std::atomic<gint64> closed_since_us = 0; /* when the first of them came */
-  bool told = false;                       /* one streaming thread per pad, and one pad counts in */
+  bool reported = false;                   /* one streaming thread per pad, and one pad counts in */
 };
 
 GstBuffer *
@@ -52,8 +52,8 @@ on_packet_in (GstPad *, GstPadProbeInfo *, gpointer user_data)
   if (watched->closed++ == 0)
     watched->closed_since_us = now_us;
   if (watched->closed >= kClosedPackets && now_us - watched->closed_since_us >= kClosedTimeUs &&
-      !watched->told) {
-    watched->told = true;
+      !watched->reported) {
+    watched->reported = true;
     g_printerr (
         "WARNING: %s: packets do not open with the key in %s: the sender has another key, or "
         "does not encrypt\n",
@@ -67,7 +67,7 @@ on_packet_out (GstPad *, GstPadProbeInfo *, gpointer user_data)
 {
   auto watched = static_cast<Watched *> (user_data);
   watched->closed = 0;
-  watched->told = false;
+  watched->reported = false;
   return GST_PAD_PROBE_OK;
 }
 

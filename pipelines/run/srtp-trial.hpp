@@ -71,6 +71,6 @@ private:
   guint roll_over_ = 0; /* of the try that is being done */
   bool opened_ = false;
   SrtpTries first_tries_, more_tries_;
-  guint32 scatter_; /* an odd number that nobody knows: who has which place */
+  guint32 scatter_; /* an odd random number, so that senders cannot choose places */
   std::array<Seeker, 1024> seekers_;
 };

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstring>
 
+namespace {
+
 /* ---- JSON ---- */
 
-static void
+void
 append_string (std::string &json, const char *text)
 {
   json += '"';
@@ -23,14 +25,14 @@ append_string (std::string &json, const char *text)
   json += '"';
 }
 
-static void
+void
 append_number (std::string &json, double number)
 {
   char text[G_ASCII_DTOSTR_BUF_SIZE];
   json += std::isfinite (number) ? g_ascii_formatd (text, sizeof text, "%.3f", number) : "null";
 }
 
-static void
+void
 append_value (std::string &json, const GValue *value)
 {
   if (G_VALUE_HOLDS_STRING (value))
@@ -58,7 +60,7 @@ append_value (std::string &json, const GValue *value)
     json += "null";
 }
 
-static gboolean
+gboolean
 append_field (GQuark field, const GValue *value, gpointer json)
 {
   auto &line = *static_cast<std::string *> (json);
@@ -68,6 +70,8 @@ append_field (GQuark field, const GValue *value, gpointer json)
   append_value (line, value);
   return TRUE;
 }
+
+} // namespace
 
 /* ---- the address ---- */
 
@@ -144,5 +148,5 @@ StatsSender::take (GstMessage *message)
                            ? sendto (fd_, line.data (), line.size (), MSG_DONTWAIT | MSG_NOSIGNAL,
                                  reinterpret_cast<const sockaddr *> (&to_), to_size_)
                            : write (fd_, line.data (), line.size ());
-  (void)sent; /* nobody listens yet, or no more */
+  (void)sent; /* there may be no receiver */
 }

@@ -7,13 +7,19 @@
 #include <cstdio>
 #include <cstdlib>
 
-static constexpr int kWrongUsage = 2;
+namespace {
+
+constexpr int kWrongUsage = 2;
+
+} // namespace
 
 bool
 FakeCameraOptions::serves (const std::string &name) const
 {
   return only.empty () || ("," + only + ",").find ("," + name + ",") != only.npos;
 }
+
+namespace {
 
 /* As they stand on the command line. */
 struct RawOptions {
@@ -29,14 +35,14 @@ struct RawOptions {
   }
 };
 
-static bool
+bool
 bad (const char *option, const char *expected, const std::string &got)
 {
   g_printerr ("fake-cameras: %s: expected %s, got '%s'\n", option, expected, got.c_str ());
   return false;
 }
 
-static bool
+bool
 parse (int *argc, char ***argv, RawOptions &raw)
 {
   const GOptionEntry entries[] = {
@@ -78,8 +84,8 @@ parse (int *argc, char ***argv, RawOptions &raw)
   return good;
 }
 
-static bool
-take_numbers (const RawOptions &raw, FakeCameraOptions &options)
+bool
+parse_numbers (const RawOptions &raw, FakeCameraOptions &options)
 {
   if (raw.views < 1 || raw.views > 64)
     return bad ("--views", "1 to 64", std::to_string (raw.views));
@@ -104,8 +110,8 @@ take_numbers (const RawOptions &raw, FakeCameraOptions &options)
   return true;
 }
 
-static bool
-take_texts (const RawOptions &raw, FakeCameraOptions &options)
+bool
+parse_texts (const RawOptions &raw, FakeCameraOptions &options)
 {
   char more = 0;
   if (raw.size && (std::sscanf (raw.size, "%5dx%5d%c", &options.scene.width, &options.scene.height,
@@ -131,6 +137,8 @@ take_texts (const RawOptions &raw, FakeCameraOptions &options)
   return true;
 }
 
+} // namespace
+
 int
 read_fake_camera_options (int argc, char **argv, FakeCameraOptions &options)
 {
@@ -141,5 +149,5 @@ read_fake_camera_options (int argc, char **argv, FakeCameraOptions &options)
     g_printerr ("fake-cameras: unknown argument '%s'\n", argv[1]);
     return kWrongUsage;
   }
-  return take_numbers (raw, options) && take_texts (raw, options) ? -1 : kWrongUsage;
+  return parse_numbers (raw, options) && parse_texts (raw, options) ? -1 : kWrongUsage;
 }

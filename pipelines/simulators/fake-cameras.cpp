@@ -21,6 +21,8 @@
 #include "gige-listener.hpp"
 #include "scene-pictures.hpp"
 
+namespace {
+
 using rangecast::SceneCamera;
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -31,7 +33,7 @@ struct ViewCameras {
   std::vector<GigeCamera *> wired; /* fired by the left camera's output line */
 };
 
-/* When each picture was taken, for whoever judges how well cameras agree. Any thread. */
+/* When each picture was taken, to measure how well cameras agree. Any thread. */
 class ExposureLog {
 public:
   Status open (const std::string &path)
@@ -76,20 +78,20 @@ private:
   std::unique_ptr<GigeListener> listener_;
 };
 
-static const char *
+const char *
 side_name (SceneCamera camera)
 {
   return camera == SceneCamera::kLeft ? "left" : camera == SceneCamera::kRight ? "right" : "third";
 }
 
-static std::string
+std::string
 serial_of (int view, SceneCamera camera)
 {
   return "view" + std::to_string (view) + "-" + side_name (camera);
 }
 
 /* The address of the rig's nth camera, whether or not it is served here. */
-static std::string
+std::string
 address_of (const FakeCameraOptions &options, int view, SceneCamera camera)
 {
   const int per_view = options.third ? 3 : 2;
@@ -205,12 +207,14 @@ FakeRig::print () const
   g_print ("ready\n");
 }
 
-static gboolean
+gboolean
 quit (gpointer loop)
 {
   g_main_loop_quit (static_cast<GMainLoop *> (loop));
   return G_SOURCE_CONTINUE;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

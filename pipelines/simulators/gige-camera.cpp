@@ -16,13 +16,16 @@
 
 #include "gige-description.hpp"
 
+namespace {
+
 using rangecast::Status;
 using rangecast::StatusCode;
 
-static constexpr std::int64_t kSecond = 1000000000;
-static constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
-static constexpr std::uint64_t kLatestAction = std::uint64_t (1)
-                                               << 62; /* ns; so sums stay numbers */
+constexpr std::int64_t kSecond = 1000000000;
+constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
+constexpr std::uint64_t kLatestAction = std::uint64_t (1) << 62; /* ns; so sums stay numbers */
+
+} // namespace
 
 struct GigeCamera::Frame {
   GvspPicture picture;
@@ -35,7 +38,9 @@ struct GigeCamera::Frame {
   }
 };
 
-static std::int64_t
+namespace {
+
+std::int64_t
 now ()
 {
   timespec time;
@@ -45,14 +50,14 @@ now ()
 
 /* A camera's hardware answers at once, whatever else this machine does. Where the user may not have
  * that (RLIMIT_RTPRIO), the thread is one as any other. */
-static void
+void
 set_at_once (bool at_once)
 {
   const sched_param priority = {at_once ? 10 : 0};
   pthread_setschedparam (pthread_self (), at_once ? SCHED_RR : SCHED_OTHER, &priority);
 }
 
-static sockaddr_in
+sockaddr_in
 make_address (const std::string &address, std::uint16_t port)
 {
   sockaddr_in result{};
@@ -62,11 +67,13 @@ make_address (const std::string &address, std::uint16_t port)
   return result;
 }
 
-static bool
+bool
 is_same (const sockaddr_in &a, const sockaddr_in &b)
 {
   return a.sin_port == b.sin_port && a.sin_addr.s_addr == b.sin_addr.s_addr;
 }
+
+} // namespace
 
 /* ---- life ---- */
 
@@ -89,7 +96,9 @@ GigeCamera::~GigeCamera ()
   g_clear_object (&registers_);
 }
 
-static int
+namespace {
+
+int
 bound_socket (const std::string &address, std::uint16_t port)
 {
   const int fd = socket (AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -102,6 +111,8 @@ bound_socket (const std::string &address, std::uint16_t port)
   }
   return fd;
 }
+
+} // namespace
 
 Status
 GigeCamera::open_sockets ()
@@ -387,7 +398,7 @@ GigeCamera::handle (const GvcpCommand &command, const sockaddr_in &from)
     case Gvcp::kPacketResend:
       return send_again (command);
     case Gvcp::kAction:
-      return take_action (command, from);
+      return handle_action (command, from);
     default:
       return refuse (command, from, GvcpStatus::kNotImplemented);
   }
@@ -402,7 +413,7 @@ GigeCamera::answer_discovery (const GvcpCommand &command, const sockaddr_in &fro
 }
 
 void
-GigeCamera::take_action (const GvcpCommand &command, const sockaddr_in &from)
+GigeCamera::handle_action (const GvcpCommand &command, const sockaddr_in &from)
 {
   ActionCommand action;
   if (!parse_action (command, action) || action.time_ns > kLatestAction)
@@ -464,7 +475,7 @@ GigeCamera::check_heartbeat (std::int64_t now_ns)
 }
 
 void
-GigeCamera::take_wake_ups (std::int64_t now_ns)
+GigeCamera::drain_wake_ups (std::int64_t now_ns)
 {
   bool due = false;
   {
@@ -516,7 +527,7 @@ GigeCamera::run ()
     if (ready > 0 && (fds[1].revents & POLLIN))
       eventfd_read (wake_, &ignored);
     time = now ();
-    take_wake_ups (time);
+    drain_wake_ups (time);
     if (acquiring_ && next_frame_ns_ != 0 && next_frame_ns_ <= time) {
       const std::int64_t due = next_frame_ns_, period = frame_period_ns ();
       next_frame_ns_ = (time / period + 1) * period;

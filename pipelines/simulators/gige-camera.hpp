@@ -63,7 +63,7 @@ public:
   void answer_discovery (const GvcpCommand &command, const sockaddr_in &from);
   /** An action command that came by broadcast. @return whether the camera obeys, and acknowledges
    */
-  void take_action (const GvcpCommand &command, const sockaddr_in &from);
+  void handle_action (const GvcpCommand &command, const sockaddr_in &from);
   /** The signal on the input line. */
   void line_rises ();
   /** As the camera's own regulators do: sets a register, whoever has control. Soon after. */
@@ -82,7 +82,7 @@ private:
   void run ();
   [[nodiscard]] std::int64_t next_wake (std::int64_t now_ns);
   void receive ();
-  void take_wake_ups (std::int64_t now_ns);
+  void drain_wake_ups (std::int64_t now_ns);
   void check_heartbeat (std::int64_t now_ns);
 
   void handle (const GvcpCommand &command, const sockaddr_in &from);

@@ -6,7 +6,9 @@
 
 #include "gige-packets.hpp"
 
-static std::string
+namespace {
+
+std::string
 hex (std::uint32_t value)
 {
   gchar text[16];
@@ -14,7 +16,7 @@ hex (std::uint32_t value)
   return text;
 }
 
-static std::string
+std::string
 register_node (const std::string &name, std::uint32_t address)
 {
   return "<IntReg Name=\"" + name + "\" NameSpace=\"Custom\"><Address>" + hex (address) +
@@ -23,7 +25,7 @@ register_node (const std::string &name, std::uint32_t address)
 }
 
 /* Bit 0 is the highest one. */
-static std::string
+std::string
 bit_node (const std::string &name, std::uint32_t address, int bit)
 {
   return "<MaskedIntReg Name=\"" + name + "\" NameSpace=\"Custom\"><Address>" + hex (address) +
@@ -32,7 +34,7 @@ bit_node (const std::string &name, std::uint32_t address, int bit)
          "</Bit><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></MaskedIntReg>\n";
 }
 
-static std::string
+std::string
 integer_node (const std::string &name, std::uint32_t address)
 {
   return "<Integer Name=\"" + name + "\" NameSpace=\"Standard\"><pValue>" + name +
@@ -40,14 +42,14 @@ integer_node (const std::string &name, std::uint32_t address)
          register_node (name + "Register", address);
 }
 
-static std::string
+std::string
 entry (const std::string &name, std::uint32_t value)
 {
   return "<EnumEntry Name=\"" + name + "\" NameSpace=\"Standard\"><Value>" +
          std::to_string (value) + "</Value></EnumEntry>\n";
 }
 
-static std::string
+std::string
 enumeration_node (const std::string &name, std::uint32_t address, const std::string &entries)
 {
   return "<Enumeration Name=\"" + name + "\" NameSpace=\"Standard\">" + entries + "<pValue>" +
@@ -55,7 +57,7 @@ enumeration_node (const std::string &name, std::uint32_t address, const std::str
 }
 
 /* The output line is wired and on, whatever these say. */
-static std::string
+std::string
 line_features ()
 {
   return enumeration_node ("LineSelector", 0x410, entry ("Line1", 1) + entry ("Line2", 2)) +
@@ -63,7 +65,7 @@ line_features ()
          enumeration_node ("LineSource", 0x418, entry ("Off", 0) + entry ("ExposureActive", 1));
 }
 
-static std::string
+std::string
 balance_features ()
 {
   return enumeration_node ("BalanceRatioSelector", kRegisterBalanceSelector,
@@ -78,7 +80,7 @@ balance_features ()
 }
 
 /* They can be set and read; the pictures stay the same. */
-static std::string
+std::string
 look_features ()
 {
   const std::string modes = entry ("Off", 0) + entry ("Once", 1) + entry ("Continuous", 2);
@@ -86,7 +88,7 @@ look_features ()
          enumeration_node ("BalanceWhiteAuto", 0x424, modes) + balance_features ();
 }
 
-static std::string
+std::string
 more_features ()
 {
   return line_features () + look_features () +
@@ -109,7 +111,7 @@ more_features ()
 }
 
 /* Puts text before the first `mark` behind `from`. */
-static void
+void
 insert (std::string &xml, const std::string &from, const std::string &mark, const std::string &text)
 {
   const std::size_t at = xml.find (from);
@@ -118,7 +120,7 @@ insert (std::string &xml, const std::string &from, const std::string &mark, cons
     xml.insert (before, text);
 }
 
-static std::string
+std::string
 description ()
 {
   ArvFakeCamera *plain = arv_fake_camera_new ("plain");
@@ -136,6 +138,8 @@ description ()
       xml, "<Category Name=\"TransportLayerControl\"", "<Port Name=\"Device\"", more_features ());
   return xml;
 }
+
+} // namespace
 
 ArvFakeCamera *
 make_fake_camera (const std::string &serial)

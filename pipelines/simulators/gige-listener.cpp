@@ -28,8 +28,10 @@ GigeListener::~GigeListener ()
     close (wake_);
 }
 
+namespace {
+
 /* The loopback network has no broadcast flag, but Linux delivers to its broadcast address. */
-static std::set<std::string>
+std::set<std::string>
 broadcast_addresses ()
 {
   std::set<std::string> found = {"255.255.255.255", "127.255.255.255"};
@@ -48,6 +50,8 @@ broadcast_addresses ()
   freeifaddrs (all);
   return found;
 }
+
+} // namespace
 
 void
 GigeListener::add_socket (const char *address)
@@ -89,7 +93,7 @@ GigeListener::receive (int socket)
     if (Gvcp (command.command) == Gvcp::kDiscovery)
       camera->answer_discovery (command, from);
     else if (Gvcp (command.command) == Gvcp::kAction)
-      camera->take_action (command, from);
+      camera->handle_action (command, from);
   }
 }
 

@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "gige-packets.hpp"
 
-static constexpr std::uint8_t kGvcpMagic = 0x42;
-static constexpr std::size_t kGvcpHeaderBytes = 8;
-static constexpr std::uint8_t kLeader = 1, kTrailer = 2, kData = 3;
-static constexpr std::uint16_t kImage = 1;
+namespace {
+
+constexpr std::uint8_t kGvcpMagic = 0x42;
+constexpr std::size_t kGvcpHeaderBytes = 8;
+constexpr std::uint8_t kLeader = 1, kTrailer = 2, kData = 3;
+constexpr std::uint16_t kImage = 1;
+
+} // namespace
 
 std::uint16_t
 read_u16 (const std::uint8_t *bytes)
@@ -91,13 +95,17 @@ gvcp_ack (const GvcpCommand &command, GvcpStatus status, std::size_t data_bytes)
   return writer;
 }
 
-static PacketWriter
+namespace {
+
+PacketWriter
 gvsp_header (std::uint16_t block_id, std::uint8_t format, std::uint32_t packet_id)
 {
   PacketWriter writer;
   writer.u16 (0).u16 (block_id).u32 (std::uint32_t (format) << 24 | (packet_id & 0xffffff));
   return writer;
 }
+
+} // namespace
 
 std::vector<std::uint8_t>
 gvsp_leader (const GvspPicture &picture)

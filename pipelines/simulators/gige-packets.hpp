@@ -63,7 +63,7 @@ struct GvcpCommand {
 /** @return false if that is no GVCP command */
 bool parse_gvcp (std::span<const std::uint8_t> packet, GvcpCommand &command);
 
-/** What a camera compares an ACTION_CMD with, or is told by it. */
+/** The fields of an ACTION_CMD, or those that a camera compares it with. */
 struct ActionCommand {
   std::uint32_t device_key = 0, group_key = 0, group_mask = 0;
   std::uint64_t time_ns = 0; ///< of the camera's clock; 0: at once

@@ -139,12 +139,16 @@ const char *const kFaultOptions =
     "limit)\n"
     "  --seed N           of all chances (default 1)\n";
 
-static bool
+namespace {
+
+bool
 read_real (const std::string &text, double &value)
 {
   const auto [end, error] = std::from_chars (text.data (), text.data () + text.size (), value);
   return error == std::errc{} && end == text.data () + text.size ();
 }
+
+} // namespace
 
 bool
 read_fault_option (const std::string &name, const std::string &value, FaultSettings &settings,

@@ -3,9 +3,13 @@
 
 #include <algorithm>
 
+namespace {
+
 using rangecast::ImageView;
 using rangecast::Rgbx;
 using rangecast::Status;
+
+} // namespace
 
 int
 bytes_per_pixel (std::uint32_t format)
@@ -61,10 +65,12 @@ EmptyPhase::at (std::int64_t moment_ns)
   return moment_ns < first_ns_ + length_ns_;
 }
 
+namespace {
+
 /* ---- pixels ---- */
 
 /* Even columns of even rows, odd columns of even rows, and the same of odd rows. */
-static void
+void
 paint_bayer (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
 {
   static constexpr std::uint8_t Rgbx::*kTiles[4][4] = {
@@ -82,7 +88,7 @@ paint_bayer (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
   }
 }
 
-static void
+void
 paint_mono16 (ImageView<const Rgbx> in, std::uint8_t *out)
 {
   const std::size_t pixels = std::size_t (in.width) * in.height;
@@ -93,7 +99,7 @@ paint_mono16 (ImageView<const Rgbx> in, std::uint8_t *out)
   }
 }
 
-static void
+void
 paint_pixels (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
 {
   if (format == kRgb8)
@@ -106,6 +112,8 @@ paint_pixels (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
   else
     paint_bayer (in, format, out);
 }
+
+} // namespace
 
 ScenePictures::ScenePictures (std::shared_ptr<rangecast::Scene> scene, int view_id,
     rangecast::SceneCamera camera, std::int64_t period_ns, int loop)

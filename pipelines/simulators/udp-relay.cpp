@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A bad network on good machines: passes UDP packets on and does to them what it is told. */
+/* A bad network on good machines: relays UDP packets with losses, delays and other faults. */
 #include "network-faults.hpp"
 
 #include <arpa/inet.h>

@@ -9,16 +9,18 @@
 
 #include "viewer.hpp"
 
-static constexpr GstClockTime kSkip = 5 * GST_SECOND;
+namespace {
+
+constexpr GstClockTime kSkip = 5 * GST_SECOND;
 
 /* ---- views ---- */
 
 /* The view-ids of the rig, in their order. */
-static std::vector<guint>
+std::vector<guint>
 view_ids (Viewer &viewer)
 {
   std::vector<guint> ids;
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   if (!sample)
     return ids;
   GstRangeCamera camera;
@@ -30,7 +32,7 @@ view_ids (Viewer &viewer)
 }
 
 /* Switches the rig's view of that number on or off; 0: all on. @return what to say of it */
-static std::string
+std::string
 switch_view (Viewer &viewer, guint number)
 {
   guint64 mask = G_MAXUINT64, all = 0;
@@ -56,10 +58,10 @@ switch_view (Viewer &viewer, guint number)
 
 /* ---- keys ---- */
 
-static GstClockTime
+GstClockTime
 frame_duration (Viewer &viewer)
 {
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   gint n = 0, d = 1;
   if (sample) {
     gst_structure_get_fraction (
@@ -69,7 +71,7 @@ frame_duration (Viewer &viewer)
   return n > 0 ? gst_util_uint64_scale_int (GST_SECOND, d, n) : GST_CLOCK_TIME_NONE;
 }
 
-static void
+void
 skip (Viewer &viewer, bool forward)
 {
   const GstClockTime at = viewer.playback->position ();
@@ -78,14 +80,14 @@ skip (Viewer &viewer, bool forward)
   viewer.overlay->show_bar ();
 }
 
-static void
+void
 step (Viewer &viewer, bool forward)
 {
   viewer.playback->step (forward, frame_duration (viewer));
   viewer.overlay->show_bar ();
 }
 
-static void
+void
 pause (Viewer &viewer)
 {
   viewer.playback->toggle_pause ();
@@ -93,7 +95,7 @@ pause (Viewer &viewer)
 }
 
 template <guint number>
-static void
+void
 view_key (Viewer &viewer)
 {
   viewer.overlay->say (switch_view (viewer, number));
@@ -106,7 +108,7 @@ struct Key {
   bool of_file;     /* of streams, striprender has it */
   KeyAction act;
 };
-static const Key kKeys[] = {
+const Key kKeys[] = {
     {"h", false, [] (Viewer &v) { v.overlay->toggle_help (); }},
     {"s", false, write_picture},
     {"p", false, write_points},
@@ -129,6 +131,8 @@ static const Key kKeys[] = {
     {"9", false, view_key<9>},
 };
 
+} // namespace
+
 std::vector<TextRow>
 key_rows (bool is_file)
 {
@@ -150,12 +154,14 @@ key_rows (bool is_file)
   return rows;
 }
 
+namespace {
+
 struct KeyPress {
   Viewer *viewer;
   KeyAction act;
 };
 
-static gboolean
+gboolean
 act_on_key (gpointer user_data)
 {
   auto press = static_cast<KeyPress *> (user_data);
@@ -166,7 +172,7 @@ act_on_key (gpointer user_data)
 }
 
 /* @return whether the key is ours */
-static bool
+bool
 handle_key (Viewer &viewer, GstEvent *event, bool pressed)
 {
   const gchar *name = nullptr;
@@ -185,11 +191,11 @@ handle_key (Viewer &viewer, GstEvent *event, bool pressed)
 
 /* ---- the time bar ---- */
 
-static gboolean
+gboolean
 act_on_mouse (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
-  if (const auto drag = viewer.overlay->take_drag ())
+  if (const auto drag = viewer.overlay->next_drag ())
     viewer.playback->seek (drag->position, drag->released);
   else if (viewer.overlay->is_stale ())
     viewer.playback->redraw_if_paused ();
@@ -197,7 +203,7 @@ act_on_mouse (gpointer user_data)
 }
 
 /* @return whether the time bar has the event */
-static bool
+bool
 handle_mouse (Viewer &viewer, GstEvent *event)
 {
   gint button = 0;
@@ -224,7 +230,7 @@ handle_mouse (Viewer &viewer, GstEvent *event)
 }
 
 /* @return whether the event is for the viewer */
-static bool
+bool
 handle_event (Viewer &viewer, GstEvent *event)
 {
   const GstNavigationEventType type = gst_navigation_event_get_type (event);
@@ -233,7 +239,7 @@ handle_event (Viewer &viewer, GstEvent *event)
   return handle_mouse (viewer, event);
 }
 
-static GstPadProbeReturn
+GstPadProbeReturn
 on_event (GstPad *, GstPadProbeInfo *info, gpointer user_data)
 {
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
@@ -243,6 +249,8 @@ on_event (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   gst_event_unref (event);
   return GST_PAD_PROBE_HANDLED;
 }
+
+} // namespace
 
 void
 handle_missed_event (Viewer &viewer, GstMessage *message)

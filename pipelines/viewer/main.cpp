@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Shows a recording or a stream of frame sets in a window. The mouse turns, moves and zooms (that
- * is striprender's doing: glimagesink sends it what the mouse and keys do); the viewer adds keys, a
- * time bar and files. Everything goes through public elements, so it can be copied into an
- * application.
+/* Shows a recording or a stream of frame sets in a window. striprender handles the mouse, through
+ * navigation events of glimagesink; the viewer adds keys, a time bar and files. It uses public
+ * elements only, so that applications can copy it.
  *
- * Threads: the mouse and keys come in glimagesink's, frame sets and pictures in streaming threads;
- * all of them only leave word, and the main loop acts. */
+ * Threads: mouse and key events come from glimagesink's thread, frame sets and pictures from
+ * streaming threads; all of them record what happened, and the main loop acts. */
 #include <glib-unix.h>
 
 #include <algorithm>
 #include <clocale>
 
+#include "dump-graph.hpp"
 #include "viewer.hpp"
 
 void
@@ -21,16 +21,18 @@ fail (Viewer &viewer, const std::string &text)
   g_main_loop_quit (viewer.loop);
 }
 
-/* That its window was closed glimagesink tells with its next picture only. */
-static gboolean
-look_for_window (gpointer user_data)
+namespace {
+
+/* glimagesink reports a closed window only when it draws. */
+gboolean
+poll_window (gpointer user_data)
 {
   static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
   return G_SOURCE_CONTINUE;
 }
 
-/* What fades or goes away also does so while there are no new pictures. */
-static gboolean
+/* Overlays fade while the picture stands still, too. */
+gboolean
 update_overlay (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -39,8 +41,8 @@ update_overlay (gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-/* Recordings are short: at its end a file begins again. */
-static void
+/* Recordings are short: a file is played again from its beginning. */
+void
 finish (Viewer &viewer)
 {
   if (!viewer.is_file || viewer.options.once)
@@ -49,8 +51,8 @@ finish (Viewer &viewer)
     fail (viewer, "the file cannot be played again: it has no times to go back to");
 }
 
-static gboolean
-say_that_nothing_comes (gpointer user_data)
+gboolean
+warn_no_frame_sets (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   if (!viewer.seen_frames)
@@ -60,9 +62,8 @@ say_that_nothing_comes (gpointer user_data)
 
 /* ---- the run ---- */
 
-/* The last line of what an element says to those who debug it: often the only one that names names.
- */
-static std::string
+/* Of an error's debug text: often the only line that names the cause. */
+std::string
 last_line (const gchar *text)
 {
   std::string all = text ? text : "";
@@ -70,16 +71,15 @@ last_line (const gchar *text)
   return all.substr (all.rfind ('\n') + 1);
 }
 
-/* What is not a file of ours either has no type that GStreamer knows, or one that does not lead to
- * range frame sets. */
-static bool
+/* A foreign file has no type that GStreamer knows, or one that does not decode to frame sets. */
+bool
 is_wrong_type (const GError *error)
 {
   return g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_TYPE_NOT_FOUND) ||
          g_error_matches (error, GST_CORE_ERROR, GST_CORE_ERROR_MISSING_PLUGIN);
 }
 
-static void
+void
 on_error (Viewer &viewer, GstMessage *message)
 {
   GError *error = nullptr;
@@ -92,7 +92,7 @@ on_error (Viewer &viewer, GstMessage *message)
   if (is_sink && g_error_matches (error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND) &&
       viewer.seen_frames) /* its window was closed */
     g_main_loop_quit (viewer.loop);
-  else if (viewer.failed) /* the first error is the one that tells */
+  else if (viewer.failed) /* the first error names the cause */
     ;
   else if (viewer.options.inputs && is_wrong_type (error))
     refuse_input (&viewer);
@@ -103,10 +103,11 @@ on_error (Viewer &viewer, GstMessage *message)
   g_error_free (error);
 }
 
-static gboolean
+gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
+  dump_graph (message, "rangecast-viewer");
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       on_error (viewer, message);
@@ -130,22 +131,22 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   return G_SOURCE_CONTINUE;
 }
 
-static gboolean
+gboolean
 on_signal (gpointer user_data)
 {
   g_main_loop_quit (static_cast<Viewer *> (user_data)->loop);
   return G_SOURCE_CONTINUE;
 }
 
-static void
+void
 show (Viewer &viewer)
 {
   GstBus *bus = gst_element_get_bus (viewer.pipeline);
   gst_bus_add_watch (bus, on_message, &viewer);
   g_unix_signal_add (SIGINT, on_signal, &viewer);
   g_unix_signal_add (SIGTERM, on_signal, &viewer);
-  g_timeout_add_seconds (5, say_that_nothing_comes, &viewer);
-  g_timeout_add (500, look_for_window, &viewer);
+  g_timeout_add_seconds (5, warn_no_frame_sets, &viewer);
+  g_timeout_add (500, poll_window, &viewer);
   g_timeout_add (100, update_overlay, &viewer);
   gst_element_set_state (viewer.pipeline, GST_STATE_PLAYING); /* errors are on the bus */
   g_main_loop_run (viewer.loop);
@@ -154,7 +155,7 @@ show (Viewer &viewer)
   gst_object_unref (bus);
 }
 
-static void
+void
 clear (Viewer &viewer)
 {
   gst_clear_object (&viewer.pipeline);
@@ -165,7 +166,7 @@ clear (Viewer &viewer)
 }
 
 /* The keys of a file, for --help. */
-static std::string
+std::string
 keys_text ()
 {
   std::string text = "Keys:\n";
@@ -175,6 +176,8 @@ keys_text ()
             row.text + "\n";
   return text;
 }
+
+} // namespace
 
 int
 main (int argc, char **argv)

@@ -6,14 +6,16 @@
 #include <cstdio>
 #include <string>
 
-static bool
+namespace {
+
+bool
 bad_option (const char *option, const char *expected, const char *got)
 {
   g_printerr ("rangecast-viewer: %s: expected %s, got '%s'\n", option, expected, got);
   return false;
 }
 
-static bool
+bool
 check_numbers (const ViewerOptions &options)
 {
   if (options.listen < 0 || options.listen > 65535)
@@ -27,7 +29,7 @@ check_numbers (const ViewerOptions &options)
   return true;
 }
 
-static bool
+bool
 check_size (ViewerOptions &options)
 {
   char more = 0;
@@ -39,7 +41,7 @@ check_size (ViewerOptions &options)
   return true;
 }
 
-static bool
+bool
 check_background (ViewerOptions &options)
 {
   if (!options.background)
@@ -54,7 +56,7 @@ check_background (ViewerOptions &options)
   return true;
 }
 
-static bool
+bool
 check_mode (const ViewerOptions &options)
 {
   const std::string mode = options.mode ? options.mode : "blend";
@@ -63,7 +65,7 @@ check_mode (const ViewerOptions &options)
   return true;
 }
 
-static bool
+bool
 check_out (const ViewerOptions &options)
 {
   if (options.out && !g_file_test (options.out, G_FILE_TEST_IS_DIR))
@@ -71,7 +73,9 @@ check_out (const ViewerOptions &options)
   return true;
 }
 
-/* Not left to glimagesink: with OpenGL that needs no display it would draw where nobody sees it. */
+} // namespace
+
+/* glimagesink itself would draw off-screen where OpenGL needs no display. */
 bool
 check_display ()
 {

@@ -5,9 +5,13 @@
 #include <cstdio>
 #include <utility>
 
-static constexpr gint64 kHintTime = 5 * G_USEC_PER_SEC, kHintFade = G_USEC_PER_SEC;
-static constexpr gint64 kMessageTime = 3 * G_USEC_PER_SEC / 2;
-static constexpr gint64 kBarTime = 2 * G_USEC_PER_SEC;
+namespace {
+
+constexpr gint64 kHintTime = 5 * G_USEC_PER_SEC, kHintFade = G_USEC_PER_SEC;
+constexpr gint64 kMessageTime = 3 * G_USEC_PER_SEC / 2;
+constexpr gint64 kBarTime = 2 * G_USEC_PER_SEC;
+
+} // namespace
 
 std::string
 time_text (GstClockTime time)
@@ -72,12 +76,16 @@ Overlay::is_on_bar (double y) const
   return duration_ > 0 && shown_.size.height > 0 && top >= 0 && y >= top;
 }
 
+namespace {
+
 /* The bit of a button in pressed_; 0: of those that the bar never takes. */
-static unsigned
+unsigned
 button_bit (int button)
 {
   return button >= 1 && button <= 3 ? 1U << button : 0; /* others are the wheel's */
 }
+
+} // namespace
 
 bool
 Overlay::is_dragging () const
@@ -135,7 +143,7 @@ Overlay::release (int button)
 }
 
 std::optional<Overlay::Drag>
-Overlay::take_drag ()
+Overlay::next_drag ()
 {
   std::lock_guard guard (lock_);
   return std::exchange (drag_, std::nullopt);
@@ -161,7 +169,9 @@ Overlay::look (gint64 now) const
   return shown;
 }
 
-static void
+namespace {
+
+void
 add (GstVideoOverlayComposition *&composition, GstVideoOverlayRectangle *rectangle)
 {
   if (!rectangle)
@@ -174,7 +184,7 @@ add (GstVideoOverlayComposition *&composition, GstVideoOverlayRectangle *rectang
 }
 
 /* A seek to between two frame sets shows the one before, whose time is outside of the segment. */
-static GstClockTime
+GstClockTime
 stream_time (GstSample *sample)
 {
   const GstSegment *segment = gst_sample_get_segment (sample);
@@ -183,6 +193,8 @@ stream_time (GstSample *sample)
     return GST_CLOCK_TIME_NONE;
   return gst_segment_to_stream_time (segment, GST_FORMAT_TIME, std::max (pts, segment->start));
 }
+
+} // namespace
 
 GstVideoOverlayComposition *
 Overlay::draw (GstSample *sample)

@@ -30,7 +30,7 @@ public:
   void set_duration (GstClockTime duration);
 
   /** @name The mouse, in pixels of the picture @{ */
-  /** @return whether the time bar has it: then nobody else shall */
+  /** @return whether the time bar handled it, so that the event goes no further */
   bool press (int button, double x, double y);
   bool move (double x, double y);
   bool release (int button);
@@ -41,7 +41,7 @@ public:
     bool released;
   };
   /** Where a hand has drawn the time bar to since the last call. */
-  std::optional<Drag> take_drag ();
+  std::optional<Drag> next_drag ();
 
   /** What is to be laid over the sample's picture now; nullptr: nothing. (transfer full) */
   GstVideoOverlayComposition *draw (GstSample *sample);

@@ -6,16 +6,18 @@
 
 #include "viewer.hpp"
 
-static const char kRtpCaps[] =
+namespace {
+
+const char kRtpCaps[] =
     "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
 
-static const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
+const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
 
 /* ---- frame sets ---- */
 
-/* Turns on by the time that has passed in the file, so that it neither jumps where the file begins
- * anew nor goes on while it is paused, as striprender's auto-orbit would. */
-static void
+/* Orbits by stream time. striprender's auto-orbit goes by running time: it would jump where a file
+ * begins again, and go on while it is paused. */
+void
 turn_on (Viewer &viewer, GstClockTime pts)
 {
   const GstClockTime last = viewer.last_pts;
@@ -29,7 +31,7 @@ turn_on (Viewer &viewer, GstClockTime pts)
   g_object_set (viewer.render, "azimuth", std::remainder (azimuth, 360.0), nullptr);
 }
 
-static GstPadProbeReturn
+GstPadProbeReturn
 on_frame_set (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -50,7 +52,7 @@ on_frame_set (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
 
 /* ---- from frame sets to the window ---- */
 
-static GstElement *
+GstElement *
 add (Viewer &viewer, const char *factory)
 {
   GstElement *element = gst_element_factory_make (factory, nullptr);
@@ -65,7 +67,7 @@ add (Viewer &viewer, const char *factory)
   return element;
 }
 
-static void
+void
 set_picture_size (Viewer &viewer, int width, int height)
 {
   GstCaps *caps = gst_caps_new_simple (
@@ -80,7 +82,7 @@ struct Reshape {
   int width, height; /* pixels */
 };
 
-static gboolean
+gboolean
 follow_window (gpointer user_data)
 {
   auto reshape = static_cast<Reshape *> (user_data);
@@ -89,8 +91,8 @@ follow_window (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* A larger window shows a larger picture, not a stretched one. */
-static gboolean
+/* Renders at the window's size instead of scaling. */
+gboolean
 on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -98,10 +100,10 @@ on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_dat
     g_idle_add_full (G_PRIORITY_DEFAULT, follow_window,
         new Reshape{&viewer, int (width), int (height)},
         [] (gpointer reshape) { delete static_cast<Reshape *> (reshape); });
-  return FALSE; /* glimagesink does its own part */
+  return FALSE; /* glimagesink reshapes, too */
 }
 
-static void
+void
 add_probe (GstElement *element, const char *pad_name, GstPadProbeType type,
     GstPadProbeCallback probe, Viewer &viewer)
 {
@@ -110,27 +112,26 @@ add_probe (GstElement *element, const char *pad_name, GstPadProbeType type,
   gst_object_unref (pad);
 }
 
-static gboolean
+gboolean
 redraw_if_paused (gpointer user_data)
 {
   static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
   return G_SOURCE_REMOVE;
 }
 
-static void
+void
 on_view_changed (GObject *, GParamSpec *, gpointer user_data)
 {
   g_idle_add (redraw_if_paused, user_data);
 }
 
-static GstVideoOverlayComposition *
+GstVideoOverlayComposition *
 on_draw (GstElement *, GstSample *sample, gpointer user_data)
 {
   return static_cast<Viewer *> (user_data)->overlay->draw (sample);
 }
 
-/* Frame sets to the window. */
-static void
+void
 build_view (Viewer &viewer)
 {
   const ViewerOptions &options = viewer.options;
@@ -151,7 +152,7 @@ build_view (Viewer &viewer)
     gst_util_set_object_arg (G_OBJECT (viewer.render), "mode", options.mode);
   if (!viewer.is_file)
     g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
-  if (!viewer.is_file) /* the view turns while the stream stalls, too */
+  if (!viewer.is_file) /* renders on while the stream stalls */
     g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
   GstElement *before = viewer.first;
   if (!options.no_filter) {
@@ -167,7 +168,7 @@ build_view (Viewer &viewer)
   g_signal_connect (viewer.render, "notify", G_CALLBACK (on_view_changed), &viewer);
 }
 
-static void
+void
 build_receiver (Viewer &viewer)
 {
   GstElement *source = add (viewer, "udpsrc"), *jitter = add (viewer, "rtpjitterbuffer"),
@@ -183,7 +184,7 @@ build_receiver (Viewer &viewer)
   gst_element_link_many (source, jitter, depayloader, queue, decoder, viewer.first, nullptr);
 }
 
-static void
+void
 on_pad_added (GstElement *, GstPad *pad, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -196,6 +197,8 @@ on_pad_added (GstElement *, GstPad *pad, gpointer user_data)
   gst_clear_caps (&caps);
 }
 
+} // namespace
+
 gboolean
 refuse_input (gpointer user_data)
 {
@@ -206,7 +209,9 @@ refuse_input (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-static void
+namespace {
+
+void
 on_no_more_pads (GstElement *, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -216,7 +221,7 @@ on_no_more_pads (GstElement *, gpointer user_data)
   gst_object_unref (sink);
 }
 
-static void
+void
 on_source_setup (GstElement *, GstElement *source, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -224,7 +229,7 @@ on_source_setup (GstElement *, GstElement *source, gpointer user_data)
     g_object_set (source, "latency", viewer.options.latency_ms, nullptr);
 }
 
-static void
+void
 build_opener (Viewer &viewer, const char *uri)
 {
   GstElement *opener = add (viewer, "uridecodebin");
@@ -236,8 +241,8 @@ build_opener (Viewer &viewer, const char *uri)
   g_signal_connect (opener, "source-setup", G_CALLBACK (on_source_setup), &viewer);
 }
 
-/* Whether a plugin opens such URIs; says it if not. */
-static bool
+/* Reports it if no plugin opens such URIs. */
+bool
 is_supported (const char *uri)
 {
   gchar *scheme = gst_uri_get_protocol (uri);
@@ -249,8 +254,8 @@ is_supported (const char *uri)
   return supported;
 }
 
-/* The input as a URI; nullptr after saying why there is none. */
-static gchar *
+/* @return transfer full; nullptr after reporting an error */
+gchar *
 input_uri (const char *input)
 {
   if (gst_uri_is_valid (input))
@@ -263,6 +268,8 @@ input_uri (const char *input)
                                                 : "no such file");
   return nullptr;
 }
+
+} // namespace
 
 bool
 build_pipeline (Viewer &viewer)

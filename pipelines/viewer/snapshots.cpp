@@ -6,8 +6,10 @@
 
 #include "viewer.hpp"
 
+namespace {
+
 /* The first name in the folder that is free. */
-static std::string
+std::string
 free_name (const Viewer &viewer, const char *extension)
 {
   const char *folder = viewer.options.out ? viewer.options.out : ".";
@@ -20,7 +22,7 @@ free_name (const Viewer &viewer, const char *extension)
   }
 }
 
-static void
+void
 write_file (const std::string &path, GstBuffer *buffer)
 {
   GstMapInfo map;
@@ -40,7 +42,7 @@ write_file (const std::string &path, GstBuffer *buffer)
 }
 
 /* As striprender drew it: without what is laid over it. */
-static GstSample *
+GstSample *
 last_picture (Viewer &viewer)
 {
   GstSample *sample = nullptr;
@@ -55,7 +57,7 @@ last_picture (Viewer &viewer)
   return picture;
 }
 
-static bool
+bool
 write_last_picture (Viewer &viewer)
 {
   GstSample *sample = last_picture (viewer);
@@ -78,7 +80,7 @@ write_last_picture (Viewer &viewer)
 }
 
 /* Before the first picture, and where a file begins again, there is none for a moment. */
-static gboolean
+gboolean
 try_to_write_picture (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
@@ -90,16 +92,20 @@ try_to_write_picture (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
+} // namespace
+
 GstSample *
-take_frame_set (Viewer &viewer)
+last_frame_set (Viewer &viewer)
 {
   std::lock_guard guard (viewer.lock);
   return viewer.frame_set ? gst_sample_ref (viewer.frame_set) : nullptr;
 }
 
+namespace {
+
 /* Says how the writing of a file ended. */
-static void
-tell_end (GstElement *pipeline, const std::string &path)
+void
+report_end (GstElement *pipeline, const std::string &path)
 {
   GstBus *bus = gst_element_get_bus (pipeline);
   GstMessage *message = gst_bus_timed_pop_filtered (
@@ -119,6 +125,8 @@ tell_end (GstElement *pipeline, const std::string &path)
   gst_object_unref (bus);
 }
 
+} // namespace
+
 void
 write_picture (Viewer &viewer)
 {
@@ -131,7 +139,7 @@ write_picture (Viewer &viewer)
 void
 write_points (Viewer &viewer)
 {
-  GstSample *sample = take_frame_set (viewer);
+  GstSample *sample = last_frame_set (viewer);
   if (!sample) {
     g_printerr ("rangecast-viewer: there are no points yet\n");
     return;
@@ -148,7 +156,7 @@ write_points (Viewer &viewer)
     gst_element_set_state (encoder, GST_STATE_PLAYING);
     gst_app_src_push_sample (GST_APP_SRC (in), sample);
     gst_app_src_end_of_stream (GST_APP_SRC (in));
-    tell_end (encoder, path);
+    report_end (encoder, path);
     gst_element_set_state (encoder, GST_STATE_NULL);
     gst_object_unref (in);
     gst_object_unref (out);

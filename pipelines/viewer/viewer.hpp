@@ -17,7 +17,7 @@
 struct Viewer {
   ViewerOptions options;
   GstElement *pipeline = nullptr;
-  GstElement *first = nullptr;           /* what takes frame sets */
+  GstElement *first = nullptr;           /* gets the frame sets */
   GstElement *render = nullptr;          /* striprender */
   GstElement *size = nullptr;            /* capsfilter behind it */
   GstElement *overlay_element = nullptr; /* overlaycomposition */
@@ -25,7 +25,7 @@ struct Viewer {
   GMainLoop *loop = nullptr;
   bool is_file = false;
   bool failed = false;
-  int patience = 0; /* times that write_picture() waits on */
+  int patience = 0; /* retries that write_picture() has left */
   std::atomic<bool> seen_frames = false;
   std::optional<Overlay> overlay;
   std::optional<Playback> playback;
@@ -35,31 +35,31 @@ struct Viewer {
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* streaming thread */
 };
 
-/** Says why the viewer ends, and ends it. Main thread. */
+/** Reports an error and quits the main loop. Main thread. */
 void fail (Viewer &viewer, const std::string &text);
 
 /** @name pipeline.cpp @{ */
-/** @return false after saying why there is none */
+/** @return false after reporting an error */
 bool build_pipeline (Viewer &viewer);
-/** GSourceFunc: fails, because the input holds something else. */
+/** GSourceFunc: fails because the input has no frame sets. */
 gboolean refuse_input (gpointer viewer);
 /** @} */
 
 /** @name snapshots.cpp, main thread @{ */
-/** Writes the picture that is shown as PNG; waits two seconds for one. */
+/** Writes the current picture as PNG; waits up to two seconds for one. */
 void write_picture (Viewer &viewer);
 /** Writes the points of the last frame set as PLY. */
 void write_points (Viewer &viewer);
 /** The last frame set. Returns: (transfer full): nullptr if there was none. Any thread */
-GstSample *take_frame_set (Viewer &viewer);
+GstSample *last_frame_set (Viewer &viewer);
 /** @} */
 
 /** @name controls.cpp @{ */
 /** The keys of a file, or of a stream, for the overlay. */
 std::vector<TextRow> key_rows (bool is_file);
-/** Takes the viewer's keys, and the mouse on the time bar, out of what goes up to striprender. */
+/** Handles the viewer's keys and the mouse on the time bar, which do not reach striprender. */
 void watch_controls (Viewer &viewer);
-/** Of a message of the window that nobody took an event of mouse or keys. While the pipeline seeks,
- *  events do not reach the elements: those of the viewer are handled now. Main thread. */
+/** For a message that a mouse or key event was not handled: events do not reach the elements while
+ * the pipeline seeks, so the viewer's own are handled here. Main thread. */
 void handle_missed_event (Viewer &viewer, GstMessage *message);
 /** @} */

@@ -39,7 +39,7 @@ units_of (std::span<const guint8> bytes)
   UnitHeader header;
   while (const auto unit = reader.next (header))
     units.emplace_back (unit->begin (), unit->end ());
-  fail_unless (reader.status ().ok ());
+  fail_unless_ok (reader.status ());
   return units;
 }
 
@@ -84,7 +84,7 @@ inline SliceHeader
 header_of (std::span<const guint8> slice)
 {
   SliceHeader header;
-  fail_unless (read_slice_header (slice, header).ok ());
+  fail_unless_ok (read_slice_header (slice, header));
   return header;
 }
 

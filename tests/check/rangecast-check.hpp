@@ -12,6 +12,8 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <string>
 
+#include "values-check.hpp"
+
 /** Says why a test did not run; the test runner counts these lines. */
 #define RANGECAST_SKIP(reason)                                                                     \
   do {                                                                                             \
@@ -67,7 +69,7 @@ make_frame_set (const Rig &rig, GstClockTime time = 0, Roi roi = {})
   gst_range_buffer_set_capture_time (buffer, time);
   GST_BUFFER_PTS (buffer) = time;
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-  fail_unless (frame.status ().ok ());
+  fail_unless_ok (frame.status ());
   for (const RangeImage &image : frame.views ())
     for (int y = 0; y < image.roi.height; y++)
       for (int x = 0; x < image.roi.width; x++) {
@@ -115,11 +117,12 @@ push_before_the_segment (GstHarness *h, const Rig &rig, GstClockTime start)
 inline void
 play_to_the_end (GstElement *pipeline)
 {
-  fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+  ck_assert_int_ne (gst_element_set_state (pipeline, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
   GstBus *bus = gst_element_get_bus (pipeline);
   GstMessage *message = gst_bus_timed_pop_filtered (
       bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
+  fail_unless (message);
+  ck_assert_int_eq (GST_MESSAGE_TYPE (message), GST_MESSAGE_EOS);
   gst_message_unref (message);
   gst_object_unref (bus);
   gst_element_set_state (pipeline, GST_STATE_NULL);

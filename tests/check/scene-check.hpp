@@ -53,7 +53,7 @@ pixels_of (GstBuffer *frame_set, int width, int height)
 {
   Pixels pixels;
   gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
-  fail_unless (frame.status ().ok ());
+  fail_unless_ok (frame.status ());
   for (const RangeImage &image : frame.views ()) {
     auto &plane = pixels[image.view_id];
     plane.assign (std::size_t (width) * std::size_t (height), 0);

@@ -30,6 +30,7 @@ LAYERS = (
     (RIGFILE_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS),
     (VISION_FOLDERS, CORE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
+    (("lib/rangecast/pch",), ()),
     (("lib/gstrange",), CORE_FOLDERS),
     (("gst/common",), ("lib/gstrange", "lib/rangecast")),
     (("gst",), ("gst/common", "lib/gstrange", "lib/rangecast")),

@@ -38,28 +38,52 @@ need_gl () {
 }
 need_data () { [ -e "$data/$1" ] || skip "no test data $1"; }
 
-# Each run has 250 UDP ports of its own, below those that the kernel gives away.
-ports=$((20000 + $$ % 48 * 250))
+# Each run has 250 UDP ports of its own, below those that the kernel gives away, until the last process that it started
+# has ended. Where the locks cannot be had (other users' files), the number of this process decides.
+slot=$(($$ % 48))
+for ((try = 0; try < 48; try++)); do
+  { exec {port_lock}>>"/tmp/rangecast-ports-$slot"; } 2>/dev/null && flock -n "$port_lock" && break
+  slot=$(((slot + 1) % 48))
+done
+ports=$((20000 + slot * 250))
 
+# A file of tests that mostly wait says side_by_side=N: so many of them run at a time. Their ports must differ.
+side_by_side=1
 file=$1
 shift
 source "$file" || { echo "0 passed, 1 failed, 0 skipped"; exit 1; }
-passed=0 failed=0 skipped=0
-for name in ${*:-$(declare -F | awk '$3 ~ /^test_/ { print $3 }')}; do
+
+# usage: run_one NAME: prints what the test prints and one line, which also goes to $results/NAME
+run_one () {
+  local folder status
   folder=$(mktemp -d)
   set -m # a process group of its own, so that nothing of a test that failed goes on
-  (set -e; cd "$folder"; "$name") & # not in a condition: bash would ignore the -e
+  (set -e; cd "$folder"; "$1") & # not in a condition: bash would ignore the -e
   wait $!
   status=$?
   kill -KILL -- -$! 2>/dev/null
   set +m
   case $status in
-    0) passed=$((passed + 1)); echo "ok $name" ;;
-    77) skipped=$((skipped + 1)); echo "skip $name" ;;
-    *) failed=$((failed + 1)); echo "not ok $name ($status)" ;;
-  esac
+    0) echo "ok $1" ;;
+    77) echo "skip $1" ;;
+    *) echo "not ok $1 ($status)" ;;
+  esac >"$results/$1"
+  cat "$results/$1"
   rm -rf "$folder"
+}
+
+results=$(mktemp -d)
+for name in ${*:-$(declare -F | awk '$3 ~ /^test_/ { print $3 }')}; do
+  while [ "$(jobs -rp | wc -l)" -ge "$side_by_side" ]; do wait -n; done
+  if [ "$side_by_side" = 1 ]; then
+    run_one "$name"
+  else
+    { run_one "$name" >"$results/log.$name" 2>&1; cat "$results/log.$name"; } &
+  fi
 done
+wait
+passed=$(cat "$results"/test_* | grep -c '^ok ') failed=$(cat "$results"/test_* | grep -c '^not ok ') skipped=$(cat "$results"/test_* | grep -c '^skip ')
+rm -rf "$results"
 [ $((passed + failed + skipped)) -gt 0 ] || { echo "not ok: no test_* in $file"; failed=1; }
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" = 0 ]

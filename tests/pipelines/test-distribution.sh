@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Camera hosts, a parent and viewers that are hosts of a network of their own: docs/guide/hosts.md.
 source "$source_dir/tests/pipelines/netns.sh"
+side_by_side=2
 
 # Frame sets of a file with points in both views, and all of them.
 whole_sets () { # file

@@ -13,6 +13,15 @@ pair () { # caps of left, caps of right, stereodepth's properties...
 export -f run pair
 vga=video/x-raw,format=RGB,width=640,height=480
 
+test_graphs_of_a_run_that_fails_are_dumped () {
+  mkdir dots
+  GST_DEBUG_DUMP_DOT_DIR=dots expect_error "Failed after" run videotestsrc is-live=true ! identity error-after=30 ! fakesink
+  local event
+  for event in PLAYING ERROR; do
+    grep -q GstIdentity dots/*-rangecast-run."$event".dot || fail "no $event graph: $(ls dots)"
+  done
+}
+
 make_rig () { run avatartestsrc views=2 num-buffers=1 rig-export=rig.yaml ! fakesink; }
 
 test_missing_rig_file_is_named () { expect_error "nowhere.yaml" pair $vga $vga rig=nowhere.yaml view-id=0; }

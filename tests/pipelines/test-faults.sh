@@ -3,6 +3,7 @@
 # What was lost is told from the capture times in what the viewer got (stream-report), which no busy
 # machine changes; each test prints its line of tests/bench/results/reliability.md.
 source "$source_dir/tests/pipelines/faults.sh"
+side_by_side=2
 
 test_a_killed_camera_host_stops_nobody_and_comes_back () {
   start_job $((ports + 0))

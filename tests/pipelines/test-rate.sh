@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # A sender whose bit rate follows its receiver: two processes, RTP through a relay that lets so many
 # bits pass a second, RTCP beside it. The launch strings are those of docs/elements/neighbourcodeenc.md.
+side_by_side=3 # they wait for slow links
 
 twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
 caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"

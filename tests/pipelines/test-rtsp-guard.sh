@@ -2,6 +2,7 @@
 # pipelines/rtsp-server: who may watch, who is slow or gone, who is hostile.
 
 source "$source_dir/tests/pipelines/rtsp-server.sh"
+side_by_side=4 # they wait for viewers and for timeouts
 
 test_viewers_beyond_the_limit_are_refused () {
   serve --max-viewers 2 --timeout 5 -- "$figure"

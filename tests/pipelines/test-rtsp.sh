@@ -8,6 +8,7 @@ for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name
 
 source "$source_dir/tests/pipelines/netns.sh"
 source "$source_dir/tests/pipelines/rtsp-server.sh"
+side_by_side=4 # they wait for viewers and for timeouts
 
 test_sdp_carries_the_rig_and_the_version () {
   gst-launch-1.0 -q avatartestsrc num-buffers=1 rig-export=rig.yaml ! video/x-range,width=160,height=120 ! fakesink
@@ -26,6 +27,18 @@ assert (fields["width"], fields["height"], fields["framerate"]) == ("160", "120"
 blob = base64.b64decode(fields["rig"], validate=True)
 assert blob[:4] == b"RCRG" and b"avatar 3" in blob, blob
 END
+  stop_server
+}
+
+test_graphs_are_dumped () {
+  mkdir dots
+  GST_DEBUG_DUMP_DOT_DIR=dots serve -- "$figure ! identity error-after=30"
+  play 10 "location=$url" protocols=udp || fail "$(tail -n 5 player.log)"
+  until_true 20 grep -q 'Failed after' server.log
+  local event
+  for event in PLAYING ERROR; do
+    grep -q GstIdentity dots/*-rtsp-server."$event".dot || fail "no $event graph: $(ls dots)"
+  done
   stop_server
 }
 

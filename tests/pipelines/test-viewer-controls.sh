@@ -4,6 +4,7 @@
 # Its helpers, not its tests.
 source "$source_dir/tests/pipelines/test-viewer.sh"
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
+side_by_side=2 # they wait for pictures
 
 # Ten seconds of a figure that moves.
 record_moving () {

@@ -4,6 +4,7 @@
 # Its helpers, not its tests.
 source "$source_dir/tests/pipelines/test-window.sh"
 for name in $(declare -F | awk '$3 ~ /^test_/ { print $3 }'); do unset -f "$name"; done
+side_by_side=2 # they wait for pictures
 
 need_program () { command -v rangecast-viewer >/dev/null || skip "no rangecast-viewer (Debian package libcairo2-dev)"; }
 need_viewer () {
@@ -88,6 +89,23 @@ test_keys_write_pictures_and_point_clouds () {
   points=$(ply_summary rangecast-0001.ply)
   [ "${points#* }" = "x y z nx ny nz red green blue view_id" ] || fail "$points"
   [ "${points%% *}" -gt 2000 ] || fail "$points"
+}
+
+dumps_graphs () {
+  mkdir dots
+  export GST_DEBUG_DUMP_DOT_DIR=dots
+  open_viewer still.rcnc --size 320x240
+  quits_with q
+  head -c 1000 /dev/zero >noise.rcnc
+  ! rangecast-viewer noise.rcnc >>log.txt 2>&1
+}
+
+test_graphs_are_dumped_when_it_plays_and_when_it_fails () {
+  need_viewer
+  record_still
+  in_display dumps_graphs
+  grep -q GstStripRender dots/*-rangecast-viewer.PLAYING.dot || fail "$(ls dots)"
+  grep -q GstStripRender dots/*-rangecast-viewer.ERROR.dot || fail "$(ls dots)"
 }
 
 turns_while_paused () {

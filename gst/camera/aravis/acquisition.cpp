@@ -37,7 +37,7 @@ CameraRun::deliver (ArvBuffer *buffer)
   const ArvBufferStatus status = arv_buffer_get_status (buffer);
   const std::uint64_t id = arv_buffer_get_frame_id (buffer);
   if (id == FrameStore::kNoId || !counter.is_id (id) || status == ARV_BUFFER_STATUS_ABORTED ||
-      status == ARV_BUFFER_STATUS_CLEARED) { /* nobody knows which one it is: a gap */
+      status == ARV_BUFFER_STATUS_CLEARED) { /* its number is unknown: a gap */
     store->give_back (buffer);
     return;
   }
@@ -47,7 +47,7 @@ CameraRun::deliver (ArvBuffer *buffer)
   frame.arrived_us = g_get_monotonic_time ();
   const std::uint64_t taken = arv_buffer_get_timestamp (buffer);
   if (taken != arv_buffer_get_system_timestamp (buffer) &&
-      taken < kLatestTime_ns) /* else Aravis' makeshift */
+      taken < kMaxCameraTime_ns) /* else Aravis filled it in */
     frame.camera_time_ns = taken;
   if (ARV_IS_GV_STREAM (stream)) {
     guint64 missing = 0;

@@ -9,19 +9,16 @@
 #include "frame_counter.hpp"
 #include "frame_store.hpp"
 
-/* Cameras that say more do not know the time; nobody's sums must overflow. */
-inline constexpr std::uint64_t kLatestTime_ns = std::uint64_t (1) << 62;
-
-/** One run of a camera's stream, from start() to stop(). */
+/** A camera's stream from start() to stop(). */
 struct CameraRun {
-  std::mutex lock; /* guards all of it, held while `arrived` runs; only the stream's thread waits */
+  std::mutex lock; /* guards all, held while `arrived` runs; only the stream's thread waits */
   Camera::Arrived arrived;
-  ArvStream *stream = nullptr; /* transfer full; deleted by take-down */
+  ArvStream *stream = nullptr; /* owned; deleted by the teardown queue */
   std::shared_ptr<FrameStore> store;
   FrameCounter counter;
   CameraFormat format;
   ArvPixelFormat code = 0;
-  std::uint64_t missing_packets = 0; /* told so far */
+  std::uint64_t missing_packets = 0; /* reported so far */
   bool stopped = false;
 
   void on_done ();
@@ -29,5 +26,5 @@ struct CameraRun {
   [[nodiscard]] bool fits (ArvBuffer *buffer) const;
 };
 
-/** What Aravis counted so far. */
+/** Aravis' counters. */
 CameraStatistics count_stream (ArvStream *stream);

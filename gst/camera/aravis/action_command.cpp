@@ -3,13 +3,17 @@
 
 #include <algorithm>
 
-/* GigE Vision 2.0, chapter GVCP: command packets begin with a key, flags, the command and the
- * length of what follows the request id; all numbers are big-endian. */
-static constexpr std::uint8_t kCommandKey = 0x42;
-static constexpr std::uint8_t kFlagAcknowledge = 0x01;
-static constexpr std::uint8_t kFlagScheduled = 0x80; /* a time follows the masks */
-static constexpr std::uint16_t kActionCommand = 0x0100;
-static constexpr std::size_t kHeaderSize = 8;
+namespace {
+
+/* GigE Vision 2.0, chapter GVCP: command packets begin with a key, flags, the command, the length
+ * of the payload and the request id; all numbers are big-endian. */
+constexpr std::uint8_t kCommandKey = 0x42;
+constexpr std::uint8_t kFlagAcknowledge = 0x01;
+constexpr std::uint8_t kFlagScheduled = 0x80; /* a time follows the masks */
+constexpr std::uint16_t kActionCommand = 0x0100;
+constexpr std::size_t kHeaderSize = 8;
+
+} // namespace
 
 ActionCommandBytes
 action_command_bytes (const ActionCommand &command)
@@ -33,20 +37,13 @@ action_command_bytes (const ActionCommand &command)
   return packet;
 }
 
-/* The loopback interface has no broadcast address; 127.255.255.255 reaches every listener on it. */
-static std::string
-broadcast_address_from (const std::string &interface)
-{
-  return interface.starts_with ("127.") ? "127.255.255.255" : "255.255.255.255";
-}
-
 CameraStatus
 ActionSender::open (std::span<const std::string> interfaces, std::uint16_t port)
 {
   close ();
   for (const std::string &interface : interfaces) {
-    const auto same = [&] (const Exit &exit) { return exit.interface == interface; };
-    if (std::any_of (exits_.begin (), exits_.end (), same))
+    const auto same = [&] (const Route &route) { return route.interface == interface; };
+    if (std::any_of (routes_.begin (), routes_.end (), same))
       continue;
     GInetAddress *address = g_inet_address_new_from_string (interface.c_str ());
     GError *error = nullptr;
@@ -70,8 +67,10 @@ ActionSender::open (std::span<const std::string> interfaces, std::uint16_t port)
       close ();
       return status;
     }
-    exits_.push_back ({interface, socket,
-        g_inet_socket_address_new_from_string (broadcast_address_from (interface).c_str (), port)});
+    /* the loopback interface has no broadcast address; this one reaches every listener on it */
+    const char *broadcast = interface.starts_with ("127.") ? "127.255.255.255" : "255.255.255.255";
+    routes_.push_back (
+        {interface, socket, g_inet_socket_address_new_from_string (broadcast, port)});
   }
   return {};
 }
@@ -79,11 +78,11 @@ ActionSender::open (std::span<const std::string> interfaces, std::uint16_t port)
 void
 ActionSender::close ()
 {
-  for (Exit &exit : exits_) {
-    g_object_unref (exit.socket);
-    g_object_unref (exit.destination);
+  for (Route &route : routes_) {
+    g_object_unref (route.socket);
+    g_object_unref (route.destination);
   }
-  exits_.clear ();
+  routes_.clear ();
 }
 
 CameraStatus
@@ -94,13 +93,13 @@ ActionSender::send (ActionCommand command)
   command.request_id = last_id_;
   const ActionCommandBytes packet = action_command_bytes (command);
   CameraStatus status;
-  for (const Exit &exit : exits_) {
+  for (const Route &route : routes_) {
     GError *error = nullptr;
-    g_socket_send_to (exit.socket, exit.destination,
+    g_socket_send_to (route.socket, route.destination,
         reinterpret_cast<const gchar *> (packet.bytes.data ()), packet.size, nullptr, &error);
     if (error && status.ok ())
       status = {CameraFault::kFailed,
-          "action commands: cannot send from '" + exit.interface + "': " + error->message};
+          "action commands: cannot send from '" + route.interface + "': " + error->message};
     g_clear_error (&error);
   }
   return status;

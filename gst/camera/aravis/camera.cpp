@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A camera that is gone lets every call wait for seconds, so what is taken down goes in a thread of
- * its own, for which nobody waits longer than a second (see TakeDown). */
+/* Every call to a camera that does not answer takes seconds, so streams and control are released in
+ * a TeardownQueue, for which nobody waits longer than a second. */
 #include "camera.hpp"
 
 #include <arv.h>
@@ -16,12 +16,14 @@
 #include "setup.hpp"
 #include "teardown_queue.hpp"
 
-static constexpr std::size_t kMinSocketBuffer = 1 << 20; /* bytes */
-static constexpr std::size_t kMaxExtra = 1 << 20; /* bytes that chunks may add to a picture */
-
 namespace {
 
-/* Outlives the camera where its device's signal is just being emitted. */
+constexpr std::size_t kMinSocketBuffer = 1 << 20; /* bytes */
+constexpr guint kPacketTimeout_us = 20000;        /* then a packet counts as missing */
+constexpr guint kFrameRetention_us = 100000;      /* then an incomplete image is given up */
+constexpr std::size_t kMaxChunkBytes = 1 << 20;   /* that chunk data may add to an image */
+
+/* Handles the device's signal control-lost, which may be emitted while the camera is deleted. */
 struct LossWatch {
   std::mutex lock; /* guards report, held while it runs */
   Camera::Lost report;
@@ -49,26 +51,26 @@ struct Camera::Impl {
   int packet_size = 0;
   std::shared_ptr<LossWatch> watch = std::make_shared<LossWatch> ();
   gulong watch_handler = 0;
-  TakeDown take_down;
+  TeardownQueue teardown;
 
   std::mutex run_lock; /* guards what follows */
   std::shared_ptr<CameraRun> run;
   CameraStatistics last_statistics;
 
-  /* Guards what follows, and features that consist of several (a selector and its value, a latch
-   * and what it keeps). Taken before the control's, which triggers wait for and which is therefore
-   * held for one feature at a time. */
-  std::mutex look_lock;
-  CameraLook written;
-  guint64 tick_frequency = 0; /* of the camera's clock, 1/s; 0: not yet read */
+  /* Guards what follows, and features of two parts (a selector and its value, a latch and its
+   * register). Taken before the control's lock, which triggers wait for and which is therefore held
+   * for one feature at a time. */
+  std::mutex imaging_lock;
+  ImagingParameters written;
+  guint64 tick_frequency = 0; /* of the camera's clock, Hz; 0: not yet read */
 
   void describe ();
   CameraStatus create_stream (const std::shared_ptr<CameraRun> &run);
   void set_stream_properties (ArvStream *stream) const;
   CameraStatus fill (CameraRun &run);
   void end (const std::shared_ptr<CameraRun> &run);
-  /* A fault is a loss where the camera is known to be lost. */
-  CameraStatus judged (CameraStatus status) const
+  /* Any fault of a camera that was lost is the loss. */
+  CameraStatus classify (CameraStatus status) const
   {
     if (status.ok () || !watch->lost)
       return status;
@@ -76,24 +78,18 @@ struct Camera::Impl {
   }
 };
 
-/* Opening */
-
-static std::string
-text_of (const char *text)
-{
-  return text ? valid_utf8 (text) : "";
-}
+/* ---- opening ---- */
 
 void
 Camera::Impl::describe ()
 {
   ArvCamera *camera = control->camera ();
   if (info.vendor.empty ())
-    info.vendor = text_of (arv_camera_get_vendor_name (camera, nullptr));
+    info.vendor = valid_utf8 (arv_camera_get_vendor_name (camera, nullptr));
   if (info.model.empty ())
-    info.model = text_of (arv_camera_get_model_name (camera, nullptr));
+    info.model = valid_utf8 (arv_camera_get_model_name (camera, nullptr));
   if (info.serial.empty ())
-    info.serial = text_of (arv_camera_get_device_serial_number (camera, nullptr));
+    info.serial = valid_utf8 (arv_camera_get_device_serial_number (camera, nullptr));
   if (info.id.empty ())
     info.id = info.vendor + "-" + info.serial;
   if (!ARV_IS_GV_DEVICE (control->device ()))
@@ -155,8 +151,8 @@ Camera::~Camera ()
 {
   stop ();
   g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
-  impl_->take_down.run ([control = std::shared_ptr<CameraControl> (
-                             std::move (impl_->control))] () mutable { control.reset (); },
+  impl_->teardown.run ([control = std::shared_ptr<CameraControl> (
+                            std::move (impl_->control))] () mutable { control.reset (); },
       !is_lost ());
 }
 
@@ -184,12 +180,12 @@ Camera::interface_address () const
   return impl_->interface;
 }
 
-/* Configuring */
+/* ---- configuration ---- */
 
 CameraStatus
 Camera::abilities (CameraAbilities &abilities)
 {
-  return impl_->judged (read_abilities (*impl_->control, abilities));
+  return impl_->classify (read_abilities (*impl_->control, abilities));
 }
 
 CameraStatus
@@ -207,15 +203,15 @@ Camera::configure (const CameraSettings &settings)
   if (status.ok ())
     status = set_trigger (control, settings);
   if (status.ok ())
-    status = set_look (control, settings, frame_rate);
+    status = set_imaging (control, settings, frame_rate);
   if (status.ok ())
     status = set_features (control, settings.features);
   if (status.ok ())
     status = read_format (control, impl_->format);
   impl_->format.frame_rate = frame_rate;
-  std::lock_guard guard (impl_->look_lock);
+  std::lock_guard guard (impl_->imaging_lock);
   impl_->written = {};
-  return impl_->judged (status);
+  return impl_->classify (status);
 }
 
 const CameraFormat &
@@ -230,21 +226,19 @@ Camera::packet_size () const
   return impl_->packet_size;
 }
 
-/* Streaming */
+/* ---- streaming ---- */
 
 void
 Camera::Impl::set_stream_properties (ArvStream *stream) const
 {
   if (!ARV_IS_GV_STREAM (stream))
     return;
-  g_object_set (stream, "packet-timeout", guint (settings.packet_timeout_us), "frame-retention",
-      guint (settings.frame_retention_us), nullptr);
-  if (!settings.packet_resend) /* else as the camera can */
+  g_object_set (
+      stream, "packet-timeout", kPacketTimeout_us, "frame-retention", kFrameRetention_us, nullptr);
+  if (!settings.packet_resend) /* else if the camera can */
     g_object_set (stream, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_NEVER, nullptr);
-  /* Aravis' own choice is one picture, which for small ones is less than a few packets need. */
-  const std::size_t wanted = settings.socket_buffer > 0
-                                 ? std::size_t (settings.socket_buffer)
-                                 : std::max (2 * format.size (), kMinSocketBuffer);
+  /* Aravis would take the size of one image, which is too little for small ones */
+  const std::size_t wanted = std::max (2 * format.size (), kMinSocketBuffer);
   const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
       bytes, nullptr);
@@ -262,7 +256,7 @@ Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
         if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE)
           static_cast<CameraRun *> (data)->on_done ();
       },
-      run.get (), nullptr, &error); /* end() keeps the run until the stream is gone */
+      run.get (), nullptr, &error); /* end() keeps the run until the stream is deleted */
   if (!stream)
     return error ? control->status ("stream", error, CameraFault::kFailed)
                  : control->refuse (CameraFault::kFailed, "does not provide a stream");
@@ -281,7 +275,7 @@ Camera::Impl::fill (CameraRun &run)
   const auto guard = control->lock ();
   const guint payload = arv_camera_get_payload (control->camera (), &error);
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
-  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMaxExtra))
+  if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMaxChunkBytes))
     status = control->refuse (CameraFault::kUnsupported,
         "sends " + std::to_string (payload) + " bytes a picture; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
@@ -304,7 +298,7 @@ Camera::start (Arrived arrived, Lost lost)
   if (impl_->watch->lost)
     return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
   stop ();
-  if (!impl_->take_down.wait (TakeDown::kLongest))
+  if (!impl_->teardown.wait (TeardownQueue::kMaxWait))
     return control.refuse (CameraFault::kTimedOut, "is still stopping");
   auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
@@ -313,7 +307,7 @@ Camera::start (Arrived arrived, Lost lost)
   run->counter = FrameCounter (is_gige () ? FrameCounter::Ids::kGigE : FrameCounter::Ids::kUsb);
   CameraStatus status = impl_->create_stream (run);
   if (!status.ok ())
-    return impl_->judged (status);
+    return impl_->classify (status);
   {
     std::lock_guard guard (impl_->watch->lock);
     impl_->watch->report = std::move (lost);
@@ -332,22 +326,21 @@ Camera::start (Arrived arrived, Lost lost)
   }
   if (!status.ok ())
     stop ();
-  return impl_->judged (status);
+  return impl_->classify (status);
 }
 
-/* The acquisition ends before the thread that receives it, which ends before its buffers go. */
+/* Stops acquisition, then the receiving thread, then releases the buffers. */
 void
 Camera::Impl::end (const std::shared_ptr<CameraRun> &run)
 {
   const bool answers = !watch->lost;
-  take_down.run (
+  teardown.run (
       [control = control.get (), run, answers] {
         if (answers) {
           const auto guard = control->lock ();
           arv_camera_stop_acquisition (control->camera (), nullptr);
         }
-        g_object_unref (
-            run->stream); /* stops its thread; Aravis takes a second stop for a mistake */
+        g_object_unref (run->stream); /* stops its thread, which must not be stopped twice */
       },
       answers);
 }
@@ -400,7 +393,7 @@ Camera::statistics () const
   return numbers;
 }
 
-/* Features while it streams */
+/* ---- features while streaming ---- */
 
 CameraStatus
 Camera::trigger_software ()
@@ -411,25 +404,25 @@ Camera::trigger_software ()
   const auto guard = control.lock ();
   GError *error = nullptr;
   arv_camera_software_trigger (control.camera (), &error);
-  return impl_->judged (control.status ("software trigger", error));
+  return impl_->classify (control.status ("software trigger", error));
 }
 
 CameraStatus
-Camera::read_look (CameraLook &look)
+Camera::read_imaging (ImagingParameters &parameters)
 {
   if (is_lost ())
     return impl_->control->refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
-  return impl_->judged (::read_look (*impl_->control, look));
+  std::lock_guard guard (impl_->imaging_lock);
+  return impl_->classify (::read_imaging (*impl_->control, parameters));
 }
 
 CameraStatus
-Camera::write_look (const CameraLook &look)
+Camera::write_imaging (const ImagingParameters &parameters)
 {
   if (is_lost ())
     return impl_->control->refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
-  return impl_->judged (::write_look (*impl_->control, look, impl_->written));
+  std::lock_guard guard (impl_->imaging_lock);
+  return impl_->classify (::write_imaging (*impl_->control, parameters, impl_->written));
 }
 
 bool
@@ -450,11 +443,11 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
   camera_time_ns = 0;
   if (is_lost ())
     return control.refuse (CameraFault::kLost, "was lost");
-  std::lock_guard guard (impl_->look_lock);
+  std::lock_guard guard (impl_->imaging_lock);
   CameraStatus status =
       is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
                  : read_usb_clock (control, camera_time_ns, read_at_us);
-  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kLatestTime_ns))
+  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kMaxCameraTime_ns))
     return control.refuse (CameraFault::kFailed, "has no readable clock");
-  return impl_->judged (status);
+  return impl_->classify (status);
 }

@@ -4,13 +4,15 @@
 #include <algorithm>
 #include <gst/gst.h>
 
-/* GigE Vision's bootstrap registers, which every GigE camera has: the latch keeps the clock for
- * reading. */
-static constexpr guint64 kTimestampControl = 0x0944, kTimestampHigh = 0x0948,
-                         kTimestampLow = 0x094c;
-static constexpr guint32 kTimestampLatch = 2;
+namespace {
 
-static std::uint64_t
+/* Bootstrap registers of GigE Vision, which every camera has. The latch holds the clock for
+ * reading.
+ */
+constexpr guint64 kTimestampControl = 0x0944, kTimestampHigh = 0x0948, kTimestampLow = 0x094c;
+constexpr guint32 kTimestampLatch = 2;
+
+std::uint64_t
 ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
 {
   constexpr std::uint64_t kSecond = 1'000'000'000;
@@ -20,7 +22,9 @@ ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
          gst_util_uint64_scale (ticks % frequency, kSecond, frequency);
 }
 
-/* Registers, no features: the control's lock is not needed. */
+} // namespace
+
+/* Registers need no lock, unlike features. */
 CameraStatus
 read_gige_clock (
     CameraControl &control, guint64 &frequency, std::uint64_t &time_ns, std::int64_t &read_at_us)

@@ -135,7 +135,7 @@ CameraControl::assign (const std::string &feature, const std::string &value)
   CameraStatus found = writable (feature, node);
   if (!found.ok ())
     return found;
-  if (ARV_IS_GC_ENUMERATION (node)) /* first: it is an integer and a string, too */
+  if (ARV_IS_GC_ENUMERATION (node)) /* before the others: it is an integer and a string, too */
     return assign_enumeration (feature, value);
   if (ARV_IS_GC_BOOLEAN (node))
     return assign_boolean (feature, value);
@@ -152,6 +152,17 @@ CameraControl::assign (const std::string &feature, const std::string &value)
     return status ("feature " + feature + "=" + value, error);
   }
   return refuse (CameraFault::kBadSetting, "feature '" + feature + "' has no value to set");
+}
+
+CameraStatus
+CameraControl::assign_all (
+    std::initializer_list<std::pair<const char *, std::string>> features_and_values)
+{
+  CameraStatus status;
+  for (const auto &[feature, value] : features_and_values)
+    if (status.ok ())
+      status = assign (feature, value);
+  return status;
 }
 
 CameraStatus

@@ -4,12 +4,14 @@
 #include <arv.h>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "status.hpp"
 
-/** Reads and writes the features of one camera. Refusals name the camera, the feature, the value,
- * and what the camera accepts. Any thread: GenICam nodes keep state, so one feature at a time. */
+/** Reads and writes the features of one camera. Faults name the camera, the feature, the value and
+ *  what the camera accepts. Any thread; the lock admits one at a time, since GenICam nodes have
+ *  state. */
 class CameraControl {
 public:
   /** @param camera  transfer full
@@ -29,14 +31,17 @@ public:
   }
 
   [[nodiscard]] bool has (const char *feature) const;
-  /** Names that an enumeration accepts now; empty if it is none. */
+  /** The entries that an enumeration accepts now; empty if the feature is no enumeration. */
   [[nodiscard]] std::vector<std::string> entries (const char *feature) const;
   [[nodiscard]] bool has_entry (const char *feature, const std::string &entry) const;
 
-  /** Whatever type the feature has: text as in a features string. */
+  /** @param value  text as in a features string, whatever the feature's type */
   CameraStatus assign (const std::string &feature, const std::string &value);
+  /** One after the other, until one fails. */
+  CameraStatus assign_all (
+      std::initializer_list<std::pair<const char *, std::string>> features_and_values);
   CameraStatus execute (const std::string &feature);
-  /** The first of these features that the camera has; fine if it has none. */
+  /** Sets the first of these features that the camera has; ok if it has none. */
   CameraStatus assign_if_there (
       std::initializer_list<const char *> features, const std::string &value);
 
@@ -45,9 +50,9 @@ public:
   [[nodiscard]] bool read (const char *feature, std::string &value) const;
 
   /** A status of this camera.
-   *  @param what  what was tried, as "exposure of 300 us"
-   *  @param error  transfer full; null: fine
-   *  @param otherwise  the fault where the error is none of the device's own */
+   *  @param what       what was tried, as "exposure of 300 us"
+   *  @param error      transfer full; null: ok
+   *  @param otherwise  the fault of an error that is not the device's */
   CameraStatus status (const std::string &what, GError *error,
       CameraFault otherwise = CameraFault::kBadSetting) const;
   CameraStatus refuse (CameraFault fault, const std::string &text) const
@@ -67,9 +72,9 @@ private:
   mutable std::recursive_mutex lock_;
 };
 
-/** The fault that an error of Aravis is. */
+/** The fault that corresponds to an error of Aravis. */
 CameraFault fault_of (const GError *error, CameraFault otherwise);
 /** "a, b, c"; cut after some 300 characters. */
 std::string joined (const std::vector<std::string> &words);
-/** A number as users write it, whatever the locale. */
+/** A number with nine digits, in the C locale. */
 std::string number_text (double value);

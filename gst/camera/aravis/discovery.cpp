@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Aravis has one list of devices for the process: whoever asks for it changes it for all others. So
- * one lock guards the list, and nobody looks at it without. */
+/* Aravis has one list of devices in the process, which each update changes for all users. So one
+ * lock guards the list, and is held while it is used. */
 #include "discovery.hpp"
 
 #include <algorithm>
@@ -9,31 +9,26 @@
 #include <fstream>
 #include <mutex>
 #include <unistd.h>
+#include <utility>
 
 #include "control.hpp"
 #include "user_name.hpp"
 
-static std::mutex list_lock;
+namespace {
+
+std::mutex list_lock;
 
 /* One discovery is enough for the cameras of a rig, which are opened one after the other. */
-static constexpr std::int64_t kListLifetime_us = 3'000'000;
-static constexpr guint64 kControlRegister = 0x0a00; /* GigE Vision: control channel privilege */
+constexpr std::int64_t kListLifetime_us = 3'000'000;
+constexpr guint64 kControlRegister = 0x0a00; /* GigE Vision: control channel privilege */
 
 struct ListedCamera {
   CameraInfo info;
-  std::string physical_id;              /* MAC address, or USB GUID */
-  std::optional<std::string> user_name; /* once asked for; GigE */
-  bool was_asked = false;
+  bool was_asked = false; /* for its user-defined name */
 };
 
-static std::string
-text_of (const char *text)
-{
-  return text ? valid_utf8 (text) : "";
-}
-
-/* list_lock is held, also while the list is used. */
-static std::vector<ListedCamera> &
+/* With list_lock, also while the list is used. */
+std::vector<ListedCamera> &
 discover (bool afresh)
 {
   static auto &list = *new std::vector<ListedCamera>; /* threads may outlive main() */
@@ -43,20 +38,22 @@ discover (bool afresh)
   arv_update_device_list ();
   list.clear ();
   for (guint i = 0; i < arv_get_n_devices (); i++) {
-    ListedCamera camera;
-    camera.info.id = text_of (arv_get_device_id (i));
-    camera.info.vendor = text_of (arv_get_device_vendor (i));
-    camera.info.model = text_of (arv_get_device_model (i));
-    camera.info.serial = text_of (arv_get_device_serial_nbr (i));
-    camera.info.address = text_of (arv_get_device_address (i));
-    camera.info.protocol = text_of (arv_get_device_protocol (i));
-    camera.info.physical_id = text_of (arv_get_device_physical_id (i));
-    if (camera.info.protocol != "Fake") /* Aravis' own, which has no pictures of anything */
-      list.push_back (std::move (camera));
+    CameraInfo info;
+    info.id = valid_utf8 (arv_get_device_id (i));
+    info.vendor = valid_utf8 (arv_get_device_vendor (i));
+    info.model = valid_utf8 (arv_get_device_model (i));
+    info.serial = valid_utf8 (arv_get_device_serial_nbr (i));
+    info.address = valid_utf8 (arv_get_device_address (i));
+    info.physical_id = valid_utf8 (arv_get_device_physical_id (i));
+    info.protocol = valid_utf8 (arv_get_device_protocol (i));
+    if (info.protocol != "Fake") /* Aravis' own, which only sends test patterns */
+      list.push_back ({std::move (info)});
   }
   listed_at = g_get_monotonic_time ();
   return list;
 }
+
+} // namespace
 
 std::vector<CameraInfo>
 list_cameras ()
@@ -68,9 +65,11 @@ list_cameras ()
   return cameras;
 }
 
-/* USB permissions. Aravis leaves out what it may not open, so the system's list is read. */
+/* ---- USB permissions: Aravis leaves out what it may not open, so sysfs is read ---- */
 
-static std::string
+namespace {
+
+std::string
 first_line (const std::filesystem::path &file)
 {
   std::ifstream in (file);
@@ -80,7 +79,7 @@ first_line (const std::filesystem::path &file)
 }
 
 /* Class EF (miscellaneous), subclass 05 (USB3 Vision), protocol 00 (control). */
-static bool
+bool
 is_usb3_vision (const std::filesystem::path &interface)
 {
   return first_line (interface / "bInterfaceClass") == "ef" &&
@@ -88,10 +87,12 @@ is_usb3_vision (const std::filesystem::path &interface)
          first_line (interface / "bInterfaceProtocol") == "00";
 }
 
-std::vector<ForbiddenCamera>
+} // namespace
+
+std::vector<CameraInfo>
 forbidden_usb_cameras (const std::string &devices, const std::string &nodes)
 {
-  std::vector<ForbiddenCamera> found;
+  std::vector<CameraInfo> found;
   std::error_code error;
   for (std::filesystem::directory_iterator entry (devices, error), end; !error && entry != end;
        entry.increment (error)) { /* devices may go meanwhile */
@@ -105,73 +106,49 @@ forbidden_usb_cameras (const std::string &devices, const std::string &nodes)
         std::sscanf (first_line (device / "devnum").c_str (), "%d", &number) != 1)
       continue;
     gchar *node = g_strdup_printf ("%s/%03d/%03d", nodes.c_str (), bus, number);
-    if (access (node, R_OK | W_OK) != 0)
-      found.push_back ({node, first_line (device / "product"), first_line (device / "serial")});
+    if (access (node, R_OK | W_OK) != 0) {
+      CameraInfo camera;
+      camera.model = first_line (device / "product");
+      camera.serial = first_line (device / "serial");
+      camera.address = node;
+      camera.protocol = "USB3Vision";
+      camera.problem =
+          permission_problem (camera.address + " (" + camera.model + " " + camera.serial + ")");
+      found.push_back (std::move (camera));
+    }
     g_free (node);
   }
   return found;
 }
 
-static std::string
-permission_text (const ForbiddenCamera &camera)
-{
-  return "no permission to open " + camera.node + " (" + camera.product + " " + camera.serial +
-         "): copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
-}
+/* ---- opening ---- */
 
-/* Names */
+namespace {
 
-static bool
-is_called (const ListedCamera &camera, const std::string &name)
-{
-  return camera.info.id == name || camera.info.serial == name || camera.info.address == name ||
-         camera.info.physical_id == name;
-}
-
-static std::string
+std::string
 describe (const std::vector<ListedCamera> &list)
 {
   std::vector<std::string> words;
-  for (const ListedCamera &camera : list)
-    words.push_back (
-        camera.info.id + " (" + camera.info.address + ", serial " + camera.info.serial + ")");
+  for (const auto &[info, asked] : list)
+    words.push_back (info.id + " (" + info.address + ", serial " + info.serial + ")");
   return words.empty () ? "no camera answers" : "these answer: " + joined (words);
 }
 
-static CameraStatus
+CameraStatus
 not_found (const std::string &name, const std::vector<ListedCamera> &list)
 {
   std::string text = name.empty () ? "no camera found: " : "no camera '" + name + "' found: ";
   text += describe (list);
-  for (const ForbiddenCamera &camera : forbidden_usb_cameras ()) {
+  for (const CameraInfo &camera : forbidden_usb_cameras ()) {
     if (list.empty () || name == camera.serial)
       return {CameraFault::kNoPermission,
-          (name.empty () ? "" : "camera '" + name + "': ") + permission_text (camera)};
-    text += "; besides, " + permission_text (camera);
+          (name.empty () ? "" : "camera '" + name + "': ") + camera.problem};
+    text += "; besides, " + camera.problem;
   }
   return {CameraFault::kNotFound, text};
 }
 
-static CameraStatus
-choose (const std::string &name, const std::vector<ListedCamera> &list, const ListedCamera *&chosen)
-{
-  chosen = nullptr;
-  for (const ListedCamera &camera : list) {
-    if (!name.empty () && !is_called (camera, name))
-      continue;
-    if (chosen)
-      return {CameraFault::kBadSetting,
-          (name.empty () ? "several cameras answer; name one of them"
-                         : "several cameras are called '" + name + "'; use their ids") +
-              std::string (": ") + describe (list)};
-    chosen = &camera;
-  }
-  return {};
-}
-
-/* Opening */
-
-static CameraStatus
+CameraStatus
 open_failed (const std::string &name, const GError *error)
 {
   const std::string label = "camera '" + name + "': ";
@@ -179,15 +156,15 @@ open_failed (const std::string &name, const GError *error)
   if (text.find ("ERROR_BUSY") != std::string::npos)
     return {CameraFault::kBusy, label + "another program uses it (" + text + ")"};
   if (text.find ("ERROR_ACCESS") != std::string::npos) {
-    const std::vector<ForbiddenCamera> forbidden = forbidden_usb_cameras ();
+    const std::vector<CameraInfo> forbidden = forbidden_usb_cameras ();
     return {CameraFault::kNoPermission,
-        label + (forbidden.empty () ? text : permission_text (forbidden.front ()))};
+        label + (forbidden.empty () ? text : forbidden.front ().problem)};
   }
   return {fault_of (error, CameraFault::kFailed), label + text};
 }
 
-/* GigE: Aravis opens devices that another program controls, too, and says so only later. */
-static CameraStatus
+/* GigE: Aravis also opens devices that another program controls, and reports that only later. */
+CameraStatus
 check_control (const std::string &name, ArvDevice *device)
 {
   if (!ARV_IS_GV_DEVICE (device) || arv_gv_device_is_controller (ARV_GV_DEVICE (device)))
@@ -207,75 +184,72 @@ check_control (const std::string &name, ArvDevice *device)
           " (GigE Vision gives it to one at a time; it is free again 3 s after that one is gone)"};
 }
 
-static CameraStatus
-open_by_id (
-    const std::string &name, const std::string &id, ArvDevice *&device, const char *&protocol)
+CameraStatus
+open_by_id (const std::string &name, const std::string &id, ArvDevice *&device)
 {
   GError *error = nullptr;
   device = arv_open_device (id.c_str (), &error);
-  if (!device) {
-    CameraStatus status = error ? open_failed (name, error)
-                                : CameraStatus (CameraFault::kNotFound,
-                                      "camera '" + name + "' does not answer any more");
-    g_clear_error (&error);
-    return status;
-  }
+  CameraStatus status;
+  if (device)
+    status = check_control (name, device);
+  else if (error)
+    status = open_failed (name, error);
+  else
+    status = {CameraFault::kNotFound, "camera '" + name + "' does not answer any more"};
   g_clear_error (&error);
-  protocol = ARV_IS_GV_DEVICE (device) ? "GigEVision" : "USB3Vision";
-  CameraStatus status = check_control (name, device);
   if (!status.ok ())
     g_clear_object (&device);
   return status;
 }
 
-/* Asks each GigE camera of the list for its user-defined name, once. */
-static const ListedCamera *
-find_by_user_name (const std::string &name, std::vector<ListedCamera> &list)
+/* Opens the camera of that name in the list, as it is or afresh.
+ * @return kNotFound: nothing in the list is called so */
+CameraStatus
+open_listed (const std::string &name, bool afresh, ArvDevice *&device, CameraInfo &info)
 {
-  for (ListedCamera &camera : list) {
-    if (!camera.was_asked && camera.info.protocol == "GigEVision")
-      camera.user_name = read_user_name (camera.info.address);
-    camera.was_asked = true;
-    if (camera.user_name == name)
-      return &camera;
+  const std::vector<ListedCamera> &list = discover (afresh);
+  const CameraInfo *chosen = nullptr;
+  for (const ListedCamera &camera : list) {
+    if (!name.empty () && !camera.info.is_called (name))
+      continue;
+    if (chosen)
+      return {CameraFault::kBadSetting,
+          (name.empty () ? "several cameras answer; name one of them"
+                         : "several cameras are called '" + name + "'; use their ids") +
+              std::string (": ") + describe (list)};
+    chosen = &camera.info;
   }
-  return nullptr;
+  if (!chosen)
+    return {CameraFault::kNotFound, ""};
+  info = *chosen;
+  return open_by_id (name.empty () ? info.id : name, info.id, device);
 }
 
-/* A host's name has a dot: others would cost a DNS query for each that is just not there. */
-static CameraStatus
+/* By its user-defined name, for which each GigE camera of the list is asked once, or by a host
+ * name. Host names have a dot: others would cost a DNS query for each camera that is not there. */
+CameraStatus
 open_by_other_name (
     const std::string &name, std::vector<ListedCamera> &list, ArvDevice *&device, CameraInfo &info)
 {
-  const char *protocol = "GigEVision";
-  info = {};
-  if (const ListedCamera *camera = find_by_user_name (name, list)) {
-    info = camera->info;
-    return open_by_id (name, info.id, device, protocol);
+  for (ListedCamera &camera : list) {
+    if (!std::exchange (camera.was_asked, true) && camera.info.is_gige ())
+      camera.info.user_name = read_user_name (camera.info.address);
+    if (camera.info.user_name == name) {
+      info = camera.info;
+      return open_by_id (name, info.id, device);
+    }
   }
+  info = {};
   if (name.find ('.') == std::string::npos || name.find (' ') != std::string::npos)
     return not_found (name, list);
-  const CameraStatus status = open_by_id (name, name, device, protocol);
+  const CameraStatus status = open_by_id (name, name, device);
   if (g_hostname_is_ip_address (name.c_str ()))
     info.address = name;
-  info.protocol = protocol;
+  info.protocol = !device || ARV_IS_GV_DEVICE (device) ? "GigEVision" : "USB3Vision";
   return status.fault () == CameraFault::kNotFound ? not_found (name, list) : status;
 }
 
-/* From the list as it is, or afresh. kNotFound: nothing in the list is called so. */
-static CameraStatus
-open_listed (const std::string &name, bool afresh, ArvDevice *&device, CameraInfo &info)
-{
-  const ListedCamera *chosen = nullptr;
-  CameraStatus status = choose (name, discover (afresh), chosen);
-  if (!status.ok ())
-    return status;
-  if (!chosen)
-    return {CameraFault::kNotFound, ""};
-  info = chosen->info;
-  const char *protocol = "";
-  return open_by_id (name.empty () ? info.id : name, info.id, device, protocol);
-}
+} // namespace
 
 CameraStatus
 open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &info)
@@ -283,7 +257,7 @@ open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &inf
   std::lock_guard guard (list_lock);
   device = nullptr;
   info = {};
-  /* What was just listed need not be listed again, but may be gone. */
+  /* A recent list need not be made again, but its cameras may be gone. */
   CameraStatus status (CameraFault::kNotFound, "");
   if (!name.empty ())
     status = open_listed (name, false, device, info);

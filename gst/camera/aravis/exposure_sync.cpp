@@ -5,8 +5,8 @@
 #include <mutex>
 #include <thread>
 
-/* Belongs to the thread as well, which may be late to end. */
-struct LookFollower::Work {
+/* Shared with the thread, which may end late. */
+struct ExposureSync::Worker {
   std::shared_ptr<Camera> leader;
   std::vector<std::shared_ptr<Camera>> followers;
   std::chrono::milliseconds period{};
@@ -21,20 +21,20 @@ struct LookFollower::Work {
 };
 
 CameraStatus
-LookFollower::Work::follow () const
+ExposureSync::Worker::follow () const
 {
-  CameraLook look;
-  CameraStatus status = leader->read_look (look);
+  ImagingParameters parameters;
+  CameraStatus status = leader->read_imaging (parameters);
   for (const auto &follower : followers)
     if (status.ok ())
-      status = follower->write_look (look);
+      status = follower->write_imaging (parameters);
   return status;
 }
 
 void
-LookFollower::Work::run ()
+ExposureSync::Worker::run ()
 {
-  bool was_ok = true; /* a camera that refuses once would refuse every time */
+  bool was_ok = true; /* report a refusal once */
   std::unique_lock guard (lock);
   while (!quit) {
     guard.unlock ();
@@ -54,28 +54,28 @@ LookFollower::Work::run ()
 }
 
 void
-LookFollower::start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
+ExposureSync::start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
     std::chrono::milliseconds period, Failed failed)
 {
   stop ();
-  work_ = std::make_shared<Work> ();
-  work_->leader = std::move (leader);
-  work_->followers = std::move (followers);
-  work_->period = period;
-  work_->failed = std::move (failed);
-  std::thread ([work = work_] { work->run (); }).detach ();
+  worker_ = std::make_shared<Worker> ();
+  worker_->leader = std::move (leader);
+  worker_->followers = std::move (followers);
+  worker_->period = period;
+  worker_->failed = std::move (failed);
+  std::thread ([worker = worker_] { worker->run (); }).detach ();
 }
 
 void
-LookFollower::stop ()
+ExposureSync::stop ()
 {
-  if (!work_)
+  if (!worker_)
     return;
-  std::unique_lock guard (work_->lock);
-  work_->quit = true;
-  work_->failed = nullptr;
-  work_->changed.notify_all ();
-  work_->changed.wait_for (guard, std::chrono::seconds (1), [this] { return work_->done; });
+  std::unique_lock guard (worker_->lock);
+  worker_->quit = true;
+  worker_->failed = nullptr;
+  worker_->changed.notify_all ();
+  worker_->changed.wait_for (guard, std::chrono::seconds (1), [this] { return worker_->done; });
   guard.unlock ();
-  work_ = nullptr;
+  worker_ = nullptr;
 }

@@ -8,26 +8,27 @@
 
 #include "camera.hpp"
 
-/** Keeps the look of cameras equal: reads what the leader's regulators chose, and writes it into
- * the followers, from a thread of its own. */
-class LookFollower {
+/** Keeps exposure, gain and white balance of cameras equal: reads what the leader has chosen and
+ *  writes it to the followers. Its thread is detached, and no GstTask, since nobody may have to
+ * wait for a camera that does not answer. */
+class ExposureSync {
 public:
   using Failed = std::function<void (const CameraStatus &)>;
 
-  LookFollower () = default;
-  LookFollower (const LookFollower &) = delete;
-  LookFollower &operator= (const LookFollower &) = delete;
-  ~LookFollower () { stop (); }
+  ExposureSync () = default;
+  ExposureSync (const ExposureSync &) = delete;
+  ExposureSync &operator= (const ExposureSync &) = delete;
+  ~ExposureSync () { stop (); }
 
-  /** @param failed  from its thread; the first time that a camera refuses, and again after a
-   * success */
+  /** @param failed  from its thread, at the first refusal of a camera, and at the first one after a
+   *  success */
   void start (std::shared_ptr<Camera> leader, std::vector<std::shared_ptr<Camera>> followers,
       std::chrono::milliseconds period, Failed failed);
-  /** `failed` does not come after it. A camera that does not answer is not waited for: its thread
-   *  lets it go when Aravis gives up, within seconds. */
+  /** `failed` is not called after it. Does not wait for a camera that does not answer: the thread
+   *  releases it when Aravis gives up, within seconds. */
   void stop ();
 
 private:
-  struct Work;
-  std::shared_ptr<Work> work_;
+  struct Worker;
+  std::shared_ptr<Worker> worker_;
 };

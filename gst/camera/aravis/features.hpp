@@ -11,7 +11,7 @@
 struct CameraFeature {
   std::string name;     ///< GenICam's, as "Gamma", "LineSelector"
   std::string value;    ///< as written, without quotes; empty only for commands
-  bool command = false; ///< written without "=": to be executed
+  bool command = false; ///< written without "=": executed
 
   bool operator== (const CameraFeature &) const = default;
 };
@@ -19,5 +19,5 @@ struct CameraFeature {
 /** Splits "Name=Value Name='two words' Command ..." at spaces, commas or semicolons; '"' and "'"
  * quote values. Names are letters, digits, '_', and begin with a letter.
  *  @param[out] features  in order of the string; empty after a failure
- *  @return kBadSetting: the text shows the place and what was expected. Pure. */
+ *  @return kBadSetting: the text shows the place and what was expected */
 CameraStatus parse_camera_features (std::string_view text, std::vector<CameraFeature> &features);

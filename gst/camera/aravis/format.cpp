@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
-static const PixelFormat kFormats[] = {
+namespace {
+
+const PixelFormat kFormats[] = {
     {ARV_PIXEL_FORMAT_MONO_8, "Mono8", GST_VIDEO_FORMAT_GRAY8, "", 1},
     {ARV_PIXEL_FORMAT_RGB_8_PACKED, "RGB8", GST_VIDEO_FORMAT_RGB, "", 3},
     {ARV_PIXEL_FORMAT_BGR_8_PACKED, "BGR8", GST_VIDEO_FORMAT_BGR, "", 3},
@@ -13,36 +15,33 @@ static const PixelFormat kFormats[] = {
     {ARV_PIXEL_FORMAT_BAYER_GR_8, "BayerGR8", GST_VIDEO_FORMAT_UNKNOWN, "grbg", 1},
 };
 
-/* Older cameras say RGB8Packed where newer ones say RGB8. */
-static std::string
-without_packed (std::string name)
+GstCaps *
+media_type (GstVideoFormat format, const char *bayer)
 {
-  if (name.ends_with ("8Packed"))
-    name.resize (name.size () - 6);
-  return name;
+  return format == GST_VIDEO_FORMAT_UNKNOWN
+             ? gst_caps_new_simple ("video/x-bayer", "format", G_TYPE_STRING, bayer, nullptr)
+             : gst_caps_new_simple ("video/x-raw", "format", G_TYPE_STRING,
+                   gst_video_format_to_string (format), nullptr);
 }
+
+GstCaps *
+caps_of (const PixelFormat &format)
+{
+  GstCaps *caps = media_type (format.video_format, format.bayer);
+  gst_caps_set_simple (caps, "width", GST_TYPE_INT_RANGE, 1, G_MAXINT, "height", GST_TYPE_INT_RANGE,
+      1, G_MAXINT, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, G_MAXINT, 1, nullptr);
+  return caps;
+}
+
+} // namespace
 
 const PixelFormat *
 find_pixel_format (const std::string &name)
 {
-  const std::string plain = without_packed (name);
-  const auto *end = std::end (kFormats);
-  const auto *found = std::find_if (
-      std::begin (kFormats), end, [&] (const PixelFormat &f) { return plain == f.name; });
-  return found == end ? nullptr : found;
-}
-
-static GstCaps *
-caps_of (const PixelFormat &format)
-{
-  GstCaps *caps =
-      format.video_format == GST_VIDEO_FORMAT_UNKNOWN
-          ? gst_caps_new_simple ("video/x-bayer", "format", G_TYPE_STRING, format.bayer, nullptr)
-          : gst_caps_new_simple ("video/x-raw", "format", G_TYPE_STRING,
-                gst_video_format_to_string (format.video_format), nullptr);
-  gst_caps_set_simple (caps, "width", GST_TYPE_INT_RANGE, 1, G_MAXINT, "height", GST_TYPE_INT_RANGE,
-      1, G_MAXINT, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, G_MAXINT, 1, nullptr);
-  return caps;
+  /* older cameras say RGB8Packed where newer ones say RGB8 */
+  const std::string plain = name.ends_with ("8Packed") ? name.substr (0, name.size () - 6) : name;
+  const auto *found = std::ranges::find (kFormats, plain, &PixelFormat::name);
+  return found == std::end (kFormats) ? nullptr : found;
 }
 
 GstCaps *
@@ -73,10 +72,7 @@ pixel_format_for_caps (const GstCaps *caps, const std::vector<std::string> &has)
 GstCaps *
 CameraFormat::caps () const
 {
-  GstCaps *caps = bayer.empty () ? gst_caps_new_simple ("video/x-raw", "format", G_TYPE_STRING,
-                                       gst_video_format_to_string (video_format), nullptr)
-                                 : gst_caps_new_simple ("video/x-bayer", "format", G_TYPE_STRING,
-                                       bayer.c_str (), nullptr);
+  GstCaps *caps = media_type (video_format, bayer.c_str ());
   gst_caps_set_simple (caps, "width", G_TYPE_INT, width, "height", G_TYPE_INT, height, nullptr);
   return caps;
 }

@@ -5,14 +5,14 @@
 
 #include "camera.hpp"
 
-/** One pixel format that can be carried. */
+/** A supported pixel format. */
 struct PixelFormat {
   ArvPixelFormat code;         ///< GenICam's number
   const char *name;            ///< GenICam's name
   GstVideoFormat video_format; ///< UNKNOWN: Bayer
   const char *bayer;           ///< format of video/x-bayer
-  int bytes;                   ///< a pixel
+  int bytes;                   ///< per pixel
 };
 
-/** By GenICam's name ("RGB8Packed" is "RGB8"); null if it cannot be carried. */
+/** By GenICam's name ("RGB8Packed" is "RGB8"); null if it is not supported. */
 const PixelFormat *find_pixel_format (const std::string &name);

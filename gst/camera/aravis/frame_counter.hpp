@@ -3,18 +3,18 @@
 
 #include <cstdint>
 
-/** Counts the frame ids of one stream on. GigE Vision has 16 bits without 0 (65535 is followed by
- * 1), or 64 bits from 1; USB3 Vision 64 bits from 0. */
+/** Continues the frame ids of one stream as 64-bit numbers. GigE Vision has 16 bits without 0
+ * (65535 is followed by 1), or 64 bits from 1; USB3 Vision 64 bits from 0. */
 class FrameCounter {
 public:
   enum class Ids { kGigE, kUsb };
 
   explicit FrameCounter (Ids ids = Ids::kGigE) : ids_ (ids) {}
 
-  /** Whether the standard has such an id. */
+  /** Whether the standard allows such an id. */
   [[nodiscard]] bool is_id (std::uint64_t id) const { return ids_ == Ids::kUsb || id != 0; }
-  /** The number of that id, 0 for the first id that there is. Grows strictly: an id that makes no
-   * sense after the last one (a camera that begins anew, a leap) is the next. */
+  /** The number of that id, from 0 for the standard's first id. Grows strictly: an id that cannot
+   * follow the last one (a camera that starts over, a leap) counts as the next. */
   std::uint64_t number (std::uint64_t id)
   {
     if (!begun_)

@@ -17,7 +17,7 @@ struct FrameStore::Slot {
   }
 };
 
-static GQuark
+GQuark
 slot_quark ()
 {
   static const GQuark quark = g_quark_from_static_string ("rangecast-camera-frame");
@@ -98,8 +98,8 @@ FrameStore::wrap (ArvBuffer *frame)
   return GstBufferPtr (buffer);
 }
 
-/* As GstBufferPool does when a buffer comes back: metas and all that a frame wrote go. */
-static void
+/* As GstBufferPool does: removes metas, flags and times that were set for a frame. */
+void
 reset_buffer (GstBuffer *buffer)
 {
   gst_buffer_foreach_meta (
@@ -116,7 +116,7 @@ reset_buffer (GstBuffer *buffer)
   GST_BUFFER_OFFSET (buffer) = GST_BUFFER_OFFSET_END (buffer) = GST_BUFFER_OFFSET_NONE;
 }
 
-/* Nobody else holds the memory, and nobody changed it or put another in its place. */
+/* Whether nobody else holds the memory, changed it, or put another in its place. */
 bool
 FrameStore::is_unchanged (GstBuffer *buffer, const Slot &slot)
 {
@@ -128,17 +128,17 @@ FrameStore::is_unchanged (GstBuffer *buffer, const Slot &slot)
   return offset == 0 && size == whole && gst_buffer_is_all_memory_writable (buffer);
 }
 
-/* The last holder let the buffer go. FALSE: it is taken care of. */
+/* The last reference was released. FALSE: the buffer is not freed. */
 gboolean
 FrameStore::dispose (GstMiniObject *object)
 {
   GstBuffer *buffer =
-      gst_buffer_ref (GST_BUFFER_CAST (object)); /* memory of no buffer is not writable */
+      gst_buffer_ref (GST_BUFFER_CAST (object)); /* else its memory is not writable */
   auto *slot = static_cast<Slot *> (gst_mini_object_get_qdata (object, slot_quark ()));
   const std::shared_ptr<FrameStore> store = slot->store; /* outlives the slot */
   if (!is_unchanged (buffer, *slot) || store->is_closed ()) {
     object->dispose = nullptr;
-    gst_buffer_unref (buffer); /* memory_gone() follows when the memory's last holder lets it go */
+    gst_buffer_unref (buffer); /* memory_gone() follows with the memory's last reference */
     return FALSE;
   }
   reset_buffer (buffer);
@@ -146,7 +146,7 @@ FrameStore::dispose (GstMiniObject *object)
   slot->out = false;
   store->out_--;
   store->give_back (
-      slot->frame); /* closed meanwhile: deletes frame, slot, buffer; hence the last */
+      slot->frame); /* last: if it was closed meanwhile, deletes frame, slot and buffer */
   return FALSE;
 }
 

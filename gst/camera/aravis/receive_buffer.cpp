@@ -6,7 +6,9 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-static bool
+namespace {
+
+bool
 is_udp_at (int fd, std::uint16_t port)
 {
   int type = 0;
@@ -18,6 +20,8 @@ is_udp_at (int fd, std::uint16_t port)
   return getsockname (fd, reinterpret_cast<struct sockaddr *> (&address), &size) == 0 &&
          address.sin_family == AF_INET && ntohs (address.sin_port) == port;
 }
+
+} // namespace
 
 bool
 enlarge_receive_buffer (std::uint16_t port, int bytes)

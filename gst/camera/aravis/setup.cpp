@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Order: pixel format before region (bytes a pixel limit the width of some cameras), trigger before
- * frame rate (which is locked while triggered), features last. */
+/* The order matters: pixel format before region (bytes per pixel limit the width of some cameras),
+ * trigger before frame rate (which is locked while triggered), features last. */
 #include "setup.hpp"
 
 #include <algorithm>
@@ -9,19 +9,15 @@
 #include "features.hpp"
 #include "format.hpp"
 
-/* What a camera says decides how much memory is taken: 512 MiB a picture are enough. */
-static constexpr std::uint64_t kLargestPicture = 512 << 20;
-static constexpr int kLongestSide = 65535;     /* pixels */
-static constexpr int kGigEMinimumPacket = 576; /* bytes; GigE Vision */
+namespace {
 
-/* An error that only says that the camera lacks something is no reason to fail. */
-static void
-forget (GError *&error)
-{
-  g_clear_error (&error);
-}
+/* Cameras decide how much memory is allocated, within this. */
+constexpr std::uint64_t kMaxImageBytes = 512 << 20;
+constexpr int kMaxSide = 65535;     /* pixels */
+constexpr int kMinGigEPacket = 576; /* bytes; GigE Vision */
+constexpr int kMaxGigEPacket = 16384;
 
-static void
+void
 read_sizes (CameraControl &control, CameraAbilities &abilities)
 {
   const auto guard = control.lock ();
@@ -43,11 +39,13 @@ read_sizes (CameraControl &control, CameraAbilities &abilities)
   abilities.height_step = std::max (1, arv_camera_get_height_increment (camera, nullptr));
   for (int *side : {&abilities.max_width, &abilities.max_height, &abilities.min_width,
            &abilities.min_height, &abilities.width_step, &abilities.height_step})
-    *side = std::clamp (*side, 0, kLongestSide);
+    *side = std::clamp (*side, 0, kMaxSide);
+  double min_frame_rate = 0;
   if (arv_camera_is_frame_rate_available (camera, nullptr))
-    arv_camera_get_frame_rate_bounds (
-        camera, &abilities.min_frame_rate, &abilities.max_frame_rate, nullptr);
+    arv_camera_get_frame_rate_bounds (camera, &min_frame_rate, &abilities.max_frame_rate, nullptr);
 }
+
+} // namespace
 
 CameraStatus
 read_abilities (CameraControl &control, CameraAbilities &abilities)
@@ -69,20 +67,15 @@ read_abilities (CameraControl &control, CameraAbilities &abilities)
   std::stable_partition (abilities.pixel_formats.begin (), abilities.pixel_formats.end (),
       [&] (const std::string &name) { return current && name == current; });
   read_sizes (control, abilities);
-  for (const std::string &source : control.entries ("TriggerSource")) {
-    abilities.software_trigger |= source == "Software";
-    abilities.line_trigger |= source.starts_with ("Line");
-    abilities.action_trigger |= source.starts_with ("Action");
-  }
-  abilities.ptp = control.has ("PtpEnable") || control.has ("GevIEEE1588");
   return {};
 }
 
-/* Image */
+/* ---- image ---- */
 
-static CameraStatus
-choose_pixel_format (CameraControl &control, const std::string &wanted, const PixelFormat *&format,
-    std::string &name)
+namespace {
+
+CameraStatus
+choose_pixel_format (CameraControl &control, const std::string &wanted, std::string &name)
 {
   CameraAbilities abilities;
   CameraStatus status = read_abilities (control, abilities);
@@ -110,12 +103,11 @@ choose_pixel_format (CameraControl &control, const std::string &wanted, const Pi
     return control.refuse (
         CameraFault::kBadSetting, "has no pixel format " + name + "; it has " + joined (all));
   name = *found; /* as this camera writes it */
-  format = find_pixel_format (name);
   return {};
 }
 
 /* One side of the region. Steps and limits are checked here because cameras round silently. */
-static CameraStatus
+CameraStatus
 check_side (CameraControl &control, const char *what, int sensor, int smallest, int step, int begin,
     int &size, int &offset)
 {
@@ -137,7 +129,7 @@ check_side (CameraControl &control, const char *what, int sensor, int smallest, 
   return {};
 }
 
-static CameraStatus
+CameraStatus
 set_region (CameraControl &control, const CameraSettings &settings)
 {
   CameraAbilities a;
@@ -153,7 +145,7 @@ set_region (CameraControl &control, const CameraSettings &settings)
   if (!status.ok ())
     return status;
   GError *error = nullptr;
-  if (settings.x < 0) /* the middle, where the camera can begin there */
+  if (settings.x < 0) /* near the middle, in the steps of the camera */
     x -= x % std::max (1, arv_camera_get_x_offset_increment (camera, nullptr));
   if (settings.y < 0)
     y -= y % std::max (1, arv_camera_get_y_offset_increment (camera, nullptr));
@@ -174,12 +166,13 @@ set_region (CameraControl &control, const CameraSettings &settings)
   return status;
 }
 
+} // namespace
+
 CameraStatus
 set_image (CameraControl &control, const CameraSettings &settings)
 {
-  const PixelFormat *pixel = nullptr;
   std::string name;
-  CameraStatus status = choose_pixel_format (control, settings.pixel_format, pixel, name);
+  CameraStatus status = choose_pixel_format (control, settings.pixel_format, name);
   if (status.ok ())
     status = control.assign ("PixelFormat", name);
   if (status.ok ())
@@ -201,25 +194,27 @@ read_format (CameraControl &control, CameraFormat &format)
   if (!control.read ("PixelFormat", format.pixel_format))
     return control.refuse (CameraFault::kFailed, "does not report its pixel format");
   const PixelFormat *pixel = find_pixel_format (format.pixel_format);
-  if (!pixel || format.width < 1 || format.height < 1 || format.width > kLongestSide ||
-      format.height > kLongestSide)
+  if (!pixel || format.width < 1 || format.height < 1 || format.width > kMaxSide ||
+      format.height > kMaxSide)
     return control.refuse (CameraFault::kUnsupported,
         "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
             " " + format.pixel_format + " is not supported");
   format.video_format = pixel->video_format;
   format.bayer = pixel->bayer;
-  if (std::uint64_t (format.width) * format.height * pixel->bytes > kLargestPicture)
+  if (std::uint64_t (format.width) * format.height * pixel->bytes > kMaxImageBytes)
     return control.refuse (CameraFault::kUnsupported,
         "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
-            " are too large: expected at most " + std::to_string (kLargestPicture) + " bytes");
+            " are too large: expected at most " + std::to_string (kMaxImageBytes) + " bytes");
   format.stride = format.width * pixel->bytes;
   return {};
 }
 
-/* Trigger */
+/* ---- trigger ---- */
 
-static CameraStatus
-switch_trigger_on (CameraControl &control, const std::string &source)
+namespace {
+
+CameraStatus
+enable_trigger (CameraControl &control, const std::string &source)
 {
   const std::vector<std::string> sources = control.entries ("TriggerSource");
   if (std::find (sources.begin (), sources.end (), source) == sources.end ())
@@ -227,18 +222,16 @@ switch_trigger_on (CameraControl &control, const std::string &source)
         CameraFault::kBadSetting, "has no trigger source " + source + "; it has " +
                                       (sources.empty () ? "none at all" : joined (sources)));
   CameraStatus status = control.assign_if_there ({"AcquisitionFrameRateEnable"}, "false");
-  if (status.ok () && control.has ("TriggerSelector"))
-    status = control.assign ("TriggerSelector",
+  if (status.ok ())
+    status = control.assign_if_there ({"TriggerSelector"},
         control.has_entry ("TriggerSelector", "FrameStart") ? "FrameStart" : "AcquisitionStart");
   if (status.ok ())
-    status = control.assign ("TriggerSource", source);
-  if (status.ok ())
-    status = control.assign ("TriggerMode", "On");
+    status = control.assign_all ({{"TriggerSource", source}, {"TriggerMode", "On"}});
   return status;
 }
 
-static CameraStatus
-show_exposure_on_line (CameraControl &control, const LineTrigger &line)
+CameraStatus
+output_exposure (CameraControl &control, const LineTrigger &line)
 {
   if (!control.has ("LineSelector") || !control.has ("LineSource"))
     return control.refuse (CameraFault::kBadSetting,
@@ -247,40 +240,37 @@ show_exposure_on_line (CameraControl &control, const LineTrigger &line)
   if (status.ok ())
     status = control.assign_if_there ({"LineMode"}, "Output");
   if (status.ok ())
-    status = control.assign ("LineSource", line.output_source);
+    status = control.assign ("LineSource", "ExposureActive");
   return status;
 }
 
-static CameraStatus
-follow_actions (CameraControl &control, const ActionTrigger &action)
+CameraStatus
+enable_actions (CameraControl &control, const ActionTrigger &action)
 {
-  std::string source;
-  for (const std::string &entry : control.entries ("TriggerSource"))
-    if (source.empty () && entry.starts_with ("Action"))
-      source = entry;
-  if (source.empty ())
+  const std::vector<std::string> sources = control.entries ("TriggerSource");
+  const auto source = std::ranges::find_if (
+      sources, [] (const std::string &entry) { return entry.starts_with ("Action"); });
+  if (source == sources.end ())
     return control.refuse (
         CameraFault::kBadSetting, "does not support action commands: none of its trigger sources "
                                   "begins with Action; it has " +
-                                      joined (control.entries ("TriggerSource")));
-  CameraStatus status;
-  if (control.has ("ActionSelector")) /* "Action1" goes by the number, 0 or 1 for the first */
-    status = control.assign ("ActionSelector", source.substr (std::string ("Action").size ()));
+                                      joined (sources));
+  /* "Action1" is selected by its number, 0 or 1 for the first */
+  const std::string number = source->substr (std::string_view ("Action").size ());
+  CameraStatus status = control.assign_if_there ({"ActionSelector"}, number);
   if (status.ok ())
-    status = control.assign ("ActionDeviceKey", std::to_string (action.device_key));
-  if (status.ok ())
-    status = control.assign ("ActionGroupKey", std::to_string (action.group_key));
-  if (status.ok ())
-    status = control.assign ("ActionGroupMask", std::to_string (action.group_mask));
+    status = control.assign_all ({{"ActionDeviceKey", std::to_string (action.device_key)},
+        {"ActionGroupKey", std::to_string (action.group_key)},
+        {"ActionGroupMask", std::to_string (action.group_mask)}});
   if (status.ok () && action.ptp && !control.has ("PtpEnable") && !control.has ("GevIEEE1588"))
     return control.refuse (CameraFault::kBadSetting,
         "does not support IEEE 1588, which scheduled action commands require");
   if (status.ok () && action.ptp)
     status = control.assign_if_there ({"PtpEnable", "GevIEEE1588"}, "true");
-  if (status.ok ())
-    status = switch_trigger_on (control, source);
-  return status;
+  return status.ok () ? enable_trigger (control, *source) : status;
 }
+
+} // namespace
 
 CameraStatus
 set_trigger (CameraControl &control, const CameraSettings &settings)
@@ -290,7 +280,7 @@ set_trigger (CameraControl &control, const CameraSettings &settings)
   arv_camera_clear_triggers (control.camera (), &error);
   if (error && fault_of (error, CameraFault::kNone) != CameraFault::kNone)
     return control.status ("trigger off", error);
-  forget (error); /* a camera without triggers */
+  g_clear_error (&error); /* a camera without triggers */
   arv_camera_set_acquisition_mode (control.camera (), ARV_ACQUISITION_MODE_CONTINUOUS, &error);
   CameraStatus status = control.status ("continuous acquisition", error);
   if (!status.ok ())
@@ -299,76 +289,74 @@ set_trigger (CameraControl &control, const CameraSettings &settings)
     case TriggerMode::kFreeRun:
       return {};
     case TriggerMode::kSoftware:
-      return switch_trigger_on (control, "Software");
+      return enable_trigger (control, "Software");
     case TriggerMode::kAction:
-      return follow_actions (control, settings.action);
+      return enable_actions (control, settings.action);
     case TriggerMode::kHardware:
       break;
   }
   if (settings.line.master)
-    return show_exposure_on_line (control, settings.line);
-  status = switch_trigger_on (control, settings.line.source);
+    return output_exposure (control, settings.line);
+  status = enable_trigger (control, settings.line.source);
   if (status.ok ())
-    status = control.assign_if_there ({"TriggerActivation"}, settings.line.activation);
+    status = control.assign_if_there ({"TriggerActivation"}, "RisingEdge");
   return status;
 }
 
-/* Look. ArvCamera knows under which of several names a camera has these. */
+/* ---- imaging parameters ---- */
 
-static CameraStatus
-set_exposure (CameraControl &control, const CameraSettings &settings)
+namespace {
+
+/* A value that cameras can adjust by themselves. ArvCamera knows under which of several names a
+ * camera has it. */
+struct AdjustableValue {
+  const char *name, *unit;
+  gboolean (*is_auto_available) (ArvCamera *, GError **);
+  void (*set_auto) (ArvCamera *, ArvAuto, GError **);
+  gboolean (*is_available) (ArvCamera *, GError **);
+  double (*get) (ArvCamera *, GError **);
+  void (*get_bounds) (ArvCamera *, double *, double *, GError **);
+  void (*set) (ArvCamera *, double, GError **);
+};
+constexpr AdjustableValue kExposure = {"exposure", " us", arv_camera_is_exposure_auto_available,
+    arv_camera_set_exposure_time_auto, arv_camera_is_exposure_time_available,
+    arv_camera_get_exposure_time, arv_camera_get_exposure_time_bounds,
+    arv_camera_set_exposure_time};
+constexpr AdjustableValue kGain = {"gain", "", arv_camera_is_gain_auto_available,
+    arv_camera_set_gain_auto, arv_camera_is_gain_available, arv_camera_get_gain,
+    arv_camera_get_gain_bounds, arv_camera_set_gain};
+
+CameraStatus
+set_value (CameraControl &control, const AdjustableValue &value, AutoMode mode,
+    const std::optional<double> &wanted)
 {
-  if (settings.exposure_mode == AutoMode::kUnchanged)
+  if (mode == AutoMode::kUnchanged)
     return {};
+  const std::string name = value.name;
   ArvCamera *camera = control.camera ();
-  const bool automatic = settings.exposure_mode == AutoMode::kAuto;
+  const bool automatic = mode == AutoMode::kAuto;
   GError *error = nullptr;
-  if (arv_camera_is_exposure_auto_available (camera, nullptr))
-    arv_camera_set_exposure_time_auto (
-        camera, automatic ? ARV_AUTO_CONTINUOUS : ARV_AUTO_OFF, &error);
+  if (value.is_auto_available (camera, nullptr))
+    value.set_auto (camera, automatic ? ARV_AUTO_CONTINUOUS : ARV_AUTO_OFF, &error);
   else if (automatic)
-    return control.refuse (CameraFault::kBadSetting, "has no automatic exposure");
-  CameraStatus status = control.status ("automatic exposure", error);
-  if (!status.ok () || automatic || !settings.exposure_us)
+    return control.refuse (CameraFault::kBadSetting, "has no automatic " + name);
+  CameraStatus status = control.status ("automatic " + name, error);
+  if (!status.ok () || automatic || !wanted)
     return status;
   double low = 0, high = 0;
-  const std::string what = "exposure of " + number_text (*settings.exposure_us) + " us";
-  arv_camera_get_exposure_time_bounds (camera, &low, &high, &error);
-  if (!error && low < high && (*settings.exposure_us < low || *settings.exposure_us > high))
-    return control.refuse (CameraFault::kBadSetting,
-        what + ": the camera accepts " + number_text (low) + " to " + number_text (high) + " us");
-  forget (error);
-  arv_camera_set_exposure_time (camera, *settings.exposure_us, &error);
+  const std::string what = name + " of " + number_text (*wanted) + value.unit;
+  error = nullptr;
+  value.get_bounds (camera, &low, &high, &error);
+  if (!error && low < high && (*wanted < low || *wanted > high))
+    return control.refuse (CameraFault::kBadSetting, what + ": the camera accepts " +
+                                                         number_text (low) + " to " +
+                                                         number_text (high) + value.unit);
+  g_clear_error (&error); /* a camera without bounds */
+  value.set (camera, *wanted, &error);
   return control.status (what, error);
 }
 
-static CameraStatus
-set_gain (CameraControl &control, const CameraSettings &settings)
-{
-  if (settings.gain_mode == AutoMode::kUnchanged)
-    return {};
-  ArvCamera *camera = control.camera ();
-  const bool automatic = settings.gain_mode == AutoMode::kAuto;
-  GError *error = nullptr;
-  if (arv_camera_is_gain_auto_available (camera, nullptr))
-    arv_camera_set_gain_auto (camera, automatic ? ARV_AUTO_CONTINUOUS : ARV_AUTO_OFF, &error);
-  else if (automatic)
-    return control.refuse (CameraFault::kBadSetting, "has no automatic gain");
-  CameraStatus status = control.status ("automatic gain", error);
-  if (!status.ok () || automatic || !settings.gain)
-    return status;
-  double low = 0, high = 0;
-  const std::string what = "gain of " + number_text (*settings.gain);
-  arv_camera_get_gain_bounds (camera, &low, &high, &error);
-  if (!error && low < high && (*settings.gain < low || *settings.gain > high))
-    return control.refuse (CameraFault::kBadSetting,
-        what + ": the camera accepts " + number_text (low) + " to " + number_text (high));
-  forget (error);
-  arv_camera_set_gain (camera, *settings.gain, &error);
-  return control.status (what, error);
-}
-
-static CameraStatus
+CameraStatus
 set_white_balance (CameraControl &control, AutoMode mode)
 {
   if (mode == AutoMode::kUnchanged)
@@ -380,12 +368,18 @@ set_white_balance (CameraControl &control, AutoMode mode)
   return control.assign ("BalanceWhiteAuto", mode == AutoMode::kAuto ? "Continuous" : "Off");
 }
 
-static CameraStatus
+/* Else its trigger sets the rate. */
+bool
+runs_freely (const CameraSettings &settings)
+{
+  return settings.trigger == TriggerMode::kFreeRun ||
+         (settings.trigger == TriggerMode::kHardware && settings.line.master);
+}
+
+CameraStatus
 set_frame_rate (CameraControl &control, const CameraSettings &settings)
 {
-  const bool own_pace = settings.trigger == TriggerMode::kFreeRun ||
-                        (settings.trigger == TriggerMode::kHardware && settings.line.master);
-  if (settings.frame_rate <= 0 || !own_pace)
+  if (settings.frame_rate <= 0 || !runs_freely (settings))
     return {};
   ArvCamera *camera = control.camera ();
   const std::string what = "frame rate of " + number_text (settings.frame_rate);
@@ -394,12 +388,13 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
   GError *error = nullptr;
   arv_camera_set_frame_rate (camera, settings.frame_rate, &error);
   CameraStatus status = control.status (what, error);
-  double low = 0, high = 0;
   if (!status.ok () && status.fault () != CameraFault::kBadSetting)
     return status;
+  double low = 0, high = 0;
+  error = nullptr;
   arv_camera_get_frame_rate_bounds (camera, &low, &high, &error);
   const bool known = !error && low < high;
-  forget (error);
+  g_clear_error (&error);
   if (known && (settings.frame_rate < low * 0.999 || settings.frame_rate > high * 1.001))
     return control.refuse (
         CameraFault::kBadSetting, what + ": the camera accepts " + number_text (low) + " to " +
@@ -407,31 +402,33 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
   return status;
 }
 
+} // namespace
+
 CameraStatus
-set_look (CameraControl &control, const CameraSettings &settings, double &frame_rate)
+set_imaging (CameraControl &control, const CameraSettings &settings, double &frame_rate)
 {
   const auto guard = control.lock ();
-  /* A long exposure limits the rate, and a high rate the exposure, of some cameras: whichever is
-   * refused first is tried again after the other. */
+  /* A long exposure limits the rate of some cameras, and a high rate the exposure: a rate that is
+   * refused is tried again after the exposure. */
   CameraStatus rate = set_frame_rate (control, settings);
-  CameraStatus status = set_exposure (control, settings);
+  CameraStatus status =
+      set_value (control, kExposure, settings.exposure_mode, settings.exposure_us);
   if (!rate.ok () && status.ok ())
     rate = set_frame_rate (control, settings);
   if (status.ok ())
     status = rate;
   if (status.ok ())
-    status = set_gain (control, settings);
+    status = set_value (control, kGain, settings.gain_mode, settings.gain);
   if (status.ok ())
     status = set_white_balance (control, settings.white_balance_mode);
-  const bool triggered = settings.trigger != TriggerMode::kFreeRun &&
-                         !(settings.trigger == TriggerMode::kHardware && settings.line.master);
   frame_rate = 0;
-  if (status.ok () && !triggered && arv_camera_is_frame_rate_available (control.camera (), nullptr))
+  if (status.ok () && runs_freely (settings) &&
+      arv_camera_is_frame_rate_available (control.camera (), nullptr))
     frame_rate = std::max (0.0, arv_camera_get_frame_rate (control.camera (), nullptr));
   return status;
 }
 
-/* Transport and the rest */
+/* ---- transport and other features ---- */
 
 CameraStatus
 set_transport (CameraControl &control, const CameraSettings &settings)
@@ -441,15 +438,14 @@ set_transport (CameraControl &control, const CameraSettings &settings)
   if (!arv_camera_is_gv_device (camera))
     return {};
   GError *error = nullptr;
-  arv_camera_gv_set_stream_options (camera, settings.packet_socket
-                                                ? ARV_GV_STREAM_OPTION_NONE
-                                                : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  /* a memory-mapped packet socket costs less CPU time, but images arrive later */
+  arv_camera_gv_set_stream_options (camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   arv_camera_gv_set_packet_size_adjustment (camera, settings.packet_size == 0
                                                         ? ARV_GV_PACKET_SIZE_ADJUSTMENT_ONCE
                                                         : ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
   if (settings.packet_size > 0) {
     const std::string what = "packet size of " + std::to_string (settings.packet_size) + " bytes";
-    if (settings.packet_size < kGigEMinimumPacket || settings.packet_size > 16384)
+    if (settings.packet_size < kMinGigEPacket || settings.packet_size > kMaxGigEPacket)
       return control.refuse (
           CameraFault::kBadSetting, what + ": GigE Vision allows 576 to 16384 bytes");
     arv_camera_gv_set_packet_size (camera, settings.packet_size, &error);
@@ -475,19 +471,15 @@ set_features (CameraControl &control, const std::string &features)
   return status;
 }
 
-/* The leader's look, and the followers' */
+/* ---- imaging parameters while streaming: one feature at a time, since triggers wait for the
+ * control's lock ---- */
 
-static constexpr const char *kBalanceColours[] = {"Red", "Green", "Blue"};
+namespace {
 
-static std::optional<double> &
-balance_of (CameraLook &look, int colour)
-{
-  return colour == 0   ? look.white_balance_red
-         : colour == 1 ? look.white_balance_green
-                       : look.white_balance_blue;
-}
+constexpr const char *kBalanceColours[] = {"Red", "Green", "Blue"};
 
-static const char *
+/* Null: the camera has none. */
+const char *
 balance_feature (CameraControl &control)
 {
   if (!control.has ("BalanceRatioSelector"))
@@ -498,87 +490,75 @@ balance_feature (CameraControl &control)
 }
 
 CameraStatus
-read_look (CameraControl &control, CameraLook &look)
+read_value (CameraControl &control, const AdjustableValue &value, std::optional<double> &current)
 {
-  look = {};
-  ArvCamera *camera = control.camera ();
+  const auto guard = control.lock ();
   GError *error = nullptr;
-  { /* one feature at a time: triggers wait for the lock */
-    const auto guard = control.lock ();
-    if (arv_camera_is_exposure_time_available (camera, nullptr))
-      look.exposure_us = arv_camera_get_exposure_time (camera, &error);
-  }
-  CameraStatus status = control.status ("exposure", error, CameraFault::kFailed);
-  error = nullptr;
-  if (status.ok ()) {
-    const auto guard = control.lock ();
-    if (arv_camera_is_gain_available (camera, nullptr))
-      look.gain = arv_camera_get_gain (camera, &error);
-  }
+  if (value.is_available (control.camera (), nullptr))
+    current = value.get (control.camera (), &error);
+  return control.status (value.name, error, CameraFault::kFailed);
+}
+
+bool
+differs (const std::optional<double> &wanted, const std::optional<double> &written)
+{
+  return wanted && (!written || std::abs (*wanted - *written) > 1e-3 * std::abs (*written) + 1e-9);
+}
+
+CameraStatus
+write_value (CameraControl &control, const AdjustableValue &value,
+    const std::optional<double> &wanted, std::optional<double> &written)
+{
+  if (!differs (wanted, written))
+    return {};
+  const auto guard = control.lock ();
+  double low = 0, high = 0;
+  GError *error = nullptr;
+  value.get_bounds (control.camera (), &low, &high, nullptr);
+  value.set (control.camera (), low < high ? std::clamp (*wanted, low, high) : *wanted, &error);
+  CameraStatus status = control.status (value.name, error);
   if (status.ok ())
-    status = control.status ("gain", error, CameraFault::kFailed);
+    written = wanted;
+  return status;
+}
+
+} // namespace
+
+CameraStatus
+read_imaging (CameraControl &control, ImagingParameters &parameters)
+{
+  parameters = {};
+  CameraStatus status = read_value (control, kExposure, parameters.exposure_us);
+  if (status.ok ())
+    status = read_value (control, kGain, parameters.gain);
   const char *ratio = status.ok () ? balance_feature (control) : nullptr;
   for (int colour = 0; ratio && colour < 3; colour++) {
     double value = 0;
     if (control.has_entry ("BalanceRatioSelector", kBalanceColours[colour]) &&
         control.assign ("BalanceRatioSelector", kBalanceColours[colour]).ok () &&
         control.read (ratio, value))
-      balance_of (look, colour) = value;
+      parameters.white_balance[colour] = value;
   }
   return status;
 }
 
-static bool
-differs (const std::optional<double> &wanted, const std::optional<double> &written)
-{
-  if (!wanted)
-    return false;
-  return !written || std::abs (*wanted - *written) > 1e-3 * std::abs (*written) + 1e-9;
-}
-
-static double
-within (double value, double low, double high)
-{
-  return low < high ? std::clamp (value, low, high) : value;
-}
-
 CameraStatus
-write_look (CameraControl &control, const CameraLook &look, CameraLook &written)
+write_imaging (
+    CameraControl &control, const ImagingParameters &parameters, ImagingParameters &written)
 {
-  ArvCamera *camera = control.camera ();
-  double low = 0, high = 0;
-  GError *error = nullptr;
-  CameraStatus status;
-  if (differs (look.exposure_us, written.exposure_us)) {
-    const auto guard = control.lock (); /* one feature at a time: triggers wait for it */
-    arv_camera_get_exposure_time_bounds (camera, &low, &high, nullptr);
-    arv_camera_set_exposure_time (camera, within (*look.exposure_us, low, high), &error);
-    status = control.status ("exposure", error, CameraFault::kBadSetting);
-    if (!status.ok ())
-      return status;
-    written.exposure_us = look.exposure_us;
-  }
-  if (differs (look.gain, written.gain)) {
-    const auto guard = control.lock ();
-    low = high = 0;
-    arv_camera_get_gain_bounds (camera, &low, &high, nullptr);
-    arv_camera_set_gain (camera, within (*look.gain, low, high), &error);
-    status = control.status ("gain", error, CameraFault::kBadSetting);
-    if (!status.ok ())
-      return status;
-    written.gain = look.gain;
-  }
-  const char *ratio = balance_feature (control);
-  for (int colour = 0; ratio && colour < 3; colour++) {
-    CameraLook wanted = look;
-    if (!differs (balance_of (wanted, colour), balance_of (written, colour)))
+  CameraStatus status =
+      write_value (control, kExposure, parameters.exposure_us, written.exposure_us);
+  if (status.ok ())
+    status = write_value (control, kGain, parameters.gain, written.gain);
+  const char *ratio = status.ok () ? balance_feature (control) : nullptr;
+  for (int colour = 0; ratio && colour < 3 && status.ok (); colour++) {
+    const auto &wanted = parameters.white_balance[colour];
+    if (!differs (wanted, written.white_balance[colour]))
       continue;
-    status = control.assign ("BalanceRatioSelector", kBalanceColours[colour]);
+    status = control.assign_all (
+        {{"BalanceRatioSelector", kBalanceColours[colour]}, {ratio, number_text (*wanted)}});
     if (status.ok ())
-      status = control.assign (ratio, number_text (*balance_of (wanted, colour)));
-    if (!status.ok ())
-      return status;
-    balance_of (written, colour) = balance_of (wanted, colour);
+      written.white_balance[colour] = wanted;
   }
   return status;
 }

@@ -4,7 +4,7 @@
 #include <glib.h>
 #include <string>
 
-/** Text that came from a device, fit for messages and properties. */
+/** Text of a device as valid UTF-8, for messages and properties. */
 inline std::string
 valid_utf8 (const std::string &text)
 {
@@ -14,7 +14,14 @@ valid_utf8 (const std::string &text)
   return copy;
 }
 
-/** What went wrong with a camera, coarsely: enough for a caller to decide whether to try again. */
+inline std::string
+valid_utf8 (const char *text)
+{
+  return text ? valid_utf8 (std::string (text)) : "";
+}
+
+/** What went wrong with a camera, for callers to decide whether to try again. The words in brackets
+ *  are the GStreamer errors that fit. */
 enum class CameraFault {
   kNone,
   kNotFound,     ///< no camera of that name answers (RESOURCE/NOT_FOUND); trying again may help
@@ -23,12 +30,11 @@ enum class CameraFault {
   kTimedOut,     ///< it was found but does not answer (RESOURCE/READ); trying again may help
   kLost,         ///< it was open and is gone (RESOURCE/READ); only a new open() helps
   kBadSetting,   ///< the camera has no such feature or refuses the value (RESOURCE/SETTINGS)
-  kUnsupported,  ///< a pixel format or payload that cannot be carried (STREAM/FORMAT)
+  kUnsupported,  ///< an unsupported pixel format or payload (STREAM/FORMAT)
   kFailed,       ///< anything else (RESOURCE/FAILED)
 };
 
-/** What is said of a camera that was open and is gone, however that was noticed.
- *  @param label  how texts name it */
+/** The text of kLost. @param label  Camera::label() */
 inline std::string
 lost_text (const std::string &label)
 {
@@ -36,8 +42,8 @@ lost_text (const std::string &label)
                  "program to take control of it";
 }
 
-/** The result of a camera function: fine, or a fault and one sentence that names the camera and
- * what was expected. The words in brackets above are the GStreamer errors that fit. */
+/** The result of a camera function: ok, or a fault and one sentence that names the camera and what
+ *  was expected. */
 class [[nodiscard]] CameraStatus {
 public:
   CameraStatus () = default;

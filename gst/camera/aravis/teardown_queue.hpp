@@ -4,36 +4,45 @@
 #include <chrono>
 #include <functional>
 #include <future>
-#include <thread>
+#include <glib.h>
+#include <memory>
 
-/** Work that may have to wait for a camera that does not answer: one after the other, in threads of
- * its own. One that is late makes the next ones not be waited for. */
-class TakeDown {
+/** Runs functions that may have to wait for a camera that does not answer, one after the other in a
+ *  thread of GLib's pool. They are finished also when this object is gone. */
+class TeardownQueue {
 public:
-  void run (std::function<void ()> work, bool patient)
+  TeardownQueue () : pool_ (g_thread_pool_new (run_task, nullptr, 1, FALSE, nullptr)) {}
+  ~TeardownQueue () { g_thread_pool_free (pool_, FALSE, FALSE); }
+  TeardownQueue (const TeardownQueue &) = delete;
+  TeardownQueue &operator= (const TeardownQueue &) = delete;
+
+  /** @param wait_for_it  wait up to a second, unless an earlier function is still running */
+  void run (std::function<void ()> function, bool wait_for_it)
   {
-    patient = patient && wait (std::chrono::milliseconds (0));
-    std::packaged_task<void ()> task ([before = done_, work = std::move (work)] {
-      if (before.valid ())
-        before.wait ();
-      work ();
-    });
-    done_ = task.get_future ().share ();
-    std::thread (std::move (task)).detach ();
-    if (patient)
-      wait (kPatience);
+    wait_for_it = wait_for_it && wait (std::chrono::milliseconds (0));
+    auto task = std::make_unique<Task> (std::move (function));
+    done_ = task->get_future ();
+    g_thread_pool_push (pool_, task.release (), nullptr);
+    if (wait_for_it)
+      wait (std::chrono::seconds (1));
   }
-  /* @return false: still at work */
+  /** @return false if the last function is still running after that time */
   bool wait (std::chrono::milliseconds limit)
   {
     return !done_.valid () || done_.wait_for (limit) == std::future_status::ready;
   }
 
-  static constexpr std::chrono::milliseconds kLongest =
-      std::chrono::seconds (15); /* Aravis' tries end before */
+  /** Longer than all tries of Aravis. */
+  static constexpr std::chrono::milliseconds kMaxWait = std::chrono::seconds (15);
 
 private:
-  static constexpr std::chrono::milliseconds kPatience = std::chrono::seconds (1);
+  using Task = std::packaged_task<void ()>;
 
-  std::shared_future<void> done_;
+  static void run_task (gpointer task, gpointer)
+  {
+    (*std::unique_ptr<Task> (static_cast<Task *> (task))) ();
+  }
+
+  GThreadPool *pool_;
+  std::future<void> done_;
 };

@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "user_name.hpp"
 
-#include <gio/gio.h>
+#include "gvcp.hpp"
+
+namespace {
 
 /* GigE Vision, chapter GVCP and table of bootstrap registers */
-static constexpr std::uint16_t kPort = 3956;
-static constexpr std::uint8_t kUserNameRegister = 0xe8;
-static constexpr std::size_t kHeaderSize = 8, kAnswerSize = kHeaderSize + 4 + kUserNameSize;
-static constexpr std::uint16_t kReadAnswer = 0x0085;
+constexpr std::uint8_t kUserNameRegister = 0xe8;
+constexpr std::size_t kHeaderSize = 8, kAnswerSize = kHeaderSize + 4 + kUserNameSize;
+constexpr std::uint16_t kReadAnswer = 0x0085;
+
+} // namespace
 
 std::array<std::uint8_t, 16>
 user_name_request (std::uint16_t request_id)
@@ -32,41 +35,23 @@ user_name_in (std::span<const std::uint8_t> answer, std::uint16_t request_id)
   return name;
 }
 
-static std::optional<std::string>
-ask (GSocket *socket)
+std::optional<std::string>
+read_user_name (const std::string &address)
 {
-  static constexpr std::uint16_t kRequest = 1;
+  constexpr std::uint16_t kRequest = 1;
+  const SocketPtr socket = connect_gvcp (address);
   const auto request = user_name_request (kRequest);
-  for (int attempt = 0; attempt < 3; attempt++) {
-    g_socket_send (socket, reinterpret_cast<const gchar *> (request.data ()), request.size (),
-        nullptr, nullptr);
-    if (!g_socket_condition_timed_wait (socket, G_IO_IN, 100'000, nullptr, nullptr))
+  for (int attempt = 0; socket && attempt < 3; attempt++) {
+    g_socket_send (socket.get (), reinterpret_cast<const gchar *> (request.data ()),
+        request.size (), nullptr, nullptr);
+    if (!g_socket_condition_timed_wait (socket.get (), G_IO_IN, 100'000, nullptr, nullptr))
       continue;
     std::array<std::uint8_t, 64> answer;
-    const gssize size = g_socket_receive (
-        socket, reinterpret_cast<gchar *> (answer.data ()), answer.size (), nullptr, nullptr);
+    const gssize size = g_socket_receive (socket.get (), reinterpret_cast<gchar *> (answer.data ()),
+        answer.size (), nullptr, nullptr);
     if (size > 0)
       if (auto name = user_name_in (std::span (answer).first (std::size_t (size)), kRequest))
         return name;
   }
   return std::nullopt;
-}
-
-std::optional<std::string>
-read_user_name (const std::string &address)
-{
-  GSocketAddress *camera = g_inet_socket_address_new_from_string (address.c_str (), kPort);
-  if (!camera)
-    return std::nullopt;
-  GSocket *socket = g_socket_new (
-      g_socket_address_get_family (camera), G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
-  std::optional<std::string> name;
-  if (socket) {
-    g_socket_set_blocking (socket, FALSE);
-    if (g_socket_connect (socket, camera, nullptr, nullptr)) /* hears the camera alone */
-      name = ask (socket);
-    g_object_unref (socket);
-  }
-  g_object_unref (camera);
-  return name;
 }

@@ -7,14 +7,14 @@
 #include <span>
 #include <string>
 
-/* The user-defined name of GigE Vision cameras, which Aravis keeps to itself. Reading it needs no
+/* The user-defined name of GigE Vision cameras, which Aravis does not export. Reading it needs no
  * control of the camera. */
 
 static constexpr std::size_t kUserNameSize = 16; ///< bytes, filled up with 0
 
-/** GVCP's READMEM_CMD for it. */
+/** The READMEM_CMD of GVCP that reads it. */
 std::array<std::uint8_t, 16> user_name_request (std::uint16_t request_id);
-/** The name in a camera's answer; absent if this is no answer to that request. Pure. */
+/** The name in a camera's answer; absent if this is no answer to that request. */
 std::optional<std::string> user_name_in (
     std::span<const std::uint8_t> answer, std::uint16_t request_id);
 

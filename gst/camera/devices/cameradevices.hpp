@@ -3,20 +3,16 @@
 
 #include <gst/gst.h>
 
-#include "foundcamera.hpp"
+#include "camera/aravis/camera_info.hpp"
 #include "knownrigs.hpp"
-
-namespace rangecast {
 
 /** A device of class Source/Video that aravissrc opens. Its properties: device.api, device.bus,
  *  camera.protocol, .id, .vendor, .model, .serial, .address, launch (the string that opens it) and,
  *  if it cannot be opened, camera.problem (why, and what to do).
- *  @return (transfer full) */
-GstDevice *new_camera_device (const FoundCamera &camera);
+ *  @return (transfer floating) */
+GstDevice *new_camera_device (const CameraInfo &camera);
 
 /** A device of class Source/Video/Stereo that stereocamsrc opens. Its properties: device.api,
  *  rig.file, rig.view-id, camera.left, .right, .third and launch.
- *  @return (transfer full) */
+ *  @return (transfer floating) */
 GstDevice *new_pair_device (const KnownPair &pair);
-
-} // namespace rangecast

@@ -47,15 +47,12 @@ new_device (const std::string &name, const gchar *klass, GstStructure *propertie
 
 } // namespace
 
-namespace rangecast {
-
 GstDevice *
-new_camera_device (const FoundCamera &camera)
+new_camera_device (const CameraInfo &camera)
 {
-  const bool is_usb = camera.transport == FoundCamera::Transport::kUsb3Vision;
   auto properties = gst_structure_new ("camera-properties", "device.api", G_TYPE_STRING, "aravis",
-      "device.bus", G_TYPE_STRING, is_usb ? "usb" : "ethernet", "camera.protocol", G_TYPE_STRING,
-      is_usb ? "USB3Vision" : "GigEVision", "camera.id", G_TYPE_STRING, camera.id.c_str (),
+      "device.bus", G_TYPE_STRING, camera.is_gige () ? "ethernet" : "usb", "camera.protocol",
+      G_TYPE_STRING, camera.protocol.c_str (), "camera.id", G_TYPE_STRING, camera.id.c_str (),
       "camera.vendor", G_TYPE_STRING, camera.vendor.c_str (), "camera.model", G_TYPE_STRING,
       camera.model.c_str (), "camera.serial", G_TYPE_STRING, camera.serial.c_str (),
       "camera.address", G_TYPE_STRING, camera.address.c_str (), nullptr);
@@ -66,9 +63,9 @@ new_camera_device (const FoundCamera &camera)
   auto name = camera.vendor + " " + camera.model + " (" + camera.serial + ")";
   if (!camera.problem.empty ())
     name += ", not usable: " + camera.problem;
-  /* By its name, Aravis would take the network that answered first, which may not be the one that
-   * pictures can come by. */
-  const auto &camera_name = is_usb ? camera.id : camera.address;
+  /* by its id, Aravis would use the network that answered first, which may not be the one that
+   * images can come by */
+  const auto &camera_name = camera.is_gige () ? camera.address : camera.id;
   return new_device (name, "Source/Video", properties, "aravissrc",
       gst_structure_new ("settings", "camera-name", G_TYPE_STRING, camera_name.c_str (), nullptr));
 }
@@ -87,8 +84,6 @@ new_pair_device (const KnownPair &pair)
       gst_structure_new ("settings", "rig", G_TYPE_STRING, pair.rig_path.c_str (), "view-id",
           G_TYPE_INT, pair.view_id, nullptr));
 }
-
-} // namespace rangecast
 
 static gboolean
 set_field (GQuark field, const GValue *value, gpointer element)

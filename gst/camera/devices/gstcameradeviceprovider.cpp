@@ -33,47 +33,41 @@
 GST_DEBUG_CATEGORY_STATIC (gst_camera_device_provider_debug);
 #define GST_CAT_DEFAULT gst_camera_device_provider_debug
 
-using rangecast::FoundCamera;
-using rangecast::FoundCameras;
-using rangecast::KnownPair;
-using rangecast::KnownRigs;
-using rangecast::UsbCameras;
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/* The networks are asked often while cameras come and go, seldom where nothing happens: each search
- * is a broadcast, and keeps others of this process from opening cameras for its second. */
-constexpr Clock::duration kShortestPeriod = std::chrono::seconds (3);
-constexpr Clock::duration kLongestPeriod = std::chrono::seconds (12);
-/* A search takes about a second, more on a host with many networks; who starts a monitor gets what
- * was found by then, and the rest as messages. */
-constexpr auto kPatience = std::chrono::milliseconds (1500);
-constexpr int kMissesAllowed = 1; // an answer to the discovery may be lost: it is UDP
+/* The networks are searched often while cameras come and go, seldom where nothing happens: each
+ * search is a broadcast, and keeps this process from opening cameras for a second. */
+constexpr Clock::duration kMinPeriod = std::chrono::seconds (3);
+constexpr Clock::duration kMaxPeriod = std::chrono::seconds (12);
+/* A search takes about a second, more on a host with many networks; an application that starts a
+ * monitor gets what was found by then, and the rest as messages. */
+constexpr auto kMaxStart = std::chrono::milliseconds (1500);
+constexpr int kMaxMisses = 1; // answers to discovery are UDP and may be lost
 
-/** What is there now, as devices are made from it. */
+/** What devices are made from. */
 struct Present {
-  FoundCameras cameras;
+  std::vector<CameraInfo> cameras;
   std::vector<KnownPair> pairs;
 };
 
 /** A device that was announced, and what it was made from. */
-template <typename What> struct Announced {
-  What what;
+template <typename Source> struct Announced {
+  Source source;
   GstDevice *device; // the provider's list owns it
 };
 
-/** What one thread watches for the provider, from start to stop. Everything but what `lock` guards
- *  belongs to that thread. */
+/** The search from start to stop, in a thread of its own because each one blocks for a second.
+ *  Everything except what `lock` guards belongs to that thread. */
 struct Watch {
   GstDeviceProvider *provider = nullptr;
   std::thread thread;
-  FoundCameras gige, usb_cameras;
+  std::vector<CameraInfo> gige, usb_cameras;
   std::vector<int> gige_misses; // in a row, per camera of `gige`
-  std::vector<Announced<FoundCamera>> cameras;
+  std::vector<Announced<CameraInfo>> cameras;
   std::vector<Announced<KnownPair>> pairs;
-  std::set<std::string> told; // problems, each said once
+  std::set<std::string> reported; // problems, each once
   KnownRigs rigs;
 
   std::mutex lock; // guards what follows; never held while searching or announcing
@@ -82,7 +76,7 @@ struct Watch {
   bool has_usb_changed = false;
   bool is_listed = false; // the first search has ended
 
-  std::unique_ptr<UsbCameras> usb; // last, so that it goes first: its thread uses what is above
+  std::unique_ptr<UsbCameras> usb; // destroyed first: its thread uses the above
 };
 
 } // namespace
@@ -96,41 +90,35 @@ G_DEFINE_TYPE (GstCameraDeviceProvider, gst_camera_device_provider, GST_TYPE_DEV
 GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdeviceprovider",
     GST_RANK_PRIMARY, GST_TYPE_CAMERA_DEVICE_PROVIDER)
 
-/*** What is there ***/
+namespace {
 
-/** A camera's user-defined name, which discovery does not tell: it is asked for until it answers,
- *  and once while it stays. */
-static std::optional<std::string>
-user_name_of (const CameraInfo &info, const FoundCameras &known)
+/** A camera's user-defined name, which is not part of discovery. A camera is asked until it
+ * answers, and then no more while it stays. */
+std::optional<std::string>
+user_name_of (const CameraInfo &info, const std::vector<CameraInfo> &known)
 {
-  const auto is_same = [&] (const FoundCamera &camera) {
+  const auto is_same = [&] (const CameraInfo &camera) {
     return camera.id == info.id && camera.address == info.address;
   };
   const auto at = std::ranges::find_if (known, is_same);
   return at != known.end () && at->user_name ? at->user_name : read_user_name (info.address);
 }
 
-/** The GigE Vision cameras that answer. USB comes from libusb, which tells about hotplug and
- *  permissions. Takes about a second. @param known  those that answered before */
-static FoundCameras
-find_gige_cameras (const FoundCameras &known)
+/** The GigE Vision cameras that answer, in about a second. USB cameras come from libusb, which has
+ *  hotplug and permissions. @param known  those that answered before */
+std::vector<CameraInfo>
+find_gige_cameras (const std::vector<CameraInfo> &known)
 {
-  FoundCameras found;
+  std::vector<CameraInfo> found;
   for (auto &info : list_cameras ())
-    if (info.protocol == "GigEVision")
-      found.push_back ({.transport = FoundCamera::Transport::kGigEVision,
-          .id = info.id,
-          .vendor = info.vendor,
-          .model = info.model,
-          .serial = info.serial,
-          .address = info.address,
-          .physical_id = info.physical_id,
-          .user_name = user_name_of (info, known),
-          .problem = {}});
+    if (info.is_gige ()) {
+      info.user_name = user_name_of (info, known);
+      found.push_back (std::move (info));
+    }
   return found;
 }
 
-static std::unique_ptr<UsbCameras>
+std::unique_ptr<UsbCameras>
 open_usb (GstDeviceProvider *provider)
 {
   std::string why;
@@ -140,26 +128,22 @@ open_usb (GstDeviceProvider *provider)
   return usb;
 }
 
-/** The problems are the user's to solve: say each once, where GStreamer's tools show it. */
-static void
-tell (GstDeviceProvider *provider, std::set<std::string> &told, const std::string &problem)
-{
-  if (!problem.empty () && told.insert (problem).second)
-    GST_WARNING_OBJECT (provider, "%s", problem.c_str ());
-}
-
-static Present
-present (
-    GstDeviceProvider *provider, KnownRigs &rigs, FoundCameras cameras, std::set<std::string> &told)
+/** Adds the pairs of known rigs, and logs problems, which users have to solve, once each. */
+Present
+find_pairs (GstDeviceProvider *provider, KnownRigs &rigs, std::vector<CameraInfo> cameras,
+    std::set<std::string> &reported)
 {
   std::vector<std::string> problems;
-  auto pairs = rigs.pairs (rangecast::known_rig_files (), cameras, problems);
+  auto pairs = rigs.pairs (known_rig_files (), cameras, problems);
   for (const auto &camera : cameras)
     problems.push_back (camera.problem);
   for (const auto &problem : problems)
-    tell (provider, told, problem);
+    if (!problem.empty () && reported.insert (problem).second)
+      GST_WARNING_OBJECT (provider, "%s", problem.c_str ());
   return {.cameras = std::move (cameras), .pairs = std::move (pairs)};
 }
+
+} // namespace
 
 static GList *
 gst_camera_device_provider_probe (GstDeviceProvider *provider)
@@ -167,50 +151,53 @@ gst_camera_device_provider_probe (GstDeviceProvider *provider)
   auto cameras = find_gige_cameras ({});
   if (auto usb = open_usb (provider))
     std::ranges::copy (usb->list (), std::back_inserter (cameras));
-  std::set<std::string> told;
+  std::set<std::string> reported;
   KnownRigs rigs;
-  const auto now = present (provider, rigs, std::move (cameras), told);
+  const auto now = find_pairs (provider, rigs, std::move (cameras), reported);
 
   GList *devices = nullptr;
   for (const auto &camera : now.cameras)
-    devices = g_list_prepend (devices, gst_object_ref_sink (rangecast::new_camera_device (camera)));
+    devices = g_list_prepend (devices, gst_object_ref_sink (new_camera_device (camera)));
   for (const auto &pair : now.pairs)
-    devices = g_list_prepend (devices, gst_object_ref_sink (rangecast::new_pair_device (pair)));
+    devices = g_list_prepend (devices, gst_object_ref_sink (new_pair_device (pair)));
   return g_list_reverse (devices);
 }
 
-/*** Watching ***/
+namespace {
 
-/** Tells what went and what came. A device whose facts changed goes and comes. */
-template <typename What>
-static void
-announce (GstDeviceProvider *provider, std::vector<Announced<What>> &announced,
-    const std::vector<What> &now, GstDevice *(*new_device) (const What &))
+/** Announces what was added and removed. A device whose properties changed is removed and added. */
+template <typename Source>
+void
+announce (GstDeviceProvider *provider, std::vector<Announced<Source>> &announced,
+    const std::vector<Source> &now, GstDevice *(*new_device) (const Source &))
 {
-  std::erase_if (announced, [&] (const Announced<What> &old) {
-    const bool is_gone = std::ranges::find (now, old.what) == now.end ();
-    if (is_gone)
+  std::erase_if (announced, [&] (const Announced<Source> &old) {
+    const bool is_gone = std::ranges::find (now, old.source) == now.end ();
+    if (is_gone) {
+      GST_DEBUG_OBJECT (provider, "removing %" GST_PTR_FORMAT, old.device);
       gst_device_provider_device_remove (provider, old.device);
+    }
     return is_gone;
   });
-  for (const auto &what : now)
-    if (std::ranges::find (announced, what, &Announced<What>::what) == announced.end ()) {
-      GstDevice *device = new_device (what);
+  for (const auto &source : now)
+    if (std::ranges::find (announced, source, &Announced<Source>::source) == announced.end ()) {
+      GstDevice *device = new_device (source);
+      GST_DEBUG_OBJECT (provider, "adding %" GST_PTR_FORMAT, device);
       gst_device_provider_device_add (provider, device);
-      announced.push_back ({.what = what, .device = device});
+      announced.push_back ({.source = source, .device = device});
     }
 }
 
-/** The cameras that answered, and those that did until just now.
- *  @return whether all is as it was */
-static bool
+/** Lists the cameras that answered, and those that missed no more than kMaxMisses searches.
+ *  @return whether nothing has changed */
+bool
 discover_gige (Watch &watch)
 {
   auto answered = find_gige_cameras (watch.gige);
   std::vector<int> misses (answered.size (), 0);
   for (std::size_t i = 0; i < watch.gige.size (); ++i) {
-    const auto is_same = [&] (const FoundCamera &camera) { return camera.id == watch.gige[i].id; };
-    if (std::ranges::none_of (answered, is_same) && watch.gige_misses[i] < kMissesAllowed) {
+    const auto is_same = [&] (const CameraInfo &camera) { return camera.id == watch.gige[i].id; };
+    if (std::ranges::none_of (answered, is_same) && watch.gige_misses[i] < kMaxMisses) {
       answered.push_back (watch.gige[i]);
       misses.push_back (watch.gige_misses[i] + 1);
     }
@@ -222,19 +209,20 @@ discover_gige (Watch &watch)
   return is_same;
 }
 
-static void
+void
 update (Watch &watch)
 {
   auto cameras = watch.gige;
   std::ranges::copy (watch.usb_cameras, std::back_inserter (cameras));
-  const auto now = present (watch.provider, watch.rigs, std::move (cameras), watch.told);
-  announce (watch.provider, watch.cameras, now.cameras, rangecast::new_camera_device);
-  announce (watch.provider, watch.pairs, now.pairs, rangecast::new_pair_device);
+  const auto now = find_pairs (watch.provider, watch.rigs, std::move (cameras), watch.reported);
+  announce (watch.provider, watch.cameras, now.cameras, new_camera_device);
+  announce (watch.provider, watch.pairs, now.pairs, new_pair_device);
 }
 
-/** Sleeps until there is something to look for.
- *  @return whether the watch goes on; `is_usb` then says whether USB devices came or went */
-static bool
+/** Waits until it is time to search.
+ *  @param[out] is_usb  whether USB devices came or went
+ *  @return false if the provider stops */
+bool
 wait_for_change (Watch &watch, Clock::time_point until, bool &is_usb)
 {
   std::unique_lock guard (watch.lock);
@@ -243,17 +231,17 @@ wait_for_change (Watch &watch, Clock::time_point until, bool &is_usb)
   return !watch.is_over;
 }
 
-static void
+void
 run_watch (Watch &watch)
 {
-  auto period = kShortestPeriod;
+  auto period = kMinPeriod;
   auto next_discovery = Clock::now ();
   bool is_usb = true;
   do {
     if (is_usb && watch.usb)
       watch.usb_cameras = watch.usb->list ();
     if (Clock::now () >= next_discovery) {
-      period = discover_gige (watch) ? std::min (2 * period, kLongestPeriod) : kShortestPeriod;
+      period = discover_gige (watch) ? std::min (2 * period, kMaxPeriod) : kMinPeriod;
       next_discovery = Clock::now () + period;
     }
     update (watch);
@@ -264,6 +252,8 @@ run_watch (Watch &watch)
     watch.changed.notify_all ();
   } while (wait_for_change (watch, next_discovery, is_usb));
 }
+
+} // namespace
 
 static gboolean
 gst_camera_device_provider_start (GstDeviceProvider *provider)
@@ -288,7 +278,7 @@ gst_camera_device_provider_start (GstDeviceProvider *provider)
     return FALSE;
   }
   std::unique_lock guard (watch.lock);
-  watch.changed.wait_for (guard, kPatience, [&] { return watch.is_listed; });
+  watch.changed.wait_for (guard, kMaxStart, [&] { return watch.is_listed; });
   return TRUE;
 }
 
@@ -304,7 +294,7 @@ gst_camera_device_provider_stop (GstDeviceProvider *provider)
   }
   self->watch->changed.notify_all ();
   self->watch->thread.join ();
-  self->watch->usb.reset (); // its thread ends before what it calls goes
+  self->watch->usb.reset (); // its thread uses the watch
   delete std::exchange (self->watch, nullptr);
 }
 
@@ -317,9 +307,9 @@ static void
 gst_camera_device_provider_class_init (GstCameraDeviceProviderClass *klass)
 {
   auto provider_class = GST_DEVICE_PROVIDER_CLASS (klass);
-  provider_class->probe = gst_camera_device_provider_probe;
-  provider_class->start = gst_camera_device_provider_start;
-  provider_class->stop = gst_camera_device_provider_stop;
+  provider_class->probe = GST_DEBUG_FUNCPTR (gst_camera_device_provider_probe);
+  provider_class->start = GST_DEBUG_FUNCPTR (gst_camera_device_provider_start);
+  provider_class->stop = GST_DEBUG_FUNCPTR (gst_camera_device_provider_stop);
   gst_device_provider_class_set_static_metadata (provider_class,
       "Machine-vision cameras and stereo pairs", "Source/Video/Stereo",
       "Lists GigE Vision and USB3 Vision cameras, and the stereo pairs of known rigs",

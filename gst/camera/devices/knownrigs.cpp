@@ -2,32 +2,25 @@
 #include "knownrigs.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <glib.h>
 #include <rangecast/rigfile/rig_file.hpp>
-
-namespace rangecast {
 
 namespace fs = std::filesystem;
 
 namespace {
 
-bool
-is_rig_file (const fs::path &path)
-{
-  return std::ranges::find (kRigExtensions, path.extension ().string ()) !=
-         std::end (kRigExtensions);
-}
-
 /** A file itself, or the rig files of a folder in the order of their names. */
 void
 add_files (const fs::path &path, std::vector<std::string> &files)
 {
+  const auto &extensions = rangecast::kRigExtensions;
   std::error_code error;
   std::vector<std::string> here;
   if (fs::is_directory (path, error)) {
     for (fs::directory_iterator at (path, error), end; !error && at != end; at.increment (error))
-      if (is_rig_file (at->path ()) && at->is_regular_file (error))
+      if (std::ranges::find (extensions, at->path ().extension ().string ()) !=
+              std::end (extensions) &&
+          at->is_regular_file (error))
         here.push_back (at->path ().string ());
     std::ranges::sort (here);
   } else if (fs::is_regular_file (path, error)) {
@@ -38,29 +31,15 @@ add_files (const fs::path &path, std::vector<std::string> &files)
       files.push_back (std::move (file));
 }
 
-std::array<std::string, 3>
-cameras_of (const View &view)
-{
-  return {view.camera, view.right ? view.right->camera : "", view.third ? view.third->camera : ""};
-}
-
-/** Whether all cameras that the view names, and at least two, are there. */
+/** Whether all cameras that a view names, and at least two, are among `found`. */
 bool
-is_complete (const View &view, const FoundCameras &found)
+is_complete (const CameraNames &names, const std::vector<CameraInfo> &found)
 {
-  const auto is_there = [&] (const std::string &name) {
+  const auto is_found = [&] (const std::string &name) {
     return std::ranges::any_of (
-        found, [&] (const FoundCamera &camera) { return camera.is_called (name); });
+        found, [&] (const CameraInfo &camera) { return camera.is_called (name); });
   };
-  const auto names = cameras_of (view);
-  return is_there (names[0]) && is_there (names[1]) && (names[2].empty () || is_there (names[2]));
-}
-
-std::string
-display_name (const View &view, const std::string &file)
-{
-  const auto name = view.name.empty () ? "view " + std::to_string (view.id) : view.name;
-  return "Stereo pair " + name + " of " + fs::path (file).filename ().string ();
+  return is_found (names[0]) && is_found (names[1]) && (names[2].empty () || is_found (names[2]));
 }
 
 } // namespace
@@ -93,13 +72,13 @@ KnownRigs::read (const std::string &path)
   RigFile &file = files_[path];
   file = {.written = written, .size = size, .rig = {}, .problem = {}};
   reads_++;
-  if (const auto status = load_rig (path, file.rig); !status.ok ())
+  if (const auto status = rangecast::load_rig (path, file.rig); !status.ok ())
     file.problem = status.message ();
   return file;
 }
 
 std::vector<KnownPair>
-KnownRigs::pairs (const std::vector<std::string> &files, const FoundCameras &found,
+KnownRigs::pairs (const std::vector<std::string> &files, const std::vector<CameraInfo> &found,
     std::vector<std::string> &problems)
 {
   std::erase_if (files_,
@@ -111,14 +90,16 @@ KnownRigs::pairs (const std::vector<std::string> &files, const FoundCameras &fou
       problems.push_back (file.problem);
       continue;
     }
-    for (const auto &view : file.rig.views)
-      if (is_complete (view, found))
+    for (const auto &view : file.rig.views) {
+      const CameraNames names = camera_names (view);
+      const auto name = view.name.empty () ? "view " + std::to_string (view.id) : view.name;
+      if (is_complete (names, found))
         pairs.push_back ({.rig_path = path,
             .view_id = view.id,
-            .cameras = cameras_of (view),
-            .display_name = display_name (view, path)});
+            .cameras = names,
+            .display_name =
+                "Stereo pair " + name + " of " + fs::path (path).filename ().string ()});
+    }
   }
   return pairs;
 }
-
-} // namespace rangecast

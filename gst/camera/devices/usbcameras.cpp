@@ -10,8 +10,6 @@
 
 #include <libusb.h>
 
-namespace rangecast {
-
 namespace {
 
 constexpr int kControlClass = 0xEF, kControlSubClass = 0x05, kControlProtocol = 0x00;
@@ -60,36 +58,22 @@ kernel_folder (libusb_device *device)
   return path;
 }
 
-/** One line of text that the kernel read from the device. */
+/** A text that the kernel read from the device, else from the device itself. */
 std::string
-kernel_text (const std::string &folder, const char *name)
+device_text (
+    const std::string &folder, const char *name, libusb_device_handle *handle, std::uint8_t index)
 {
   std::string line;
   if (!folder.empty ()) {
     std::ifstream file (folder + "/" + name);
     std::getline (file, line);
   }
-  return line;
-}
-
-/** A string of the device itself, for kernels that show none. */
-std::string
-device_text (libusb_device_handle *handle, std::uint8_t index)
-{
+  if (!line.empty () || !handle || !index)
+    return line;
   std::array<unsigned char, 256> text;
-  const int size = handle && index ? libusb_get_string_descriptor_ascii (
-                                         handle, index, text.data (), int (text.size ()))
-                                   : 0;
+  const int size =
+      libusb_get_string_descriptor_ascii (handle, index, text.data (), int (text.size ()));
   return size > 0 ? std::string (text.begin (), text.begin () + size) : std::string ();
-}
-
-std::string
-device_node (libusb_device *device)
-{
-  std::array<char, 32> path;
-  std::snprintf (path.data (), path.size (), "/dev/bus/usb/%03d/%03d",
-      libusb_get_bus_number (device), libusb_get_device_address (device));
-  return path.data ();
 }
 
 std::string
@@ -98,36 +82,27 @@ opening_problem (int error, const std::string &node)
   if (error == LIBUSB_SUCCESS)
     return {};
   if (error == LIBUSB_ERROR_ACCESS)
-    return "no permission to open " + node +
-           ": copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the camera in again";
+    return permission_problem (node);
   return "cannot open " + node + ": " + libusb_strerror (libusb_error (error));
 }
 
-/** What Aravis calls a USB camera: the vendor and the serial number. */
-std::string
-aravis_id (const FoundCamera &camera)
-{
-  return camera.vendor + "-" + camera.serial;
-}
-
-FoundCamera
+CameraInfo
 describe (libusb_device *device, const libusb_device_descriptor &descriptor)
 {
-  FoundCamera camera;
-  camera.transport = FoundCamera::Transport::kUsb3Vision;
-  camera.address = device_node (device);
+  CameraInfo camera;
+  camera.protocol = "USB3Vision";
+  std::array<char, 32> node;
+  std::snprintf (node.data (), node.size (), "/dev/bus/usb/%03d/%03d",
+      libusb_get_bus_number (device), libusb_get_device_address (device));
+  camera.address = node.data ();
   libusb_device_handle *handle = nullptr;
   camera.problem = opening_problem (libusb_open (device, &handle), camera.address);
 
   const auto folder = kernel_folder (device);
-  const auto read = [&] (const char *name, std::uint8_t index) {
-    auto text = kernel_text (folder, name);
-    return text.empty () ? device_text (handle, index) : text;
-  };
-  camera.vendor = read ("manufacturer", descriptor.iManufacturer);
-  camera.model = read ("product", descriptor.iProduct);
-  camera.serial = read ("serial", descriptor.iSerialNumber);
-  camera.id = aravis_id (camera);
+  camera.vendor = device_text (folder, "manufacturer", handle, descriptor.iManufacturer);
+  camera.model = device_text (folder, "product", handle, descriptor.iProduct);
+  camera.serial = device_text (folder, "serial", handle, descriptor.iSerialNumber);
+  camera.id = camera.vendor + "-" + camera.serial; /* as Aravis names it */
   if (handle)
     libusb_close (handle);
   return camera;
@@ -143,24 +118,7 @@ struct UsbCameras::Private {
   std::atomic<bool> has_changed{false};
   std::function<void ()> on_change;
   std::thread thread;
-
-  void run ()
-  {
-    while (!is_over) {
-      timeval pause{.tv_sec = 1, .tv_usec = 0};
-      libusb_handle_events_timeout (context, &pause);
-      if (has_changed.exchange (false) && !is_over)
-        on_change ();
-    }
-  }
 };
-
-static int LIBUSB_CALL
-on_hotplug (libusb_context *, libusb_device *, libusb_hotplug_event, void *user_data)
-{
-  static_cast<std::atomic<bool> *> (user_data)->store (true); // a device may not be opened here
-  return 0;
-}
 
 UsbCameras::UsbCameras (std::unique_ptr<Private> priv) : priv_ (std::move (priv)) {}
 
@@ -187,10 +145,10 @@ UsbCameras::~UsbCameras ()
   libusb_exit (priv_->context);
 }
 
-FoundCameras
+std::vector<CameraInfo>
 UsbCameras::list ()
 {
-  FoundCameras found;
+  std::vector<CameraInfo> found;
   libusb_device **devices = nullptr;
   const auto count = libusb_get_device_list (priv_->context, &devices);
   for (ssize_t i = 0; i < count; ++i) {
@@ -211,12 +169,24 @@ UsbCameras::watch (std::function<void ()> on_change)
     return false;
   constexpr auto both = LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
   priv_->on_change = std::move (on_change);
+  // devices may not be opened in the callback
+  const auto on_hotplug = [] (libusb_context *, libusb_device *, libusb_hotplug_event, void *data) {
+    static_cast<std::atomic<bool> *> (data)->store (true);
+    return 0;
+  };
   if (libusb_hotplug_register_callback (priv_->context, both, LIBUSB_HOTPLUG_NO_FLAGS,
           LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_hotplug,
           &priv_->has_changed, &priv_->hotplug) != LIBUSB_SUCCESS)
     return false;
   try {
-    priv_->thread = std::thread ([priv = priv_.get ()] { priv->run (); });
+    priv_->thread = std::thread ([priv = priv_.get ()] {
+      while (!priv->is_over) {
+        timeval pause{.tv_sec = 1, .tv_usec = 0};
+        libusb_handle_events_timeout (priv->context, &pause);
+        if (priv->has_changed.exchange (false) && !priv->is_over)
+          priv->on_change ();
+      }
+    });
   } catch (const std::system_error &) {
     libusb_hotplug_deregister_callback (priv_->context, priv_->hotplug);
     return false;
@@ -224,5 +194,3 @@ UsbCameras::watch (std::function<void ()> on_change)
   priv_->is_watched = true;
   return true;
 }
-
-} // namespace rangecast

@@ -12,8 +12,8 @@ namespace rangecast {
 namespace {
 
 constexpr int kFewestCharucoCorners = 6;
-/* Chessboards are looked for in pictures no wider or taller than that, pixels; corners are refined
- * in the whole picture. */
+/* Chessboards are searched in images scaled down to this size, pixels; corners are refined at full
+ * size. */
 constexpr int kSearchSide = 1024;
 
 struct NamedDictionary {
@@ -66,7 +66,7 @@ as_mat (ImageView<const std::uint8_t> picture)
       std::size_t (picture.stride)};
 }
 
-/* Smallest distance between corners that are neighbours on the board. */
+/* Minimum distance of neighbouring corners. */
 double
 spacing (const std::vector<cv::Point2f> &corners, int columns)
 {
@@ -80,7 +80,7 @@ spacing (const std::vector<cv::Point2f> &corners, int columns)
   return smallest;
 }
 
-/* Mean grey level of the squares with even column + row less that of the others. */
+/* Mean grey level of the squares with even column + row, minus that of the others. */
 double
 even_minus_odd (const cv::Mat &picture, const std::vector<cv::Point2f> &c, int columns, int rows)
 {
@@ -98,8 +98,8 @@ even_minus_odd (const cv::Mat &picture, const std::vector<cv::Point2f> &c, int c
   return sum[0] / std::max (count[0], 1) - sum[1] / std::max (count[1], 1);
 }
 
-/* OpenCV may begin at any end of the board. Columns to the right and rows down, and the square
- * beside corner 0 black: then all cameras number the corners alike. */
+/* OpenCV may start at any corner. Columns to the right, rows down, and a black square next to
+ * corner 0 give the same numbers in all cameras. */
 void
 bring_into_order (const cv::Mat &picture, std::vector<cv::Point2f> &c, int columns, int rows)
 {
@@ -124,7 +124,8 @@ search (const cv::Mat &picture, const BoardSpec &board, bool thorough,
   const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
   if (cv::findChessboardCorners (picture, size, corners, flags))
     return true;
-  /* Local thresholds help in uneven light, and take up to a second where half a board is seen. */
+  /* Adaptive thresholds help in uneven light, but take up to a second when half a board is visible.
+   */
   return thorough &&
          cv::findChessboardCorners (picture, size, corners, flags | cv::CALIB_CB_ADAPTIVE_THRESH);
 }
@@ -146,7 +147,7 @@ find_chessboard (const cv::Mat &picture, const BoardSpec &board, bool thorough,
     return false;
   if (corners.size () != std::size_t (board.corner_count ()))
     return false;
-  /* Half a window must not reach the next corner. */
+  /* The window must not reach the next corner. */
   const int half = std::clamp (int (0.25 * spacing (corners, board.columns)), 2, 11);
   cv::cornerSubPix (picture, corners, {half, half}, {-1, -1},
       {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 0.001});
@@ -154,7 +155,7 @@ find_chessboard (const cv::Mat &picture, const BoardSpec &board, bool thorough,
   return true;
 }
 
-/* Two rows with two corners each: less does not say how the board lies. */
+/* The board's pose needs two rows with two corners each. */
 bool
 spans_a_plane (const std::vector<BoardCorner> &corners, int columns)
 {
@@ -215,7 +216,7 @@ struct BoardDetector::Charuco {
   cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create ();
   double marker_share = 0.75; /* marker by square */
 
-  /* The side of the smallest square, judged by its marker. */
+  /* Side of the smallest square, derived from its marker. */
   [[nodiscard]] double square_px (const std::vector<std::vector<cv::Point2f>> &markers) const
   {
     double smallest = 1e9;
@@ -225,7 +226,7 @@ struct BoardDetector::Charuco {
     return smallest / marker_share;
   }
 
-  /* Enough corners to say how the board lies, or none. */
+  /* All corners if they determine the board's pose, else none. */
   void detect (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
   {
     find_corners (picture, corners);
@@ -245,7 +246,7 @@ struct BoardDetector::Charuco {
     cv::aruco::interpolateCornersCharuco (markers, marker_ids, picture, board, points, ids);
     if (points.rows == 0)
       return;
-    /* OpenCV stops at a tenth of a pixel. The window ends before the markers. */
+    /* OpenCV's own refinement stops at 0.1 pixels. The window must not reach the markers. */
     const double margin = 0.4 * (1 - marker_share);
     const int half = std::clamp (int (margin * square_px (markers)), 2, 11);
     cv::cornerSubPix (picture, points, {half, half}, {-1, -1},

@@ -10,7 +10,7 @@ namespace rangecast {
 namespace {
 
 constexpr int kMaxThreads = 8;
-/* More cameras than that: their equations are mostly zeros. */
+/* Number of cameras from which a sparse solver is used. */
 constexpr int kManyCameras = 50;
 
 using PoseParameters = std::array<double, 6>; // angle-axis, translation
@@ -35,7 +35,7 @@ to_pose (const PoseParameters &p)
   return pose;
 }
 
-/* One corner in one picture: its distance from where lens, camera and board put it, pixels. */
+/* Reprojection error of one corner in one image, pixels. */
 struct CornerError {
   Vec3 on_board;
   double x, y;
@@ -60,7 +60,7 @@ struct CornerError {
   }
 };
 
-/* Ends the adjustment when somebody asks. */
+/* Ends the adjustment when the token requests it. */
 class StopWhenAsked : public ceres::IterationCallback {
 public:
   explicit StopWhenAsked (std::stop_token stop) : stop_ (std::move (stop)) {}

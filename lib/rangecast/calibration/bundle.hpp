@@ -7,7 +7,7 @@
 
 namespace rangecast {
 
-/** All cameras and all boards at once: what the bundle adjustment makes better. */
+/** Lenses and poses of all cameras and boards, which bundle adjustment refines. */
 struct Bundle {
   std::vector<LensParameters> lenses;  ///< by camera
   std::vector<Pose> camera_from_first; ///< by camera; camera 0's is the identity
@@ -16,14 +16,14 @@ struct Bundle {
 
 struct BundleSettings {
   DistortionModel distortion = DistortionModel::kFive;
-  bool refine_lenses = true; ///< false: only poses
-  double robust_px = 0;      ///< Huber's loss beyond so many pixels; 0: plain squares
+  bool refine_lenses = true; ///< false: refine poses only
+  double robust_px = 0;      ///< threshold of the Huber loss, pixels; 0: least squares
 };
 
-/** Moves lenses, cameras and boards so that the corners fall where they were seen (Ceres).
- *  @param frames  as many as bundle.first_from_board; those without sightings stay as they are;
- *  no corner may be behind its camera to begin with
- *  @param stop    ends it after the iteration that it is at
+/** Minimizes the reprojection error over lenses, camera poses and board poses (Ceres).
+ *  @param frames  as many as bundle.first_from_board; those without sightings are ignored;
+ * initially no corner may be behind its camera
+ *  @param stop    ends it after the current iteration
  *  @return kBadValue if there is no solution, kInterrupted; bundle is then unspecified */
 Status adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &frames,
     const BundleSettings &settings, Bundle &bundle, std::stop_token stop = {});

@@ -27,8 +27,8 @@ opencv_flags (DistortionModel model)
   return 0;
 }
 
-/* How far from the middle of the lens its distortion turns back, pixels; `limit` if it does not
- * before that. */
+/* Distance from the principal point at which radial distortion stops being monotonic, pixels; at
+ * most `limit`. */
 double
 fold_px (const LensParameters &lens, double limit)
 {

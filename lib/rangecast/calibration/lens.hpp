@@ -8,18 +8,18 @@
 
 namespace rangecast {
 
-/** How many coefficients the lens model has, in OpenCV's order. */
+/** Number of distortion coefficients, in OpenCV's order. */
 enum class DistortionModel {
   kNone = 0,
   kFour = 4,  ///< k1 k2 p1 p2
-  kFive = 5,  ///< and k3
-  kEight = 8, ///< and k4 k5 k6: the rational model, for wide angles
+  kFive = 5,  ///< k1 k2 p1 p2 k3
+  kEight = 8, ///< k1 k2 p1 p2 k3 k4 k5 k6: rational model, for wide-angle lenses
 };
 
-/** fx fy cx cy, then k1 k2 p1 p2 k3 k4 k5 k6 (0 where the model has them not). */
+/** fx fy cx cy, then k1 k2 p1 p2 k3 k4 k5 k6 (0 for those that the model lacks). */
 using LensParameters = std::array<double, 12>;
 
-/** OpenCV's pinhole camera with distortion, for doubles and for Ceres' jets.
+/** Projection of OpenCV's pinhole camera with distortion, for double and Ceres' Jet.
  *  @param p  camera frame; in front of the camera
  *  @param[out] pixel  x, y */
 template <typename T>
@@ -37,22 +37,21 @@ project (const T *lens, const T *p, T *pixel)
   pixel[1] = lens[1] * yd + lens[3];
 }
 
-/** Nothing nearer is in front of a camera, metres. */
+/** Minimum depth of a point in front of a camera, metres. */
 inline constexpr double kNearestM = 1e-6;
 
-/** Square root of the mean square distance of corners from where the board's corners should be,
- *  pixels; infinite if one of them is behind the camera. */
+/** RMS reprojection error of the corners, pixels; infinite if one of them is behind the camera. */
 [[nodiscard]] double reprojection_rms (const LensParameters &lens, const Pose &camera_from_board,
     const BoardSpec &board, const std::vector<BoardCorner> &corners);
 
 [[nodiscard]] Intrinsics intrinsics_of (const LensParameters &lens);
 [[nodiscard]] Distortion distortion_of (const LensParameters &lens, DistortionModel model);
 
-/** One camera alone. */
+/** The calibration of one camera alone. */
 struct LensCalibration {
   LensParameters lens{};
   double rms_px = 0;
-  std::vector<int> frames; ///< used: indices into the list of frames
+  std::vector<int> frames; ///< frames used: indices into the list of frames
   std::vector<Pose> poses; ///< camera_from_board of each of them
 };
 
@@ -62,10 +61,10 @@ Status calibrate_lens (const CalibrationCamera &camera, int index,
     const std::vector<CalibrationFrame> &frames, const BoardSpec &board, DistortionModel model,
     LensCalibration &result);
 
-/** Whether the numbers can be a camera's.
+/** Checks the parameters for plausibility.
  *  @param reach_px  farthest corner seen from the principal point, pixels
- *  @param[out] warning  what is odd although it may be, or empty
- *  @return kBadValue naming the camera and what is wrong */
+ *  @param[out] warning  what is unusual but possible, or empty
+ *  @return kBadValue that names the camera and the parameter */
 Status check_lens (const CalibrationCamera &camera, const LensParameters &lens, double reach_px,
     std::string &warning);
 

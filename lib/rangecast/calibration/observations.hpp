@@ -10,7 +10,7 @@
 
 namespace rangecast {
 
-/** What a camera is to its view. */
+/** The role of a camera in its view. */
 enum class CameraRole {
   kLeft,  ///< the view's own camera; every view has one
   kRight, ///< the second camera of a stereo pair, on the left camera's +x side
@@ -19,9 +19,9 @@ enum class CameraRole {
 
 [[nodiscard]] std::string_view role_name (CameraRole role);
 
-/** A camera that is to be calibrated. */
+/** A camera to calibrate. */
 struct CalibrationCamera {
-  std::string name; ///< for messages, e.g. the pad's
+  std::string name; ///< for messages, e.g. a pad name
   int view_id = 0;  ///< 0 .. kMaxViews - 1
   CameraRole role = CameraRole::kLeft;
   int width = 0, height = 0; ///< pixels
@@ -32,16 +32,16 @@ struct CalibrationCamera {
 /** "sink_1 (view 0, right)" */
 [[nodiscard]] std::string text_of (const CalibrationCamera &camera);
 
-/** The board in one camera's picture. */
+/** The board in the image of one camera. */
 struct Sighting {
   int camera = 0; ///< index into the list of cameras
   std::vector<BoardCorner> corners;
 };
 
-/** The board at one moment, in the pictures of all cameras that saw it. */
+/** The board at one moment, in the images of all cameras that saw it. */
 struct CalibrationFrame {
-  std::vector<Sighting> sightings; ///< at most one a camera
-  std::uint64_t number = 0;        ///< by which the caller knows it
+  std::vector<Sighting> sightings; ///< at most one per camera
+  std::uint64_t number = 0;        ///< the caller's number
 
   [[nodiscard]] const Sighting *find (int camera) const;
 };
@@ -49,9 +49,9 @@ struct CalibrationFrame {
 /** Number of frames in which both cameras saw the board, and at least 4 corners of it in common. */
 [[nodiscard]] int shared_frames (const std::vector<CalibrationFrame> &frames, int a, int b);
 
-/** Which cameras hang together, directly or through others.
- *  @param fewest_shared  frames that two cameras must share to count as linked
- *  @return for each camera the number of its group, 0 for the first camera's */
+/** Connected components of the cameras that saw the same boards.
+ *  @param fewest_shared  number of frames that two linked cameras share at least
+ *  @return the component of each camera, 0 for that of the first camera */
 [[nodiscard]] std::vector<int> linked_groups (
     int cameras, const std::vector<CalibrationFrame> &frames, int fewest_shared);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Our poses and lenses as OpenCV has them; for .cpp files of this folder. */
+/* Conversions of poses and lenses to OpenCV types, for .cpp files of this folder. */
 #pragma once
 
 #include <opencv2/calib3d.hpp>

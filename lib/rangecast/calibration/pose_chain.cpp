@@ -9,7 +9,7 @@
 namespace rangecast {
 namespace {
 
-/* The corners that both cameras saw, frame by frame. */
+/* The corners that both cameras saw, by frame. */
 struct CommonCorners {
   std::vector<std::vector<cv::Point3f>> object;
   std::vector<std::vector<cv::Point2f>> first, second;
@@ -67,7 +67,7 @@ link_cameras (const std::vector<CalibrationCamera> &cameras,
   return {};
 }
 
-/* The next camera without a pose: the one with most frames in common with one that has. */
+/* The link with most common frames between a camera with a pose and one without. */
 CameraLink
 strongest_link (const std::vector<CalibrationFrame> &frames, const std::vector<bool> &placed)
 {
@@ -80,7 +80,7 @@ strongest_link (const std::vector<CalibrationFrame> &frames, const std::vector<b
   return best;
 }
 
-/* Each board where the camera that fits it best has it. */
+/* Takes the pose of each board from the camera with the smallest error. */
 void
 place_boards (const std::vector<CalibrationFrame> &frames, const BoardSpec &board,
     const std::vector<LensCalibration> &lenses, Bundle &bundle)

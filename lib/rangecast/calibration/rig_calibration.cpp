@@ -12,17 +12,17 @@
 namespace rangecast {
 namespace {
 
-/* A board whose error is larger than so many times the median of all, and than so many pixels, is
- * left out: it was moving, or its corners are not where they were taken to be. */
+/* A board with an error above both limits (a multiple of the median, and pixels) is an outlier: it
+ * moved, or its corners were misdetected. */
 constexpr double kOutlierFactor = 4, kOutlierPx = 0.6;
 constexpr int kOutlierRounds = 3;
 constexpr double kRobustPx = 1;
-/* A larger error than that is not a calibration, pixels. */
+/* Maximum error of a calibration, and of a good one, pixels. */
 constexpr double kWorstRmsPx = 5;
 constexpr double kGoodRmsPx = 1;
-/* Rows of a pair that differ by more are worth a warning: stereodepth looks in one row. */
+/* Row error of a pair that is worth a warning, because stereodepth matches within rows. */
 constexpr double kOddRowErrorPx = 1;
-/* A pair whose cameras are turned against each other by more cannot be rectified to any use. */
+/* Maximum relative roll of a pair that can be rectified usefully. */
 constexpr double kMaxRollDeg = 45;
 
 Status
@@ -48,7 +48,7 @@ find_camera (const std::vector<CalibrationCamera> &cameras, int view_id, CameraR
   return -1;
 }
 
-/* By how much a camera is turned about its axis against another one, degrees, -180 .. 180. */
+/* Relative rotation about the optical axis, degrees, -180 .. 180. */
 double
 roll_deg (const Pose &right_from_left)
 {
@@ -56,7 +56,7 @@ roll_deg (const Pose &right_from_left)
   return std::atan2 (x.y, x.x) * 180 / M_PI;
 }
 
-/* The two cameras of a pair stand the same way up, and the right one on the left one's +x side. */
+/* Checks that both cameras are the same way up, and the right one is on the left one's +x side. */
 Status
 check_pair (
     const CalibrationCamera &left, const CalibrationCamera &right, const Pose &right_from_left)
@@ -84,7 +84,7 @@ check_pair (
   return {};
 }
 
-/* The calibration as it goes. */
+/* The state of a calibration. */
 class Calibration {
 public:
   Calibration (const std::vector<CalibrationCamera> &cameras, std::vector<CalibrationFrame> &frames,
@@ -144,7 +144,7 @@ private:
   Bundle bundle_;
 };
 
-/* Frames of a camera that drop_outliers() took away, in words; empty if there are none. */
+/* Describes the frames of a camera that drop_outliers() removed; empty if there are none. */
 std::string
 Calibration::what_was_dropped (int camera) const
 {
@@ -238,8 +238,8 @@ Calibration::outlier_limit () const
   return std::max (kOutlierFactor * errors[errors.size () / 2], kOutlierPx);
 }
 
-/* @param[out] any  whether one went
- * @return what check_counts() and check_linked() say of the rest */
+/* @param[out] any  whether any was removed
+ * @return the result of check_counts() and check_linked() for the rest */
 Status
 Calibration::drop_outliers (double limit_px, bool &any)
 {
@@ -264,8 +264,8 @@ Calibration::drop_outliers (double limit_px, bool &any)
                         " boards that do not fit were left out: do the pictures belong together?");
 }
 
-/* Where each camera fits its boards and all of them do not, it is not the lenses' fault, whatever
- * the status says. */
+/* If each camera alone fits its boards but all of them together do not, the cause is not the
+ * lenses, whatever the status says: adds a hint. */
 Status
 Calibration::with_hint (const Status &status) const
 {
@@ -279,7 +279,7 @@ Calibration::with_hint (const Status &status) const
                               "moments, and are those of one of them mirrored?"};
 }
 
-/* A loss that forgives outliers finds them; without them, plain squares are the best estimate. */
+/* A robust loss identifies outliers; without them, least squares is the best estimate. */
 Status
 Calibration::adjust ()
 {
@@ -320,7 +320,7 @@ Calibration::check_pairs () const
   return {};
 }
 
-/* Median difference of the rows in which a corner falls once the pair is rectified, pixels. */
+/* Median row difference of corresponding corners after rectification, pixels. */
 double
 Calibration::row_error (int left, int right) const
 {
@@ -444,7 +444,8 @@ Calibration::world_from_first () const
         first_board.translation = boards[0];
       }
     }
-  /* place_world() thinks in the first view's own camera; camera 0 may be another one. */
+  /* place_world() expects the first view's left camera as reference; camera 0 may be another one.
+   */
   const Pose reference = views[0].inverse ();
   for (Pose &view : views)
     view = reference * view;
@@ -475,7 +476,7 @@ Calibration::make_rig ()
     view.near_m = settings_.near_m;
     view.far_m = settings_.far_m;
     if (view.far_m >= 65535 * view.depth_unit_m)
-      view.depth_unit_m = view.far_m / 65000; /* as stereodepth does */
+      view.depth_unit_m = view.far_m / 65000; /* as in stereodepth */
     for (const CameraRole role : {CameraRole::kRight, CameraRole::kThird})
       if (const int other = find_camera (cameras_, view.id, role); other >= 0)
         (role == CameraRole::kRight ? view.right : view.third) = PartnerCamera{

@@ -12,7 +12,7 @@ namespace rangecast {
 struct CalibrationSettings {
   BoardSpec board;
   DistortionModel distortion = DistortionModel::kFive;
-  int min_frames = 8; ///< each camera must have seen the board so often, 3 .. 1000
+  int min_frames = 8; ///< in which each camera must have seen the board, 3 .. 1000
   WorldFrame world = WorldFrame::kCentre;
   double near_m = 0.3, far_m = 3; ///< written into all views; 0 < near < far
 };
@@ -20,49 +20,48 @@ struct CalibrationSettings {
 struct CameraReport {
   int camera = 0;
   int frames = 0;          ///< used
-  double rms_px = 0;       ///< reprojection error in the end
-  double alone_rms_px = 0; ///< of cv::calibrateCamera with this camera alone
+  double rms_px = 0;       ///< final reprojection error
+  double alone_rms_px = 0; ///< of cv::calibrateCamera for this camera alone
 };
 
-/** Two cameras that saw boards together: all stereo pairs, and those that the poses were chained
- *  along. */
+/** Two cameras with common boards: all stereo pairs, and the links of the pose chain. */
 struct PairReport {
   int a = 0, b = 0;
-  int frames = 0;           ///< that both saw
+  int frames = 0;           ///< that both cameras saw
   double rms_px = 0;        ///< of both cameras in these frames
   double distance_m = 0;    ///< between the cameras
-  double row_error_px = -1; ///< left and right: median |dy| after rectification; else -1
+  double row_error_px = -1; ///< median |dy| after rectification; -1 unless a stereo pair
 };
 
-/** A board that does not fit, and was left out. */
+/** A board that was rejected as an outlier. */
 struct DroppedBoard {
   std::uint64_t frame = 0; ///< CalibrationFrame::number
   int camera = 0;
-  double rms_px = 0; ///< how badly
+  double rms_px = 0; ///< reprojection error
 };
 
 struct CalibrationResult {
   Rig rig;           ///< raw views, by view-id
-  double rms_px = 0; ///< of all corners in all pictures
+  double rms_px = 0; ///< of all corners in all images
   int frames = 0;    ///< used
   std::vector<CameraReport> cameras;
   std::vector<PairReport> pairs;
   std::vector<DroppedBoard> dropped;
-  std::vector<std::string> warnings; ///< what is odd although it may be
+  std::vector<std::string> warnings; ///< unusual but possible results
 };
 
-/** Whether the cameras make up views: a left one each, roles once, partners of the same size, and a
- *  board that can tell its ends apart where there is more than one.
+/** Checks that the cameras form views: each with one left camera, no role twice, partners of the
+ * same size; and that the board is asymmetric if there are several cameras.
  *  @return kBadValue or kBadSize that names the camera */
 Status check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &board);
 
-/** From boards in pictures to a rig: each camera alone (cv::calibrateCamera), cameras chained along
- *  the boards that they share (cv::stereoCalibrate), then all lenses, cameras and boards together
- *  (bundle adjustment). Reprojection errors are the square root of the mean square distance.
- *  @param frames  boards at one moment each; corners by id, as BoardDetector gives them
- *  @param stop    ends it soon: between cameras, between pairs, in the adjustment
- *  @return one status that names the cameras and what was expected: too few frames, cameras that
- *  share no boards, left and right swapped, no solution; kInterrupted. Reentrant. */
+/** Calibrates a rig from boards in images: each camera alone (cv::calibrateCamera), initial poses
+ * from common boards (cv::stereoCalibrate), then all lenses and poses together (bundle adjustment).
+ *  Reprojection errors are RMS.
+ *  @param frames  each of one moment; corners sorted by id, as BoardDetector returns them
+ *  @param stop    is checked between cameras, between pairs, and during bundle adjustment
+ *  @return an error that names the cameras and what was expected: too few frames, cameras without
+ * common boards, left and right exchanged, no solution; or kInterrupted. Reentrant. */
 Status calibrate_rig (const std::vector<CalibrationCamera> &cameras,
     std::vector<CalibrationFrame> frames, const CalibrationSettings &settings,
     CalibrationResult &result, std::stop_token stop = {});

@@ -13,12 +13,12 @@ namespace {
 constexpr double kNewPlace = 0.1;      // see BoardPlace
 constexpr double kTiltSeen = 0.2;      // sine of an angle
 constexpr double kSizeRatio = 1.25;    // of the largest to the smallest board
-constexpr double kMotionShare = 0.003; // of the picture's width, between two frames
+constexpr double kMotionShare = 0.003; // of the image's width, between two frames
 constexpr std::uint64_t kMotionNs = 1'000'000'000;
 constexpr double kBlurredPx = 6, kBlurredShare = 0.004; // the larger of both, of the width
 constexpr int kFewLinks = 8; // two cameras with fewer common frames want more
 
-/* The board's normal in a camera with a focal length as long as the picture is wide. */
+/* The board's normal for a camera whose focal length is the image width. */
 bool
 guess_normal (const std::vector<cv::Point3d> &object, const std::vector<cv::Point2d> &image,
     int width, int height, cv::Vec3d &normal)
@@ -36,14 +36,14 @@ guess_normal (const std::vector<cv::Point3d> &object, const std::vector<cv::Poin
   }
   normal = {r (0, 2), r (1, 2), r (2, 2)};
   if (normal[2] < 0)
-    normal = -normal; /* away from the camera, whichever way the board's z axis points */
+    normal = -normal; /* away from the camera, for either direction of the board's z axis */
   return std::isfinite (normal[0]) && std::isfinite (normal[1]);
 }
 
 double
 distance (const BoardPlace &a, const BoardPlace &b)
 {
-  /* Tilts count half: a tenth of the picture is as good as 12 degrees. */
+  /* Tilts count half: 12 degrees are equivalent to a tenth of the image. */
   return std::sqrt ((a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y) +
                     (a.size - b.size) * (a.size - b.size) +
                     0.25 * (a.tilt_x - b.tilt_x) * (a.tilt_x - b.tilt_x) +
@@ -72,7 +72,7 @@ place_board (const BoardSpec &board, const std::vector<BoardCorner> &corners, in
   std::vector<cv::Point2f> hull;
   cv::convexHull (points, hull);
   place.size = std::sqrt (cv::contourArea (hull) / (double (width) * height));
-  /* The normal n points away; where the board's right end is farther, n leans to the left. */
+  /* The normal points away from the camera; if the right end is farther, it points to the left. */
   if (cv::Vec3d normal; guess_normal (object, image, width, height, normal)) {
     place.tilt_x = -normal[0];
     place.tilt_y = -normal[1];
@@ -180,7 +180,7 @@ FrameSelector::clear ()
   have_last_ = false;
 }
 
-/* A camera that sees the board now and did not before does not know whether it moves. */
+/* Motion is unknown for a camera that did not see the board in the previous frame. */
 bool
 FrameSelector::is_moving (
     const std::vector<CalibrationCamera> &cameras, const CalibrationFrame &frame) const
@@ -204,7 +204,7 @@ FrameSelector::is_moving (
   return false;
 }
 
-/* Of the camera for which the frame is most unlike all other frames, but `except`. */
+/* The maximum over all cameras of the difference from all frames but `except`. */
 double
 FrameSelector::difference (const Places &places, std::size_t except) const
 {
@@ -231,8 +231,8 @@ FrameSelector::links_are_few (const CalibrationFrame &frame) const
   return false;
 }
 
-/* When there are enough, the frame most like others makes room, or the new one is it. The first one
- * stays: its board may be where the world begins. */
+/* At the maximum number, the most redundant frame is replaced, unless the new one is more
+ * redundant. The first frame is kept: its board may define the world. */
 FrameVerdict
 FrameSelector::take (CalibrationFrame frame, Places places)
 {

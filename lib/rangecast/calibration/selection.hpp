@@ -10,60 +10,62 @@
 
 namespace rangecast {
 
-/** Where and how a board lies in a picture, each in a unit in which 0.1 is worth a new picture. */
+/** Position, size and tilt of a board in an image, scaled so that a difference of 0.1 is worth
+ *  another image. */
 struct BoardPlace {
-  double x = 0, y = 0; ///< middle of the corners, 0 .. 1 of the picture
-  double size = 0;     ///< square root of the share of the picture that the corners enclose
-  double tilt_x = 0;   ///< of the board's right end away from the camera: sine of the angle
-  double tilt_y = 0;   ///< of its lower end away
+  double x = 0, y = 0; ///< centre of the corners, 0 .. 1 of the image
+  double size = 0;     ///< square root of the fraction of the image that the corners enclose
+  double tilt_x = 0;   ///< sine of the angle by which the right end is tilted away from the camera
+  double tilt_y = 0;   ///< the same for the lower end
 };
 
-/** @param corners  at least 4; tilt is worked out with a guessed focal length */
+/** @param corners  at least 4; tilt is computed with a guessed focal length */
 [[nodiscard]] BoardPlace place_board (
     const BoardSpec &board, const std::vector<BoardCorner> &corners, int width, int height);
 
-/** What a camera has seen of the board so far. */
+/** The part of its image in which a camera has seen the board. */
 struct CameraCoverage {
   static constexpr int kColumns = 4, kRows = 3;
 
-  int frames = 0;                             ///< taken frames with a board in this picture
-  std::array<bool, kColumns * kRows> cells{}; ///< cells of the picture that held a corner, by rows
+  int frames = 0;                             ///< taken frames in which this camera saw the board
+  std::array<bool, kColumns * kRows> cells{}; ///< cells of the image with a corner, row-major
   bool tilted_left = false, tilted_right = false, tilted_up = false, tilted_down = false;
-  bool distances = false; ///< boards of clearly different size
+  bool distances = false; ///< boards of clearly different sizes
 
-  /** 0 .. 1: how much of all that is wanted is there. */
+  /** Fraction of the required coverage, 0 .. 1. */
   [[nodiscard]] double share () const;
   [[nodiscard]] bool complete () const { return share () == 1; }
-  /** What to do next, in words, e.g. "board at the top left of the picture". */
+  /** What is missing, in words, e.g. "board at the top left of the image". */
   [[nodiscard]] std::vector<std::string> missing () const;
 };
 
 struct SelectionSettings {
-  int max_frames = 100; ///< 3 .. 1000; then the frame most like others, but the first, makes room
-  bool all = false;     ///< every frame with a board, moving and similar ones too
+  int max_frames = 100; ///< 3 .. 1000; then the most redundant frame but the first is replaced
+  bool all = false;     ///< take every frame with a board, even moving and similar ones
 };
 
-/** What became of a frame. */
+/** The result for a frame. */
 enum class FrameVerdict {
   kTaken,
-  kNoBoard, ///< in no picture
-  kMoving,  ///< the board moved since the frame before, or was not in it
-  kBlurred, ///< its edges are wide
+  kNoBoard, ///< in no image
+  kMoving,  ///< the board moved since the previous frame, or was not in it
+  kBlurred, ///< edges are too wide
   kSimilar, ///< no camera sees it at a new place
 };
 inline constexpr int kFrameVerdicts = 5;
 
 [[nodiscard]] std::string_view verdict_name (FrameVerdict verdict);
 
-/** Picks frames in which boards stand still, are sharp, and lie otherwise than in those it has. */
+/** Selects frames in which the board is still, sharp, and at a new place, size or tilt. */
 class FrameSelector {
 public:
   void set (const BoardSpec &board, const SelectionSettings &settings);
   void clear ();
 
-  /** @param cameras  all of them; later calls may have more at the end
-   *  @param edge_widths  of each sighting (see edge_width_px), or empty: not judged
-   *  @param time_ns  of the frame; frames more than a second apart say nothing about motion */
+  /** @param cameras  all cameras; later calls may append more
+   *  @param edge_widths  edge_width_px() of each sighting; empty: not evaluated
+   *  @param time_ns  of the frame; motion is not evaluated between frames more than a second apart
+   */
   FrameVerdict offer (const std::vector<CalibrationCamera> &cameras, CalibrationFrame frame,
       const std::vector<double> &edge_widths, std::uint64_t time_ns);
 
@@ -83,7 +85,7 @@ private:
   SelectionSettings settings_;
   std::vector<CalibrationFrame> frames_;
   std::vector<Places> places_; // of frames_
-  CalibrationFrame last_;      // offered before
+  CalibrationFrame last_;      // the previous frame
   std::uint64_t last_time_ns_ = 0;
   bool have_last_ = false;
 };

@@ -45,7 +45,7 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
 {
   if (cameras.size () < cameras_.size () ||
       !std::equal (cameras_.begin (), cameras_.end (), cameras.begin ()))
-    clear (); /* one went, or became another */
+    clear (); /* one was removed or replaced */
   cameras_ = cameras;
   while (eyes_.size () < cameras.size ()) {
     eyes_.push_back (std::make_unique<Eye> ());
@@ -119,7 +119,7 @@ CalibrationSession::draw (
   }
 }
 
-/* Too few boards were kept, although more were seen: says why. */
+/* Explains why too few of the boards seen were kept. */
 Status
 CalibrationSession::check_kept () const
 {

@@ -17,25 +17,24 @@ struct SessionSettings {
   bool thorough = false; ///< see BoardDetector::set
 };
 
-/** A calibration as it is done: pictures come in, frames are kept, in the end there is a rig.
- *  One thread at a time. */
+/** A calibration in progress: examines images, keeps frames, calibrates. Not thread-safe. */
 class CalibrationSession {
 public:
-  /** Forgets everything. @return kBadValue that names the setting */
+  /** Restarts with new settings. @return kBadValue that names the setting */
   Status set (const SessionSettings &settings);
-  /** Forgets all frames. */
+  /** Discards all frames. */
   void clear ();
 
-  /** Looks for the board in the pictures of one moment, all of them at once.
-   *  @param cameras   the same every time; more may come at the end. All frames are forgotten where
-   *  one went or became another
-   *  @param pictures  by camera; empty where there is none
-   *  @param time_ns   of the pictures
-   *  @param number    by which the caller knows them */
+  /** Looks for the board in all images of one moment, in parallel.
+   *  @param cameras   the same in each call, or with more appended; otherwise all frames are
+   * discarded
+   *  @param images  by camera; empty if there is none
+   *  @param time_ns   of the images
+   *  @param number    the caller's number */
   Status examine (const std::vector<CalibrationCamera> &cameras,
       std::span<const ImageView<const Rgbx>> pictures, std::uint64_t time_ns, std::uint64_t number);
 
-  /** @name Of the last pictures @{ */
+  /** @name Of the last images @{ */
   [[nodiscard]] FrameVerdict verdict () const { return verdict_; }
   [[nodiscard]] const std::vector<BoardCorner> &corners (int camera) const
   {
@@ -49,15 +48,16 @@ public:
   {
     return selector_.coverage (cameras_[camera], camera);
   }
-  /** Which cameras see the same boards, directly or through others: numbers of groups by camera. */
+  /** Connected components of the cameras that saw the same boards, by camera. */
   [[nodiscard]] std::vector<int> groups () const;
-  /** Whether every camera has seen enough, and all of them hang together. */
+  /** Whether every camera has seen enough, and all are in one component. */
   [[nodiscard]] bool complete () const;
 
-  /** Draws what examine() saw, one tile a camera. @param out  of lay_out()'s size */
+  /** Draws the images that examine() saw, one tile per camera. @param out  size as lay_out() says
+   */
   void draw (std::span<const ImageView<const Rgbx>> pictures, ImageView<Rgbx> out) const;
 
-  /** See calibrate_rig(). Frames stay: more may come, and make it better. */
+  /** See calibrate_rig(). Frames are kept, so that more can be added. */
   Status calibrate (CalibrationResult &result, std::stop_token stop = {}) const;
 
 private:
@@ -66,7 +66,7 @@ private:
     std::vector<BoardCorner> corners;
     double edge_width = 0;
     Status status;
-    std::array<int, kFrameVerdicts> seen{}; // pictures with a board so far, by verdict
+    std::array<int, kFrameVerdicts> seen{}; // images with a board so far, by verdict
   };
   [[nodiscard]] Status check_kept () const;
 

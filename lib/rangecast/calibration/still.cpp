@@ -18,7 +18,7 @@ as_mat (ImageView<const Rgbx> picture)
       std::size_t (picture.stride)};
 }
 
-/* Colours go round the circle from row to row. */
+/* Hue rotates from row to row. */
 cv::Scalar
 row_colour (int row)
 {

@@ -19,13 +19,13 @@ column (const Pose &pose, int i)
   return {pose.rotation[i], pose.rotation[3 + i], pose.rotation[6 + i]};
 }
 
-/* A world with this y axis and its z axis as near as may be to `towards`. */
+/* A world with this y axis and the z axis closest to `towards`. */
 Pose
 world_from (Vec3 origin, Vec3 up, Vec3 towards)
 {
   const Vec3 y = normalised (up);
   Vec3 flat = towards - dot (towards, y) * y;
-  if (norm (flat) < 1e-6) { /* straight above: any direction will do */
+  if (norm (flat) < 1e-6) { /* parallel: any direction is as good */
     const Vec3 any = std::abs (y.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
     flat = any - dot (any, y) * y;
   }
@@ -44,9 +44,8 @@ mean (std::span<const Vec3> points)
   return 1.0 / double (points.size ()) * sum;
 }
 
-/* The point with the least sum of squared distances from the optical axes; the middle of the boards
- * where the axes do not say it: they are parallel, or meet behind a camera or far beyond all
- * boards.
+/* The point closest to the optical axes in the least-squares sense; the centre of the boards if the
+ * axes are parallel, or meet behind a camera or far beyond all boards.
  */
 Vec3
 looked_at (std::span<const Pose> cameras, Vec3 middle)

@@ -8,16 +8,16 @@
 namespace rangecast {
 namespace {
 
-/* Neighbours whose depths differ by more than this share belong to different surfaces. */
+/* Maximum relative depth difference of neighbours on one surface. */
 constexpr float kStep = 0.03f;
-/* A joint between neighbours that is wider than this in the other picture is left out: a rig that
- * magnifies so much is wrong, and would cost the time of its whole picture for every pixel. */
+/* Maximum size of a triangle in the other image, pixels: a rig that magnifies more is wrong, and
+ * each triangle would cost the time of a whole image. */
 constexpr float kWidest = 64;
 constexpr float kNearest = 0.01f; /* metres from the other camera */
 
 using Corner = cv::Vec3f;
 
-/* The pixels whose centres lie between two positions, within a picture. */
+/* The pixels with centres between two positions, within an image. */
 struct Span {
   int first, last;
 
@@ -40,7 +40,7 @@ put (float &pixel, float inverse)
   pixel = std::max (pixel, inverse);
 }
 
-/* Fills a triangle that faces the camera; 1/z is linear in the picture. */
+/* Fills a front-facing triangle; 1/z is linear in the image. */
 void
 fill (const Corner &a, const Corner &b, const Corner &c, cv::Mat &picture)
 {
@@ -52,7 +52,7 @@ fill (const Corner &a, const Corner &b, const Corner &c, cv::Mat &picture)
   if (!fits (x0, x1) || !fits (y0, y1))
     return;
   const Span columns (x0, x1, picture.cols), rows (y0, y1, picture.rows);
-  constexpr float kEdge = -1e-4f; /* what lies on an edge belongs to both */
+  constexpr float kEdge = -1e-4f; /* pixels on an edge belong to both triangles */
   for (int y = rows.first; y <= rows.last; y++) {
     auto out = picture.ptr<float> (y);
     for (int x = columns.first; x <= columns.last; x++) {
@@ -72,7 +72,7 @@ joined (const Corner &a, const Corner &b)
   return a[2] > 0 && b[2] > 0 && std::abs (a[2] - b[2]) <= kStep * std::max (a[2], b[2]);
 }
 
-/* What one pixel covers by itself: where nothing is yet, or something well behind it. */
+/* Draws the area of one pixel where nothing was drawn, or something well behind it. */
 void
 dot (const Corner &at, float radius, cv::Mat &picture)
 {

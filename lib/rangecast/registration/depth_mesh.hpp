@@ -11,22 +11,22 @@
 
 namespace rangecast {
 
-/** The surface that a depth camera sees, drawn as another camera sees it. Neighbouring pixels
- *  are joined where their depths differ by at most 3 %, so that the surface has no holes whatever
- *  the other camera's resolution; what stands alone covers as much as its pixel did. Nearer hides
- *  farther, by z-buffer. Memory is kept between frames. */
+/** The surface that a depth camera sees, rendered from the view of another camera. Neighbouring
+ * pixels are connected if their depths differ by at most 3 %, so that the surface has no holes at
+ * any resolution; an isolated pixel covers its own area. Hidden surfaces are removed by z-buffer.
+ * Reuses its memory between images. */
 class DepthMesh {
 public:
-  /** @param camera  that took the depth; may have lens distortion */
+  /** @param camera  the depth camera; may have lens distortion */
   Status set (const View &camera);
 
-  /** Takes a depth picture: the points that the camera saw.
+  /** Unprojects a depth image.
    *  @param depth     of the camera's size; 0 = invalid
-   *  @param metres    per unit of it
+   *  @param metres    per unit of `depth`
    *  @param near_m, far_m  other depths are invalid */
   void take (ImageView<const std::uint16_t> depth, double metres, double near_m, double far_m);
 
-  /** @name The points, row by row; z = 0 where there is none @{ */
+  /** @name The points by row; z = 0 for invalid ones @{ */
   [[nodiscard]] const cv::Vec3f *row (int y) const { return points_.ptr<cv::Vec3f> (y); }
   [[nodiscard]] int width () const { return points_.cols; }
   [[nodiscard]] int height () const { return points_.rows; }
@@ -34,7 +34,7 @@ public:
 
   /** @param lens        of the other camera, without distortion
    *  @param to_camera   other_from_depth
-   *  @param[out] inverse_depth  CV_32F of the size that is wanted: 1/z, 1/m, 0 = nothing seen */
+   *  @param[out] inverse_depth  CV_32F of the size to draw: 1/z in 1/m, 0 = nothing */
   void draw (const Intrinsics &lens, const Pose &to_camera, cv::Mat &inverse_depth);
 
 private:

@@ -12,11 +12,12 @@
 namespace rangecast {
 namespace {
 
-/* A point this much farther than what the colour camera sees there is hidden. */
+/* A point is hidden if it is farther than the surface that the colour camera sees by more than this
+ * fraction. */
 constexpr float kHidden = 0.03f;
 
-/* Where a point at (x, y, 1) of a camera with distortion appears, at (x, y, 1) again; the model is
- * that of cv::projectPoints without tilt. */
+/* Applies lens distortion to normalized image coordinates; the model of cv::projectPoints without
+ * tilt. */
 cv::Vec2d
 distort (double x, double y, const std::array<double, 14> &d)
 {
@@ -92,7 +93,7 @@ Registration::set (const View &depth, const View &colour, RegisterInto into)
   return {};
 }
 
-/* What was drawn, in depth units. */
+/* Converts the rendered depth to depth units. */
 void
 Registration::write_depth (const RangeImage &image) const
 {
@@ -146,7 +147,7 @@ Registration::sample (ImageView<const Rgbx> colour, const cv::Vec3f &point, Rgbx
   return true;
 }
 
-/* Colour without distortion; what the lens did not show has none, and so no depth. */
+/* Undistorts colour; pixels outside of the distorted image become invalid. */
 void
 Registration::straighten (ImageView<const Rgbx> colour, const RangeImage &image) const
 {

@@ -8,29 +8,29 @@
 
 namespace rangecast {
 
-/** Whose view a range image of two cameras is. */
+/** The camera whose view a registered range image has. */
 enum class RegisterInto { kDepth, kColour };
 
-/** Depth and colour of two cameras that stand side by side, of any sizes, to one range image.
+/** Registers depth and colour of two cameras, of any sizes, into one range image.
  *
- *  Into depth: every depth stays as it was measured and gets the colour of its point; points that
- *  the colour camera does not see, because something nearer hides them or they lie outside of its
- *  picture, are invalid. Into colour: the depth is drawn as the colour camera sees it (DepthMesh).
- *  Lens distortion of either camera is taken out: the range view has none. */
+ *  Into depth: depth stays as measured and each point gets its colour; points that the colour
+ * camera does not see, because they are hidden or outside of its image, become invalid. Into
+ * colour: depth is rendered from the view of the colour camera (DepthMesh). Lens distortion of both
+ * cameras is removed. */
 class Registration {
 public:
-  /** @param depth, colour  the cameras; their poses say how they stand. Near, far, unit and, into
-   *  depth, the view-id are those of `depth` */
+  /** @param depth, colour  the cameras, with poses. Near, far, unit and, into depth, the view-id
+   * are those of `depth` */
   Status set (const View &depth, const View &colour, RegisterInto into);
 
-  /** The view of the range images; its id is that of the camera whose view it is. */
+  /** The view of the range images; its id is that of the camera whose view it has. */
   [[nodiscard]] const View &range_view () const { return range_view_; }
 
   /** @param depth    of the depth camera's size, 0 = invalid
-   *  @param metres   per unit of it
+   *  @param metres   per unit of `depth`
    *  @param colour   of the colour camera's size
    *  @param image    of the whole range view; written in full
-   *  @return kBadSize if a picture has another size */
+   *  @return kBadSize if an image has another size */
   Status process (ImageView<const std::uint16_t> depth, double metres, ImageView<const Rgbx> colour,
       const RangeImage &image);
 
@@ -47,9 +47,9 @@ private:
   Pose colour_from_depth_;
   std::array<double, 14> bend_{}; /* distortion of the colour camera, all coefficients */
   DepthMesh mesh_, range_mesh_;   /* range_mesh_: of the range view, where depth had distortion */
-  Intrinsics shadow_lens_;        /* of hidden_: the colour camera, no finer than depth */
+  Intrinsics shadow_lens_;        /* of hidden_: no finer than the depth image */
   cv::Mat hidden_, drawn_, maps_[2];
-  cv::Mat outside_; /* of the colour view: not in the picture that has distortion; empty: none */
+  cv::Mat outside_; /* pixels outside of the distorted colour image; empty: none */
 };
 
 } // namespace rangecast

@@ -15,7 +15,7 @@ namespace rangecast {
 static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
 
 constexpr int kFileVersion = 2;
-/* In base64 a pixel takes 43 bytes, and spaces: some 20 views of 1920x1080. */
+/* A pixel takes 43 bytes in base64, and spaces: enough for about 20 views of 1920x1080. */
 constexpr std::uint64_t kMaxFileBytes = std::uint64_t{2} << 30;
 constexpr std::uint32_t kLongestAdaptMs = 10'000;
 constexpr int kAdaptSteps = 1000; // of 10 ms
@@ -108,7 +108,7 @@ BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8
   }
   const auto now_ms = static_cast<std::uint32_t> (
       std::min<std::uint64_t> ((image.capture_time_ns - adapt_base_ns_) / 1'000'000, UINT32_MAX));
-  std::array<float, kAdaptSteps + 1> shares; // by the time since a pixel was taught
+  std::array<float, kAdaptSteps + 1> shares; // by the time since a pixel's last update
   for (int i = 0; i <= kAdaptSteps; i++)
     shares[i] = float (
         std::min (1 - std::exp (-i * (kLongestAdaptMs * 1e-3 / kAdaptSteps) / adapt_time_s), 0.5));
@@ -145,13 +145,13 @@ BackgroundModel::measure_noise ()
   depth_noise_ = *middle;
 }
 
-/* Holes in a surface have the inverse depth, which is linear on a plane, of what surrounds them:
- * halved again and again as far as some pixels are known, and doubled into the holes. */
+/* Fills holes with the inverse depth of their surroundings, which is linear on a plane: averages
+ * known pixels down an image pyramid, then interpolates into the holes on the way up. */
 void
 BackgroundModel::infer_depth ()
 {
-  constexpr float kKnownShare = 0.05f; /* as for the segmenter */
-  constexpr int kLevels = 6;           /* a hole of some 64 pixels */
+  constexpr float kKnownShare = 0.05f; /* as in the segmenter */
+  constexpr int kLevels = 6;           /* holes of up to about 64 pixels */
   std::array<cv::Mat, kLevels + 1> sum, weight;
   sum[0].create (height_, width_, CV_32F);
   weight[0].create (height_, width_, CV_32F);
@@ -218,7 +218,7 @@ save_backgrounds (
   return {};
 }
 
-/* What is in a file may be anything; the segmenter counts on numbers within their ranges. */
+/* Files are untrusted; the segmenter requires values within their ranges. */
 static bool
 is_sound (const BackgroundPixel &p)
 {
@@ -229,7 +229,7 @@ is_sound (const BackgroundPixel &p)
          within (p.nearest, 0, 65535);
 }
 
-/* One view of the file, or false if it is not what save_backgrounds() writes. */
+/* Reads one view. @return false if it does not have the form that save_backgrounds() writes */
 bool
 read_background (const cv::FileNode &node, int &id, BackgroundModel &model)
 {

@@ -5,8 +5,8 @@
 
 namespace rangecast {
 
-/** The smallest box, in full-image pixels, that holds all valid pixels of an image, grown by a
- *  margin but not beyond the image's ROI. Empty if nothing is valid. */
+/** Bounding box of all valid pixels, in full-image pixels, with a margin but within the image's
+ * ROI. Empty if no pixel is valid. */
 Roi bounding_box (const ConstRangeImage &image, int margin);
 
 } // namespace rangecast

@@ -9,17 +9,17 @@
 namespace rangecast {
 namespace {
 
-/* Pixels around one that make its plane: all of the nearest, of the others every second one of
- * every second row, which counts for four. */
+/* Neighbourhood for the plane fit: all pixels within kAll; beyond, every second one of every second
+ * row with a weight of four. */
 constexpr int kAll = 2, kAround = 6;
-/* A surface's depth differs by no more than this share for each pixel in between; nor does a new
- * pixel's from its neighbour's. */
+/* Maximum relative depth difference per pixel of distance on one surface, and between a new pixel
+ * and its neighbour. */
 constexpr float kSlant = 0.02f, kStep = 0.03f;
-/* Levels, sum of R, G, B, at which a colour counts 0.6, and the weight of samples that is enough:
- * one neighbour of the same colour, or some that are like it. */
+/* Colour difference (sum over R, G, B) with weight 0.6, and the required sum of weights: one
+ * neighbour of the same colour or several similar ones. */
 constexpr float kLike = 25, kEnough = 1;
-/* Square pixels that the spread of samples is taken to be larger: a few in a line, or noise, tilt
- * no plane. */
+/* Regularization added to the variance of positions, pixels squared, so that a few collinear or
+ * noisy samples do not tilt the plane. */
 constexpr float kFlat = 0.1f;
 
 struct Sample {
@@ -62,7 +62,7 @@ unlike (Rgbx a, Rgbx b)
   return std::size_t (std::abs (a.r - b.r) + std::abs (a.g - b.g) + std::abs (a.b - b.b));
 }
 
-/* Calls visit (u, v) for the pixels beside one that lie in the picture. */
+/* Calls visit (u, v) for the neighbours of a pixel that are inside the image. */
 template <typename Visit>
 void
 for_neighbours (const RangeImage &image, int x, int y, const Visit &visit)
@@ -72,7 +72,7 @@ for_neighbours (const RangeImage &image, int x, int y, const Visit &visit)
       visit (u, v);
 }
 
-/* The depth beside a pixel that looks most like it, or kInvalidDepth. */
+/* Depth of the neighbour with the most similar colour, or kInvalidDepth. */
 std::uint16_t
 likeliest (const RangeImage &image, int x, int y)
 {
@@ -89,7 +89,7 @@ likeliest (const RangeImage &image, int x, int y)
   return depth;
 }
 
-/* Weighted least squares of a plane, seen from its origin. */
+/* Weighted least-squares fit of a plane, evaluated at the origin. */
 class PlaneFit {
 public:
   void add (float x, float y, float value, float weight)
@@ -99,7 +99,7 @@ public:
     xx_ += wx * x, xy_ += wx * y, yy_ += wy * y, xv_ += wx * value, yv_ += wy * value;
   }
   [[nodiscard]] float weight () const { return n_; }
-  /* Of some weight. */
+  /* Requires samples. */
   [[nodiscard]] float at_origin () const
   {
     const float mx = x_ / n_, my = y_ / n_, mv = value_ / n_;
@@ -113,7 +113,7 @@ private:
   float n_ = 0, x_ = 0, y_ = 0, value_ = 0, xx_ = 0, xy_ = 0, yy_ = 0, xv_ = 0, yv_ = 0;
 };
 
-/* What depth a pixel has if the surface beside it goes on; kInvalidDepth if none does. */
+/* Depth of a pixel as continuation of a neighbouring surface; kInvalidDepth if there is none. */
 std::uint16_t
 depth_of (const RangeImage &image, int x, int y, bool any_colour)
 {
@@ -142,7 +142,7 @@ depth_of (const RangeImage &image, int x, int y, bool any_colour)
 
 } // namespace
 
-/* The front is what has no depth beside what has. */
+/* The front: pixels without depth next to pixels with depth. */
 void
 DepthFill::begin (const RangeImage &image, const cv::Mat &allowed)
 {
@@ -170,7 +170,7 @@ DepthFill::advance (const RangeImage &image, const cv::Mat &allowed)
 {
   next_front_.clear ();
   for (std::size_t i = 0; i < front_.size ();
-       i++) /* what looked like nothing may be reached again */
+       i++) /* pixels without depth may be reached again from elsewhere */
     if (found_[i] == kInvalidDepth)
       seen_.at<std::uint8_t> (front_[i]) = 0;
   for (std::size_t i = 0; i < front_.size (); i++) {
@@ -197,7 +197,7 @@ DepthFill::fill (const RangeImage &image, const cv::Mat &allowed, int reach, boo
     for (const cv::Point &at : front_)
       found_.push_back (depth_of (image, at.x, at.y, any_colour));
     for (std::size_t i = 0; i < front_.size (); i++) {
-      image.depth.at (front_[i].x, front_[i].y) = found_[i]; /* was invalid, or still is */
+      image.depth.at (front_[i].x, front_[i].y) = found_[i]; /* it was invalid, or still is */
       filled += found_[i] != kInvalidDepth;
     }
     advance (image, allowed);

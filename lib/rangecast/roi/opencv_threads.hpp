@@ -7,9 +7,9 @@
 
 namespace rangecast {
 
-/** in_parallel() for work that calls OpenCV's functions, which split a picture among threads of
- *  OpenCV's own: where several jobs run at a time, they do not. OpenCV runs one loop at a time in a
- *  process, so a loop of one item around the jobs keeps all of them from starting others. */
+/** in_parallel() for work that calls OpenCV, whose functions start threads of their own: prevents
+ * that if there are several jobs. OpenCV runs one parallel loop at a time in a process, so a loop
+ * of one item around the jobs makes all loops inside them serial. */
 template <typename Work>
 void
 in_parallel_with_opencv (std::size_t n, int threads, const Work &work)

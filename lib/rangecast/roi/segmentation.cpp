@@ -10,35 +10,35 @@ namespace rangecast {
 namespace {
 
 constexpr std::uint8_t kYes = 255;
-/* The background's depth is known where it was valid in at least this share of its frames; where
- * it was not, the scene is out of reach there. */
+/* Fraction of frames with valid depth from which the background's depth is known; below it, the
+ * scene there is out of range. From kSteadyShare on it is reliable. */
 constexpr float kKnownShare = 0.05f, kSteadyShare = 0.5f;
-/* Where depth says that the background is there, shadow and light may go so much farther. */
+/* Factor on the limits of shadow and highlight where depth matches the background. */
 constexpr float kConfirmed = 2;
-/* A pixel looks just like the background within so many standard deviations (which are at least
- * kMinSpread grey levels), and within this share of its brightness. */
+/* A pixel matches the background within this number of standard deviations (at least kMinSpread
+ * grey levels) and this fraction of its brightness. */
 constexpr float kSameFactor = 2.5f, kMinSpread = 1.5f, kSameShare = 0.08f;
 constexpr float kBurntOut = 250; /* grey levels */
-/* Noise of brightness from which the background's colour tells nothing. */
+/* Relative noise of brightness above which the background's colour is not used. */
 constexpr float kVague = 0.3f;
-/* How far around a pixel the person or the background is looked for, as a share of the width. */
+/* Search range around a pixel for foreground or background, relative to the width. */
 constexpr double kSight = 0.125;
-/* What teaches the background and has no depth to prove it keeps so far from what is kept, pixels.
+/* Distance from the foreground at which pixels without depth may update the background, pixels.
  */
 constexpr int kGuard = 7;
 constexpr std::uint8_t kPerhaps = 128;
 
-/* Thresholds in the units of the pixels. */
+/* Thresholds in units of the pixels. */
 struct Limits {
   bool use_colour, use_depth;
-  bool doubt_depth; /* depth is of stereo: it means nothing where there is no texture */
+  bool doubt_depth; /* depth comes from stereo: unreliable without texture */
   float noise_factor, colour, shadow, highlight;
   float nearness;    /* depth units */
   float depth_noise; /* BackgroundModel::depth_noise() */
   std::array<float, 3> light;
 };
 
-/* kSomewhere: there is depth where the background never had any. */
+/* kSomewhere: valid depth where the background had none. */
 enum class Where { kUnknown, kBackground, kSomewhere, kNearer };
 
 Where
@@ -56,36 +56,36 @@ place_of (
            : float (depth) < inferred + doubt ? Where::kBackground
                                               : Where::kUnknown;
   }
-  /* Where stereo wavers between two surfaces, their distance is no noise: only what is nearer than
-   * the nearer one is new. */
+  /* Where stereo alternates between two surfaces, their distance is not noise: only depth in front
+   * of the nearer one is foreground. */
   const float sensor = limits.depth_noise * background.depth * background.depth;
   const float wavers = background.depth - background.nearest + limits.noise_factor * sensor;
-  /* Stereo is steady where there is no texture, too, and errs by more when a shadow brings some. */
+  /* Stereo is stable without texture, too, but its error grows when a shadow adds texture. */
   float noise = std::max ({limits.nearness, limits.noise_factor * sensor,
       std::min (limits.noise_factor * background.depth_spread, wavers)});
   if (background.depth_share < kSteadyShare)
-    noise *= 2; /* learnt from few */
+    noise *= 2; /* learnt from few frames */
   if (float (depth) < background.depth - noise)
     return Where::kNearer;
   return float (depth) < background.depth + noise ? Where::kBackground : Where::kUnknown;
 }
 
-/* How a colour compares with the background's in the present light. */
+/* Comparison of a colour with the background's under the current light. */
 struct Comparison {
   float distortion; /* chromatic, grey levels, squared */
-  float brightness; /* as a share of the background's */
-  float noise;      /* of brightness: one standard deviation */
+  float brightness; /* relative to the background's */
+  float noise;      /* standard deviation of brightness */
 };
 
 Comparison
 compare (Rgbx colour, const BackgroundPixel &background, const Limits &limits)
 {
-  /* One is added to all, so that black has a brightness to compare. */
+  /* Offset by one, so that black has a brightness. */
   const float rgb[] = {float (colour.r) + 1, float (colour.g) + 1, float (colour.b) + 1};
   float mean[3], mixed = 0, square = 0, distortion = 0;
   for (int c = 0; c < 3; c++) {
     mean[c] = background.mean[c] * limits.light[c] + 1;
-    if (rgb[c] > kBurntOut) /* what was too bright says only that */
+    if (rgb[c] > kBurntOut) /* saturated: only a lower bound is known */
       mean[c] = std::min (mean[c], 256.f);
     mixed += rgb[c] * mean[c];
     square += mean[c] * mean[c];
@@ -117,19 +117,19 @@ has_other_light (const Comparison &c, bool confirmed, const Limits &limits)
 bool
 has_same_hue (const Comparison &c, const BackgroundPixel &background)
 {
-  constexpr float kChannels = 1.6f; /* the distance has two free directions */
+  constexpr float kChannels = 1.6f; /* the distortion has two degrees of freedom */
   const float chroma = kSameFactor * kChannels * std::max (background.spread, kMinSpread);
   return c.distortion < chroma * chroma;
 }
 
-/* White without texture. */
+/* Saturated, without texture. */
 bool
 is_burnt_out (const BackgroundPixel &background)
 {
   return std::ranges::all_of (background.mean, [] (float level) { return level > kBurntOut; });
 }
 
-/* A histogram of brightness ratios, from a quarter to four times, that finds the commonest. */
+/* Histogram of brightness ratios from 1/4 to 4, to find the mode. */
 class RatioPeak {
 public:
   void add (float ratio)
@@ -139,7 +139,7 @@ public:
       counts_[bin]++;
     all_++;
   }
-  /** @return the ratio that at least a sixth of all share, or the fallback */
+  /** @return the mode if at least a sixth of all samples share it, else the fallback */
   [[nodiscard]] float peak (float fallback) const
   {
     constexpr int kReach = 3;
@@ -167,8 +167,8 @@ private:
 
 } // namespace
 
-/* From every sixteenth pixel that is no nearer than the background, but not from very dark or burnt
- * out ones, whose ratios say little. */
+/* Estimated from every sixteenth pixel that is not nearer than the background, without very dark
+ * and saturated ones. */
 static void
 estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
     const Limits &limits, std::array<float, 3> &light)
@@ -225,7 +225,7 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
     for (int x = 0; x < image.roi.width; x++) {
       Where where =
           limits.use_depth ? place_of (depth[x], behind[x], inferred[x], limits) : Where::kUnknown;
-      const bool unseen = behind[x].spread < 0; /* as good as another colour */
+      const bool unseen = behind[x].spread < 0; /* treated as a different colour */
       const Comparison c =
           unseen || !limits.use_colour ? Comparison{} : compare (colour[x], behind[x], limits);
       const bool alike = !unseen && has_same_hue (c, behind[x]);
@@ -240,7 +240,7 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
       blank[x] = is_burnt_out (behind[x]) || tolerance[x] > kVague ? kYes : 0;
       same[x] = alike ? kYes : 0;
       const bool quiet = alike && std::abs (c.brightness - 1) < tolerance[x];
-      /* Stereo finds something now and then where there is no texture; colour knows better. */
+      /* Stereo sometimes finds false depth without texture; colour is more reliable there. */
       const bool textureless = limits.doubt_depth && is_burnt_out (behind[x]);
       if (where == Where::kSomewhere || (where == Where::kNearer && textureless))
         where = quiet && limits.use_colour ? Where::kUnknown : Where::kNearer;
@@ -252,8 +252,8 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
   }
 }
 
-/* What is known by depth, and by colour where depth is unknown; then what is surrounded. Small
- * patches of depth are as good as none. */
+/* Classifies pixels by depth, or by colour where depth is unknown; then those that are surrounded.
+ * Small patches of depth are ignored. */
 void
 Segmenter::find_sides (const SegmentationSettings &settings)
 {
@@ -262,7 +262,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   sides_.create (nearer_.size (), CV_8U);
   sides_.setTo (int (Side::kUnknown));
   sides_.setTo (int (Side::kBackground), placed_);
-  /* Where the background never had depth, colour decides, if it says something. */
+  /* Where the background had no depth, colour decides if it is conclusive. */
   cv::bitwise_or (seen_, blank_, by_colour_);
   cv::bitwise_or (by_colour_, other_, by_colour_);
   cv::bitwise_not (by_colour_, by_colour_);
@@ -271,8 +271,8 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   sides_.setTo (int (Side::kForeground), opened_);
   const int reach = std::clamp (int (kSight * sides_.cols), 16, 255);
   surroundings_.find_inside (sides_, reach, surrounded_);
-  /* What looks just like the background, where that says something, is a hole to look through.
-   * Stereo finds the depth of wide ones. */
+  /* A region that matches the background conclusively is a hole through which it is seen. Stereo
+   * finds the depth of wide ones. */
   const int wide = 2 * settings.fringe + 1;
   cv::morphologyEx (surrounded_, opened_, cv::MORPH_OPEN,
       cv::getStructuringElement (cv::MORPH_RECT, cv::Size (wide, wide)));
@@ -287,8 +287,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   inside_.setTo (0, inverse_);
 }
 
-/* However deep a shadow or bright a light: where depth says all around that the background is
- * there, it is the background's. */
+/* Ignores shadows and light of any strength where depth matches the background all around. */
 void
 Segmenter::forgive_light (int reach)
 {
@@ -301,8 +300,8 @@ Segmenter::forgive_light (int reach)
   cv::bitwise_and (inverse_, lit_, inverse_);
   inverse_.setTo (0, opened_);
   other_.setTo (0, inverse_);
-  /* A shadow that reaches the person's feet: what has no depth there has the light of the shadow
-   * beside it. */
+  /* A shadow that reaches the person's feet: pixels without depth have the brightness of the shadow
+   * next to them. */
   if (cv::countNonZero (inverse_) == 0)
     return;
   inverse_.convertTo (dark_, CV_32F, 1.0 / kYes);
@@ -321,8 +320,9 @@ Segmenter::forgive_light (int reach)
   }
 }
 
-/* Of the pixels with the background's hue only those stay `same` that have the light of background
- * within reach, be it in shadow or not. What has none within reach is marked in inverse_. */
+/* Of the pixels with the background's hue, only those with the brightness of background within
+ * reach stay `same`, in shadow or not. Pixels without background within reach are marked in
+ * inverse_. */
 void
 Segmenter::find_same (int reach)
 {
@@ -346,7 +346,7 @@ Segmenter::find_same (int reach)
         same[x] = 0;
     }
   }
-  cv::medianBlur (same_, opened_, 3); /* one pixel may look like the background by chance */
+  cv::medianBlur (same_, opened_, 3); /* single pixels may match by chance */
   cv::bitwise_and (opened_, nearer_, same_);
 }
 
@@ -357,23 +357,23 @@ Segmenter::join_cues (const SegmentationSettings &settings)
     cv::bitwise_or (other_, nearer_, mask_);
     return;
   }
-  const int side = settings.fringe | 1; /* an even kernel would move things by half a pixel */
+  const int side = settings.fringe | 1; /* an even kernel shifts by half a pixel */
   if (kernel_.rows != side)
     kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
   find_sides (settings);
   forgive_light (settings.fringe);
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
-  cv::bitwise_or (inverse_, same_, inverse_); /* wide where it goes on into the thing */
+  cv::bitwise_or (inverse_, same_, inverse_); /* wide where it extends into the object */
   cv::morphologyEx (inverse_, opened_, cv::MORPH_OPEN, kernel_);
   cv::bitwise_not (same_, inverse_);
-  cv::bitwise_and (nearer_, inverse_, mask_); /* nearer, and does not look like the background */
+  cv::bitwise_and (nearer_, inverse_, mask_); /* nearer, and unlike the background */
   cv::bitwise_or (mask_, other_, mask_);
   cv::bitwise_or (mask_, opened_, mask_);
   cv::bitwise_or (mask_, inside_, mask_);
 }
 
-/* Islands of fewer than min_area pixels go; of the others only the `keep` largest stay. */
+/* Removes components of fewer than min_area pixels, and all but the `keep` largest. */
 void
 Segmenter::remove_small (cv::Mat &mask, int min_area, int keep)
 {
@@ -412,8 +412,8 @@ Segmenter::find_quiet ()
   cv::bitwise_or (quiet_, opened_, quiet_);
 }
 
-/* For every depth a number that grows by 128 where neighbours are just too far apart: by 30 mm, or,
- * farther away, by what noise does between two pixels (it grows with the square of depth). */
+/* Maps depth to a scale on which 128 is the maximum difference of neighbours on one surface: 30 mm,
+ * or the noise between two pixels, which grows with the square of depth. */
 void
 Segmenter::make_steps (double depth_unit_m, double noise)
 {
@@ -432,8 +432,8 @@ Segmenter::make_steps (double depth_unit_m, double noise)
   }
 }
 
-/* Islands in space: patches beside the person in the picture, but well before or behind it. What
- * stereo makes of a silhouette is often such a patch. */
+/* Removes components in space: patches next to the person in the image, but well in front or
+ * behind. Stereo often produces them at silhouettes. */
 void
 Segmenter::remove_small_in_space (
     const RangeImage &image, double depth_unit_m, double noise, int min_area)
@@ -459,9 +459,9 @@ Segmenter::remove_small_in_space (
   }
 }
 
-/* Not to single pixels that stick out of the silhouette, which may be chance; nor, with colour, to
- * what looks just like the background: a hole that was closed may be one. Farther where the hue
- * differs, as a shadow's does not. */
+/* Not into single pixels that stick out of the silhouette, nor, with colour, where the image
+ * matches the background: a closed hole may be a real one. Farther where the hue differs, because a
+ * shadow's does not. */
 void
 Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &settings)
 {

@@ -12,12 +12,12 @@
 namespace rangecast {
 namespace {
 
-/* Signs that may begin a collection or an element: a rig of 64 views has some
- * 2,000, and each may take some 300 bytes of stack. */
+/* Maximum number of characters that may start a collection or element: a rig of 64 views has about
+ * 2,000, and each can take about 300 bytes of stack. */
 constexpr int kMaxSigns = 10000;
-/* What a rule looks at together: a marker, the spaces behind it, and the header of its data. */
+/* Look-ahead of a rule: a marker, the spaces after it, and the header of its data. */
 constexpr std::size_t kLookAhead = 512, kBlock = 65536;
-/* OpenCV fills the name of the type up to so many bytes, which are 32 in base64. */
+/* OpenCV pads the type name to this many bytes, 32 in base64. */
 constexpr std::size_t kHeaderBytes = 24;
 
 std::string
@@ -36,7 +36,7 @@ encoded_header (std::string_view type)
   return text;
 }
 
-/* "- " begins an element of a list, "-1" is a number. */
+/* "- " starts a list element, "-1" is a number. */
 bool
 is_sign (std::string_view text)
 {
@@ -45,8 +45,8 @@ is_sign (std::string_view text)
          (text[0] == '-' && (next == ' ' || next == '\n' || next == '\r' || next == '-'));
 }
 
-/* What stands before a place: its last character, and the last one before that which is no space
- * and not of a byte order mark. */
+/* Context before a position: the last character, and the last one that is neither space nor byte
+ * order mark. */
 struct Before {
   char last = '\n', solid = '\n';
 
@@ -58,7 +58,7 @@ struct Before {
   }
 };
 
-/* Where data in base64 begin if `text` begins with a marker for them; else 0. The markers are
+/* Offset of base64 data if `text` starts with their marker, else 0. The markers are
  * YAML's !!binary and JSON's "$base64$. */
 std::size_t
 behind_marker (std::string_view text, const Before &before)
@@ -72,8 +72,8 @@ behind_marker (std::string_view text, const Before &before)
   return tag ? kWord.size () : 0;
 }
 
-/* Behind a marker, where only what such a file has there may stand: at another sign OpenCV would
- * look for data for ever. */
+/* Checks the text after a marker: on an unexpected character OpenCV would search for data forever.
+ */
 bool
 has_header (std::string_view text, const std::string &header, bool json)
 {
@@ -99,14 +99,13 @@ is_control (char c)
   return std::iscntrl (static_cast<unsigned char> (c)) && c != '\n' && c != '\r' && c != '\t';
 }
 
-/* Whether a YAML file is one map of fields that begin their lines. OpenCV 4.6 takes what is left of
- * a document whose collection ends before it does (a list, a flow collection, an indented map) for
- * the end of that document, steps over three characters, and may then never end. Other formats
- * pass. */
+/* Checks that a YAML file is one map with unindented keys. If the collection of a document ends
+ * early (a list, a flow collection, an indented map), OpenCV 4.6 takes the rest for the document
+ * end, skips three characters, and may then loop forever. Other formats pass. */
 class YamlShape {
 public:
-  /** @param rest  begins with the character to look at
-   *  @return what is wrong, or nothing */
+  /** @param rest  starts with the character to examine
+   *  @return an error message, or an empty string */
   std::string look_at (std::string_view rest)
   {
     const char c = rest[0];
@@ -130,7 +129,7 @@ private:
   struct Line {
     int column = 0;
     bool ignored = false; /* the rest of it */
-    bool marked = false;  /* begins with --- or ... */
+    bool marked = false;  /* starts with --- or ... */
   };
 
   std::string look_at_sign (std::string_view rest)
@@ -162,7 +161,7 @@ private:
   Line line_;
 };
 
-/* Text that comes in blocks. */
+/* Scans text in blocks. */
 class StorageScanner {
 public:
   explicit StorageScanner (const StorageLimits &limits)
@@ -171,7 +170,7 @@ public:
   {
   }
 
-  /** Looks at the first `count` bytes of `text`; the others say what follows. */
+  /** Scans the first `count` bytes of `text`; the rest is look-ahead. */
   void scan (std::string_view text, std::size_t count)
   {
     bytes_ += count;
@@ -214,7 +213,7 @@ private:
 Status
 check_storage (const std::string &path, const StorageLimits &limits)
 {
-  /* Reads what is not compressed as it is. OpenCV goes by the name. */
+  /* gzopen() reads uncompressed files, too. OpenCV decides by name. */
   const std::unique_ptr<gzFile_s, int (*) (gzFile)> file (gzopen (path.c_str (), "rb"), gzclose);
   if (!file)
     return {};

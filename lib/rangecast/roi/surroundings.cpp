@@ -27,14 +27,14 @@ Surroundings::halve (const cv::Mat &sides)
   }
 }
 
-/* Half of the directions: along the row and to the three pixels of the row before, which is the one
- * above for step 1 and the one below for step -1. */
+/* Four of the eight directions: along the row, and to three pixels of the previous row, which is
+ * above for step 1 and below for step -1. */
 void
 Surroundings::look (int reach, int step)
 {
   const cv::Mat &sides = blocks_;
   const int width = sides.cols, height = sides.rows;
-  /* What a pixel sees in a direction is its neighbour there, or what that one sees. */
+  /* A pixel sees its neighbour in a direction, or what that one sees. */
   const auto beyond = [reach] (Side side, Sight neighbour) -> Sight {
     if (side != Side::kUnknown)
       return {side, 1};

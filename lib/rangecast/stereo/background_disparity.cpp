@@ -9,10 +9,10 @@ namespace {
 
 constexpr std::int16_t kUnknown = -32768, kHidden = -32767;
 constexpr int kRadius = 2, kArea = 25; /* of a patch, pixels */
-/* Grey levels, mean of a patch, that mean nothing; sums of a patch that are no more than that. */
+/* Mean difference of a patch that is noise, grey levels; the same as a sum over the patch. */
 constexpr int kNoise = 3, kNoiseSum = kNoise * kArea + kArea / 2;
 
-/* Fills what is not known of a row with the farther one of its neighbours. */
+/* Fills unknown pixels of a row with the farther one of the neighbouring disparities. */
 void
 guess_row (std::int16_t *row, int width)
 {
@@ -36,7 +36,7 @@ guess_row (std::int16_t *row, int width)
 
 } // namespace
 
-/* Pixels without a disparity beside the background: one camera does not see them. */
+/* Marks pixels without disparity next to the background as hidden from one camera. */
 void
 BackgroundDisparity::mark_hidden (
     const std::int16_t *d, const std::uint8_t *grey, int y, int least, int far)
@@ -100,7 +100,7 @@ BackgroundDisparity::extend (
     for (int y = tile.y; y < tile.br ().y; y++) {
       auto d = disparity.ptr<std::int16_t> (y);
       const auto back = likely_.ptr<std::int16_t> (at.y + y) + at.x;
-      /* What is known of the pixels beside the tile: nothing, or the background. */
+      /* Whether the pixels next to the tile are known background. */
       const auto beside = [&] (int x) {
         const bool inside = at.x + x >= 0 && at.x + x < likely_.cols;
         return inside && back[x] > kHidden ? back[x] : kNothing;
@@ -122,8 +122,8 @@ BackgroundDisparity::extend (
   });
 }
 
-/* Differences of patches between both pictures, where there is a disparity. memory.grey is the left
- * one. @param disparity  of the size of job.left */
+/* Compares patches of both images where there is a disparity. memory.grey is the left image. @param
+ * disparity  of the size of job.left */
 void
 BackgroundDisparity::compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity,
     int least, Memory &m, Plane &unlike) const
@@ -150,7 +150,7 @@ BackgroundDisparity::compare (const Job &job, const cv::Rect &tile, const cv::Ma
   sum_windows<kRadius> (m.pixels, unlike, m.columns);
 }
 
-/* Row y of the part, which is row i of the tile, from column x on. */
+/* Restores row y of the part (row i of the tile), from column x on. */
 void
 BackgroundDisparity::restore_row (
     const Job &job, int x0, int y, int i, int width, Memory &m, std::int16_t *d) const
@@ -175,7 +175,7 @@ BackgroundDisparity::restore_row (
     } else if (d[x] < job.least)
       d[x] = static_cast<std::int16_t> (job.none);
   }
-  /* What the right camera sees as background cannot be seen as something else as well. */
+  /* A right pixel that matches the background better cannot match something else as well. */
   for (int x = 0; x < width; x++)
     if (d[x] >= job.least && m.claims[there (x)] < own[x])
       d[x] = static_cast<std::int16_t> (job.none);

@@ -10,43 +10,44 @@
 
 namespace rangecast {
 
-/** What lay beyond far when the whole picture was matched at all depths. Where only some depths are
- *  matched, a matcher takes that for something else; here it is known again by its disparity.
+/** Remembers the background beyond far from images that were matched at all depths. A matcher that
+ *  searches only some depths would mistake it for something nearer; here it is recognized by its
+ *  disparity.
  *  Disparities are CV_16S in 1/16 pixel, greys CV_8U. */
 class BackgroundDisparity {
 public:
   void reset () { known_.release (); }
   [[nodiscard]] bool empty () const { return known_.empty (); }
 
-  /** @param grey       the whole left picture
-   *  @param disparity  of it; from `least` on and below `far` it is background
-   *  Where something else stands now, what was known stays; where nothing ever was, the rest of the
-   *  row says what may be there. */
+  /** @param grey       the whole left image
+   *  @param disparity  its disparities; background from `least` to below `far`
+   *  Keeps what was known where something else is now; where nothing is known, guesses from the
+   * rest of the row. */
   void remember (const cv::Mat &grey, const cv::Mat &disparity, int least, int far);
 
-  /** Gives pixels the background's disparity if that fits the pictures better than theirs, and none
-   *  to those beside the background that had none and still look the same: the right camera does
-   *  not see them.
+  /** Replaces disparities by the background's where that matches the images better, and removes
+   * them next to the background where there was none and the image has not changed: the right
+   * camera does not see these pixels.
    *  @param left, right  the same rows; column `right_x` of `right` is column 0 of `left`
-   *  @param at           where `left` lies in the whole picture
-   *  @param none         written where `disparity` is below `least` and stays so
+   *  @param at           position of `left` in the whole image
+   *  @param none         written where `disparity` stays below `least`
    *  @param[out] to      as `disparity`, not the same memory; written in `tiles` */
   void restore (const cv::Mat &left, const cv::Mat &right, int right_x, const cv::Point &at,
       int least, int none, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
-  /** Gives what has no disparity, but is beside the background in its row, the farthest one there
-   *  is, `least`: one camera does not see it. */
+  /** Sets the farthest disparity, `least`, for pixels without disparity next to the background in
+   * their row: one camera does not see them. */
   void extend (
       const cv::Point &at, int least, int far, const Tiles &tiles, cv::Mat &disparity) const;
 
 private:
-  /* What one thread needs for one tile: pixels, and sums over the patches around them. */
+  /* Scratch memory of one thread for one tile: pixels, and sums over patches. */
   struct Memory {
     Plane grey, before, pixels, own, other, contrast, change, sums;
     std::vector<std::int16_t> columns;
-    std::vector<std::int16_t> claims; /* by column of the right picture: how well it fits */
+    std::vector<std::int16_t> claims; /* by column of the right image: cost of the best match */
   };
-  /* Where the pictures of one call lie. */
+  /* Positions of the images of one call. */
   struct Job {
     const cv::Mat &left, &right;
     int right_x;
@@ -62,9 +63,9 @@ private:
   void mark_hidden (
       const std::int16_t *disparity, const std::uint8_t *grey, int y, int least, int far);
 
-  cv::Mat known_;   /* CV_16S, kUnknown where nothing is, kHidden where there was no disparity */
-  cv::Mat likely_;  /* the same, with guesses from the row */
-  cv::Mat picture_; /* CV_8U: the left picture where something is known */
+  cv::Mat known_;   /* CV_16S; kUnknown; kHidden: had no disparity */
+  cv::Mat likely_;  /* the same with guesses from the row */
+  cv::Mat picture_; /* CV_8U: left image where something is known */
   WorkerMemory<Memory> memory_;
 };
 

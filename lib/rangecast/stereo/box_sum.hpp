@@ -12,7 +12,7 @@
 
 namespace rangecast {
 
-/** Numbers of a small part of a picture. Its memory only grows. */
+/** Values of a small part of an image. Its memory only grows. */
 class Plane {
 public:
   void set_size (int width, int height)
@@ -35,8 +35,8 @@ private:
   int width_ = 0, height_ = 0;
 };
 
-/** A part of a picture and `around` pixels more on each side, mirrored where the picture ends.
- *  @param picture  CV_8U */
+/** Copies a part of an image with `around` pixels on each side, mirrored at the image border.
+ *  @param image  CV_8U */
 inline void
 cut_grey (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
 {
@@ -58,18 +58,18 @@ cut_grey (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
   }
 }
 
-/** What pixels of a row look like in the other camera's picture.
+/** Samples the other image at the disparities of a row.
  *  @param disparity  of each pixel, 1/16 pixel
- *  @param row, width other picture's row, at least two pixels wide
+ *  @param row, width other image's row, at least two pixels wide
  *  @param x          column there of disparity 0 of the first pixel
- *  @param[out] grey  levels, linear between two pixels; of the nearest one outside of the row */
+ *  @param[out] grey  levels, interpolated linearly; clamped at the ends of the row */
 inline void
 look_up (const std::int16_t *disparity, int n, const std::uint8_t *row, int width, int x,
     std::int16_t *grey)
 {
   constexpr int kAtOnce = 64, kFirst = std::endian::native == std::endian::little ? 0 : 8;
   std::int16_t at[kAtOnce];
-  std::uint16_t pairs[kAtOnce]; /* of neighbours: loops without loads from anywhere are vectors */
+  std::uint16_t pairs[kAtOnce]; /* of neighbours: loops without gather loads are vectorized */
   const auto last = static_cast<std::int16_t> (width - 2);
   for (int begin = 0; begin < n; begin += kAtOnce) {
     const int end = std::min (n - begin, kAtOnce);
@@ -90,7 +90,7 @@ look_up (const std::int16_t *disparity, int n, const std::uint8_t *row, int widt
 
 /** Sums over windows of 2 * kRadius + 1 pixels squared. Sums must fit 16 bits.
  *  @param[out] to  smaller than `from` by kRadius pixels on each side
- *  @param columns  memory to use */
+ *  @param columns  scratch memory */
 template <int kRadius>
 void
 sum_windows (const Plane &from, Plane &to, std::vector<std::int16_t> &columns)
@@ -121,9 +121,9 @@ sum_windows (const Plane &from, Plane &to, std::vector<std::int16_t> &columns)
   }
 }
 
-/** How much each pixel differs from the mean of the window around it.
+/** Absolute difference of each pixel from the mean of its window.
  *  @param grey  levels, 0 to 255; @param[out] to  smaller by kRadius on each side
- *  @param sums, columns  memory to use */
+ *  @param sums, columns  scratch memory */
 template <int kRadius>
 void
 differ_from_mean (const Plane &grey, Plane &to, Plane &sums, std::vector<std::int16_t> &columns)

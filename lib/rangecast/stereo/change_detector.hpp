@@ -9,26 +9,25 @@
 
 namespace rangecast {
 
-/** Tells whether anything moves in the part of the pictures that is not looked at closely. Compares
- *  means of blocks of 8 x 8 pixels, whose noise is an eighth of a pixel's. Keeps its memory. */
+/** Detects changes outside of the region that is matched. Compares means of blocks of 8 x 8 pixels,
+ *  whose noise is an eighth of a pixel's. Reuses its memory between images. */
 class ChangeDetector {
 public:
   static constexpr int kBlock = 8; ///< pixels
-  /** Takes the blocks of one camera's picture. @param picture  CV_8UC4, R G B x */
+  /** Computes the blocks of an image. @param image  CV_8UC4, R G B x */
   void look (const cv::Mat &picture);
-  /** Means of the blocks, CV_8UC4: with every second row, halves rounded to the even number. */
+  /** Means of the blocks, CV_8UC4: of every second row, rounded half to even. */
   [[nodiscard]] const cv::Mat &blocks () const { return blocks_; }
-  /** What was looked at last is what later pictures are compared with. */
+  /** Makes the last image the reference for later ones. */
   void remember ();
   void reset () { remembered_.release (); }
 
-  /** Whether two or more blocks that lie wholly outside of the ROI (pixels) differ from what was
-   *  remembered by more than 10 grey levels in one colour. True if nothing is remembered. */
+  /** Whether two or more blocks completely outside of the ROI (pixels) differ from the reference by
+   * more than 10 grey levels in one channel. True without reference. */
   [[nodiscard]] bool changed_outside (const Roi &roi) const;
 
-  /** Whether a block (counted from the top left one) differs from what was remembered by more than
-   *  4 grey levels in one colour: something that hardly stands out may be there. True if nothing is
-   *  remembered. */
+  /** Whether a block (index from the top left) differs from the reference by more than 4 grey
+   * levels in one channel, as a low-contrast object may. True without reference. */
   [[nodiscard]] bool block_changed (int bx, int by) const;
 
 private:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* clear_flying() works on 16-bit disparities with saturating arithmetic in OpenCV's vectors: Lanes
- * (base/simd.hpp) hold 32-bit numbers, half as many. */
+/* clear_flying() uses OpenCV's vectors for saturating 16-bit arithmetic, because Lanes
+ * (base/simd.hpp) have 32-bit elements, half as many. */
 #include "disparity_filter.hpp"
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 namespace rangecast {
 namespace {
 
-/* Of patches: pixels around their centre, and all. */
+/* Radius and area of patches, pixels. */
 constexpr int kPatchRadius = 3, kPatchArea = 49;
-/* Grey levels that two pictures of one patch differ by from noise and interpolation alone. */
+/* Difference between two images of a patch due to noise and interpolation, grey levels. */
 constexpr int kNoise = 4;
 
-/* The right picture's grey at 1/16 pixels, linear between two. */
+/* Grey level at 1/16 pixel positions, interpolated linearly. */
 int
 grey_at (const std::uint8_t *row, int x16, int width)
 {
@@ -25,8 +25,8 @@ grey_at (const std::uint8_t *row, int x16, int width)
 
 } // namespace
 
-/* Sums over patches: how many pixels have a disparity, their difference between both pictures, how
- * large it is, and the contrast of the left one. */
+/* Sums over patches: number of pixels with disparity, signed and absolute difference between both
+ * images, and contrast of the left one. */
 void
 DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
     const cv::Rect &tile, const cv::Mat &disparity, Memory &m) const
@@ -103,7 +103,7 @@ DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity
       }
       if (low > high)
         continue;
-      const int first = (high + 8) >> 4; /* columns of the right picture begin so far left */
+      const int first = (high + 8) >> 4; /* offset of the first column of the right image */
       nearest.assign (std::size_t (tile.width + first - ((low + 8) >> 4)), none);
       const auto there = [&] (int x) { return std::size_t (x + first - ((d[x] + 8) >> 4)); };
       for (int x = 0; x < tile.width; x++)
@@ -116,7 +116,7 @@ DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity
   });
 }
 
-/* A tile and one pixel around it, and `more` columns so that vectors may end beyond it. */
+/* Copies a tile with a border of one pixel, and `more` columns for vectors that end beyond it. */
 static void
 copy_with_border (
     const cv::Mat &disparity, const cv::Rect &tile, int more, std::int16_t none, Plane &to)
@@ -148,7 +148,7 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least, 
     const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
                         zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
                         shift = cv::v_setall_s16 (static_cast<short> (offset)),
-                        /* counts are negative, and hold the pixel itself */
+                        /* counts are negative and include the pixel itself */
         enough = cv::v_setall_s16 (static_cast<short> (-support));
     for (int y = 0; y < tile.height; y++) {
       auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
@@ -195,7 +195,7 @@ DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint
   const auto there = [&] (int x) {
     return std::size_t (std::clamp (x + right_x - ((d[x] + 8) >> 4), 0, right_width - 1));
   };
-  std::vector<std::int16_t> &seen = m.nearest; /* as this disparity, at least, in a wide surface */
+  std::vector<std::int16_t> &seen = m.nearest; /* at least this disparity, in a wide surface */
   seen.assign (std::size_t (right_width), 32767);
   for (const auto &[begin, end] : m.surfaces)
     for (int x = begin; x < end && end - begin >= kWide; x++)
@@ -237,7 +237,7 @@ DisparityFilter::find_root (int run)
   return run;
 }
 
-/* Joins runs a to a_end of a row with runs a_end to b_end of the row below it. */
+/* Merges runs a to a_end of a row with runs a_end to b_end of the row below. */
 void
 DisparityFilter::join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
     std::size_t a_end, std::size_t b_end, int range)
@@ -258,7 +258,7 @@ DisparityFilter::join_rows (const std::int16_t *upper, const std::int16_t *lower
   }
 }
 
-/* The runs of one row, from x0 to x1. */
+/* Finds the runs of one row, from x0 to x1. */
 void
 DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, int least)
 {
@@ -280,7 +280,7 @@ DisparityFilter::clear_specks (
 {
   runs_.clear ();
   first_runs_.assign (std::size_t (disparity.rows) + 1, 0);
-  std::size_t next = 0; /* row whose first run is not known yet */
+  std::size_t next = 0; /* first row without first_runs_ */
   for (const cv::Rect &part : tiles.parts ()) {
     const std::size_t top = std::size_t (part.y);
     for (; next <= top; next++)
@@ -308,7 +308,7 @@ DisparityFilter::clear_specks (
 
 namespace {
 
-/* Whether a colour lies between two others, or nearly. */
+/* Whether a colour is approximately between two others. */
 bool
 is_between (const cv::Vec4b &p, const cv::Vec4b &a, const cv::Vec4b &b)
 {
@@ -319,8 +319,8 @@ is_between (const cv::Vec4b &p, const cv::Vec4b &a, const cv::Vec4b &b)
   return true;
 }
 
-/* Fills elements `last` + 1 to i - 1 of a row or a column, if they are a gap in one surface. Steps
- * are in elements. */
+/* Fills elements `last` + 1 to i - 1 of a row or column if they are a gap in one surface. Steps are
+ * in elements. */
 void
 fill_gap (const cv::Vec4b *colour, std::ptrdiff_t colour_step, std::int16_t *disparity,
     std::ptrdiff_t step, int last, int i)
@@ -354,7 +354,7 @@ DisparityFilter::fill_gaps (
       }
     }
   });
-  /* Columns go down together, as memory lies; threads share them among each other. */
+  /* Columns are processed in groups, in memory order; threads share the groups. */
   constexpr int kColumns = 64;
   const cv::Rect hull = tiles.hull ();
   last_rows_.assign (std::size_t (disparity.cols), -1);

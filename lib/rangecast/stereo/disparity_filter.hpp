@@ -11,62 +11,59 @@
 
 namespace rangecast {
 
-/** Clears disparities that cannot be right. Disparities are CV_16S in 1/16 pixel, left x minus
- *  right x; below `least` = none, and least - 16 is what is written. Greys are CV_8U, rectified, of
- *  the disparities' size. Only pixels in `tiles` are looked at and written: around them there must
- *  be no disparities. Keeps its memory between pictures. */
+/** Clears wrong disparities. Disparities are CV_16S in 1/16 pixel, left x minus right x; below
+ * `least` = none; cleared ones become least - 16. Greys are CV_8U, rectified, of the disparities'
+ * size. Only pixels in `tiles` are read and written; there must be no disparities around them.
+ * Reuses its memory between images. */
 class DisparityFilter {
 public:
-  /** Clears pixels whose surroundings look otherwise in the right picture than in the left one: of
-   *  7 x 7 pixels, those with a disparity differ on average, after the mean difference is taken off
-   *  (cameras may be of different brightness), by more than `tolerance` of the patch's contrast and
-   *  what noise does. Foreign parts of the picture, of which a matcher makes what it can, go.
-   *  @param right  of the same height; its column `right_x` is the left picture's column 0
+  /** Clears pixels whose patches of 7 x 7 pixels differ between both images: the mean absolute
+   * difference of pixels with disparity, after subtracting the mean difference (cameras may differ
+   * in brightness), exceeds `tolerance` times the patch's contrast plus noise. Removes false
+   * matches of parts that only one camera sees.
+   *  @param right  of the same height; its column `right_x` corresponds to column 0 of `left`
    *  @param[out] to  of the same size, not the same memory */
   void clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x, double tolerance,
       int least, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
-  /** Clears what the right camera cannot see because something nearer stands before it: of the
-   *  pixels that land on one of the right picture, those more than 1.5 pixels of disparity behind
-   *  the nearest. */
+  /** Clears pixels that are occluded in the right image: of all pixels that map to one right pixel,
+   * those more than 1.5 pixels of disparity behind the nearest one. */
   void clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity);
 
-  /** Clears flying pixels: those of whose eight neighbours fewer than `support` have a disparity
-   *  within `step` (a share of disparity + offset: the same share of the depth) or 0.5 pixel.
+  /** Clears flying pixels: fewer than `support` of the eight neighbours have a disparity within
+   * `step` (a fraction of disparity + offset, i.e. of depth) or 0.5 pixel.
    *  @param[out] to  of the same size, not the same memory */
   void clear_flying (double step, int support, int offset, int least, const Tiles &tiles,
       const cv::Mat &disparity, cv::Mat &to);
 
-  /** Clears patches of up to `window` pixels, each within `range` (1/16 pixel) of one of its
-   *  four neighbours: what cv::filterSpeckles() does.
-   *  @param nearest  at least `least`: what is farther is left alone, and no part of a patch */
+  /** Clears components of up to `window` pixels, in which four-connected neighbours differ by at
+   * most `range` (1/16 pixel), like cv::filterSpeckles().
+   *  @param nearest  at least `least`; farther pixels are ignored */
   void clear_specks (
       int window, int range, int least, int nearest, const Tiles &tiles, cv::Mat &disparity);
 
-  /** Fills gaps of up to `width` pixels in a row or a column between disparities that differ by at
-   *  most one pixel, where colours lie between those of the ends, or nearly: specks on a surface.
-   */
+  /** Fills gaps of up to `width` pixels in a row or column between disparities that differ by at
+   * most one pixel, if the colours are approximately between those of the ends. */
   void fill_gaps (
       const cv::Mat &colour, int width, int least, const Tiles &tiles, cv::Mat &disparity);
 
-  /** Clears narrow surfaces that the pictures show no reason for: what they land on in the right
-   *  picture is seen, by its disparity and its grey, as a part of a wide surface farther off. A
-   *  pattern that repeats is matched so where its true match is hidden. */
+  /** Clears narrow surfaces whose right pixels also match, in disparity and grey level, a wide
+   * surface farther away: false matches of a repetitive pattern whose true match is occluded. */
   void clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
       const Tiles &tiles, cv::Mat &disparity);
 
 private:
-  /* What one thread needs for one tile. */
+  /* Scratch memory of one thread for one tile. */
   struct Memory {
-    Plane grey, contrast, valid, difference, size; /* of patches, and of their pixels */
+    Plane grey, contrast, valid, difference, size; /* of pixels, and sums over patches */
     Plane contrasts, counts, differences, sizes, sums;
     std::vector<std::int16_t> columns, nearest;
-    std::vector<std::array<int, 2>> surfaces; /* of a row: first column, and the one after it */
+    std::vector<std::array<int, 2>> surfaces; /* of a row: first column, last column + 1 */
   };
-  /* Neighbours in a row that belong together. */
+  /* Connected pixels of a row. */
   struct Run {
-    int x0, x1;     /* columns, x1 is not one of them */
-    int root, size; /* of the patch: the number of one of its runs; there: its pixels */
+    int x0, x1;     /* columns, without x1 */
+    int root, size; /* index of a run of the same component; its pixels, in the root run */
   };
   void compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
       const cv::Rect &tile, const cv::Mat &disparity, Memory &memory) const;
@@ -79,8 +76,8 @@ private:
 
   WorkerMemory<Memory> memory_;
   std::vector<Run> runs_;
-  std::vector<std::size_t> first_runs_; /* by row of the picture, and one more */
-  std::vector<int> last_rows_;          /* by column: the lowest one that has a disparity */
+  std::vector<std::size_t> first_runs_; /* by row of the image, and one for the end */
+  std::vector<int> last_rows_;          /* by column: last row with a disparity */
 };
 
 } // namespace rangecast

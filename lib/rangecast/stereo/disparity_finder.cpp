@@ -8,8 +8,7 @@
 
 namespace rangecast {
 
-/* Rows and columns around the ROI that matching looks at, so that its edge is as good as its
- * middle. */
+/* Margin around the ROI in which to match, for the same quality at its border, pixels. */
 constexpr int kMargin = 8;
 
 static Status
@@ -31,7 +30,7 @@ DisparityFinder::set (
     whole.create (pair.height, pair.width, CV_16S);
   const double farthest =
       settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
-  const double nearest = pair.focal_baseline / near_m - pair.offset; /* int may not hold it */
+  const double nearest = pair.focal_baseline / near_m - pair.offset; /* may exceed int */
   if (!(nearest < pair.width))
     return needs_too_much (near_m, nearest);
   least_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
@@ -46,8 +45,8 @@ DisparityFinder::set (
   return some_.set (settings.match, least_, most_);
 }
 
-/* The matcher for a part of the depths. Its number of disparities is a multiple of 16: what is left
- * over goes to the near side. */
+/* Configures the matcher for a range of depths. Its number of disparities is a multiple of 16; the
+ * excess is on the near side. */
 Status
 DisparityFinder::choose_range (double near_m, double far_m)
 {
@@ -64,8 +63,8 @@ DisparityFinder::choose_range (double near_m, double far_m)
   return some_.set_range (low, std::max (high, low + 1));
 }
 
-/* Lays out the window that the ROI's matches lie in. Columns that would lie left or right of the
- * picture repeat its edge: without them OpenCV matches nothing near the edges. */
+/* Places the window that contains all matches of the ROI. Columns outside of the image repeat its
+ * border, near which OpenCV would match nothing otherwise. */
 void
 DisparityFinder::place_window (const Roi &roi)
 {
@@ -102,7 +101,7 @@ DisparityFinder::choose_parts (const std::vector<cv::Rect> *parts)
   tiles_.set (parts_, settings_.n_threads);
 }
 
-/* Matches each part with some rows around it, and puts it into the core. */
+/* Matches each part with some rows around it and copies it to core_. */
 Status
 DisparityFinder::match ()
 {
@@ -126,8 +125,7 @@ DisparityFinder::match ()
   return {};
 }
 
-/* What was matched at some depths only: disparities of the background, or none, for what lies
- * beyond. */
+/* After matching a limited range: sets the disparities of known background beyond it, or none. */
 void
 DisparityFinder::know_background (const cv::Mat &grey, int right_x)
 {
@@ -141,7 +139,7 @@ DisparityFinder::know_background (const cv::Mat &grey, int right_x)
   cv::swap (core_, next_);
 }
 
-/* Takes away what cannot be right of the disparities of the ROI and its margin. */
+/* Clears wrong disparities in the ROI and its margin. */
 void
 DisparityFinder::filter (const cv::Mat &left)
 {
@@ -161,7 +159,7 @@ DisparityFinder::filter (const cv::Mat &left)
     cv::swap (core_, next_);
   }
   filter_.clear_hidden (least, tiles_, core_);
-  constexpr int kSupport = 4; /* of eight neighbours: a straight edge has five */
+  constexpr int kSupport = 4; /* of eight neighbours; at a straight edge there are five */
   if (settings_.flying_pixel_step > 0) {
     filter_.clear_flying (
         settings_.flying_pixel_step, kSupport, offset, least, tiles_, core_, next_);
@@ -194,7 +192,8 @@ DisparityFinder::filter (const cv::Mat &left)
     background_.remember (grey, core_, least, far_);
 }
 
-/* OpenCV's disparities of the window to ours of the ROI. The farthest one is none: see extend(). */
+/* Converts OpenCV's disparities of the window to disparity_. The farthest one means none: see
+ * extend(). */
 void
 DisparityFinder::take (const Roi &roi)
 {
@@ -207,7 +206,7 @@ DisparityFinder::take (const Roi &roi)
     auto to = disparity_.ptr<std::uint16_t> (y);
     for (int x = 0; x < roi.width; x++) {
       const int d = from[x] + offset;
-      const int there = 16 * (roi.x + x) - from[x]; /* not where the right picture is repeated */
+      const int there = 16 * (roi.x + x) - from[x]; /* must not be in the border */
       const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
       to[x] = from[x] > least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }

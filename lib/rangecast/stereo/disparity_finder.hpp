@@ -15,43 +15,42 @@ namespace rangecast {
 
 struct StereoSettings {
   MatchSettings match;
-  double patch_tolerance = 1;      ///< share of its contrast that a patch may differ by; 0 = off
-  double flying_pixel_step = 0.03; ///< share of the depth that neighbours may differ; 0 = off
-  int silhouette_radius = 8;       ///< pixels around that say what is beside a silhouette; 0 = off
-  int gap_width = 12;              ///< pixels; narrower holes in a surface are filled; 0 = off
+  double patch_tolerance = 1; ///< maximum difference of a patch relative to its contrast; 0 = off
+  double flying_pixel_step = 0.03; ///< maximum relative depth difference of neighbours; 0 = off
+  int silhouette_radius = 8;       ///< radius of SilhouetteFilter, pixels; 0 = off
+  int gap_width = 12;              ///< maximum width of gaps that are filled, pixels; 0 = off
   int refine = 2;                  ///< refinement iterations; 0 = off
-  /** How far to match, metres; 0 = to infinity. What lies beyond far is cleared, but must be
-   *  matched so as not to be taken for something nearer. */
+  /** Maximum depth to match, metres; 0 = infinity. Depth beyond far is cleared, but must be matched
+   * so that it is not mistaken for something nearer. */
   double search_far_m = 0;
-  /** Where nothing moves, pictures are matched that are the mean of so many; 1 = off. */
+  /** Maximum number of frames averaged before matching where nothing moves; 1 = off. */
   int average = 10;
-  double steady = 0; ///< 0 (off) to 1: how much depth is held still where nothing moves
-  int n_threads = 0; ///< that match one pair; 0 = as many as there are cores
+  double steady = 0; ///< 0 (off) to 1: temporal smoothing of depth where nothing moves
+  int n_threads = 0; ///< 0 = one per core
 
   friend bool operator== (const StereoSettings &, const StereoSettings &) = default;
 };
 
-/** What a rectified pair's disparities mean. */
+/** Geometry of a rectified pair. */
 struct PairGeometry {
-  int width = 0, height = 0; ///< pixels, of both pictures
+  int width = 0, height = 0; ///< pixels, of both images
   double focal_baseline = 0; ///< pixels times metres
-  double offset = 0;         ///< pixels, right minus left principal point
+  double offset = 0;         ///< pixels, principal point of right minus left
 };
 
-/** Matches rectified pairs and clears what cannot be right: the whole picture at all depths, or a
- *  part of it at some. Keeps its memory between pictures. */
+/** Matches rectified pairs and clears wrong disparities: the whole image at all depths, or a part
+ * of it in a range of depths. Reuses its memory between images. */
 class DisparityFinder {
 public:
-  /** @return kBadValue if near needs more disparity than there is picture, or what Matcher says */
+  /** @return kBadValue if near needs a disparity beyond the image width, or the error of Matcher */
   Status set (
       const PairGeometry &pair, const StereoSettings &settings, double near_m, double far_m);
 
   /** @param left, right  CV_8UC4, R G B x, of the pair's size
-   *  @param roi          in the picture, not empty
-   *  @param parts        of the picture, one below the other: where to look in the ROI; null =
-   *  everywhere in it
-   *  @param near_m, far_m  where to look, 0 = everywhere; with limits, what was seen beyond them
-   *  while there were none is not taken for something else as long as it stays
+   *  @param roi          inside the image, not empty
+   *  @param parts        rectangles one below the other in which to match; null = the whole ROI
+   *  @param near_m, far_m  depth range, 0 = unlimited; with limits, background that was seen beyond
+   * them in earlier images is still recognized
    *  @return kNoSpace if OpenCV failed */
   Status find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
       double far_m, const std::vector<cv::Rect> *parts = nullptr);
@@ -65,7 +64,7 @@ public:
     return 16 * pair_.focal_baseline / depth_m;
   }
 
-  /** Disparities to look for, pixels: of the pictures as they are. */
+  /** Disparity range in the images, pixels. */
   [[nodiscard]] int least () const { return least_; }
   [[nodiscard]] int most () const { return most_; }
 
@@ -82,19 +81,19 @@ private:
   PairGeometry pair_;
   StereoSettings settings_;
   Matcher all_, some_, *matcher_ = &all_;
-  int least_ = 0, most_ = 0; /* disparities, pixels, of all there is to see */
+  int least_ = 0, most_ = 0; /* disparity range of all depths, pixels */
   int far_ = 0;              /* disparity, 1/16 pixel, of the farthest depth of interest */
   DisparityFilter filter_;
   SilhouetteFilter silhouettes_;
   DisparityRefiner refiner_;
   BackgroundDisparity background_;
-  cv::Rect window_at_, core_at_; /* of the picture: what is needed; the ROI and its margin */
-  Tiles tiles_;                  /* of the core: where to look */
-  int missing_[2] = {0, 0};      /* columns that the window has beyond it, left and right */
+  cv::Rect window_at_, core_at_; /* in the image: all columns needed; the ROI and its margin */
+  Tiles tiles_;                  /* in core_: where to match */
+  int missing_[2] = {0, 0};      /* columns of the window outside of the image, left and right */
   std::vector<cv::Rect> parts_;
   cv::Mat grey_, window_[2], raw_, disparity_;
-  cv::Mat whole_[2];    /* as large as the picture: memory of what follows */
-  cv::Mat core_, next_; /* CV_16S of the core: disparities, and what the next filter writes */
+  cv::Mat whole_[2];    /* of the size of the image: memory for the others */
+  cv::Mat core_, next_; /* CV_16S of core_at_: disparities, and output of the next filter */
 };
 
 } // namespace rangecast

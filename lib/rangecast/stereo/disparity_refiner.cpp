@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Windows of 7 x 7 pixels are summed in OpenCV's vectors of fixed width (bytes for colours, four
- * floats): the order in which floats are added up must not depend on the processor. */
+ * floats), so that the order of float additions does not depend on the processor. */
 #include "disparity_refiner.hpp"
 
 #include <algorithm>
@@ -15,30 +15,30 @@
 namespace rangecast {
 namespace {
 
-/* Pixels around one that make its plane, and whose greys are compared. */
+/* Radius of the plane fit and of the patches compared, pixels. */
 constexpr int kPlane = 3, kPatch = 4, kPad = std::max (kPlane, kPatch);
-/* Neighbours in one surface differ by no more, pixels: beside each other, and more for each pixel
- * between them; nor in colour, sum of R, G and B, levels. */
+/* Maximum difference within a surface: in disparity (pixels) of adjacent pixels, more for each
+ * pixel of distance; in colour (sum over R, G, B). */
 constexpr float kStep = 1.0f, kSlant = 0.5f;
 constexpr int kAlike = 110;
-/* What the squares of grey's slope must come to in a patch to say more than noise does. */
+/* Minimum sum of squared gradients of a patch that exceeds noise. */
 constexpr float kDull = 15;
-/* Greys that differ by more show different things, levels. */
+/* Maximum grey level difference of the same point in both images. */
 constexpr float kUnlike = 20;
-/* No iteration moves a disparity farther, nor do all together, pixels. */
+/* Maximum change of a disparity in one iteration, and in total, pixels. */
 constexpr float kMax = 0.5f, kMaxOfAll = 1;
 
-/* Where bytes that follow each other in memory lie in a word. */
+/* Positions in a word of bytes that are adjacent in memory. */
 constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
 constexpr int kNext = kFirst == 0 ? 8 : -8;
 constexpr int kByte[] = {kFirst, kFirst + kNext, kFirst + 2 * kNext, kFirst + 3 * kNext};
 
-/* Sums over windows of kSide columns, and kSide rows, one row of them after the other. */
+/* Sums over windows of kSide x kSide pixels, row by row. */
 template <int kSide, typename T> class WindowSums {
 public:
-  /** @param first   column and row of the picture where the first window begins
+  /** @param first   column and row of the first window
    *  @param width   windows in a row
-   *  @param columns memory to use; @param[out] sums  the row's, after next() */
+   *  @param columns scratch memory; @param[out] sums  those of the row, after next() */
   WindowSums (const cv::Mat &from, const cv::Point &first, int width, std::vector<T> &columns,
       std::vector<T> &sums)
       : from_ (from), x_ (first.x), y_ (first.y), n_ (width + kSide - 1)
@@ -53,7 +53,7 @@ public:
   void next ()
   {
     add (y_ + kSide - 1);
-    /* Of two, four and eight columns, as far as needed. */
+    /* Sums of two, four and eight columns, as needed. */
     std::copy_n (columns_, n_, sums_);
     constexpr int kPower = int (std::bit_floor (unsigned (kSide)));
     for (int reach = 1; reach < kPower; reach *= 2)
@@ -122,8 +122,8 @@ DisparityRefiner::take_colours (const cv::Mat &colour)
   }
 }
 
-/* Takes over what a part of the picture has, and makes it as narrow as that. From then on parts
- * lie in the planes with a border. */
+/* Copies a part of the image and shrinks it to the columns with disparities. From then on parts are
+ * in the coordinates of the padded planes. */
 void
 DisparityRefiner::take (const Job &job, const cv::Mat &disparity, cv::Rect &part)
 {
@@ -163,13 +163,13 @@ DisparityRefiner::mark_steps (const cv::Rect &part)
   }
 }
 
-/* Bits of rows, eight to each, of the last of which none counts. */
+/* One bit per neighbour, eight per row, of which the last is unused. */
 using Members = std::uint64_t;
 constexpr int kLanes = 2 * kPlane + 2;
 static_assert (kLanes == 8 && kPlane == 3);
 using Floats = cv::v_float32x4;
 
-/* Those of a row of members: all bits, or none. */
+/* Masks for a row of members: all bits or none. */
 struct Choice {
   Floats left, right;
   Choice (Members members, int v)
@@ -183,7 +183,7 @@ struct Choice {
   [[nodiscard]] const Floats &of (int part) const { return part == 0 ? left : right; }
 };
 
-/* The pixels around one that belong to its surface, by disparity and by colour. */
+/* The neighbours that belong to the surface of a pixel, by disparity and colour. */
 Members
 DisparityRefiner::members_of (int x, int y) const
 {
@@ -214,7 +214,7 @@ DisparityRefiner::members_of (int x, int y) const
   return members;
 }
 
-/* The plane through what belongs to a pixel's surface, at that pixel: least squares. */
+/* The least-squares plane through a pixel's surface, evaluated at the pixel. */
 float
 DisparityRefiner::on_plane (int x, int y, Members members) const
 {
@@ -247,13 +247,13 @@ DisparityRefiner::on_plane (int x, int y, Members members) const
               sxx = cv::v_reduce_sum (u[0] * u[0] * count[0] + u[1] * u[1] * count[1]),
               sxy = sum_x (count_y), syy = sum (count_yy), sxd = sum_x (off), syd = sum (off_y);
   const float mx = sx / n, my = sy / n, md = sd / n;
-  const float few = 0.02f * n; /* pixels in a line make no plane */
+  const float few = 0.02f * n; /* collinear pixels do not determine a plane */
   const float cxx = sxx - sx * mx + few, cyy = syy - sy * my + few, cxy = sxy - sx * my,
               cxd = sxd - sx * md, cyd = syd - sy * md, det = cxx * cyy - cxy * cxy;
   return own + md - (mx * (cxd * cyy - cyd * cxy) + my * (cyd * cxx - cxd * cxy)) / det;
 }
 
-/* Of pixels that have a step near them. */
+/* For pixels near a step. */
 void
 DisparityRefiner::choose_members (const cv::Rect &part, Memory &m)
 {
@@ -269,7 +269,7 @@ DisparityRefiner::choose_members (const cv::Rect &part, Memory &m)
   }
 }
 
-/* From now_ to next_. In the middle of a surface the plane's disparity is the mean. */
+/* From now_ to next_. Inside a surface, the plane's value is the mean. */
 void
 DisparityRefiner::smooth (const cv::Rect &part, Memory &m)
 {
@@ -289,7 +289,8 @@ DisparityRefiner::smooth (const cv::Rect &part, Memory &m)
   }
 }
 
-/* Of next_: how the left picture's grey differs from the right one's, and that one's slope. */
+/* Grey level difference of the left image and the right one at next_, and the gradient of the right
+ * one. */
 void
 DisparityRefiner::compare (const Job &job, const cv::Rect &part, Memory &m)
 {
@@ -330,13 +331,13 @@ DisparityRefiner::compare (const Job &job, const cv::Rect &part, Memory &m)
   }
 }
 
-/* Sums over some pixels. */
+/* Sums over pixels. */
 struct Match {
   float product, square, slope, difference;
 };
 
-/* The shift that leaves least difference between both pictures, but for a mean difference in
- * brightness, which cameras may have. */
+/* The shift that minimizes the difference between both images, without its mean: cameras may differ
+ * in brightness. */
 inline float
 shift_of (const Match &m, float n)
 {
@@ -363,8 +364,7 @@ DisparityRefiner::shift_of_members (int x, int y, Members members) const
       float (std::popcount (members)));
 }
 
-/* From next_ to now_: the shift that leaves least difference between both pictures, but for a mean
- * difference in brightness, which cameras may have. */
+/* From next_ to now_: see shift_of(). */
 void
 DisparityRefiner::move (const cv::Rect &part, Memory &m)
 {

@@ -12,9 +12,9 @@ struct HistogramRange {
   int low = 0, high = 0;
 };
 
-/** Where a histogram's values lie, but for half a per cent at either end.
+/** The range of bins without the lowest and highest 0.5 % of all counts.
  *  @param histogram  counts >= 0, at least one bin
- *  @return all bins if nothing was counted. Pictures of any number of pixels will do. */
+ *  @return all bins if the histogram is empty */
 inline HistogramRange
 without_half_a_per_cent (std::span<const int> histogram)
 {

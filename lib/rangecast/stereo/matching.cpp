@@ -8,7 +8,7 @@
 
 namespace rangecast {
 
-/* OpenCV's 16-bit disparities in 1/16 pixel hold no more. */
+/* Limit of OpenCV's 16-bit disparities in 1/16 pixel. */
 constexpr int kMaxDisparity = 2000;
 
 static cv::Ptr<cv::StereoMatcher>
@@ -24,8 +24,8 @@ make_bm (const MatchSettings &s, int block_size, int disparities)
 static cv::Ptr<cv::StereoMatcher>
 make_sgbm (const MatchSettings &s, int block_size, int disparities)
 {
-  /* A quarter less than OpenCV's examples: steps are found where they are, and hair is less often
-   * taken for what lies behind it. */
+  /* A quarter less than in OpenCV's examples: steps are located better, and hair is less often
+   * merged with the background. */
   const int area = block_size * block_size;
   const int mode = s.algorithm == MatchAlgorithm::kSgbm ? cv::StereoSGBM::MODE_SGBM
                                                         : cv::StereoSGBM::MODE_SGBM_3WAY;
@@ -46,7 +46,7 @@ make (const MatchSettings &s, int min_disparity, int disparities)
                                                  ? make_bm (s, block_of (s), disparities)
                                                  : make_sgbm (s, block_of (s), disparities);
   matcher->setMinDisparity (min_disparity);
-  matcher->setSpeckleWindowSize (0); /* after other filters, see DisparityFinder */
+  matcher->setSpeckleWindowSize (0); /* DisparityFinder does it after other filters */
   matcher->setDisp12MaxDiff (s.left_right_max_difference);
   return matcher;
 }
@@ -95,8 +95,8 @@ Matcher::set_range (int min_disparity, int max_disparity)
   return {};
 }
 
-/* OpenCV splits a picture among all cores by itself, but not within a parallel loop: so one thread
- * is a loop of one. Some threads get stripes, which overlap so that no seam is seen. */
+/* OpenCV splits an image among all cores, but not inside a parallel loop: so one thread is a loop
+ * of one. Several threads get stripes, which overlap to avoid seams. */
 Status
 Matcher::match (const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity)
 {
@@ -130,7 +130,7 @@ Status
 Matcher::match_stripes (
     const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity)
 {
-  constexpr int kOverlap = 16; /* rows, at least: the ways of SGM come to rest in so many */
+  constexpr int kOverlap = 16; /* minimum number of rows; the paths of SGM converge within them */
   const int n = std::clamp (left.rows / (4 * kOverlap), 1, n_threads);
   const int overlap = std::max (kOverlap, block_of (settings_));
   while (static_cast<int> (more_.size ()) < n)

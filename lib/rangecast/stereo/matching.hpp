@@ -13,10 +13,10 @@ enum class MatchAlgorithm { kBm, kSgbm, kSgbm3Way, kSgm };
 
 struct MatchSettings {
   MatchAlgorithm algorithm = MatchAlgorithm::kSgm;
-  int block_size = 0;                ///< pixels, odd; 0: 15 for kBm, 3 for kSgbm...; not for kSgm
-  int uniqueness_ratio = 0;          ///< per cent by which the best match must beat the second
-  int speckle_window_size = 100;     ///< pixels; smaller patches of like disparity go; 0 = off
-  int speckle_range = 2;             ///< pixels of disparity within a patch
+  int block_size = 0;            ///< pixels, odd; 0: 15 for kBm, 3 for kSgbm...; not for kSgm
+  int uniqueness_ratio = 0;      ///< per cent by which the best match must beat the second
+  int speckle_window_size = 100; ///< maximum area of components that are cleared, pixels; 0 = off
+  int speckle_range = 2;         ///< maximum disparity difference within a component, pixels
   int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
 
   friend bool operator== (const MatchSettings &, const MatchSettings &) = default;
@@ -31,25 +31,25 @@ public:
    */
   Status set (const MatchSettings &settings, int min_disparity, int max_disparity);
 
-  /** Other disparities at the same settings. @return kBadValue as set() */
+  /** Changes the disparity range only. @return kBadValue as set() */
   Status set_range (int min_disparity, int max_disparity);
 
   [[nodiscard]] int min_disparity () const { return min_disparity_; }
-  /** Columns left of a pixel that its match can need. */
+  /** Number of columns left of a pixel that its match may need. */
   [[nodiscard]] int reach () const
   {
     return min_disparity_ + disparities_ > 0 ? min_disparity_ + disparities_ : 0;
   }
 
-  /** Columns right of a pixel that its match can need: for negative disparities. */
+  /** Number of columns right of a pixel that its match may need, for negative disparities. */
   [[nodiscard]] int reach_right () const { return min_disparity_ < 0 ? -min_disparity_ : 0; }
 
-  /** Whether matches depend on the rows below a pixel as they do on those above. */
+  /** Whether matches depend on rows below a pixel as well as above. */
   [[nodiscard]] bool looks_down () const { return settings_.algorithm == MatchAlgorithm::kSgm; }
 
   /** @param left, right  8 bit grey, the same size, rows agree
-   *  @param n_threads  0 = as many as there are cores. OpenCV's algorithms with some, but fewer:
-   *  each has a part of the rows and some beyond
+   *  @param n_threads  0 = one per core. Otherwise OpenCV's algorithms split the rows into
+   * overlapping stripes
    *  @param[out] disparity  CV_16S, 1/16 pixel; below 16 * min_disparity() = no match
    *  @return kNoSpace if OpenCV failed */
   Status match (const cv::Mat &left, const cv::Mat &right, int n_threads, cv::Mat &disparity);
@@ -62,7 +62,7 @@ private:
   MatchSettings settings_;
   SemiGlobalMatcher sgm_;
   cv::Ptr<cv::StereoMatcher> matcher_;
-  std::vector<cv::Ptr<cv::StereoMatcher>> more_; /* one a stripe */
+  std::vector<cv::Ptr<cv::StereoMatcher>> more_; /* one per stripe */
   std::vector<cv::Mat> stripes_;
   int min_disparity_ = 0, disparities_ = 0;
 };

@@ -8,15 +8,15 @@
 
 namespace rangecast {
 
-constexpr int kWidth = 240;      /* pixels that pictures are made small to */
-constexpr int kEveryPicture = 8; /* so many at first */
-/* A direction is right that has so large a share of the picture, and so many times as much as the
- * other one. On the pairs of the tests the right one has 0.1 to 0.8, the other one at most 0.37
- * times as much: a pair that was rectified with each other's lenses may match here and there. */
+constexpr int kWidth = 240;      /* width to which images are scaled down, pixels */
+constexpr int kEveryPicture = 8; /* number of images that are all examined at first */
+/* An order is right if it matches at least this fraction of the image, and by this factor more than
+ * the other order. On test data, the right order has 0.1 to 0.8, the other one at most 0.37 times
+ * as much: a pair rectified with exchanged lenses may match in places. */
 constexpr double kMuch = 0.04, kTimes = 2;
 
-/* Share of pixels that lie before the cameras less those beyond infinity. As much disparity is
- * looked for on either side, so that chance is as often wrong here as there. */
+/* Fraction of pixels in front of the cameras minus those beyond infinity. The same disparity range
+ * is searched on both sides, so that random matches cancel. */
 static double
 balance (const MirrorCheck::Pair &pair, double infinity, double most)
 {

@@ -5,9 +5,8 @@
 
 namespace rangecast {
 
-/** Tells cameras whose pictures come on each other's pads. What can be matched then seems to lie
- *  beyond infinity, which nothing does, and before the cameras with the pictures exchanged. Looks
- *  at small pictures, and only at pixels that can be matched without doubt. */
+/** Detects exchanged left and right cameras: matches are then beyond infinity, and in front of the
+ *  cameras if the images are exchanged. Uses small images and only unambiguous matches. */
 class MirrorCheck {
 public:
   /** A rectified pair, CV_8UC4. */
@@ -16,17 +15,17 @@ public:
   };
 
   void reset () { *this = {}; }
-  /** Whether look() has seen enough; it is not needed after that. */
+  /** Whether look() has reached a decision and need not be called again. */
   [[nodiscard]] bool decided () const { return decided_; }
   [[nodiscard]] bool mirrored () const { return mirrored_; }
-  /** Whether these pictures should be looked at: all at first, then fewer and fewer, so that
-   * cameras which see nothing to match cost little. Counts them. */
+  /** Whether to examine the next images: all at first, then fewer and fewer, to save time if there
+   * is nothing to match. Counts the calls. */
   [[nodiscard]] bool wants_next ();
 
-  /** @param as_is      rectified as they come
-   *  @param exchanged  the same pictures, exchanged and then rectified
-   *  @param infinity   disparity of what is infinitely far, pixels
-   *  @param most       largest disparity to look for, pixels */
+  /** @param as_is      rectified in the given order
+   *  @param exchanged  the same images, exchanged and then rectified
+   *  @param infinity   disparity of infinity, pixels
+   *  @param most       maximum disparity to search, pixels */
   void look (const Pair &as_is, const Pair &exchanged, double infinity, double most);
 
 private:

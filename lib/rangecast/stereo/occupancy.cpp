@@ -6,7 +6,7 @@
 namespace rangecast {
 
 constexpr int kBlock = ChangeDetector::kBlock;
-constexpr int kFew = 4; /* pixels of a block with depth that may be wrong */
+constexpr int kFew = 4; /* number of pixels with depth in a block that may be noise */
 
 void
 Occupancy::set (int width, int height)
@@ -39,7 +39,7 @@ Occupancy::learn (const RangeImage &image)
   known_ = true;
 }
 
-/* What is of interest in each row of blocks, with a block more on all sides. */
+/* Marks the columns of interest in each row of blocks, with a margin of one block. */
 void
 Occupancy::mark (const ChangeDetector &changes, const Roi &roi)
 {
@@ -63,12 +63,12 @@ Occupancy::mark (const ChangeDetector &changes, const Roi &roi)
   }
 }
 
-/* Cheapest way to cover all rows; from the last to the first. */
+/* Finds the cheapest cover of all rows by dynamic programming, from the last row to the first. */
 void
 Occupancy::divide ()
 {
-  constexpr float kSeam = 1.5f; /* blocks' height that is matched beyond a rectangle */
-  constexpr float kBegin = 8;   /* blocks whose matching costs what a rectangle does by itself */
+  constexpr float kSeam = 1.5f; /* height that is matched outside of a rectangle, blocks */
+  constexpr float kBegin = 8;   /* fixed cost of a rectangle, in blocks */
   const int n = int (of_interest_.size ());
   cost_.assign (std::size_t (n) + 1, 0);
   next_.assign (std::size_t (n), n);

@@ -10,28 +10,29 @@
 
 namespace rangecast {
 
-/** Remembers which blocks of 8 x 8 pixels had depth, to say where there may be some in the next
- *  picture: there, one block around, and where the picture has changed. Keeps its memory. */
+/** Predicts which blocks of 8 x 8 pixels may have depth in the next image: those that had depth in
+ * the last one, their neighbours, and those in which the image has changed. Reuses its memory
+ * between images. */
 class Occupancy {
 public:
-  /** Nothing is known of a view of that size. */
+  /** Resets for a view of this size. */
   void set (int width, int height);
   void reset () { known_ = false; }
 
-  /** Takes the depth of one picture. @param image  of a view of the size that was set */
+  /** Records the blocks with depth. @param image  of a view of the size that was set */
   void learn (const RangeImage &image);
 
-  /** Rectangles of blocks, one below the other, each as wide as its rows need. They are few, as
-   *  what lies above and below each must be matched, too.
-   *  @param roi  in the view; rectangles may reach one block further
-   *  @return null if nothing is known: everywhere */
+  /** Rectangles of blocks, one below the other, each as wide as its rows need. Few, because rows
+   * above and below each one must be matched, too.
+   *  @param roi  inside the view; rectangles may extend one block beyond it
+   *  @return null if nothing is known: the whole image */
   const std::vector<cv::Rect> *find (const ChangeDetector &changes, const Roi &roi);
 
 private:
   void mark (const ChangeDetector &changes, const Roi &roi);
   void divide ();
 
-  /* Columns of a row of blocks that are of interest, x1 is not one of them. */
+  /* Columns of interest in a row of blocks, without x1. */
   struct Row {
     int x0, x1;
   };
@@ -40,8 +41,8 @@ private:
   std::vector<std::uint8_t> had_depth_;
   int first_row_ = 0;
   std::vector<Row> of_interest_; /* from first_row_ on */
-  std::vector<float> cost_;      /* of the rows from here to the end */
-  std::vector<int> next_;        /* row that the next rectangle begins with */
+  std::vector<float> cost_;      /* of covering the rows from here to the end */
+  std::vector<int> next_;        /* first row of the next rectangle */
   std::vector<cv::Rect> parts_;
 };
 

@@ -8,27 +8,27 @@
 
 namespace rangecast {
 
-/** Turns the pictures of a stereo pair so that their rows agree and their lenses are gone.
- *  Method: cv::stereoRectify (J.-Y. Bouguet's) with zero disparity at infinity, scaled so that no
- *  pixel is without a picture; maps are made once. A pair that is ideal already is left as it is.
+/** Rectifies stereo pairs and removes lens distortion.
+ *  Method: cv::stereoRectify (J.-Y. Bouguet's) with zero disparity at infinity, scaled so that
+ * every pixel is covered; maps are computed once. Pairs that are rectified already are not changed.
  */
 class Rectifier {
 public:
-  /** @return kNotFound if the view has no right camera, kBadValue if the pair stands one above the
-   *  other, or left and right are swapped */
+  /** @return kNotFound if the view has no right camera, kBadValue if the cameras are one above the
+   * other, or left and right are exchanged */
   Status set (const View &view);
 
-  /** The rectified left camera: a range view, with the pose that goes with it. */
+  /** The rectified left camera, a range view with its pose. */
   [[nodiscard]] const View &range_view () const { return range_view_; }
-  /** Metres between the rectified cameras, > 0. */
+  /** Distance of the cameras, metres, > 0. */
   [[nodiscard]] double baseline_m () const { return baseline_m_; }
-  /** Right minus left principal point, pixels: disparity + this is fx * baseline / z. */
+  /** Principal point of right minus left, pixels: disparity + offset = fx * baseline / z. */
   [[nodiscard]] double principal_offset () const { return principal_offset_; }
-  /** Whether pictures stay as they are. */
+  /** Whether images are not changed. */
   [[nodiscard]] bool is_identity () const { return maps_[0][0].empty (); }
 
-  /** @param camera  0 left, 1 right; @param in  of the view's size; @param[out] out  the same type
-   *  and size; memory of that size is used */
+  /** @param camera  0 left, 1 right; @param in  of the view's size; @param[out] out  same type and
+   * size; reuses memory of that size */
   void rectify (int camera, const cv::Mat &in, cv::Mat &out) const;
 
 private:

@@ -11,27 +11,27 @@
 namespace rangecast {
 namespace {
 
-/* The neighbours that a pixel is compared with: every second one of 7 x 5, as on a chessboard. */
+/* The neighbours of the descriptor: every second one of 7 x 5 in a chessboard pattern. */
 constexpr int kRadiusX = 3, kRadiusY = 2, kNeighbours = 16;
-/* Grey levels of a difference to a neighbour that count. */
+/* Clipping of differences to neighbours, grey levels. */
 constexpr int kMaxDifference = 7;
-/* Grey levels of the difference of both pixels that count, and how much each counts. */
+/* Clipping of the difference of both pixels, grey levels, and its weight. */
 constexpr int kMaxGrey = 15, kGreyWeight = 2;
 constexpr int kCostShift = 2;
 constexpr int kMaxCost = (kNeighbours * 2 * kMaxDifference + kGreyWeight * kMaxGrey) >> kCostShift;
 static_assert (kMaxCost << kCostShift < 256);
 
-/* Costs of a disparity that differs by a pixel from the one before it on a path, and by more: the
- * second falls with the step in grey between the two, for surfaces end at edges. */
+/* Penalties for a change of disparity along a path by one pixel, and by more; the latter decreases
+ * with the grey level step, because surfaces end at edges. */
 constexpr int kStep = 10, kJump = 60, kMinJump = 15, kEdge = 8;
-/* More than any cost along a path. */
+/* Greater than any cost along a path. */
 constexpr std::uint8_t kNever = 200;
 static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
 
-constexpr int kPad = 16;                    /* bytes around the disparities of a pixel's path */
-constexpr int kRows = 16, kColumns = 32;    /* of one thread's job */
-constexpr int kOverlap = 16;                /* rows; paths come to rest in so many */
-constexpr std::size_t kMaxCells = 24 << 20; /* of three bytes, in memory at a time */
+constexpr int kPad = 16;                    /* padding around the costs of a pixel, bytes */
+constexpr int kRows = 16, kColumns = 32;    /* per job */
+constexpr int kOverlap = 16;                /* rows in which paths converge */
+constexpr std::size_t kMaxCells = 24 << 20; /* maximum number in memory, of three bytes each */
 constexpr int kMaxKnown = 128;              /* disparities */
 constexpr std::int16_t kAmbiguous = INT16_MIN;
 
@@ -56,7 +56,8 @@ greater (T a, T b)
   return a > b ? a : b;
 }
 
-/* The differences between a row's pixels and one neighbour of each, from 0; adds them up. */
+/* Computes the differences of a row's pixels to one neighbour, offset to start at 0, and adds them
+ * up. */
 void
 compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restrict own, int n,
     std::uint8_t *__restrict differences, std::uint8_t *__restrict sums)
@@ -68,7 +69,7 @@ compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restri
   }
 }
 
-/* @param way  -1 if the picture is reversed
+/* @param way  -1: the image is reversed
  * @param[out] planes  by neighbour and column, and a plane of their sums */
 void
 transform_row (const cv::Mat &padded, int y, int way, std::vector<std::uint8_t> &planes)
@@ -87,7 +88,7 @@ transform_row (const cv::Mat &padded, int y, int way, std::vector<std::uint8_t> 
     }
 }
 
-/* The least and the greatest grey from halfway to the left to halfway to the right. */
+/* Minimum and maximum grey level from half a pixel to the left to half a pixel to the right. */
 void
 range_of_row (const std::uint8_t *__restrict grey, int n, std::uint8_t *__restrict low,
     std::uint8_t *__restrict high)
@@ -101,8 +102,8 @@ range_of_row (const std::uint8_t *__restrict grey, int n, std::uint8_t *__restri
 }
 
 /* The cost of each disparity of a pixel.
- * @param left       differences to its neighbours and their sum, and `own` its grey
- * @param right      those of right pixels, in the order of disparities, by neighbour
+ * @param left       differences to the neighbours and their sum; `own`: the grey level
+ * @param right      the same for right pixels in order of disparity, by neighbour
  * @param low, high  range_of_row() of the right pixels */
 template <int kCount>
 inline void
@@ -116,7 +117,7 @@ compare (const std::uint8_t *__restrict left, std::uint8_t own,
                below = std::uint8_t (greater (own, low[d]) - own);
     auto sum =
         std::uint8_t (kGreyWeight * lesser (greater (above, below), std::uint8_t (kMaxGrey)));
-    /* The sum of |a - b| is that of 2 max (a, b) - a - b; what overflows comes back. */
+    /* The sum of |a - b| is that of 2 max (a, b) - a - b; overflow cancels. */
     std::uint8_t greatest = 0;
 #pragma GCC unroll 16
     for (int k = 0; k < kNeighbours; k++)
@@ -126,9 +127,9 @@ compare (const std::uint8_t *__restrict left, std::uint8_t own,
   }
 }
 
-/* One step of a path: what the disparities of a pixel cost, given those of the pixel before it.
- * @param before, now  with kPad bytes on either side
- * @param lowest  of `before`. @return that of `now` */
+/* One step of a path: costs of the disparities of a pixel, given those of the previous pixel.
+ * @param before, now  padded by kPad bytes on both sides
+ * @param lowest  minimum of `before`. @return the minimum of `now` */
 template <int kCount>
 inline std::uint8_t
 step (const std::uint8_t *__restrict cost, const std::uint8_t *__restrict before,
@@ -155,7 +156,7 @@ SemiGlobalMatcher::at (const Stripe &stripe, int x, int y) const
          std::size_t (disparities_);
 }
 
-/* The cost of each disparity of a row's pixels. */
+/* Costs of all disparities of a row. */
 template <int kCount>
 void
 SemiGlobalMatcher::compare_row (const Stripe &stripe, int y, Memory &m)
@@ -171,7 +172,7 @@ SemiGlobalMatcher::compare_row (const Stripe &stripe, int y, Memory &m)
                      *grey = stripe.left.ptr<std::uint8_t> (y) + stripe.x0;
   std::uint8_t *costs = &costs_[at (stripe, 0, y)];
   for (int x = 0; x < stripe.columns; x++) {
-    /* Of the reversed row. */
+    /* In the reversed row. */
     const int first = width - 1 - (stripe.x0 + x - stripe.min_disparity);
     const std::uint8_t *right = m.transformed[1].data () + first, *low = m.low.data () + first,
                        *high = m.high.data () + first;
@@ -183,7 +184,7 @@ SemiGlobalMatcher::compare_row (const Stripe &stripe, int y, Memory &m)
   }
 }
 
-/* Both ways along a row. */
+/* Both paths along a row. */
 template <int kCount>
 void
 SemiGlobalMatcher::walk_row (const Stripe &stripe, int y, Memory &m)
@@ -214,7 +215,7 @@ SemiGlobalMatcher::walk_row (const Stripe &stripe, int y, Memory &m)
   }
 }
 
-/* Whether none but those beside the best of these costs is nearly as good. */
+/* Whether no cost but those next to the best one is nearly as good. */
 template <int kCount>
 bool
 SemiGlobalMatcher::is_unique (const std::uint16_t *sums, int best, int disparities) const
@@ -229,8 +230,8 @@ SemiGlobalMatcher::is_unique (const std::uint16_t *sums, int best, int dispariti
   return rivals == 0;
 }
 
-/* The cheapest disparity of a pixel, to a part of a pixel by the parabola through it and its
- * neighbours; none if another is nearly as good.
+/* The disparity of a pixel with the lowest cost, with subpixel precision by a parabola through it
+ * and its neighbours; none if another one is nearly as good.
  * @param up  costs along the path from below */
 template <int kCount>
 SemiGlobalMatcher::Match
@@ -262,7 +263,7 @@ SemiGlobalMatcher::choose (
   return match;
 }
 
-/* Both ways along columns x to end: down, and up with the choice of disparities. */
+/* Both paths along columns x to end: down, then up with the choice of disparities. */
 template <int kCount>
 void
 SemiGlobalMatcher::walk_columns (const Stripe &stripe, int x, int end, Memory &m)
@@ -297,7 +298,7 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int x, int end, Memory &m
   }
 }
 
-/* Writes a row's disparities, but those of right pixels that match something else better. */
+/* Writes the disparities of a row, without those whose right pixel has a better match. */
 void
 SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &disparity) const
 {
@@ -323,13 +324,13 @@ SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &d
       out[stripe.x0 + x] = matches[x].disparity;
 }
 
-/* @param y, end  rows of the stripe that are put out */
+/* @param y, end  rows of the stripe to write */
 template <int kCount>
 void
 SemiGlobalMatcher::match_stripe (
     const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity)
 {
-  /* Calls work (first, last, memory) for parts of n rows or columns. */
+  /* Calls work (first, last, memory) for parts of n rows or columns in parallel. */
   const auto in_parts = [&] (int n, int each, const auto &work) {
     in_parallel (
         std::size_t ((n + each - 1) / each), n_threads, [&] (std::size_t i, std::size_t worker) {
@@ -377,7 +378,7 @@ SemiGlobalMatcher::match (const cv::Mat &left, const cv::Mat &right, int min_dis
     for (auto *memory : {&costs_, &across_, &down_})
       memory->resize (std::max (memory->size (), needed));
     matches_.resize (std::max (matches_.size (), needed / std::size_t (disparities)));
-    /* With a number that the compiler knows, where it is not too large. */
+    /* With a compile-time number of disparities, unless it is too large. */
     const bool known = [&]<int... kTimes> (std::integer_sequence<int, kTimes...>)
     {
       return ((disparities == 16 * (kTimes + 1) &&

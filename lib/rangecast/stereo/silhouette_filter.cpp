@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Colours and disparities are compared as 8 and 16-bit numbers with saturating arithmetic, in
- * OpenCV's vectors: Lanes (base/simd.hpp) hold 32-bit numbers. */
+/* Uses OpenCV's vectors for saturating 8 and 16-bit arithmetic, because Lanes (base/simd.hpp) have
+ * 32-bit elements. */
 #include "silhouette_filter.hpp"
 
 #include <algorithm>
@@ -9,15 +9,15 @@
 namespace rangecast {
 namespace {
 
-/* Sum of three colours' differences, levels, above which two pixels do not look alike. */
+/* Maximum colour difference (sum over R, G, B) of similar pixels. */
 constexpr int kLike = 60;
-/* Of weights, each kLike at most: four pixels of nearly the same colour. */
+/* Required sum of weights, each at most kLike: four pixels of nearly the same colour. */
 constexpr int kEnough = 160;
-/* Samples that are looked at together. */
+/* Samples that are processed together. */
 constexpr int kLanes = 16;
 
-/* The least or the greatest of each window of `side` pixels squared.
- * @param[out] to  smaller by side - 1; @param memory  to use */
+/* Minimum or maximum of each window of `side` x `side` pixels.
+ * @param[out] to  smaller by side - 1; @param memory  scratch */
 template <typename Choose>
 void
 choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const Choose &choose)
@@ -27,7 +27,7 @@ choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const 
   memory.set_size (width, height);
   std::copy_n (from.row (0), std::ptrdiff_t (width) * height, memory.row (0));
   to.set_size (cols, rows);
-  int reach = 1; /* rows, then columns, that each number has been chosen from */
+  int reach = 1; /* rows, then columns, that each value covers */
   for (; 2 * reach <= side; reach *= 2)
     for (int y = 0; y + reach < height; y++) {
       std::int16_t *row = memory.row (y);
@@ -48,8 +48,7 @@ choose_in_windows (const Plane &from, int side, Plane &memory, Plane &to, const 
   }
 }
 
-/* A part of a picture and `around` pixels more on each side: of those outside of it, the nearest in
- * it. */
+/* Copies a part of an image with `around` pixels on each side; the border is repeated. */
 void
 cut (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
 {
@@ -72,7 +71,7 @@ void
 SilhouetteFilter::sample (
     int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
 {
-  pad_ = radius / 2 + 1; /* no window leaves that */
+  pad_ = radius / 2 + 1; /* windows stay inside */
   const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
   samples_.set_size (cols + 2 * pad_ + kLanes, rows + 2 * pad_);
   const auto width = std::size_t (samples_.width ());
@@ -105,7 +104,7 @@ SilhouetteFilter::sample (
       });
 }
 
-/* Calls `count (weight, disparity)` with eight samples of a window at a time. */
+/* Calls `count (weight, disparity)` for eight samples of a window at a time. */
 template <typename Count>
 void
 SilhouetteFilter::for_window (
@@ -121,7 +120,7 @@ SilhouetteFilter::for_window (
     for (int v = y0; v < y0 + radius; v++) {
       const std::size_t at =
           std::size_t (v) * std::size_t (samples_.width ()) + std::size_t (x0 + u);
-      /* These sums end at 255, which is far enough. */
+      /* Saturates at 255, which exceeds kLike. */
       const cv::v_uint8x16 unlike = cv::v_absdiff (cv::v_load (&colours_[0][at]), r) +
                                     cv::v_absdiff (cv::v_load (&colours_[1][at]), g) +
                                     cv::v_absdiff (cv::v_load (&colours_[2][at]), b) +
@@ -163,7 +162,7 @@ SilhouetteFilter::vote (
   return votes;
 }
 
-/* The mean disparity of the samples around a pixel that are like it, or `least` - 1. */
+/* Mean disparity of the similar samples around a pixel, or `least` - 1. */
 int
 SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const
 {
@@ -202,7 +201,7 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       if (highest[x] < std::max (least, settings.nearest) ||
           (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
                         (settings.only_beyond && lowest[x] > settings.look_near))))
-        continue; /* a surface, or nothing near */
+        continue; /* inside a surface, or nothing near */
       const int d = valid ? from[x] : likely (settings, pixels[x], tile.x + x, tile.y + y);
       if (d < std::max (least, settings.nearest))
         continue;

@@ -10,27 +10,27 @@
 
 namespace rangecast {
 
-/** Clears the rim that block matching hangs around what stands before something farther: pixels
- *  near a step down, or near pixels without disparity, that are more like these in colour than like
- *  the pixels of their own depth, as far as `radius` around. Gives a disparity to what has none
- *  where the pixels around that look like it agree on one. Keeps its memory between pictures. */
+/** Removes the rim that block matching adds around foreground: pixels near a step to farther
+ * pixels, or near pixels without disparity, that are more similar in colour to those than to pixels
+ * of their own depth within `radius`. Sets missing disparities where similar pixels around agree on
+ * one. Reuses its memory between images. */
 class SilhouetteFilter {
 public:
   struct Settings {
     int radius = 8;   ///< pixels, > 0
-    double step = 0;  ///< share of the depth that pixels of one surface may differ
+    double step = 0;  ///< maximum relative depth difference within a surface
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
-    int least = 0;    ///< 1/16 pixel; less = none, least - 16 is what is written
-    int nearest = -1; ///< what is farther is of no interest, but that it is there
-    /** Only those that look like what is known to be farther than `nearest` go. */
+    int least = 0;    ///< 1/16 pixel; less = none; cleared ones become least - 16
+    int nearest = -1; ///< farther pixels are not processed, but count as farther
+    /** Clear only pixels that are similar to pixels farther than `nearest`. */
     bool only_beyond = false;
-    /** With only_beyond: 1/16 pixel; pixels without anything that far near them stay. */
+    /** With only_beyond: 1/16 pixel; skip pixels that have none this far around them. */
     int look_near = 0;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
-   *  @param disparity  CV_16S, 1/16 pixel; outside of `tiles` there must be none
-   *  @param[out] to    the same, not the same memory; written in `tiles` */
+   *  @param disparity  CV_16S, 1/16 pixel; none outside of `tiles`
+   *  @param[out] to    as `disparity`, other memory; written in `tiles` */
   void apply (const Settings &settings, const cv::Mat &colour, const Tiles &tiles,
       const cv::Mat &disparity, cv::Mat &to);
 
@@ -38,10 +38,10 @@ private:
   struct Memory {
     Plane around, lowest, highest, line;
   };
-  /* How much the samples around a pixel are like it in colour, by their depth. */
+  /* Similarity in colour of the samples around a pixel, by their depth. */
   struct Votes {
     int same = 0, near = 0; /* of disparity d, nearer */
-    int far = 0, none = 0;  /* farther, without depth; not kCountNone: both are far */
+    int far = 0, none = 0;  /* farther, without depth; unless kCountNone, both are in `far` */
   };
   void sample (int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads);
   template <typename Count>
@@ -53,8 +53,8 @@ private:
   void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
       const cv::Mat &disparity, Memory &memory, cv::Mat &to) const;
 
-  /* Every second pixel of every second row, and pad_ more around that are of no colour. */
-  std::vector<std::uint8_t> colours_[4]; /* R, G, B, 255 = of no colour */
+  /* Every second pixel of every second row, padded by pad_ samples without colour. */
+  std::vector<std::uint8_t> colours_[4]; /* R, G, B, 255 = without colour */
   Plane samples_;                        /* disparities */
   int pad_ = 0;
   WorkerMemory<Memory> memory_;

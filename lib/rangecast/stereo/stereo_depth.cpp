@@ -96,7 +96,7 @@ StereoDepth::rectify (
   return {};
 }
 
-/* Where surfaces of the last ROI are, and how much of it: half a per cent at either end may be
+/* Records the depth range and coverage of the last ROI, without 0.5 % at both ends, which may be
  * wrong. */
 void
 StereoDepth::learn_range (const RangeImage &image)
@@ -123,14 +123,14 @@ StereoDepth::learn_range (const RangeImage &image)
   if (seen < 64)
     return;
   const auto [low, high] = without_half_a_per_cent (histogram_);
-  /* Who walks at 1.5 m/s comes 6 cm nearer in a frame of 25: 7 % at 0.85 m. */
+  /* Walking at 1.5 m/s is 6 cm per frame at 25 Hz: 7 % at 0.85 m. */
   const double margin = 1 + 0.07 * high;
   near_now_m_ = finder_.disparity_at (1) / 16 / (high + 1 + margin);
   far_now_m_ = finder_.disparity_at (1) / 16 / std::max (0.5, low - 1 - 0.03 * low);
 }
 
-/* Whether what was found within limits looks as if something lay beyond them: pixels are missing,
- * or crowd at the near end. */
+/* Whether the result of a limited depth range suggests that something is outside of it: pixels are
+ * missing, or accumulate at the near end. */
 bool
 StereoDepth::is_suspect (const RangeImage &image) const
 {
@@ -148,9 +148,9 @@ StereoDepth::is_suspect (const RangeImage &image) const
   return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || crowd > 0.01 * seen;
 }
 
-/* What one pair takes for a part of what stands in front, though its colour is that of the
- * background which the other one knows: edges that run from one camera to the other match anywhere
- * along themselves. */
+/* Clears pixels that one pair assigns to the foreground, although their colour is that of the
+ * background that the other pair has found: edges parallel to the baseline match anywhere along
+ * themselves. */
 void
 StereoDepth::clear_rims_of_third (const Roi &roi)
 {
@@ -163,7 +163,7 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  const int radius = settings_.silhouette_radius * 5 / 4; /* such rims are wider */
+  const int radius = settings_.silhouette_radius * 5 / 4; /* these rims are wider */
   SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kMin};
   rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
   rims.only_beyond = true;
@@ -192,7 +192,8 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   return status;
 }
 
-/* Exchanged before they are rectified: lenses and rows are those of the other camera. */
+/* Images are exchanged before rectification, because lenses and rows are those of the other camera.
+ */
 void
 StereoDepth::check_mirror ()
 {
@@ -208,7 +209,7 @@ StereoDepth::check_mirror ()
     mirror_.look (
         {pictures_[0], pictures_[1]}, exchanged, -rectifier_.principal_offset (), finder_.most ());
   } catch (const cv::Exception &) {
-    return; /* too small a picture to say */
+    return; /* too small to decide */
   }
 }
 

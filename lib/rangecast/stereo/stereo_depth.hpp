@@ -17,13 +17,13 @@
 
 namespace rangecast {
 
-/** A stereo pair's pictures to a range image: rectifies, matches, filters, converts. Keeps its
- *  memory between frames. */
+/** Computes range images from stereo pairs: rectifies, matches, filters, converts to depth. Reuses
+ * its memory between images. */
 class StereoDepth {
 public:
   /** @param view        a raw view with a right camera; its near and far set the disparity range
-   *  @param with_third  the view's third camera takes part: rectify() gets its pictures
-   *  @return what Rectifier, DisparityFinder and ThirdPair say about the view */
+   *  @param with_third  use the view's third camera, whose images are passed to rectify()
+   *  @return the errors of Rectifier, DisparityFinder and ThirdPair */
   Status set (const View &view, const StereoSettings &settings, bool with_third = false);
 
   /** The view of the range images. */
@@ -32,23 +32,23 @@ public:
   /** @name One pair
    *  Either process(), or rectify() and match(), between which the caller may choose the ROI. @{ */
 
-  /** Takes and rectifies both pictures. Their memory must stay until match() is done.
+  /** Rectifies the images. Their memory must stay valid until match() returns.
    *  @param left, right  of the view's size
-   *  @param third        the same; empty if there is none, then this pair goes without
-   *  @return kBadSize if a picture has another size */
+   *  @param third        the same; empty: this pair is matched without it
+   *  @return kBadSize if an image has another size */
   Status rectify (
       ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third = {});
 
-  /** Whether anything outside of the ROI has changed in the left picture since the last one that
-   *  was matched as a whole (ChangeDetector). */
+  /** Whether the left image has changed outside of the ROI since the last one that was matched
+   * completely (ChangeDetector). */
   [[nodiscard]] bool changed_outside (const Roi &roi) const
   {
     return changes_.changed_outside (roi);
   }
 
-  /** @param image  its ROI (not empty, inside the view) says what to compute; depth and colour are
-   *  written in full
-   *  @return kBadSize if the ROI is not in the view */
+  /** @param image  its ROI (not empty, inside the view) is computed; depth and colour are
+   * completely written
+   *  @return kBadSize if the ROI is not inside the view */
   Status match (const RangeImage &image);
 
   Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image,
@@ -59,10 +59,11 @@ public:
   }
   /** @} */
 
-  /** Whether left and right look exchanged (MirrorCheck): known after the first whole pictures. */
+  /** Whether left and right seem to be exchanged (MirrorCheck); known after the first complete
+   * images. */
   [[nodiscard]] bool looks_mirrored () const { return mirror_.mirrored (); }
 
-  /** What was held still is not compared with what comes: after a gap in the stream. */
+  /** After a gap in the stream: discards the history of temporal filters. */
   void reset ()
   {
     changes_.reset ();
@@ -73,7 +74,7 @@ public:
     near_now_m_ = far_now_m_ = 0;
   }
 
-  /** The disparities of the last picture, 1/16 pixel with equal principal points, 0 = no match; of
+  /** The disparities of the last image, 1/16 pixel with equal principal points, 0 = no match; of
    *  its ROI. */
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
@@ -90,9 +91,9 @@ private:
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;
-  SilhouetteFilter rims_; /* of what both pairs know */
+  SilhouetteFilter rims_; /* for the result of both pairs */
   Tiles tiles_;
-  bool with_third_ = false, has_third_ = false; /* set up; in this pair */
+  bool with_third_ = false, has_third_ = false; /* configured; for this pair */
   DisparityToDepth to_depth_;
   ChangeDetector changes_;
   Occupancy occupancy_;
@@ -105,8 +106,8 @@ private:
   cv::Mat rectified_[2], before_fusion_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
-  Roi last_roi_;                          /* that was not the whole picture */
-  double seen_share_ = 0;                 /* of the ROI's pixels, the last time */
+  Roi last_roi_;                          /* last ROI that was not the whole image */
+  double seen_share_ = 0;                 /* fraction of the last ROI with depth */
 };
 
 } // namespace rangecast

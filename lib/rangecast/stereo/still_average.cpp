@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kBlock = 8;
 constexpr int kScale = 128; /* of sums to levels */
-/* More noise than this is motion, grey levels. */
+/* Maximum noise, grey levels; more is motion. */
 constexpr float kMaxNoise = 6;
 
 } // namespace
@@ -24,7 +24,7 @@ StillAverage::set (int frames)
   reset ();
 }
 
-/* How a row of blocks differs from its mean. */
+/* Differences of a row of blocks from the mean. */
 void
 StillAverage::compare (const cv::Mat &picture, int by)
 {
@@ -49,7 +49,7 @@ StillAverage::compare (const cv::Mat &picture, int by)
   }
 }
 
-/* Noise is what the quarter of all blocks that change least have. The mean of 64 pixels has an
+/* Noise is estimated from the quarter of all blocks that change least. The mean of 64 pixels has an
  * eighth of their standard deviation, which is 1.25 times their mean deviation. */
 void
 StillAverage::find_motion ()

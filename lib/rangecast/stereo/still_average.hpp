@@ -7,22 +7,23 @@
 
 namespace rangecast {
 
-/** Takes the noise off one camera's pictures where nothing moves: the mean of the last few. Blocks
- *  of 8 x 8 pixels that differ from it by more than noise, and those beside them, begin anew. */
+/** Temporal noise filter of one camera's images: the mean of the last ones where nothing moves.
+ * Blocks of 8 x 8 pixels that differ from the mean by more than noise, and their neighbours,
+ * restart. */
 class StillAverage {
 public:
-  /** @param frames  that are averaged, 2 to 64; the latest ones count most */
+  /** @param frames  number to average, 2 to 64; the latest ones have the highest weight */
   void set (int frames);
   void reset () { blocks_.clear (); }
 
-  /** @param picture  CV_8UC4; another size than before begins anew
-   *  @return the mean, of the same kind; valid until the next call */
+  /** @param image  CV_8UC4; a change of size restarts
+   *  @return the mean, of the same type; valid until the next call */
   const cv::Mat &add (const cv::Mat &picture);
 
 private:
   struct Block {
-    float drift = 0, change = 0; /* grey levels: of the block's mean, and of its pixels */
-    int frames = 0;              /* in its mean */
+    float drift = 0, change = 0; /* grey levels: change of the block's mean, and of its pixels */
+    int frames = 0;              /* averaged */
     bool moves = false;
   };
   void compare (const cv::Mat &picture, int by);

@@ -7,7 +7,7 @@
 namespace rangecast {
 
 constexpr int kBlock = 8;
-constexpr float kDrift = 0.15f;  /* pixels of disparity, in two pictures running */
+constexpr float kDrift = 0.15f;  /* pixels of disparity, in two successive images */
 constexpr float kJump = 1.0f;    /* the same, of one pixel */
 constexpr float kMaxNoise = 6.f; /* grey levels: more is motion */
 
@@ -30,7 +30,7 @@ TemporalFilter::set (int width, int height, double steady, double focal_baseline
   changes_.reserve (blocks_.size ());
 }
 
-/* What is different in a block, of its part in the ROI. */
+/* Compares the part of a block that is in the ROI. */
 void
 TemporalFilter::look_at_block (const RangeImage &image, int bx, int by, Block &block) const
 {
@@ -58,7 +58,7 @@ TemporalFilter::look_at_block (const RangeImage &image, int bx, int by, Block &b
   block.drift = drift / static_cast<float> (std::max (16, n));
 }
 
-/* How much blocks change where nothing moves: the quarter of all that changes least. */
+/* Noise, estimated from the quarter of all blocks that change least. */
 float
 TemporalFilter::noise ()
 {
@@ -89,7 +89,7 @@ TemporalFilter::average (const RangeImage &image)
         held[x] = z;
       if (z <= 0 || moves)
         continue;
-      /* What jumps for one picture where all else is still is wrong, and counts as a step. */
+      /* A jump in a single image where nothing else moves is wrong: limit its effect. */
       const float most = kJump * z * z / focal_baseline_;
       held[x] = held[x] > 0 ? held[x] + weight_ * std::clamp (z - held[x], -most, most) : z;
       depth[x] = static_cast<std::uint16_t> (std::lround (held[x]));

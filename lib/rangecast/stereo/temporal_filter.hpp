@@ -9,26 +9,26 @@
 
 namespace rangecast {
 
-/** Holds depth still where nothing moves: each pixel's depth is a running mean. Blocks of 8 x 8
- *  pixels whose colours change by more than noise, and those beside them, begin anew, and so do
- *  blocks whose depth drifts to one side, by more than 0.15 pixel of disparity on average in two
- *  pictures running: nothing trails. */
+/** Smooths depth over time where nothing moves: each pixel's depth is a running mean. Blocks of 8 x
+ * 8 pixels whose colours change by more than noise, and their neighbours, restart, as do blocks
+ * whose depth drifts by more than 0.15 pixels of disparity on average in two successive images. So
+ * moving surfaces leave no trail. */
 class TemporalFilter {
 public:
   /** @param width, height  of the view, pixels
-   *  @param steady         0 (off) to 1: each new depth counts 1 - 0.9 * steady
-   *  @param focal_baseline pixels times depth units: disparity times depth */
+   *  @param steady         0 (off) to 1: the weight of new depth is 1 - 0.9 * steady
+   *  @param focal_baseline focal length times baseline, pixels times depth units */
   void set (int width, int height, double steady, double focal_baseline);
   void reset () { held_.setTo (0); }
 
-  /** @param image  its depth is replaced; its colour says what moves */
+  /** @param image  its depth is replaced; motion is detected in its colour */
   void apply (const RangeImage &image);
 
 private:
   struct Block {
     float change = 0;       /* grey levels, mean of the absolute differences */
     float drift = 0;        /* pixels of disparity, mean of the differences */
-    float drift_before = 0; /* in the picture before */
+    float drift_before = 0; /* in the previous image */
     bool moves = false, drifts = false;
   };
   void look_at_block (const RangeImage &image, int bx, int by, Block &block) const;

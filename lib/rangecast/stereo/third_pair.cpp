@@ -29,7 +29,8 @@ bad_third (const View &view, const char *what)
 
 } // namespace
 
-/* Axes of the rectified pictures: x to the third camera, z as near to the left camera's as may be.
+/* Axes of the rectified images: x towards the third camera, z as close as possible to the left
+ * camera's.
  */
 Status
 ThirdPair::choose_axes (const View &view)
@@ -47,8 +48,8 @@ ThirdPair::choose_axes (const View &view)
   return {};
 }
 
-/* Lays the rectified picture around what the range view shows, which is all that is ever looked up:
- * both are pinhole cameras, so its corners say where it lies whatever the lenses do. */
+/* Places the rectified image around the range view, outside of which nothing is sampled. Both are
+ * pinhole cameras, so the corners of the range view determine it. */
 Status
 ThirdPair::place (const View &view, const View &range_view)
 {
@@ -70,8 +71,8 @@ ThirdPair::place (const View &view, const View &range_view)
   return {};
 }
 
-/* Where a ROI of the range view lies in the rectified picture.
- * @return false if some of it lies behind the camera, or nearly */
+/* Bounds of a ROI of the range view in the rectified image.
+ * @return false if a part of it is behind the camera, or nearly */
 bool
 ThirdPair::bounds (const Roi &roi, cv::Vec2d &low, cv::Vec2d &high) const
 {
@@ -119,7 +120,7 @@ ThirdPair::map_range_view (const View &range_view, double focal_baseline)
       const bool inside = u >= 0 && v >= 0 && u < pair_.width && v < pair_.height;
       where_.at<cv::Vec2s> (y, x) =
           inside ? cv::Vec2s (static_cast<short> (u), static_cast<short> (v)) : cv::Vec2s (-1, -1);
-      /* Depth there is p[2] times depth here. */
+      /* Depth in the rectified image is p[2] times depth in the range view. */
       factor_.at<float> (y, x) = static_cast<float> (p[2] * focal_baseline / pair_.focal_baseline);
     }
 }
@@ -166,7 +167,8 @@ ThirdPair::bounding_box (const Roi &roi) const
   return right < x || bottom < y ? Roi{} : Roi{x, y, right - x + 1, bottom - y + 1};
 }
 
-/* Depth in the rectified picture over depth in the range view is linear in the pixel. */
+/* The ratio of depth in the rectified image and in the range view is linear in pixel coordinates.
+ */
 ThirdPair::DepthFactors
 ThirdPair::depth_factors (const Roi &roi) const
 {
@@ -207,7 +209,7 @@ ThirdPair::find (const Roi &roi, double near_m, double far_m)
   return {};
 }
 
-/* Pixels around (x, y) of `of` that agree with disparity d. */
+/* Number of pixels around (x, y) that agree with disparity d. */
 static int
 support (const cv::Mat &of, int x, int y, int d)
 {

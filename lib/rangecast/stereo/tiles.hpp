@@ -12,14 +12,14 @@
 
 namespace rangecast {
 
-/** The parts of a picture that are worked on: rectangles one below the other, no two of which share
- *  a row, cut into tiles of a few rows for threads to take. */
+/** Regions of an image: rectangles one below the other without common rows, divided into tiles of a
+ * few rows for parallel processing. */
 class Tiles {
 public:
-  /** @param n_threads  that work at a time; 0 = as many as there are cores */
+  /** @param n_threads  0 = one per core */
   void set (std::span<const cv::Rect> parts, int n_threads)
   {
-    constexpr int kRows = 32; /* their scratch memory stays in a core's cache */
+    constexpr int kRows = 32; /* scratch memory fits a core's cache */
     n_threads_ = n_threads;
     parts_.assign (parts.begin (), parts.end ());
     tiles_.clear ();
@@ -29,9 +29,9 @@ public:
   }
 
   [[nodiscard]] const std::vector<cv::Rect> &parts () const { return parts_; }
-  /** What each() calls work for. */
+  /** The arguments of each(). */
   [[nodiscard]] const std::vector<cv::Rect> &tiles () const { return tiles_; }
-  /** The smallest rectangle that holds all parts; empty if there are none. */
+  /** Bounding box of all parts; empty if there are none. */
   [[nodiscard]] cv::Rect hull () const
   {
     cv::Rect all;
@@ -39,11 +39,11 @@ public:
       all = all.empty () ? part : all | part;
     return all;
   }
-  /** How many tiles are worked on at a time; workers are numbered below that. */
+  /** Number of tiles processed concurrently; worker numbers are less than that. */
   [[nodiscard]] std::size_t workers () const { return workers_for (tiles_.size (), n_threads_); }
   [[nodiscard]] int n_threads () const { return n_threads_; }
 
-  /** Calls work (tile, worker) for each, some at a time, in a version for this processor. */
+  /** Calls work (tile, worker) for each tile in parallel, in a version for this processor. */
   template <typename Work> void each (const Work &work) const
   {
     in_parallel (tiles_.size (), n_threads_, [&] (std::size_t i, std::size_t worker) {

@@ -98,7 +98,7 @@ struct Job {
   std::optional<unsigned> dress; /* empty: the figure bare and dressed */
   int rounds = 15;
   double merge = StripSettings{}.merge;
-  double view_gap_m = StripPainter::Picture{}.view_gap_m;
+  double view_gap_m = RenderPicture{}.view_gap_m;
   int max_gap = StripSettings{}.max_gap;
   CylinderSettings cylinder;
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
@@ -123,14 +123,14 @@ orbit_at (double azimuth_deg)
   return orbit;
 }
 
-StripPainter::Picture
+RenderPicture
 make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
 {
   const SceneFrame frame = scene_frame (set.rig);
   std::vector<Vec3> hull;
   for (const RangeImage &image : set.images)
     append_hull (image, *set.rig.find (image.view_id), hull);
-  StripPainter::Picture picture = {};
+  RenderPicture picture = {};
   const Orbit orbit = orbit_at (azimuth_deg);
   picture.clip_from_world =
       orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
@@ -200,7 +200,7 @@ void
 time_all (
     Job &job, const Kind &kind, Target &target, double azimuth_deg, std::vector<RenderRow> &rows)
 {
-  const StripPainter::Picture picture = make_picture (kind.set, azimuth_deg, job.view_gap_m);
+  const RenderPicture picture = make_picture (kind.set, azimuth_deg, job.view_gap_m);
   std::vector<std::vector<double>> processor (rows.size ()), total (rows.size ());
   for (int round = -1; round < job.rounds; round++) /* the first one allocates */
     for (std::size_t i = 0; i < rows.size (); i++) {

@@ -4,7 +4,7 @@
 #include <rangecast/base/parallel.hpp>
 #include <rangecast/surface/orbit.hpp>
 
-#include "render/glshader.hpp"
+#include "render/glhelpers.hpp"
 #include "ways.hpp"
 
 using namespace rangecast;
@@ -87,7 +87,7 @@ public:
     });
   }
 
-  guint64 draw (const StripPainter::Picture &picture) override
+  guint64 draw (const RenderPicture &picture) override
   {
     begin (picture);
     guint64 bytes = 0;
@@ -121,7 +121,7 @@ public:
   }
 
 private:
-  void begin (const StripPainter::Picture &picture)
+  void begin (const RenderPicture &picture)
   {
     gl_->Viewport (0, 0, picture.width, picture.height);
     gl_->ClearColor (0, 0, 0, 0);

@@ -26,11 +26,11 @@ Target::~Target ()
 }
 
 guint64
-Target::draw (Way &way, const StripPainter::Picture &picture)
+Target::draw (Way &way, const RenderPicture &picture)
 {
   struct Job {
     Way &way;
-    const StripPainter::Picture &picture;
+    const RenderPicture &picture;
     guint64 bytes;
   } job = {way, picture, 0};
   GstMapInfo map; /* so that reading it back knows of the change */

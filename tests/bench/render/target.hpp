@@ -17,7 +17,7 @@ public:
 
   [[nodiscard]] bool usable () const { return memory_ && framebuffer_; }
   /** Draws once. @return bytes uploaded; the GPU has finished */
-  guint64 draw (Way &way, const StripPainter::Picture &picture);
+  guint64 draw (Way &way, const RenderPicture &picture);
   /** CV_8UC4, RGBA */
   [[nodiscard]] cv::Mat read () const;
 

@@ -24,9 +24,9 @@ public:
     scene_.count_into (stats_);
   }
 
-  guint64 draw (const StripPainter::Picture &picture) override
+  guint64 draw (const RenderPicture &picture) override
   {
-    StripPainter::Picture own = picture;
+    RenderPicture own = picture;
     own.mode = settings_.strips.mode;
     own.depth_step = settings_.strips.depth_step;
     const bool uploads = uploaded_ != scene_.serial () || !held_;

@@ -20,7 +20,7 @@ public:
   /** @param orbit  from where it will be drawn */
   virtual void build (const rangecast::Orbit &orbit) = 0;
   /** Draws into the bound framebuffer, in the GL thread. @return bytes uploaded */
-  virtual guint64 draw (const StripPainter::Picture &picture) = 0;
+  virtual guint64 draw (const RenderPicture &picture) = 0;
   [[nodiscard]] virtual std::size_t vertices () const = 0;
   [[nodiscard]] virtual std::size_t triangles () const = 0;
   [[nodiscard]] const std::string &name () const { return name_; }

@@ -213,34 +213,38 @@ GST_START_TEST (test_boards_in_two_cameras_become_a_rig_file_at_eos)
   GstMessage *message = c.message ("rigcalibrate-result");
   const GstStructure *s = gst_message_get_structure (message);
   fail_unless_equals_string (gst_structure_get_string (s, "location"), location.c_str ());
-  fail_unless (number (s, "rms") < 0.3);
+  fail_unless_cmp (number (s, "rms"), <, 0.3);
   const GstStructure *camera = item (s, "cameras", 1);
   fail_unless_equals_string (gst_structure_get_string (camera, "pad"), "sink_1");
   fail_unless_equals_string (gst_structure_get_string (camera, "role"), "right");
-  fail_unless (number (camera, "rms") < 0.3 && number (camera, "alone-rms") < 0.3);
+  fail_unless_cmp (number (camera, "rms"), <, 0.3);
+  fail_unless_cmp (number (camera, "alone-rms"), <, 0.3);
   const GstStructure *pair = item (s, "pairs", 0);
-  fail_unless (std::abs (number (pair, "distance") - 0.1) < 0.003);
-  fail_unless (number (pair, "row-error") >= 0 && number (pair, "row-error") < 0.5);
+  fail_unless_cmp (std::abs (number (pair, "distance") - 0.1), <, 0.003);
+  fail_unless_cmp (number (pair, "row-error"), >=, 0);
+  fail_unless_cmp (number (pair, "row-error"), <, 0.5);
   guint frames = 0;
   fail_unless (gst_structure_get_uint (pair, "frames", &frames));
   fail_unless (frames >= 10, "%u", frames);
 
   Rig rig;
-  fail_unless (load_rig (location, rig).ok ());
+  fail_unless_ok (load_rig (location, rig));
   fail_unless_equals_int (rig.views.size (), 1);
   fail_unless (rig.views[0].right.has_value ());
-  fail_unless (std::abs (rig.views[0].right->partner_from_left.translation.x + 0.1) < 0.003);
-  fail_unless (std::abs (rig.views[0].intrinsics.fx - 300) < 10);
-  fail_unless (rig.views[0].near_m == 0.4 && rig.views[0].far_m == 2);
+  fail_unless_cmp (std::abs (rig.views[0].right->partner_from_left.translation.x + 0.1), <, 0.003);
+  fail_unless_cmp (std::abs (rig.views[0].intrinsics.fx - 300), <, 10);
+  fail_unless_cmp (rig.views[0].near_m, ==, 0.4);
+  fail_unless_cmp (rig.views[0].far_m, ==, 2);
   GstBuffer *blob = nullptr;
   fail_unless (gst_structure_get (s, "rig", GST_TYPE_BUFFER, &blob, nullptr));
   GstMapInfo map;
   gst_buffer_map (blob, &map, GST_MAP_READ);
   Rig posted;
-  fail_unless (decode_rig ({map.data, map.size}, posted).ok ());
+  fail_unless_ok (decode_rig ({map.data, map.size}, posted));
   gst_buffer_unmap (blob, &map);
   gst_buffer_unref (blob);
-  fail_unless (posted.views[0].width == kWidth && posted.views[0].right.has_value ());
+  ck_assert_int_eq (posted.views[0].width, kWidth);
+  fail_unless (posted.views[0].right.has_value ());
   gst_message_unref (message);
 }
 GST_END_TEST;
@@ -257,7 +261,8 @@ GST_START_TEST (test_messages_say_which_camera_saw_the_board)
     gboolean said;
     guint corners;
     guint64 time;
-    fail_unless (gst_structure_get_boolean (s, "seen", &said) && bool (said) == seen);
+    fail_unless (gst_structure_get_boolean (s, "seen", &said));
+    ck_assert_int_eq (bool (said), seen);
     fail_unless (gst_structure_get_uint (s, "corners", &corners));
     fail_unless_equals_int (corners, seen ? 54 : 0);
     fail_unless (gst_structure_get_uint64 (s, "running-time", &time));
@@ -272,9 +277,9 @@ GST_START_TEST (test_messages_say_which_camera_saw_the_board)
     guint frames;
     fail_unless (gst_structure_get_uint (s, "frames", &frames));
     fail_unless_equals_int (frames, seen ? 1 : 0);
-    fail_unless (seen == (number (s, "share") > 0));
+    ck_assert_int_eq (seen, (number (s, "share") > 0));
     fail_unless_equals_int (strlen (gst_structure_get_string (s, "cells")), 12);
-    fail_unless (gst_value_array_get_size (gst_structure_get_value (s, "missing")) >= 5);
+    ck_assert_int_ge (gst_value_array_get_size (gst_structure_get_value (s, "missing")), 5);
     gst_message_unref (message);
   }
 }
@@ -302,7 +307,8 @@ GST_START_TEST (test_still_pictures_stand_side_by_side)
       const guint8 *p = map.data + 4 * (320 * y + x);
       coloured[x / 160] += std::abs (p[0] - p[2]) > 60 && x % 160 > 10 && x % 160 < 150;
     }
-  fail_unless (coloured[0] > 50 && coloured[1] > 50);
+  ck_assert_int_gt (coloured[0], 50);
+  ck_assert_int_gt (coloured[1], 50);
   gst_buffer_unmap (still, &map);
   gst_buffer_unref (still);
 }
@@ -437,7 +443,7 @@ GST_START_TEST (test_calibrate_signal_gives_a_result_and_the_stream_goes_on)
   Calibrate c (1);
   g_signal_emit_by_name (c.element, "calibrate");
   std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
-  fail_unless (text.find ("no images") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, "no images");
   c.push_boards (10);
   c.wait_until_examined (10);
   g_signal_emit_by_name (c.element, "calibrate");
@@ -447,7 +453,7 @@ GST_START_TEST (test_calibrate_signal_gives_a_result_and_the_stream_goes_on)
   GstMessage *message = c.message ("rigcalibrate-result");
   guint frames = 0;
   gst_structure_get_uint (gst_message_get_structure (message), "frames", &frames);
-  fail_unless (frames > 10);
+  ck_assert_int_gt (frames, 10);
   gst_message_unref (message);
 }
 GST_END_TEST;
@@ -477,7 +483,7 @@ GST_START_TEST (test_auto_finish_that_cannot_write_is_one_error_and_the_rig_is_i
 {
   if (!g_file_test ("/dev/full", G_FILE_TEST_EXISTS))
     return;
-  fail_unless (symlink ("/dev/full", temporary_rig ().c_str ()) == 0);
+  ck_assert_int_eq (symlink ("/dev/full", temporary_rig ().c_str ()), 0);
   Calibrate c (1, "min-frames=5 auto-finish=true location=" + temporary_rig ());
   c.show_everywhere ();
   GstMessage *message = c.message ("rigcalibrate-result");
@@ -570,7 +576,7 @@ GST_START_TEST (test_what_cannot_end_well_does_not_start)
     fail_unless_equals_int (
         gst_element_set_state (element, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
     const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
-    fail_unless (said.find (text) != std::string::npos, said.c_str ());
+    fail_unless_contains (said, text);
     gst_element_set_state (element, GST_STATE_NULL);
     gst_element_set_bus (element, nullptr);
     gst_object_unref (bus);
@@ -598,9 +604,9 @@ GST_START_TEST (test_live_pictures_go_unseen_while_the_last_ones_are_looked_at)
     gst_structure_get (
         stats, "examined", G_TYPE_UINT64, &examined, "skipped", G_TYPE_UINT64, &skipped, nullptr);
     gst_structure_free (stats);
-    fail_unless (examined >= 1);
+    ck_assert_uint_ge (examined, 1);
     fail_unless (skipped >= 1, "nobody looks for boards in a millisecond");
-    fail_unless (examined + skipped <= 100);
+    ck_assert_uint_le (examined + skipped, 100);
     gst_element_set_state (pipeline, GST_STATE_NULL);
     gst_bus_set_flushing (bus, TRUE);
     gst_bus_set_flushing (bus, FALSE);

@@ -147,7 +147,7 @@ struct Monitor {
 
   explicit Monitor (const char *classes = "Video/Source")
   {
-    fail_unless (gst_device_monitor_add_filter (monitor, classes, nullptr) != 0);
+    ck_assert_int_ne (gst_device_monitor_add_filter (monitor, classes, nullptr), 0);
     fail_unless (gst_device_monitor_start (monitor));
   }
   ~Monitor ()
@@ -273,8 +273,8 @@ GST_END_TEST
 GST_START_TEST (test_missing_permission_is_told_with_the_rule_to_add)
 {
   if (geteuid () == 0)
-    fail_unless (
-        setuid (65534) == 0); // root may open everything; the test has a process of its own
+    ck_assert_int_eq (
+        setuid (65534), 0); // root may open everything; the test has a process of its own
   TestBed bed;
   bed.add (usb_camera (1, "SN1"));
   std::filesystem::permissions (bed.node (1), std::filesystem::perms::none);
@@ -282,8 +282,8 @@ GST_START_TEST (test_missing_permission_is_told_with_the_rule_to_add)
   GstDevice *device = monitor.find ("camera.serial", "SN1");
   fail_unless (device != nullptr);
   const auto problem = text_of (device, "camera.problem");
-  fail_unless (problem.find ("/dev/bus/usb/002/002") != problem.npos, "%s", problem.c_str ());
-  fail_unless (problem.find (kUdevRule) != problem.npos, "%s", problem.c_str ());
+  fail_unless_contains (problem, "/dev/bus/usb/002/002");
+  fail_unless_contains (problem, kUdevRule);
   const gchar *source = g_getenv ("RANGECAST_SOURCE");
   fail_unless (std::filesystem::exists (std::filesystem::path (source) / kUdevRule));
   gst_object_unref (device);
@@ -356,7 +356,7 @@ GST_START_TEST (test_pair_of_a_known_rig_is_there_while_both_cameras_are)
   view.camera = "SN1";
   view.right->camera = "SN2";
   rig.views.push_back (view);
-  fail_unless (save_rig (file, rig).ok ());
+  fail_unless_ok (save_rig (file, rig));
   g_setenv ("RANGECAST_RIG_PATH", folder, TRUE);
 
   TestBed bed;
@@ -408,7 +408,7 @@ GST_START_TEST (test_pair_is_found_by_user_defined_name)
   view.camera = "studio-left";
   view.right->camera = "SN2";
   rig.views.push_back (view);
-  fail_unless (save_rig (file, rig).ok ());
+  fail_unless_ok (save_rig (file, rig));
   g_setenv ("RANGECAST_RIG_PATH", folder, TRUE);
   TestBed bed;
   bed.add (usb_camera (2, "SN2"));
@@ -427,8 +427,8 @@ GST_END_TEST
 
 GST_START_TEST (test_camera_is_called_by_all_its_names)
 {
-  FoundCamera camera;
-  camera.transport = FoundCamera::Transport::kGigEVision;
+  CameraInfo camera;
+  camera.protocol = "GigEVision";
   camera.id = "Maker-7";
   camera.serial = "7";
   camera.address = "10.0.0.7";
@@ -451,8 +451,8 @@ GST_START_TEST (test_rig_files_are_read_again_only_when_they_have_changed)
   view.camera = "SN1";
   view.right->camera = "SN2";
   rig.views.push_back (view);
-  fail_unless (save_rig (file, rig).ok ());
-  FoundCamera left, right;
+  fail_unless_ok (save_rig (file, rig));
+  CameraInfo left, right;
   left.serial = "SN1";
   right.serial = "SN2";
   KnownRigs rigs;
@@ -461,7 +461,7 @@ GST_START_TEST (test_rig_files_are_read_again_only_when_they_have_changed)
     fail_unless_equals_int (int (rigs.pairs ({file}, {left, right}, problems).size ()), 1);
   fail_unless_equals_int (int (rigs.reads ()), 1);
   rig.views[0].camera = "another"; /* another length, too: clocks of file systems are coarse */
-  fail_unless (save_rig (file, rig).ok ());
+  fail_unless_ok (save_rig (file, rig));
   fail_unless_equals_int (int (rigs.pairs ({file}, {left, right}, problems).size ()), 0);
   fail_unless_equals_int (int (rigs.reads ()), 2);
   fail_unless (problems.empty ());

@@ -28,17 +28,17 @@ GST_START_TEST (test_frames_arrive_whole_numbered_and_in_order)
   std::uint64_t last = 0, last_time = 0;
   for (int i = 0; i < 50; i++) {
     const CameraFrame frame = listener.next ();
-    fail_unless (frame.state == FrameState::kComplete);
+    fail_unless_cmp (frame.state, ==, FrameState::kComplete);
     assert_equals_int (gst_buffer_get_size (frame.buffer.get ()), 64 * 48);
     fail_unless (!GST_BUFFER_PTS_IS_VALID (frame.buffer.get ()));
     fail_unless (i == 0 || frame.number == last + 1);
-    fail_unless (frame.camera_time_ns > last_time);
-    fail_unless (frame.arrived_us <= g_get_monotonic_time ());
+    ck_assert_uint_gt (frame.camera_time_ns, last_time);
+    ck_assert_int_le (frame.arrived_us, g_get_monotonic_time ());
     last = frame.number;
     last_time = frame.camera_time_ns;
   }
   const CameraStatistics numbers = camera->statistics ();
-  fail_unless (numbers.completed >= 50);
+  ck_assert_uint_ge (numbers.completed, 50);
   assert_equals_int (numbers.failures, 0);
   assert_equals_int (numbers.underruns, 0);
   camera->stop ();
@@ -279,9 +279,9 @@ GST_START_TEST (test_lost_packets_make_incomplete_frames_or_gaps_never_pictures)
     n_complete++;
     (void)count_in (frame);
   }
-  fail_unless (n_complete > 50);
-  fail_unless (missing >= guint64 (n_incomplete));
-  fail_unless (camera->statistics ().failures >= guint64 (n_incomplete));
+  ck_assert_int_gt (n_complete, 50);
+  ck_assert_uint_ge (missing, guint64 (n_incomplete));
+  ck_assert_uint_ge (camera->statistics ().failures, guint64 (n_incomplete));
 }
 GST_END_TEST;
 
@@ -371,9 +371,9 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
   Listener from_leader, from_follower;
   start (*leader, from_leader);
   start (*follower, from_follower);
-  LookFollower look;
+  ExposureSync sync;
   std::atomic<int> n_refusals{0};
-  look.start (leader, {follower}, std::chrono::milliseconds (5),
+  sync.start (leader, {follower}, std::chrono::milliseconds (5),
       [&] (const CameraStatus &) { n_refusals++; });
   for (const guint32 exposure : {3000u, 700u, 12000u}) {
     /* as the camera's own regulator would */
@@ -394,7 +394,7 @@ GST_START_TEST (test_followers_take_over_the_look_of_the_leader)
   }
   assert_equals_int (n_refusals, 0);
   (void)from_follower.next_complete ();
-  look.stop ();
+  sync.stop ();
 }
 GST_END_TEST;
 

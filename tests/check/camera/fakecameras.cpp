@@ -63,7 +63,7 @@ struct CamerasOnSockets {
     for (const auto &camera : list)
       camera->start ();
     listener = std::make_unique<GigeListener> (list);
-    fail_unless (listener->start () > 0);
+    ck_assert_uint_gt (listener->start (), 0);
   }
   ~CamerasOnSockets ()
   {
@@ -300,7 +300,7 @@ GST_START_TEST (test_scheduled_action_waits_for_its_time)
   fail_unless_equals_uint64 (sender.receive (), kObeyed);
   ArvBuffer *buffer = arv_stream_timeout_pop_buffer (client.stream, 5000000);
   fail_unless (buffer != nullptr);
-  fail_unless (std::int64_t (arv_buffer_get_timestamp (buffer)) >= at);
+  ck_assert_int_ge (std::int64_t (arv_buffer_get_timestamp (buffer)), at);
   arv_stream_push_buffer (client.stream, buffer);
 }
 GST_END_TEST;

@@ -87,7 +87,7 @@ struct CamerasOnSockets {
     for (int i = 0; i < count; i++)
       plug (i);
     listener = std::make_unique<GigeListener> (list);
-    fail_unless (listener->start () > 0);
+    ck_assert_uint_gt (listener->start (), 0);
   }
   ~CamerasOnSockets ()
   {
@@ -235,7 +235,8 @@ public:
 
   void play ()
   {
-    fail_if (gst_element_set_state (pipeline_, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+    ck_assert_int_ne (
+        gst_element_set_state (pipeline_, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
   }
   void stop () { gst_element_set_state (pipeline_, GST_STATE_NULL); }
 

@@ -8,7 +8,7 @@
 
 static constexpr std::int64_t kMs = 1'000'000, kPeriod = 20 * kMs;
 
-using Fired = CamSourcePairing::Fired;
+using By = FramePairing::TriggeredBy;
 
 /* A whole picture. Cameras' clocks are that of the test. */
 static CameraFrame
@@ -24,29 +24,29 @@ picture (std::uint64_t number, std::int64_t taken_ns, std::int64_t way_ns = 2 * 
   return frame;
 }
 
-/* Ticks of which one shot is fired where the pairing allows it; each camera's answer gets lost
- * where the caller says so. @return ticks without a shot */
+/* Ticks of which one trigger is fired where the pairing allows it; each camera's answer gets lost
+ * where the caller says so. @return ticks without a trigger */
 template <typename Lost>
 static int
-run_shots (CamSourcePairing &pairing, int ticks, Lost lost)
+run_triggers (FramePairing &pairing, int ticks, Lost lost)
 {
   int missed = 0, fired = 0;
   std::uint64_t numbers[2] = {};
   for (int tick = 1; tick <= ticks; tick++) {
     const std::int64_t now = 1000 * kMs + tick * kPeriod;
-    if (!pairing.may_fire (false, now)) {
+    if (!pairing.may_trigger (false, now)) {
       missed++;
       continue;
     }
-    pairing.fired (static_cast<GstClockTime> (now), now);
+    pairing.add_trigger (static_cast<GstClockTime> (now), now);
     for (int camera = 0; camera < 2; camera++) {
       CameraFrame frame = picture (numbers[camera]++, now + kMs);
       if (!lost (fired, camera))
-        pairing.take (camera, std::move (frame));
+        pairing.add_frame (camera, std::move (frame));
     }
     fired++;
-    CamSourceSet set;
-    while (pairing.next (set))
+    ImageSet set;
+    while (pairing.next_set (set))
       set = {};
   }
   return missed;
@@ -54,55 +54,56 @@ run_shots (CamSourcePairing &pairing, int ticks, Lost lost)
 
 GST_START_TEST (test_answers_that_get_lost_while_delays_are_learnt_cost_few_ticks)
 {
-  CamSourcePairing pairing;
-  pairing.start (2, Fired::kHere, kPeriod, 0, 3);
-  pairing.forget ();
-  const int missed = run_shots (pairing, 200, [] (int shot, int camera) {
-    return (shot == 0 && camera == 0) || (shot == 1 && camera == 1);
+  FramePairing pairing;
+  pairing.configure (2, By::kElement, kPeriod, 0, 3);
+  pairing.reset ();
+  const int missed = run_triggers (pairing, 200, [] (int trigger, int camera) {
+    return (trigger == 0 && camera == 0) || (trigger == 1 && camera == 1);
   });
   fail_unless (missed > 0, "nothing was waited for");
-  fail_unless (missed < 15, "%d ticks of 200 without a shot", missed);
+  fail_unless (missed < 15, "%d ticks of 200 without a trigger", missed);
 }
 GST_END_TEST;
 
 GST_START_TEST (test_camera_that_never_answers_is_waited_for_longer_and_longer)
 {
-  CamSourcePairing pairing;
-  pairing.start (2, Fired::kHere, kPeriod, 0, 3);
-  pairing.forget ();
-  const int missed = run_shots (pairing, 200, [] (int, int camera) { return camera == 1; });
-  fail_unless (missed > 100, "%d ticks of 200 without a shot", missed);
+  FramePairing pairing;
+  pairing.configure (2, By::kElement, kPeriod, 0, 3);
+  pairing.reset ();
+  const int missed = run_triggers (pairing, 200, [] (int, int camera) { return camera == 1; });
+  fail_unless (missed > 100, "%d ticks of 200 without a trigger", missed);
 }
 GST_END_TEST;
 
-/* Answers of the right camera come long after the next shot was fired: whose they are must not be
- * mistaken. */
-GST_START_TEST (test_camera_that_is_late_from_the_start_is_never_given_another_shot)
+/* Answers of the right camera come long after the next trigger was fired: whose they are must not
+ * be mistaken. */
+GST_START_TEST (test_camera_that_is_late_from_the_start_is_never_given_another_trigger)
 {
   for (const std::int64_t late : {70, 100, 130, 170, 250}) {
-    CamSourcePairing pairing;
-    pairing.start (2, Fired::kHere, kPeriod, 0, rangecast::FrameSets::kMaxWaiting);
-    pairing.forget ();
+    FramePairing pairing;
+    pairing.configure (2, By::kElement, kPeriod, 0, rangecast::FrameSets::kMaxWaiting);
+    pairing.reset ();
     std::deque<std::pair<std::int64_t, CameraFrame>> under_way; /* with its arrival */
     std::uint64_t number = 0;
     int sets = 0;
     for (int tick = 1; tick <= 400; tick++) {
       const std::int64_t now = 1000 * kMs + tick * kPeriod;
       for (; !under_way.empty () && under_way.front ().first <= now; under_way.pop_front ())
-        pairing.take (1, std::move (under_way.front ().second));
-      CamSourceSet set;
-      for (; pairing.next (set); set = {}, sets++)
+        pairing.add_frame (1, std::move (under_way.front ().second));
+      ImageSet set;
+      for (; pairing.next_set (set); set = {}, sets++)
         for (int camera = 0; camera < 2; camera++)
-          fail_unless_equals_uint64 (GST_BUFFER_OFFSET (set.pictures[camera].get ()), set.tick);
-      if (!pairing.may_fire (false, now))
+          fail_unless_equals_uint64 (
+              GST_BUFFER_OFFSET (set.images[camera].get ()), set.trigger_time);
+      if (!pairing.may_trigger (false, now))
         continue;
-      pairing.fired (static_cast<GstClockTime> (now), now);
+      pairing.add_trigger (static_cast<GstClockTime> (now), now);
       CameraFrame left = picture (number, now + kMs), right = picture (number, now + kMs);
       number++;
       GST_BUFFER_OFFSET (left.buffer.get ()) = static_cast<guint64> (now);
       GST_BUFFER_OFFSET (right.buffer.get ()) = static_cast<guint64> (now);
       right.arrived_us = (now + late * kMs) / 1000;
-      pairing.take (0, std::move (left));
+      pairing.add_frame (0, std::move (left));
       under_way.emplace_back (now + late * kMs, std::move (right));
     }
     fail_unless (sets > 0 || late > 130, "no set at %d ms", int (late));
@@ -113,23 +114,23 @@ GST_END_TEST;
 /* @return how many sets of `frames` come out if the right camera's frame 20 has a stamp that is so
  * much off */
 static int
-sets_with_a_wrong_stamp (Fired fired, std::int64_t off)
+sets_with_a_wrong_stamp (By by, std::int64_t off)
 {
-  CamSourcePairing pairing;
-  pairing.start (2, fired, kPeriod, 0, 3);
-  pairing.forget ();
+  FramePairing pairing;
+  pairing.configure (2, by, kPeriod, 0, 3);
+  pairing.reset ();
   for (int camera = 0; camera < 2; camera++)
     pairing.set_clock_offset (camera, 0);
   int sets = 0;
   for (int i = 0; i < 30; i++) {
     const std::int64_t taken = 1000 * kMs + i * kPeriod;
-    pairing.take (0, picture (static_cast<std::uint64_t> (100 + i), taken));
+    pairing.add_frame (0, picture (static_cast<std::uint64_t> (100 + i), taken));
     CameraFrame right = picture (static_cast<std::uint64_t> (i), taken + kMs);
     if (i == 20)
       right.camera_time_ns += static_cast<std::uint64_t> (off);
-    pairing.take (1, std::move (right));
-    CamSourceSet set;
-    while (pairing.next (set)) {
+    pairing.add_frame (1, std::move (right));
+    ImageSet set;
+    while (pairing.next_set (set)) {
       sets++;
       set = {};
     }
@@ -139,9 +140,9 @@ sets_with_a_wrong_stamp (Fired fired, std::int64_t off)
 
 GST_START_TEST (test_wrong_stamp_costs_no_set_where_cameras_that_one_signal_fires_count_alike)
 {
-  fail_unless_equals_int (sets_with_a_wrong_stamp (Fired::kElsewhere, -9 * kMs), 30);
-  fail_unless_equals_int (sets_with_a_wrong_stamp (Fired::kElsewhere, 10 * kMs), 30);
-  fail_unless_equals_int (sets_with_a_wrong_stamp (Fired::kAlone, 10 * kMs), 29);
+  fail_unless_equals_int (sets_with_a_wrong_stamp (By::kExternal, -9 * kMs), 30);
+  fail_unless_equals_int (sets_with_a_wrong_stamp (By::kExternal, 10 * kMs), 30);
+  fail_unless_equals_int (sets_with_a_wrong_stamp (By::kCamera, 10 * kMs), 29);
 }
 GST_END_TEST;
 
@@ -152,7 +153,7 @@ stereocampairing_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_answers_that_get_lost_while_delays_are_learnt_cost_few_ticks);
-  tcase_add_test (tc, test_camera_that_is_late_from_the_start_is_never_given_another_shot);
+  tcase_add_test (tc, test_camera_that_is_late_from_the_start_is_never_given_another_trigger);
   tcase_add_test (tc, test_camera_that_never_answers_is_waited_for_longer_and_longer);
   tcase_add_test (
       tc, test_wrong_stamp_costs_no_set_where_cameras_that_one_signal_fires_count_alike);

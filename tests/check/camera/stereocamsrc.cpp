@@ -23,7 +23,7 @@ GST_START_TEST (test_software_pairs_share_pts_and_capture_time_on_ticks)
     fail_unless_equals_uint64 (picture.pts, picture.capture - base);
     fail_unless_equals_uint64 (picture.duration, kPeriod);
     /* the system clock is CLOCK_MONOTONIC: it was taken after its tick */
-    fail_unless (picture.mark.taken_ns >= static_cast<std::int64_t> (picture.capture));
+    ck_assert_int_ge (picture.mark.taken_ns, static_cast<std::int64_t> (picture.capture));
   }
   fail_unless_equals_uint64 (p.stat ("sets"), 50);
 }
@@ -173,7 +173,7 @@ GST_START_TEST (test_caps_that_nobody_has_are_one_error_that_names_pad_field_and
   };
   for (const auto &row : rows) {
     const std::string text = error_with_caps (row.left, row.right);
-    fail_unless (text.find (row.expected) != std::string::npos, "%s", text.c_str ());
+    fail_unless_contains (text, row.expected);
   }
 }
 GST_END_TEST;
@@ -185,9 +185,9 @@ GST_START_TEST (test_format_that_is_not_there_is_one_error_that_lists_the_camera
   p.play ();
   const std::string text = p.next_text (GST_MESSAGE_ERROR);
   for (const char *part : {"Mono12Packed", "Mono8"})
-    fail_unless (text.find (part) != std::string::npos, "%s", text.c_str ());
+    fail_unless_contains (text, part);
   for (int camera = 0; camera < 2; camera++)
-    fail_unless (text.find (camera_address (camera)) != std::string::npos, "%s", text.c_str ());
+    fail_unless_contains (text, camera_address (camera));
   fail_unless (text.find ("Mono8") == text.rfind ("Mono8"), "the same twice: %s", text.c_str ());
 }
 GST_END_TEST;
@@ -208,7 +208,7 @@ write_rig (bool with_names)
   rig.views[0].right = right;
   const std::string path =
       std::string (g_get_tmp_dir ()) + "/rangecast-cameras-" + std::to_string (getpid ()) + ".yaml";
-  fail_unless (save_rig (path, rig).ok ());
+  fail_unless_ok (save_rig (path, rig));
   return path;
 }
 
@@ -279,7 +279,7 @@ GST_START_TEST (test_blocked_branch_does_not_hold_up_the_other)
   p.play ();
   fail_unless (p.wait_for_pictures (1, 40));
   fail_unless_equals_int (int (p.seen (0).size ()), 0);
-  fail_unless (p.stat ("overrun-left") > 0);
+  ck_assert_uint_gt (p.stat ("overrun-left"), 0);
   fail_unless_equals_uint64 (p.stat ("overrun-right"), 0);
   gst_pad_remove_probe (left, id);
   fail_unless (p.wait_for_pictures (0, 5));

@@ -112,7 +112,7 @@ GST_START_TEST (test_scheduled_action_fires_at_the_tick_itself)
   p.play_to_the_end ();
   expect_pairs (p, 2, kPeriod / 2);
   for (const SeenPicture &picture : p.seen (0))
-    fail_unless (picture.mark.taken_ns >= static_cast<std::int64_t> (picture.capture));
+    ck_assert_int_ge (picture.mark.taken_ns, static_cast<std::int64_t> (picture.capture));
 }
 GST_END_TEST;
 
@@ -227,7 +227,7 @@ GST_START_TEST (test_single_shot_has_the_time_that_was_asked_for)
   fail_unless (p.wait_for_pictures (0, 2) && p.wait_for_pictures (1, 2));
   fail_unless_equals_uint64 (p.seen (0)[1].capture, time);
   fail_unless_equals_uint64 (p.seen (1)[1].capture, time);
-  fail_unless (p.seen (0)[1].mark.taken_ns >= static_cast<std::int64_t> (time));
+  ck_assert_int_ge (p.seen (0)[1].mark.taken_ns, static_cast<std::int64_t> (time));
 }
 GST_END_TEST;
 
@@ -269,7 +269,7 @@ GST_START_TEST (test_clock_server_that_never_answers_is_one_error)
   CameraPipeline p ("trigger=software clock-server=127.0.0.1:9");
   p.play ();
   const std::string text = p.next_text (GST_MESSAGE_ERROR);
-  fail_unless (text.find ("127.0.0.1:9 does not answer") != std::string::npos, "%s", text.c_str ());
+  fail_unless_contains (text, "127.0.0.1:9 does not answer");
 }
 GST_END_TEST;
 

@@ -147,7 +147,7 @@ GST_START_TEST (test_without_trouble_thresholds_are_as_configured)
   Session plain (""), adaptive ("adaptive-bitrate=true");
   plain.play (30);
   adaptive.play (30);
-  fail_unless (plain.sizes == adaptive.sizes);
+  fail_unless_cmp (plain.sizes, ==, adaptive.sizes);
   fail_unless_equals_uint64 (adaptive.estimate (), 0);
   fail_unless_equals_uint64 (adaptive.stat ("receiver-reports"), 30);
   fail_unless_equals_int (adaptive.messages (), 0);
@@ -163,8 +163,8 @@ GST_START_TEST (test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it)
   session.play (15);
   const guint64 low = session.estimate ();
   fail_unless (low > 0 && double (low) < 0.95 * before, "%" G_GUINT64_FORMAT " of %g", low, before);
-  fail_unless (session.sizes.back () < session.sizes.front ());
-  fail_unless (session.messages () > 0);
+  ck_assert_uint_lt (session.sizes.back (), session.sizes.front ());
+  ck_assert_int_gt (session.messages (), 0);
   session.receiver.queue_growth_s = -session.receiver.queue_s / 10;
   session.play (10);
   session.receiver.queue_growth_s = 0;
@@ -173,7 +173,7 @@ GST_START_TEST (test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it)
     g_usleep (50000);
     session.play (10);
   }
-  fail_unless (session.estimate () > low);
+  ck_assert_uint_gt (session.estimate (), low);
 }
 GST_END_TEST;
 
@@ -183,8 +183,8 @@ GST_START_TEST (test_lost_packets_lower_the_rate)
   session.play (15);
   session.receiver.lost_of_10 = 4;
   session.play (40);
-  fail_unless (session.estimate () > 0);
-  fail_unless (session.sizes.back () < session.sizes.front ());
+  ck_assert_uint_gt (session.estimate (), 0);
+  ck_assert_uint_lt (session.sizes.back (), session.sizes.front ());
 }
 GST_END_TEST;
 
@@ -209,7 +209,7 @@ GST_START_TEST (test_without_adaptive_bitrate_events_change_nothing)
   session.receiver.lost_of_10 = 9;
   session.play (60);
   other.play (60, false);
-  fail_unless (session.sizes == other.sizes);
+  fail_unless_cmp (session.sizes, ==, other.sizes);
   fail_unless_equals_uint64 (session.stat ("receiver-reports"), 60);
 }
 GST_END_TEST;
@@ -221,8 +221,8 @@ GST_START_TEST (test_receiver_reports_lower_the_rate)
   for (int i = 0; i < 2; i++)
     fail_unless (gst_harness_push_upstream_event (session.h, receiver_report (0.3)));
   session.play (10, false);
-  fail_unless (session.estimate () > 0);
-  fail_unless (double (session.estimate ()) < 0.7 * usual_rate ());
+  ck_assert_uint_gt (session.estimate (), 0);
+  fail_unless_cmp (double (session.estimate ()), <, 0.7 * usual_rate ());
 }
 GST_END_TEST;
 
@@ -238,7 +238,7 @@ GST_START_TEST (test_below_the_worst_thresholds_whole_frame_sets_are_left_out_ev
   fail_unless (session.times.size () < 46, "%d frame sets", int (session.times.size ()));
   const GstClockTime step = session.times[1] - session.times[0];
   for (gsize i = 1; i < session.times.size (); i++)
-    fail_unless (session.times[i] - session.times[i - 1] == step);
+    ck_assert_uint_eq (session.times[i] - session.times[i - 1], step);
   fail_unless_equals_uint64 (session.stat ("left-out") - before, 90 - session.times.size ());
   /* Each is a GAP downstream. */
   fail_unless_equals_int (
@@ -252,9 +252,10 @@ GST_START_TEST (test_below_the_worst_thresholds_whole_frame_sets_are_left_out_ev
   fail_unless (last != nullptr);
   GstClockTime time, duration;
   gst_event_parse_gap (last, &time, &duration);
-  fail_unless (time > 88 * kInterval && time < 180 * kInterval);
+  ck_assert_uint_gt (time, 88 * kInterval);
+  ck_assert_uint_lt (time, 180 * kInterval);
   gst_event_unref (last);
-  fail_unless (session.messages () > 0);
+  ck_assert_int_gt (session.messages (), 0);
 }
 GST_END_TEST;
 
@@ -275,7 +276,7 @@ GST_START_TEST (test_what_refers_to_earlier_frame_sets_decodes_where_some_are_le
                    std::to_string (int (usual_rate () / 60)));
   session.keeps = true;
   session.play (90);
-  fail_unless (session.stat ("left-out") > 20);
+  ck_assert_uint_gt (session.stat ("left-out"), 20);
   GstHarness *decoder = harness_of ("neighbourcodedec");
   gst_harness_set_src_caps (decoder, coded_caps (session.rig));
   for (GstBuffer *buffer : session.buffers)
@@ -347,7 +348,7 @@ GST_START_TEST (test_ready_forgets_the_receivers)
   Session session ("adaptive-bitrate=true");
   session.receiver.lost_of_10 = 5;
   session.play (40);
-  fail_unless (session.estimate () > 0);
+  ck_assert_uint_gt (session.estimate (), 0);
   gst_element_set_state (session.h->element, GST_STATE_READY);
   gst_harness_play (session.h);
   gst_harness_set_src_caps (session.h, range_caps (session.rig));

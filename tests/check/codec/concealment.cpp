@@ -49,8 +49,9 @@ GST_START_TEST (test_view_of_which_nothing_comes_stays_for_a_second_and_goes)
   for (int i = 1; i <= 10; i++)
     fail_unless (show (h, of_view (units, 1), GstClockTime (i) * kStep) == whole, "at %d", i);
   const Pixels one = show (h, of_view (units, 1), 11 * kStep);
-  fail_unless (!one.contains (0) && one.at (1) == whole.at (1));
-  fail_unless (show (h, units, 12 * kStep) == whole);
+  fail_unless (!one.contains (0));
+  fail_unless_cmp (one.at (1), ==, whole.at (1));
+  fail_unless_cmp (show (h, units, 12 * kStep), ==, whole);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -64,9 +65,9 @@ GST_START_TEST (test_frame_sets_of_which_nothing_is_sound_leave_the_picture)
     unit[6] = 99; /* depth bits */
   GstHarness *h = decoder (rig);
   const Pixels whole = show (h, units, 0);
-  fail_unless (show (h, kNothing, kStep) == whole);
-  fail_unless (show (h, damaged, 2 * kStep) == whole);
-  fail_unless (show (h, {units[3]}, 3 * kStep) == whole);
+  fail_unless_cmp (show (h, kNothing, kStep), ==, whole);
+  fail_unless_cmp (show (h, damaged, 2 * kStep), ==, whole);
+  fail_unless_cmp (show (h, {units[3]}, 3 * kStep), ==, whole);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -88,7 +89,7 @@ GST_START_TEST (test_stray_slice_that_comes_alone_does_not_crop_the_picture)
       if (!inside && mixed.at (0)[p] != whole.at (0)[p])
         fail ("another pixel at %d, %d", x, y);
     }
-  fail_unless (show (h, {units[2]}, 2 * kStep).at (0).size () == whole.at (0).size ());
+  ck_assert_uint_eq (show (h, {units[2]}, 2 * kStep).at (0).size (), whole.at (0).size ());
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -104,7 +105,10 @@ GST_START_TEST (test_region_that_shrinks_where_most_came_is_that_of_the_frame_se
   most.pop_back ();
   GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (most, kStep));
   const GstRangeMeta *meta = gst_buffer_get_range_meta (output, 0);
-  fail_unless (meta->x == 60 && meta->y == 50 && meta->width == 200 && meta->height == 150);
+  ck_assert_int_eq (meta->x, 60);
+  ck_assert_int_eq (meta->y, 50);
+  ck_assert_int_eq (meta->width, 200);
+  ck_assert_int_eq (meta->height, 150);
   gst_buffer_unref (output);
   gst_harness_teardown (h);
 }
@@ -120,14 +124,14 @@ GST_START_TEST (test_damaged_time_of_one_frame_set_does_not_end_concealment_but_
   const Pixels whole = show (h, units, 50 * kStep);
   GstClockTime time = 50 * kStep;
   for (const GstClockTime damaged : {700 * kStep, 3 * kStep}) {
-    fail_unless (show (h, some, damaged, true) != whole);
-    fail_unless (show (h, some, time += 2 * kStep, true) == whole);
-    fail_unless (show (h, some, time += kStep) == whole);
+    fail_unless_cmp (show (h, some, damaged, true), !=, whole);
+    fail_unless_cmp (show (h, some, time += 2 * kStep, true), ==, whole);
+    fail_unless_cmp (show (h, some, time += kStep), ==, whole);
   }
-  fail_unless (show (h, some, 700 * kStep, true) != whole);
-  fail_unless (show (h, some, 701 * kStep) != whole);
-  fail_unless (show (h, units, 702 * kStep) == whole);
-  fail_unless (show (h, some, 703 * kStep) == whole);
+  fail_unless_cmp (show (h, some, 700 * kStep, true), !=, whole);
+  fail_unless_cmp (show (h, some, 701 * kStep), !=, whole);
+  fail_unless_cmp (show (h, units, 702 * kStep), ==, whole);
+  fail_unless_cmp (show (h, some, 703 * kStep), ==, whole);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -140,7 +144,7 @@ GST_START_TEST (test_damaged_time_does_not_end_the_second_for_which_a_view_may_s
     GstHarness *h = decoder (rig);
     const Pixels whole = show (h, units, 50 * kStep);
     show (h, units, damaged, true);
-    fail_unless (show (h, of_view (units, 1), 52 * kStep, true) == whole);
+    fail_unless_cmp (show (h, of_view (units, 1), 52 * kStep, true), ==, whole);
     gst_harness_teardown (h);
   }
 }

@@ -99,13 +99,13 @@ expect_digests (const std::string &name, int views = 2)
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
   fail_unless (caps != nullptr);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   gst_caps_unref (caps);
   std::map<int, Pictures> pictures; /* by view-id */
   while (GstBuffer *buffer = gst_harness_try_pull (h)) {
     {
       const gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
-      fail_unless (frame.status ().ok ());
+      fail_unless_ok (frame.status ());
       for (const View &view : info.rig.views) {
         ConstRangeImage image; /* empty where the view did not come */
         for (const RangeImage &one : frame.views ())
@@ -198,7 +198,7 @@ GST_START_TEST (test_exact_pictures_are_coded_as_ever)
     gst_buffer_unref (buffer);
   }
   gst_harness_teardown (h);
-  fail_unless (coded == stream);
+  fail_unless_cmp (coded, ==, stream);
 }
 GST_END_TEST;
 

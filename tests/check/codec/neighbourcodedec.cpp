@@ -85,12 +85,14 @@ GST_START_TEST (test_lossless_settings_give_every_pixel_back)
     fail_unless_equals_int (b.views ().size (), 3);
     for (int i = 0; i < 3; i++) {
       const RangeImage &x = a.views ()[i], &y = b.views ()[i];
-      fail_unless (x.roi == y.roi && x.view_id == y.view_id);
+      fail_unless_cmp (x.roi, ==, y.roi);
+      ck_assert_int_eq (x.view_id, y.view_id);
       for (int row = 0; row < x.roi.height; row++)
         for (int column = 0; column < x.roi.width; column++) {
           fail_unless_equals_int (x.depth.at (column, row), y.depth.at (column, row));
           if (x.depth.at (column, row))
-            fail_unless (memcmp (&x.colour.at (column, row), &y.colour.at (column, row), 3) == 0);
+            ck_assert_int_eq (
+                memcmp (&x.colour.at (column, row), &y.colour.at (column, row), 3), 0);
         }
     }
   }
@@ -109,9 +111,9 @@ GST_START_TEST (test_lost_slices_leave_invalid_pixels_and_no_error)
   GstHarness *h = decoder_harness (rig);
   GstBuffer *whole = gst_harness_push_and_pull (h, gst_buffer_ref (coded));
   GstBuffer *damaged = gst_harness_push_and_pull (h, without_units (coded, 1, 4));
-  fail_unless (points (damaged) < points (whole));
-  fail_unless (points (damaged) > points (whole) / 2);
-  fail_unless (stat (h, "neighbourcodedec", "missing-pixels") > 0);
+  ck_assert_uint_lt (points (damaged), points (whole));
+  ck_assert_uint_gt (points (damaged), points (whole) / 2);
+  ck_assert_uint_gt (stat (h, "neighbourcodedec", "missing-pixels"), 0);
   gst_buffer_unref (whole);
   gst_buffer_unref (damaged);
   gst_buffer_unref (coded);
@@ -133,7 +135,7 @@ GST_START_TEST (test_conceal_last_keeps_the_pixels_of_lost_slices)
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
   GstBuffer *after_flush = gst_harness_push_and_pull (h, without_units (coded, 1, 4));
-  fail_unless (points (after_flush) < points (whole));
+  ck_assert_uint_lt (points (after_flush), points (whole));
   gst_buffer_unref (after_flush);
   gst_buffer_unref (whole);
   gst_buffer_unref (concealed);
@@ -171,7 +173,7 @@ GST_START_TEST (test_noise_gives_empty_frame_sets_and_no_error)
     gst_buffer_unref (output);
   }
   g_rand_free (random);
-  fail_unless (stat (h, "neighbourcodedec", "bad-slices") > 100);
+  ck_assert_uint_gt (stat (h, "neighbourcodedec", "bad-slices"), 100);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -189,7 +191,7 @@ GST_START_TEST (test_settings_change_while_playing)
     sizes[i] = stat (h, "neighbourcodeenc", "coded-bytes");
     g_object_set (encoder, "colour-threshold", 40, "depth-threshold", 60, nullptr);
   }
-  fail_unless (sizes[1] - sizes[0] < sizes[0] / 2);
+  ck_assert_uint_lt (sizes[1] - sizes[0], sizes[0] / 2);
   gst_object_unref (encoder);
   gst_harness_teardown (h);
 }
@@ -295,9 +297,9 @@ GST_START_TEST (test_stray_slice_that_comes_first_costs_only_itself)
     units.insert (units.begin (), stray);
     GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (units));
     for (const int row : {0, 100, 239})
-      fail_unless (depths_of_row (output, row) == depths_of_row (whole, row));
-    fail_unless (stat (h, "neighbourcodedec", "slices") >= 2 * good.size ());
-    fail_unless (stat (h, "neighbourcodedec", "bad-slices") <= 1);
+      fail_unless_cmp (depths_of_row (output, row), ==, depths_of_row (whole, row));
+    ck_assert_uint_ge (stat (h, "neighbourcodedec", "slices"), 2 * good.size ());
+    ck_assert_uint_le (stat (h, "neighbourcodedec", "bad-slices"), 1);
     gst_buffer_unref (whole);
     gst_buffer_unref (output);
     gst_harness_teardown (h);
@@ -352,7 +354,7 @@ expect_frame_set (GstHarness *h, GstBuffer *expected, GstClockTime time)
   fail_if (GST_BUFFER_FLAG_IS_SET (output, GST_BUFFER_FLAG_MARKER));
   fail_unless_equals_int (points (output), points (expected));
   for (const int row : {0, 100, 239})
-    fail_unless (depths_of_row (output, row) == depths_of_row (expected, row));
+    fail_unless_cmp (depths_of_row (output, row), ==, depths_of_row (expected, row));
   gst_buffer_unref (output);
 }
 
@@ -423,7 +425,7 @@ GST_START_TEST (test_flush_and_null_drop_slices_that_wait)
   flush (h);
   push_slices (h, units, 1, false);
   for (const GstState state : {GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
-    fail_unless (gst_element_set_state (h->element, state) == GST_STATE_CHANGE_SUCCESS);
+    ck_assert_int_eq (gst_element_set_state (h->element, state), GST_STATE_CHANGE_SUCCESS);
   gst_harness_play (h);
   gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
   push_slices (h, units, 2, true);
@@ -450,7 +452,7 @@ GST_START_TEST (test_slices_and_access_units_decode_to_the_same)
   fail_unless_equals_int (outputs[1].size (), 3);
   for (std::size_t i = 0; i < 3; i++) {
     fail_unless_equals_int (points (outputs[0][i]), points (outputs[1][i]));
-    fail_unless (depths_of_row (outputs[0][i], 99) == depths_of_row (outputs[1][i], 99));
+    fail_unless_cmp (depths_of_row (outputs[0][i], 99), ==, depths_of_row (outputs[1][i], 99));
   }
   unref_all (outputs[0]);
   unref_all (outputs[1]);
@@ -466,7 +468,7 @@ GST_START_TEST (test_endless_frame_set_of_slices_stays_below_32_MiB)
     push_slices (h, {chunk}, 0, false);
   push_slices (h, {chunk}, 0, true);
   gst_buffer_unref (gst_harness_pull (h));
-  fail_unless (stat (h, "neighbourcodedec", "coded-bytes") <= 32 << 20);
+  ck_assert_uint_le (stat (h, "neighbourcodedec", "coded-bytes"), 32 << 20);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -493,7 +495,7 @@ points_by_view (const std::string &source, const char *rest)
   std::vector<std::size_t> counts;
   {
     gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
-    fail_unless (frame.status ().ok ());
+    fail_unless_ok (frame.status ());
     for (const RangeImage &image : frame.views ()) {
       fail_unless_equals_int (image.view_id, counts.size ());
       std::size_t n = 0;
@@ -530,12 +532,12 @@ GST_START_TEST (test_17_and_64_views_keep_the_points_of_each_view_alone)
     const auto raw = points_by_view (source, "");
     fail_unless_equals_int (raw.size (), views);
     for (const int view : {0, 1, 15, 16, views - 1}) {
-      fail_unless (raw[std::size_t (view)] > 0);
+      ck_assert_uint_gt (raw[std::size_t (view)], 0);
       fail_unless_equals_int (raw[std::size_t (view)], points_of_view_alone (views, view));
     }
-    fail_unless (raw == points_by_view (source, " ! rangemux"));
-    fail_unless (
-        raw == points_by_view (source, " ! neighbourcodeenc depth-bits=16 ! neighbourcodedec"));
+    fail_unless_cmp (raw, ==, points_by_view (source, " ! rangemux"));
+    fail_unless_cmp (
+        raw, ==, points_by_view (source, " ! neighbourcodeenc depth-bits=16 ! neighbourcodedec"));
   }
 }
 GST_END_TEST;
@@ -563,7 +565,7 @@ GST_START_TEST (test_rig_beyond_the_limit_is_an_error_that_names_it)
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (h->element, bus);
   gst_harness_set_src_caps (h, coded_caps (ring_rig (64, 16384, 16384)));
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("134217728") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "134217728");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -602,7 +604,7 @@ GST_START_TEST (test_one_row_of_a_huge_image_makes_a_small_one)
   fail_unless_equals_int (meta->y, 4000);
   fail_unless_equals_int (meta->width, 80);
   fail_unless_equals_int (meta->height, 1);
-  fail_unless (gst_buffer_get_size (output) < 2000);
+  ck_assert_uint_lt (gst_buffer_get_size (output), 2000);
   fail_unless_equals_uint64 (
       stat (h, "neighbourcodedec", "missing-pixels"), 2 * (4096 * 4096 - 80));
   fail_unless_equals_uint64 (stat (h, "neighbourcodedec", "slices"), 2);

@@ -39,7 +39,7 @@ GST_START_TEST (test_states_change_twice_and_frames_count_from_0_again)
       fail_unless_equals_int (header_of (units[0]).frame_number, i);
     }
     for (const GstState state : {GST_STATE_READY, GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
-      fail_unless (gst_element_set_state (h->element, state) == GST_STATE_CHANGE_SUCCESS);
+      ck_assert_int_eq (gst_element_set_state (h->element, state), GST_STATE_CHANGE_SUCCESS);
     gst_harness_play (h);
     gst_harness_set_src_caps (h, range_caps (rig));
   }
@@ -115,8 +115,8 @@ GST_START_TEST (test_new_caps_in_mid_stream_give_slices_of_the_new_rig)
     fail_unless_equals_int (header_of (units.back ()).view_id, int (rig->views.size ()) - 1);
     GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
     gstrange::RangeInfo info;
-    fail_unless (gstrange::parse_caps (caps, info).ok ());
-    fail_unless (encode_rig (info.rig) == encode_rig (*rig));
+    fail_unless_ok (gstrange::parse_caps (caps, info));
+    fail_unless_cmp (encode_rig (info.rig), ==, encode_rig (*rig));
     gst_caps_unref (caps);
   }
   gst_harness_teardown (h);
@@ -148,7 +148,8 @@ with_padded_strides (GstBuffer *frame_set)
   meta->colour_stride = colour_stride;
   {
     gstrange::RangeFrameMap from (frame_set, GST_MAP_READ), to (padded, GST_MAP_WRITE);
-    fail_unless (from.status ().ok () && to.status ().ok ());
+    fail_unless_ok (from.status ());
+    fail_unless_ok (to.status ());
     fill_from (from.views ()[0], to.views ()[0]);
   }
   gst_buffer_unref (frame_set);
@@ -159,7 +160,7 @@ GST_START_TEST (test_padded_strides_code_to_the_same)
 {
   const Rig rig = ring_rig (1);
   const auto plain = encoded_units (rig, make_frame_set (rig));
-  fail_unless (encoded_units (rig, with_padded_strides (make_frame_set (rig))) == plain);
+  fail_unless_cmp (encoded_units (rig, with_padded_strides (make_frame_set (rig))), ==, plain);
 }
 GST_END_TEST;
 
@@ -172,7 +173,7 @@ worst_depth_error (GstBuffer *sent, GstBuffer *got)
   int worst = 0;
   for (std::size_t i = 0; i < a.views ().size (); i++) {
     const RangeImage &x = a.views ()[i], &y = b.views ()[i];
-    fail_unless (x.roi == y.roi);
+    fail_unless_cmp (x.roi, ==, y.roi);
     for (int row = 0; row < x.roi.height; row++)
       for (int column = 0; column < x.roi.width; column++) {
         const int before = x.depth.at (column, row), after = y.depth.at (column, row);
@@ -196,7 +197,7 @@ GST_START_TEST (test_bits_change_with_the_next_frame_set)
   g_object_get (h->element, "max-depth-error", &fine, nullptr);
   fail_unless_equals_int (header.depth_bits, 16);
   fail_unless_equals_int (header.colour_bits, 5);
-  fail_unless (fine < coarse);
+  fail_unless_cmp (fine, <, coarse);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -250,7 +251,7 @@ GST_START_TEST (test_larger_thresholds_give_fewer_bytes_at_once)
   for (const int threshold : {0, 4, 20, 100}) {
     g_object_set (h->element, "depth-threshold", threshold, "colour-threshold", threshold, nullptr);
     GstBuffer *coded = gst_harness_push_and_pull (h, make_frame_set (rig));
-    fail_unless (gst_buffer_get_size (coded) < last);
+    ck_assert_uint_lt (gst_buffer_get_size (coded), last);
     last = gst_buffer_get_size (coded);
     gst_buffer_unref (coded);
   }
@@ -267,8 +268,8 @@ GST_START_TEST (test_no_slice_is_longer_than_max_slice_size_also_when_it_changes
     gsize longest = 0;
     for (const auto &unit : push_and_pull_units (h, make_frame_set (rig)))
       longest = std::max (longest, unit.size ());
-    fail_unless (longest <= gsize (limit));
-    fail_unless (longest > gsize (limit) / 2);
+    ck_assert_uint_le (longest, gsize (limit));
+    ck_assert_uint_gt (longest, gsize (limit) / 2);
   }
   gst_harness_teardown (h);
 }
@@ -305,7 +306,8 @@ GST_START_TEST (test_caps_without_a_rig_are_an_error)
     ErrorCounter errors (h);
     gst_harness_set_src_caps_str (
         h, "video/x-range,format=Z16_RGBx,width=320,height=240,framerate=30/1,views=1");
-    fail_unless (errors.take () > 0); /* again with each event: GStreamer repeats refused caps */
+    ck_assert_int_gt (
+        errors.take (), 0); /* again with each event: GStreamer repeats refused caps */
   }
   gst_harness_teardown (h);
 }
@@ -367,7 +369,7 @@ GST_START_TEST (test_slices_come_one_a_buffer_with_the_times_of_their_frame_set)
   auto buffers = pull_all (h);
   fail_unless_equals_int (buffers.size (), expected.size ());
   for (std::size_t i = 0; i < buffers.size (); i++) {
-    fail_unless (bytes_of (buffers[i]) == expected[i]);
+    fail_unless_cmp (bytes_of (buffers[i]), ==, expected[i]);
     fail_unless_equals_uint64 (GST_BUFFER_PTS (buffers[i]), 42);
     fail_unless_equals_uint64 (GST_BUFFER_DURATION (buffers[i]), 5);
     fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (buffers[i]), 42);
@@ -437,21 +439,21 @@ GST_START_TEST (test_a_request_waits_until_the_last_key_frame_set_is_old_enough)
   const Rig rig = ring_rig (1);
   GstHarness *h =
       encoder (rig, "temporal=true profile=packed min-force-key-unit-interval=90000000");
-  fail_unless (kinds (h, rig, 0, 1) == "k");
+  fail_unless_cmp (kinds (h, rig, 0, 1), ==, "k");
   ask_for_key (h);
   ask_for_key (h); /* both get the same answer */
-  fail_unless (kinds (h, rig, 1, 5) == "ddkd");
+  fail_unless_cmp (kinds (h, rig, 1, 5), ==, "ddkd");
   fail_unless_equals_int (count_announcements (h), 1);
   ask_for_key (h);
-  fail_unless (kinds (h, rig, 5, 8) == "dkd");
+  fail_unless_cmp (kinds (h, rig, 5, 8), ==, "dkd");
   /* Long enough after it there is nothing to wait for. */
-  fail_unless (kinds (h, rig, 8, 12) == "dddd");
+  fail_unless_cmp (kinds (h, rig, 8, 12), ==, "dddd");
   ask_for_key (h);
-  fail_unless (kinds (h, rig, 12, 14) == "kd");
+  fail_unless_cmp (kinds (h, rig, 12, 14), ==, "kd");
   fail_unless_equals_int (count_announcements (h), 2);
   g_object_set (h->element, "min-force-key-unit-interval", guint64{0}, nullptr);
   ask_for_key (h);
-  fail_unless (kinds (h, rig, 14, 16) == "kd");
+  fail_unless_cmp (kinds (h, rig, 14, 16), ==, "kd");
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -460,12 +462,12 @@ GST_START_TEST (test_requests_for_the_far_future_do_not_keep_others_from_being_h
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = encoder (rig, "temporal=true profile=packed");
-  fail_unless (kinds (h, rig, 0, 2) == "kd");
+  fail_unless_cmp (kinds (h, rig, 0, 2), ==, "kd");
   for (guint i = 0; i < 100; i++)
     gst_harness_push_upstream_event (
         h, gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE - 1, FALSE, i));
   ask_for_key (h);
-  fail_unless (kinds (h, rig, 2, 4) == "kd");
+  fail_unless_cmp (kinds (h, rig, 2, 4), ==, "kd");
   gst_harness_teardown (h);
 }
 GST_END_TEST;

@@ -45,7 +45,8 @@ GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_
     const std::vector<guint8> cut (recording.bytes.begin (), recording.bytes.begin () + size);
     auto parsed = parse (cut, G_MAXINT);
     const auto whole = gsize (size >= ends[1]) + gsize (size >= ends[2]);
-    fail_unless (parsed.size () >= whole && parsed.size () <= whole + 1);
+    ck_assert_uint_ge (parsed.size (), whole);
+    ck_assert_uint_le (parsed.size (), whole + 1);
     for (gsize i = 0; i < whole; i++)
       fail_unless (same_bytes (parsed[i], recording.access_units[i]));
     unref_all (parsed);
@@ -184,7 +185,7 @@ pad_first_access_unit (const Recording &recording, std::vector<guint8> padding)
 {
   AccessUnitHeader header;
   const auto &bytes = recording.bytes;
-  fail_unless (read_access_unit_header ({&bytes[4], 24}, header).ok ());
+  fail_unless_ok (read_access_unit_header ({&bytes[4], 24}, header));
   header.size += guint32 (padding.size ());
   std::vector<guint8> padded (bytes.begin (), bytes.begin () + 28);
   write_access_unit_header (header, &padded[4]);
@@ -231,7 +232,7 @@ GST_START_TEST (test_longest_access_unit_in_small_pieces_takes_linear_time)
   fail_unless_equals_int (parsed.size (), 10);
   unref_all (parsed);
   /* Looking at it all again with each piece would copy 120 GB. */
-  fail_unless (g_get_monotonic_time () - begin < 15 * G_USEC_PER_SEC);
+  ck_assert_int_lt (g_get_monotonic_time () - begin, 15 * G_USEC_PER_SEC);
 }
 GST_END_TEST;
 
@@ -252,10 +253,10 @@ GST_START_TEST (test_longest_access_unit_of_short_units_takes_linear_time)
   const gint64 begin = g_get_monotonic_time ();
   auto parsed = parse (bytes, G_MAXINT);
   /* Copying all again with every 16th piece would take more than a minute. */
-  fail_unless (g_get_monotonic_time () - begin < 30 * G_USEC_PER_SEC);
+  ck_assert_int_lt (g_get_monotonic_time () - begin, 30 * G_USEC_PER_SEC);
   fail_unless_equals_int (parsed.size (), 3);
   /* Its own rig goes on neither: it stands behind the padding. */
-  fail_unless (bytes_of (parsed[0]) == expected);
+  fail_unless_cmp (bytes_of (parsed[0]), ==, expected);
   unref_all (parsed);
 }
 GST_END_TEST;
@@ -275,7 +276,7 @@ GST_START_TEST (test_pieces_of_an_access_unit_keep_their_order_however_many_they
     expected.insert (expected.end (), slices.begin (), slices.end ());
     auto parsed = parse (pad_first_access_unit (recording, padding), G_MAXINT);
     fail_unless_equals_int (parsed.size (), 2);
-    fail_unless (bytes_of (parsed[0]) == expected);
+    fail_unless_cmp (bytes_of (parsed[0]), ==, expected);
     unref_all (parsed);
   }
 }
@@ -291,7 +292,7 @@ GST_START_TEST (test_size_that_lies_delays_nothing)
   for (int i = 0; i < 20; i++) /* 64 KiB are asked for at first, and all is shorter than that */
     push_bytes (
         h, {bytes.data () + recording.offsets[1], bytes.size () - recording.offsets[1]}, 500);
-  fail_unless (gst_harness_buffers_received (h) >= 100);
+  ck_assert_int_ge (gst_harness_buffers_received (h), 100);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -320,7 +321,7 @@ GST_START_TEST (test_access_units_that_came_in_one_buffer_share_its_memory)
   fail_unless_equals_int (parsed.size (), 10);
   for (GstBuffer *buffer : parsed) {
     fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
-    fail_unless (gst_buffer_peek_memory (buffer, 0)->parent == memory);
+    ck_assert_ptr_eq (gst_buffer_peek_memory (buffer, 0)->parent, memory);
   }
   unref_all (parsed);
   gst_memory_unref (memory);
@@ -334,7 +335,7 @@ GST_START_TEST (test_access_unit_that_came_in_pieces_is_one_copy)
   auto parsed = parse (recording.bytes, 1000);
   fail_unless_equals_int (parsed.size (), 10);
   for (GstBuffer *buffer : parsed) {
-    fail_unless (gst_buffer_get_size (buffer) > 1000);
+    ck_assert_uint_gt (gst_buffer_get_size (buffer), 1000);
     fail_unless_equals_int (gst_buffer_n_memory (buffer), 1);
   }
   unref_all (parsed);
@@ -385,7 +386,7 @@ is_written_as_key (const Recording &recording, GstBuffer *coded)
   GstBuffer *written = gst_harness_push_and_pull (h, coded);
   guint8 flags = 7;
   gst_buffer_extract (written, 4 + 1, &flags, 1);
-  fail_unless (flags == !GST_BUFFER_FLAG_IS_SET (written, GST_BUFFER_FLAG_DELTA_UNIT));
+  ck_assert_int_eq (flags, !GST_BUFFER_FLAG_IS_SET (written, GST_BUFFER_FLAG_DELTA_UNIT));
   gst_buffer_unref (written);
   gst_harness_teardown (h);
   return flags;
@@ -395,7 +396,7 @@ GST_START_TEST (test_written_header_is_not_key_where_slices_are_missing)
 {
   const Recording recording (1, 160);
   const auto units = units_of (bytes_of (recording.access_units[0]));
-  fail_unless (units.size () > 4); /* of two views */
+  ck_assert_uint_gt (units.size (), 4); /* of two views */
   fail_unless (is_written_as_key (recording, buffer_of (units)));
   for (std::size_t lost = 0; lost < units.size (); lost++) {
     auto rest = units;
@@ -511,7 +512,7 @@ errors_of (std::span<const guint8> bytes, const char *between)
     if (GST_MESSAGE_TYPE (end) == GST_MESSAGE_ERROR &&
         g_str_has_prefix (GST_MESSAGE_SRC_NAME (end), "neighbourcodeparse")) {
       gst_message_parse_error (end, &error, nullptr);
-      fail_unless (error->domain == GST_STREAM_ERROR);
+      ck_assert_int_eq (error->domain, GST_STREAM_ERROR);
       texts.emplace_back (error->message);
       g_error_free (error);
     }
@@ -619,7 +620,7 @@ GST_START_TEST (test_access_unit_that_no_reader_would_take_is_one_error)
     gst_buffer_memset (longer, 0, 0, longest + 1);
     fail_unless_equals_int (gst_harness_push (h, longer), GST_FLOW_ERROR);
     const std::string text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
-    fail_unless (text.find ("32 MiB") != std::string::npos, "%s", text.c_str ());
+    fail_unless_contains (text, "32 MiB");
     fail_unless_equals_int (errors.take (), 0);
   }
   fail_unless_equals_int (gst_harness_buffers_received (h), 1);
@@ -685,7 +686,7 @@ GST_START_TEST (test_downstream_may_change_its_mind)
   auto parsed = pull_all (h);
   fail_unless_equals_int (parsed.size (), 5);
   for (GstBuffer *buffer : parsed)
-    fail_unless (gst_buffer_memcmp (buffer, 0, kStartCode.data (), kStartCode.size ()) == 0);
+    ck_assert_int_eq (gst_buffer_memcmp (buffer, 0, kStartCode.data (), kStartCode.size ()), 0);
   unref_all (parsed);
   gst_harness_teardown (h);
 }

@@ -72,7 +72,7 @@ play (const std::string &source, const std::string &properties,
         return GST_PAD_PROBE_OK;
       },
       &data, nullptr);
-  fail_unless (gst_element_set_state (pipeline, GST_STATE_PLAYING) != GST_STATE_CHANGE_FAILURE);
+  ck_assert_int_ne (gst_element_set_state (pipeline, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
   while (GstSample *sample = gst_app_sink_pull_sample (GST_APP_SINK (sink)))
     gst_sample_unref (sample);
   gst_element_set_state (pipeline, GST_STATE_NULL);
@@ -85,7 +85,7 @@ play (const std::string &source, const std::string &properties,
 static double
 rate_of (const std::vector<Coded> &coded, std::size_t first, std::size_t n)
 {
-  fail_unless (first + n <= coded.size ());
+  ck_assert_uint_le (first + n, coded.size ());
   double bytes = 0;
   for (std::size_t i = first; i < first + n; i++)
     bytes += double (coded[i].bytes);
@@ -171,9 +171,9 @@ GST_START_TEST (test_target_0_gives_the_bytes_of_the_thresholds_as_they_are)
             g_object_set (encoder, "target-bitrate", 0, nullptr);
         });
     for (std::size_t i = 0; i < 8; i++) {
-      fail_unless (off[i].data == without[i].data);
+      fail_unless_cmp (off[i].data, ==, without[i].data);
       fail_unless ((switched_off[i].data == without[i].data) == (i >= 4), "frame set %d", int (i));
-      fail_unless (off[i].thresholds == (Thresholds{4, 7}));
+      fail_unless_cmp (off[i].thresholds, ==, (Thresholds{4, 7}));
     }
   }
 }
@@ -203,9 +203,9 @@ GST_START_TEST (test_thresholds_stay_within_their_limits)
   const std::string limits = "depth-threshold=5 colour-threshold=6 max-depth-threshold=12 "
                              "max-colour-threshold=20";
   const auto least = play ("num-buffers=10", limits + target (1));
-  fail_unless (least.back ().thresholds == (Thresholds{12, 20}));
+  fail_unless_cmp (least.back ().thresholds, ==, (Thresholds{12, 20}));
   const auto most = play ("num-buffers=10", limits + target (4e9));
-  fail_unless (most.back ().thresholds == (Thresholds{5, 6}));
+  fail_unless_cmp (most.back ().thresholds, ==, (Thresholds{5, 6}));
   for (const auto *coded : {&least, &most})
     for (const Coded &c : *coded)
       fail_unless (c.thresholds.depth >= 5 && c.thresholds.depth <= 12 &&
@@ -223,8 +223,8 @@ GST_START_TEST (test_limits_change_while_playing)
         if (n == 5)
           g_object_set (encoder, "max-depth-threshold", 20, "max-colour-threshold", 16, nullptr);
       });
-  fail_unless (coded[4].thresholds == (Thresholds{32, 32}));
-  fail_unless (coded[5].thresholds == (Thresholds{20, 16}));
+  fail_unless_cmp (coded[4].thresholds, ==, (Thresholds{32, 32}));
+  fail_unless_cmp (coded[5].thresholds, ==, (Thresholds{20, 16}));
 }
 GST_END_TEST;
 
@@ -232,7 +232,8 @@ GST_START_TEST (test_person_who_comes_back_finds_nothing_saved_up)
 {
   const double wanted = 0.7 * usual_rate ("", "profile=packed");
   const auto coded = play ("num-buffers=75 empty-frames=30", "profile=packed" + target (wanted));
-  fail_unless (coded[29].bytes < 100 && coded[30].bytes > 1000);
+  ck_assert_uint_lt (coded[29].bytes, 100);
+  ck_assert_uint_gt (coded[30].bytes, 1000);
   expect_windows_on_target (coded, 30, wanted);
 }
 GST_END_TEST;
@@ -244,7 +245,7 @@ GST_START_TEST (test_stats_tell_the_rate_of_the_last_two_seconds)
   const auto coded = play ("num-buffers=60", "profile=plain" + target (wanted),
       [&] (GstElement *encoder, int) { thresholds_of (encoder, &bitrate); });
   const double expected = rate_of (coded, coded.size () - kTwoSeconds, kTwoSeconds);
-  fail_unless (std::abs (double (bitrate) / expected - 1) < 1e-3);
+  fail_unless_cmp (std::abs (double (bitrate) / expected - 1), <, 1e-3);
 }
 GST_END_TEST;
 
@@ -278,7 +279,7 @@ GST_START_TEST (test_target_follows_a_controller)
     gst_object_unref (source);
   });
   for (std::size_t i = 0; i < kFps; i++)
-    fail_unless (coded[i].thresholds == (Thresholds{8, 5}));
+    fail_unless_cmp (coded[i].thresholds, ==, (Thresholds{8, 5}));
   expect_windows_on_target (coded, kFps + kFps / 2, 0.7 * usual);
 }
 GST_END_TEST;
@@ -324,12 +325,12 @@ GST_START_TEST (test_goes_on_after_a_flush_and_begins_anew_after_ready)
   flush (h);
   push_some (h, rig, 3, 10);
   const Thresholds flushed = thresholds_of (h->element);
-  fail_unless (std::abs (flushed.colour - settled.colour) <= 2);
+  ck_assert_int_le (std::abs (flushed.colour - settled.colour), 2);
   gst_element_set_state (h->element, GST_STATE_READY);
   gst_harness_play (h);
   gst_harness_set_src_caps (h, range_caps (rig));
   push_some (h, rig, 0, 1);
-  fail_unless (thresholds_of (h->element) == first);
+  fail_unless_cmp (thresholds_of (h->element), ==, first);
   gst_harness_teardown (h);
 }
 GST_END_TEST;

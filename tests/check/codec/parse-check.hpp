@@ -125,7 +125,7 @@ struct TemporaryFile {
   {
     gchar *name = nullptr;
     const gint fd = g_file_open_tmp ("neighbourcodeparse-XXXXXX", &name, nullptr);
-    fail_unless (fd >= 0);
+    ck_assert_int_ge (fd, 0);
     g_close (fd, nullptr);
     path = name;
     g_free (name);

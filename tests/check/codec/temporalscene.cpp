@@ -147,11 +147,11 @@ GST_START_TEST (test_slices_one_by_one_are_the_frame_sets_of_access_units)
   for (const char *profile : kProfiles) {
     const Made whole = encoded (scene, encoder (profile));
     const Made slices = encoded (scene, encoder (profile, kBySlices));
-    fail_unless (slices.buffers.size () > 10 * whole.buffers.size ());
+    ck_assert_uint_gt (slices.buffers.size (), 10 * whole.buffers.size ());
     fail_unless (decoded (slices) == decoded (whole), "%s", profile);
     for (GstBuffer *slice : slices.buffers) /* of a frame set, not of the slice */
-      fail_unless (GST_BUFFER_FLAG_IS_SET (slice, GST_BUFFER_FLAG_DELTA_UNIT) ==
-                   (GST_BUFFER_PTS (slice) > 0));
+      ck_assert_int_eq (
+          GST_BUFFER_FLAG_IS_SET (slice, GST_BUFFER_FLAG_DELTA_UNIT), (GST_BUFFER_PTS (slice) > 0));
   }
 }
 GST_END_TEST;
@@ -233,7 +233,8 @@ kinds_of_numbers (const std::vector<guint32> &numbers, Profile profile)
   settings.refresh_period_ns = 0;
   AccessUnitEncoder enc;
   AccessUnitDecoder dec;
-  fail_unless (enc.configure (rig, settings).ok () && dec.set_rig (rig).ok ());
+  fail_unless_ok (enc.configure (rig, settings));
+  fail_unless_ok (dec.set_rig (rig));
   std::string kinds;
   guint64 points = 0;
   for (std::size_t i = 0; i < numbers.size (); i++) {
@@ -241,11 +242,11 @@ kinds_of_numbers (const std::vector<guint32> &numbers, Profile profile)
     {
       gstrange::RangeFrameMap from (in, GST_MAP_READ), to (out, GST_MAP_READWRITE);
       EncoderResult coded;
-      fail_unless (enc.encode (from.views (), numbers[i], 1, coded).ok ());
+      fail_unless_ok (enc.encode (from.views (), numbers[i], 1, coded));
       DecoderResult result;
       const auto bytes = enc.bytes ();
       dec.plan (bytes, result);
-      fail_unless (dec.decode (to.views (), 1, result).ok ());
+      fail_unless_ok (dec.decode (to.views (), 1, result));
       points = coded.points;
       kinds += coded.delta_slices ? 'd' : 'k';
       kinds += result.points == points && result.unknown_pixels == 0 ? '+' : '-';
@@ -261,7 +262,7 @@ GST_START_TEST (test_encoder_refers_over_255_numbers_and_across_2_to_the_32_but_
   constexpr guint32 kLast = G_MAXUINT32;
   for (const Profile profile : {Profile::kPlain, Profile::kPacked, Profile::kEntropy}) {
     const auto expect = [&] (const std::vector<guint32> &numbers, const char *kinds) {
-      fail_unless (kinds_of_numbers (numbers, profile) == kinds);
+      fail_unless_cmp (kinds_of_numbers (numbers, profile), ==, kinds);
     };
     expect ({kLast - 1, kLast, 0, 1}, "k+d+d+d+");
     expect ({kLast - 200, 54, 55}, "k+d+d+"); /* 255 further */
@@ -280,7 +281,7 @@ public:
     EncoderSettings settings;
     settings.profile = Profile::kPacked;
     settings.temporal = true;
-    fail_unless (enc_.configure (rig, settings).ok ());
+    fail_unless_ok (enc_.configure (rig, settings));
     in_ = make_frame_set (rig);
   }
   Numbered (const Numbered &) = delete;
@@ -289,7 +290,7 @@ public:
   {
     gstrange::RangeFrameMap from (in_, GST_MAP_READ);
     EncoderResult coded;
-    fail_unless (enc_.encode (from.views (), number, 1, coded).ok ());
+    fail_unless_ok (enc_.encode (from.views (), number, 1, coded));
     return enc_.bytes ();
   }
 
@@ -304,7 +305,7 @@ GST_START_TEST (test_decoder_keeps_no_reference_that_is_255_numbers_late_and_beg
   for (const guint32 late : {1u, 255u, 256u}) {
     Numbered camera (rig), other (rig);
     AccessUnitDecoder dec;
-    fail_unless (dec.set_rig (rig).ok ());
+    fail_unless_ok (dec.set_rig (rig));
     const guint32 first = 100; /* the late ones' numbers wrap around */
     GstBuffer *out = make_frame_set (rig);
     DecoderResult result;
@@ -313,7 +314,7 @@ GST_START_TEST (test_decoder_keeps_no_reference_that_is_255_numbers_late_and_beg
       gstrange::RangeFrameMap to (out, GST_MAP_READWRITE);
       result = {};
       dec.plan (bytes, result);
-      fail_unless (dec.decode (to.views (), 1, result).ok ());
+      fail_unless_ok (dec.decode (to.views (), 1, result));
     }
     fail_unless ((result.unknown_pixels > 0) == (late > 255), "%u late", late);
     gst_buffer_unref (out);
@@ -357,7 +358,7 @@ GST_START_TEST (test_encoder_of_each_view_and_rangemux_give_what_one_encoder_of_
     GstCaps *caps;
     auto joined = join ({&a, &b}, &caps);
     for (std::size_t i = 0; i < joined.size (); i++)
-      fail_unless (GST_BUFFER_FLAG_IS_SET (joined[i], GST_BUFFER_FLAG_DELTA_UNIT) == (i > 0));
+      ck_assert_int_eq (GST_BUFFER_FLAG_IS_SET (joined[i], GST_BUFFER_FLAG_DELTA_UNIT), (i > 0));
     std::vector<Pixels> pixels;
     const Made shown ("neighbourcodedec", caps, joined);
     for (GstBuffer *buffer : shown.buffers)

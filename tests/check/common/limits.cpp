@@ -49,7 +49,7 @@ memory_in_use ()
 GST_START_TEST (test_rig_of_65_views_is_refused)
 {
   Rig rig = ring_rig (64, 16, 12);
-  fail_unless (validate (rig).ok ());
+  fail_unless_ok (validate (rig));
   rig.views.push_back (rig.views[0]);
   fail_unless (says (validate (rig), "64"));
   std::vector<guint8> blob = encode_rig (ring_rig (64, 16, 12));
@@ -63,7 +63,7 @@ GST_START_TEST (test_view_id_64_is_refused)
 {
   Rig rig = ring_rig (1);
   rig.views[0].id = 63;
-  fail_unless (validate (rig).ok ());
+  fail_unless_ok (validate (rig));
   rig.views[0].id = 64;
   fail_unless (says (validate (rig), "view-id 64"));
 }
@@ -72,7 +72,7 @@ GST_END_TEST;
 GST_START_TEST (test_image_side_of_16385_is_refused)
 {
   Rig rig = ring_rig (1, kMaxImageSide, 16);
-  fail_unless (validate (rig).ok ());
+  fail_unless_ok (validate (rig));
   rig.views[0].width++;
   fail_unless (says (validate (rig), "16385x16"));
 }
@@ -82,7 +82,7 @@ GST_START_TEST (test_name_of_256_bytes_is_refused)
 {
   Rig rig = ring_rig (1);
   rig.views[0].name = std::string (kMaxViewName, 'n');
-  fail_unless (validate (rig).ok ());
+  fail_unless_ok (validate (rig));
   rig.views[0].name += 'n';
   fail_unless (says (validate (rig), "255"));
 }
@@ -90,7 +90,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps)
 {
-  fail_unless (validate (ring_rig (2, 8192, 8192)).ok ());
+  fail_unless_ok (validate (ring_rig (2, 8192, 8192)));
   const Rig rig = ring_rig (3, 8192, 8192);
   fail_unless (says (validate (rig), "134217728"));
   Rig united = ring_rig (2, 8192, 8192), third;
@@ -121,7 +121,7 @@ GST_START_TEST (test_rig_file_beyond_4_MiB_is_refused_unread)
 {
   gchar *path = nullptr;
   const int file = g_file_open_tmp ("rig-XXXXXX.yaml", &path, nullptr);
-  fail_unless (file >= 0);
+  ck_assert_int_ge (file, 0);
   fail_unless_equals_int (ftruncate (file, off_t (kMaxRigFileSize) + 1), 0);
   Rig rig;
   fail_unless (says (load_rig (path, rig), "4 MiB"));
@@ -188,7 +188,7 @@ repeated (const std::vector<guint8> &unit, gsize count)
 GST_START_TEST (test_slices_beyond_131072_are_left_out_and_counted)
 {
   AccessUnitDecoder decoder;
-  fail_unless (decoder.set_rig (ring_rig (1)).ok ());
+  fail_unless_ok (decoder.set_rig (ring_rig (1)));
   for (const gsize more : {0, 1, 1000}) {
     const std::vector<guint8> bytes = repeated (small_slice (), kMaxSlices + more);
     DecoderResult result;
@@ -219,11 +219,11 @@ GST_START_TEST (test_pixels_beyond_eight_times_the_roi_are_left_out)
     for (const auto &unit : units)
       bytes.insert (bytes.end (), unit.begin (), unit.end ());
   AccessUnitDecoder decoder;
-  fail_unless (decoder.set_rig (rig).ok ());
+  fail_unless_ok (decoder.set_rig (rig));
   DecoderResult result;
   decoder.plan (bytes, result);
   fail_unless_equals_int (decoder.views ().size (), 1);
-  fail_unless (decoder.views ()[0].held_pixels <= 64 * 48);
+  ck_assert_uint_le (decoder.views ()[0].held_pixels, 64 * 48);
 }
 GST_END_TEST;
 
@@ -351,7 +351,8 @@ GST_START_TEST (test_two_MiB_of_rubbish_at_the_beginning_are_one_error)
       flow = gst_harness_push (h, rubbish);
     }
     fail_unless_equals_int (flow, GST_FLOW_ERROR);
-    fail_unless (pushed >= (2 << 20) && pushed < (3 << 20));
+    ck_assert_uint_ge (pushed, (2 << 20));
+    ck_assert_uint_lt (pushed, (3 << 20));
     fail_unless_equals_int (errors.take (), 1);
   }
   gst_harness_teardown (h);

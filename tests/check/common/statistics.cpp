@@ -139,16 +139,17 @@ GST_START_TEST (test_encoder_counts_what_went_in_and_out)
   }
   const auto all = enc.end ();
   fail_unless_equals_int (all.size (), 1);
-  fail_unless (all[0].text ("element") == "neighbourcodeenc");
-  fail_unless (all[0].views () == "0 1 ");
+  fail_unless_cmp (all[0].text ("element"), ==, "neighbourcodeenc");
+  fail_unless_cmp (all[0].views (), ==, "0 1 ");
   fail_unless_equals_uint64 (all[0].count ("frames"), 3);
   fail_unless_equals_uint64 (all[0].count ("points"), points);
   fail_unless_equals_uint64 (all[0].count ("bytes"), bytes);
-  fail_unless (std::abs (all[0].rate ("points-per-frame") - double (points) / 3) < 0.5);
+  fail_unless_cmp (std::abs (all[0].rate ("points-per-frame") - double (points) / 3), <, 0.5);
   const double seconds = double (all[0].count ("interval")) * 1e-9;
-  fail_unless (seconds > 0);
-  fail_unless (std::abs (all[0].rate ("fps") * seconds - 3) < 1e-6);
-  fail_unless (std::abs (double (all[0].count ("bitrate")) * seconds - 8 * double (bytes)) < 8);
+  fail_unless_cmp (seconds, >, 0);
+  fail_unless_cmp (std::abs (all[0].rate ("fps") * seconds - 3), <, 1e-6);
+  fail_unless_cmp (
+      std::abs (double (all[0].count ("bitrate")) * seconds - 8 * double (bytes)), <, 8);
 }
 GST_END_TEST;
 
@@ -157,7 +158,7 @@ GST_START_TEST (test_decoder_counts_points_and_lost_pixels)
   const Rig rig = ring_rig (1, 64, 48);
   Watched dec (std::string ("neighbourcodedec") + kAtTheEnd, coded_caps (rig));
   auto units = encoded_units (rig, make_frame_set (rig), "max-slice-size=512");
-  fail_unless (units.size () > 2);
+  ck_assert_uint_gt (units.size (), 2);
   const auto push = [&] (GstClockTime time) {
     GstBuffer *decoded = gst_harness_push_and_pull (dec.h, buffer_of (units, time));
     const guint64 points = points_of (decoded);
@@ -176,7 +177,7 @@ GST_START_TEST (test_decoder_counts_points_and_lost_pixels)
   g_object_get (dec.h->element, "stats", &own, nullptr);
   gst_structure_get_uint64 (own, "missing-pixels", &missing);
   gst_structure_free (own);
-  fail_unless (missing > 0);
+  ck_assert_uint_gt (missing, 0);
   fail_unless_equals_uint64 (all[0].count ("lost"), missing);
 }
 GST_END_TEST;
@@ -200,7 +201,7 @@ GST_START_TEST (test_packets_are_counted_on_both_sides_and_the_lost_ones)
 
   Watched depay (
       std::string ("rtpneighbourcodedepay") + kAtTheEnd, gst_pad_get_current_caps (pay.h->sinkpad));
-  fail_unless (packets.size () > 6);
+  ck_assert_uint_gt (packets.size (), 6);
   for (std::size_t i = 0; i < packets.size (); i++)
     if (i == 2 || i == 3)
       gst_buffer_unref (packets[i]);
@@ -236,7 +237,7 @@ GST_START_TEST (test_filters_count_the_points_that_they_leave)
     fail_unless_equals_uint64 (all[0].count ("frames"), 3);
     if (!g_str_has_suffix (name, "off")) /* it looks at nothing then */
       fail_unless_equals_uint64 (all[0].count ("points"), points);
-    fail_unless (all[0].views () == "0 1 ");
+    fail_unless_cmp (all[0].views (), ==, "0 1 ");
   }
 }
 GST_END_TEST;
@@ -296,12 +297,12 @@ GST_START_TEST (test_mux_tells_of_each_stream_what_came_and_what_was_missed)
   fail_if (whole.has ("pad"));
   fail_unless_equals_uint64 (whole.count ("frames"), 4);
   fail_unless_equals_uint64 (whole.count ("lost"), 1); /* that frame set lacked a view */
-  fail_unless (whole.views () == "0 1 ");
-  fail_unless (sink_0.text ("pad") == "sink_0");
-  fail_unless (sink_0.views () == "0 ");
+  fail_unless_cmp (whole.views (), ==, "0 1 ");
+  fail_unless_cmp (sink_0.text ("pad"), ==, "sink_0");
+  fail_unless_cmp (sink_0.views (), ==, "0 ");
   fail_unless_equals_uint64 (sink_0.count ("frames"), 4);
   fail_unless_equals_uint64 (sink_0.count ("lost"), 0);
-  fail_unless (sink_1.text ("pad") == "sink_1");
+  fail_unless_cmp (sink_1.text ("pad"), ==, "sink_1");
   fail_unless_equals_uint64 (sink_1.count ("frames"), 3);
   fail_unless_equals_uint64 (sink_1.count ("lost"), 1);
   fail_unless_equals_uint64 (sink_1.count ("late"), 0);
@@ -322,8 +323,8 @@ GST_START_TEST (test_demux_counts_frame_sets_and_the_views_that_they_lack)
   gst_harness_push_event (demux.h, gst_event_new_eos ()); /* nobody takes it either */
   const auto all = demux.now ();
   fail_unless_equals_int (all.size (), 1);
-  fail_unless (all[0].text ("element") == "rangedemux");
-  fail_unless (all[0].views () == "0 1 2 ");
+  fail_unless_cmp (all[0].text ("element"), ==, "rangedemux");
+  fail_unless_cmp (all[0].views (), ==, "0 1 2 ");
   fail_unless_equals_uint64 (all[0].count ("frames"), 2);
   fail_unless_equals_uint64 (all[0].count ("lost"), 2);
 }
@@ -360,7 +361,7 @@ GST_START_TEST (test_stereodepth_counts_pairs_and_pictures_without_partner)
   fail_unless_equals_uint64 (stats.count ("frames"), 2);
   fail_unless_equals_uint64 (stats.count ("lost"), 1);
   fail_unless_equals_uint64 (stats.count ("late"), 0);
-  fail_unless (stats.views () == "0 ");
+  fail_unless_cmp (stats.views (), ==, "0 ");
   gst_harness_teardown (right);
 }
 GST_END_TEST;
@@ -448,7 +449,8 @@ frames_at_the_end (GstElement *pipeline)
   for (bool ended = false; !ended;) {
     GstMessage *message = gst_bus_timed_pop_filtered (bus, 60 * GST_SECOND,
         GstMessageType (GST_MESSAGE_ELEMENT | GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-    fail_unless (message && GST_MESSAGE_TYPE (message) != GST_MESSAGE_ERROR);
+    fail_unless (message);
+    ck_assert_int_ne (GST_MESSAGE_TYPE (message), GST_MESSAGE_ERROR);
     ended = GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS;
     if (gst_message_has_name (message, "rangecast-stats"))
       gst_structure_get_uint64 (

@@ -36,7 +36,7 @@ parse_ply (GstBuffer *buffer, bool with_view_id, bool with_normals = false)
   fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
   const std::string_view text (reinterpret_cast<const char *> (map.data), map.size);
   const auto end = text.find ("end_header\n");
-  fail_unless (end != text.npos);
+  ck_assert_uint_ne (end, text.npos);
   fail_unless (text.starts_with ("ply\nformat binary_little_endian 1.0\n"));
   const auto element = text.find ("element vertex ");
   Ply ply;
@@ -87,9 +87,9 @@ GST_START_TEST (test_point_is_where_the_camera_saw_it)
   const Ply ply = parse_ply (output, true);
   fail_unless_equals_int (ply.points, 1);
   /* View 1 stands behind (-z) and looks along +z; its x axis is the world's -x. */
-  fail_unless (std::abs (ply.xyz[0] - -159.5 / 320 * 0.8) < 1e-6);
-  fail_unless (std::abs (ply.xyz[1] - -119.5 / 320 * 0.8) < 1e-6);
-  fail_unless (std::abs (ply.xyz[2] - 0.0) < 1e-6);
+  fail_unless_cmp (std::abs (ply.xyz[0] - -159.5 / 320 * 0.8), <, 1e-6);
+  fail_unless_cmp (std::abs (ply.xyz[1] - -119.5 / 320 * 0.8), <, 1e-6);
+  fail_unless_cmp (std::abs (ply.xyz[2] - 0.0), <, 1e-6);
   fail_unless_equals_int (ply.view_id[0], 1);
   fail_unless_equals_int (ply.rgb[0], 319 % 256);
   fail_unless_equals_int (ply.rgb[1], 239);
@@ -114,7 +114,7 @@ GST_START_TEST (test_only_valid_pixels_of_the_roi_are_points)
   }
   GstHarness *h = ply_harness (rig);
   GstBuffer *output = gst_harness_push_and_pull (h, input);
-  fail_unless (valid > 1000);
+  ck_assert_uint_gt (valid, 1000);
   fail_unless_equals_int (parse_ply (output, false).points, valid);
   gst_buffer_unref (output);
   gst_harness_teardown (h);
@@ -140,7 +140,7 @@ GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (h->element, bus);
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (2))), GST_FLOW_ERROR);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("no view 1") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "no view 1");
   fail_if (gst_bus_have_pending (bus) && gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) != nullptr);
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
@@ -152,7 +152,8 @@ GST_START_TEST (test_works_again_after_null)
 {
   GstElement *pipeline = gst_parse_launch ("appsrc name=a ! plyenc ! fakesink", nullptr);
   for (int i = 0; i < 2; i++) {
-    fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+    ck_assert_int_ne (
+        gst_element_set_state (pipeline, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
     fail_unless_equals_int (
         gst_element_set_state (pipeline, GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
   }
@@ -207,7 +208,7 @@ GST_START_TEST (test_normals_of_a_slanted_plane_are_the_planes)
     return z > 0.3 && z < 2 ? std::round (z / view.depth_unit_m) : 0;
   });
   const Ply ply = normals_of (rig, input);
-  fail_unless (ply.points > 30000);
+  ck_assert_uint_gt (ply.points, 30000);
   const Vec3 in_world = view.world_from_view.rotation * normal;
   double worst = 1;
   for (std::size_t i = 0; i < ply.points; i++)
@@ -239,7 +240,7 @@ GST_START_TEST (test_normal_of_a_lone_point_or_line_is_towards_the_camera)
   for (std::size_t i = 0; i < ply.points; i++) {
     const Vec3 to_camera =
         Vec3{0, 0, 0.8} - Vec3{ply.xyz[3 * i], ply.xyz[3 * i + 1], ply.xyz[3 * i + 2]};
-    fail_unless (along (ply, i, 1 / norm (to_camera) * to_camera) > 0.99999);
+    fail_unless_cmp (along (ply, i, 1 / norm (to_camera) * to_camera), >, 0.99999);
   }
 }
 GST_END_TEST;
@@ -251,7 +252,7 @@ GST_START_TEST (test_normals_of_noise_have_length_1_and_face_the_camera)
   for (const int limit : {65535, 3}) {
     const Ply ply =
         normals_of (rig, make_depths (rig, [&] (int, int) { return random () % (limit + 1); }));
-    fail_unless (ply.points > 50000);
+    ck_assert_uint_gt (ply.points, 50000);
     double length_error = 0, backwards = 0;
     bool has_nan = false;
     for (std::size_t i = 0; i < ply.points; i++) {
@@ -296,9 +297,9 @@ GST_START_TEST (test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_imag
   fail_unless_equals_int (whole.points, 25);
   for (const Roi &roi : {Roi{100, 50, 37, 41}, Roi{108, 58, 5, 5}, Roi{3, 57, 300, 9}}) {
     const Ply part = cut_to (rig, roi);
-    fail_unless (part.xyz == whole.xyz);
-    fail_unless (part.normals == whole.normals);
-    fail_unless (part.rgb == whole.rgb);
+    fail_unless_cmp (part.xyz, ==, whole.xyz);
+    fail_unless_cmp (part.normals, ==, whole.normals);
+    fail_unless_cmp (part.rgb, ==, whole.rgb);
   }
 }
 GST_END_TEST;
@@ -337,7 +338,7 @@ public:
     const auto found = fields_.find (field);
     fail_unless (found != fields_.end (), "no field %s", field.c_str ());
     fail_unless_equals_int (found->second.size, sizeof (T));
-    fail_unless (found->second.type == (std::is_floating_point_v<T> ? "F" : "U"));
+    fail_unless_cmp (found->second.type, ==, (std::is_floating_point_v<T> ? "F" : "U"));
     T value;
     std::memcpy (
         &value, bytes_.data () + data_ + point * stride_ + found->second.offset, sizeof value);
@@ -410,7 +411,7 @@ GST_START_TEST (test_pcd_read_by_its_header_has_the_points_of_the_ply)
   GstBuffer *ply_file = whole_file (rig, "ply"), *pcd_file = whole_file (rig, "pcd");
   const Ply ply = parse_ply (ply_file, true, true);
   const Pcd pcd (pcd_file);
-  fail_unless (ply.points > 500);
+  ck_assert_uint_gt (ply.points, 500);
   fail_unless_equals_int (pcd.points (), ply.points);
   std::size_t wrong = 0;
   for (std::size_t i = 0; i < ply.points; i++) {
@@ -435,11 +436,11 @@ GST_START_TEST (test_pcd_header_says_what_readers_ask_for)
   GstBuffer *file = whole_file (rig, "pcd");
   const Pcd pcd (file);
   using Words = std::vector<std::string>;
-  fail_unless (pcd.words ("VERSION") == Words{"0.7"});
-  fail_unless (pcd.words ("WIDTH") == pcd.words ("POINTS"));
-  fail_unless (pcd.words ("HEIGHT") == Words{"1"}); /* a cloud, not a picture */
+  fail_unless_cmp (pcd.words ("VERSION"), ==, Words{"0.7"});
+  fail_unless_cmp (pcd.words ("WIDTH"), ==, pcd.words ("POINTS"));
+  fail_unless_cmp (pcd.words ("HEIGHT"), ==, Words{"1"}); /* a cloud, not a picture */
   fail_unless ((pcd.words ("VIEWPOINT") == Words{"0", "0", "0", "1", "0", "0", "0"}));
-  fail_unless (pcd.words ("DATA") == Words{"binary"});
+  fail_unless_cmp (pcd.words ("DATA"), ==, Words{"binary"});
   gst_buffer_unref (file);
 }
 GST_END_TEST;
@@ -482,8 +483,8 @@ GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
 {
   if (!memory_can_end ())
     RANGECAST_SKIP ("operator new is somebody else's");
-  fail_unless (run_out_of_memory ("plyenc", ring_rig (2, 32, 24)) > 2);
-  fail_unless (run_out_of_memory ("plyenc format=pcd normals=true", ring_rig (2, 32, 24)) > 2);
+  ck_assert_int_gt (run_out_of_memory ("plyenc", ring_rig (2, 32, 24)), 2);
+  ck_assert_int_gt (run_out_of_memory ("plyenc format=pcd normals=true", ring_rig (2, 32, 24)), 2);
 }
 GST_END_TEST;
 

@@ -44,7 +44,7 @@ GST_START_TEST (test_depth_has_the_full_size_with_the_roi_in_its_place)
   GstHarness *h = split_harness (rig, "depth_1");
   GstBuffer *output = gst_harness_push_and_pull (h, input);
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
-  fail_unless (middle > 0);
+  ck_assert_int_gt (middle, 0);
   fail_unless_equals_int (depth_at (output, caps, 125, 81), middle);
   fail_unless_equals_int (depth_at (output, caps, 99, 81), 0);
   fail_unless_equals_int (depth_at (output, caps, 125, 59), 0);
@@ -98,7 +98,7 @@ GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (h->element, bus);
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("view 5") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "view 5");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);

@@ -66,7 +66,7 @@ GST_START_TEST (test_millimetres_become_depth_units_and_colour_stays)
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
     fail_unless_equals_int (frame.views ().size (), 1);
     const RangeImage &image = frame.views ()[0];
-    fail_unless (image.roi == (Roi{0, 0, 5, 3}));
+    fail_unless_cmp (image.roi, ==, (Roi{0, 0, 5, 3}));
     fail_unless_equals_int (image.depth.at (3, 2), 12340);
     fail_unless_equals_int (image.depth.at (4, 2), 0);
     fail_unless_equals_int (image.colour.at (4, 2).r, 77);
@@ -236,8 +236,8 @@ GST_START_TEST (test_pictures_of_different_size_are_one_error)
   c.push_colour (0, 1);
   c.push_depth (0, 1);
   const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("pad depth is 6x3") != std::string::npos, text.c_str ());
-  fail_unless (text.find ("expected") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, "pad depth is 6x3");
+  fail_unless_contains (text, "expected");
 }
 GST_END_TEST;
 
@@ -271,7 +271,7 @@ GST_START_TEST (test_colour_of_more_pixels_comes_out_at_either_size)
     {
       gstrange::RangeFrameMap frame (output, GST_MAP_READ);
       const RangeImage &image = frame.views ()[0];
-      fail_unless (image.roi == (Roi{0, 0, it.width, it.height}));
+      fail_unless_cmp (image.roi, ==, (Roi{0, 0, it.width, it.height}));
       for (int y = 0; y < it.height; y++)
         for (int x = 0; x < it.width; x++) {
           fail_unless_equals_int (image.depth.at (x, y), 15000);
@@ -296,7 +296,7 @@ rig_of_two (const char *name)
   }
   const std::string path =
       std::string (g_get_tmp_dir ()) + "/" + name + std::to_string (getpid ()) + ".yaml";
-  fail_unless (save_rig (path, rig).ok ());
+  fail_unless_ok (save_rig (path, rig));
   return path;
 }
 
@@ -321,9 +321,9 @@ GST_START_TEST (test_colour_camera_of_the_rig_is_registered_into_either_view)
       fail_unless_equals_int (image.depth.at (last / 2, row), 10000);
       /* The colour camera stands 5 cm to the right: at 1 m that is 5 % of the picture's width. */
       const int strip = image.roi.width / 25;
-      fail_unless ((image.depth.at (0, row) == 0) == !into_colour);
-      fail_unless ((image.depth.at (strip / 2, row) == 0) == !into_colour);
-      fail_unless ((image.depth.at (last, row) == 0) == into_colour);
+      ck_assert_int_eq ((image.depth.at (0, row) == 0), !into_colour);
+      ck_assert_int_eq ((image.depth.at (strip / 2, row) == 0), !into_colour);
+      ck_assert_int_eq ((image.depth.at (last, row) == 0), into_colour);
     }
     gst_buffer_unref (output);
   }
@@ -340,8 +340,8 @@ GST_START_TEST (test_calibration_of_another_shape_is_one_error_that_names_the_ri
   gst_harness_push (c.colour, flat (64, 48, 3, 77, 0));
   gst_harness_push (c.depth, flat (64, 36, 2, 1000, 0));
   const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find (path) != std::string::npos, text.c_str ());
-  fail_unless (text.find ("64x36") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, path);
+  fail_unless_contains (text, "64x36");
   g_unlink (path.c_str ());
 }
 GST_END_TEST;
@@ -353,7 +353,7 @@ GST_START_TEST (test_colour_camera_without_a_rig_is_one_error)
   c.push_colour (0, 1);
   c.push_depth (0, 1);
   const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("colour-view-id") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, "colour-view-id");
 }
 GST_END_TEST;
 
@@ -444,7 +444,7 @@ GST_START_TEST (test_missing_rig_is_one_error_that_names_it)
   c.push_colour (0, 1);
   c.push_depth (0, 1);
   const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("/nowhere/rig.yaml") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, "/nowhere/rig.yaml");
 }
 GST_END_TEST;
 
@@ -485,7 +485,7 @@ GST_START_TEST (test_new_size_in_the_stream_is_taken)
   GstBuffer *output = gst_harness_pull (c.colour);
   {
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-    fail_unless (frame.views ()[0].roi == (Roi{0, 0, 4, 2}));
+    fail_unless_cmp (frame.views ()[0].roi, ==, (Roi{0, 0, 4, 2}));
     fail_unless_equals_int (frame.views ()[0].depth.at (3, 1), 10280);
   }
   gst_buffer_unref (output);

@@ -78,9 +78,9 @@ GST_START_TEST (test_learns_then_crops_to_the_person_without_copying)
   GstBuffer *input = scene (rig, 3, true);
   GstMemory *memory = gst_buffer_peek_memory (input, 0);
   GstBuffer *output = gst_harness_push_and_pull (h, input);
-  fail_unless (gst_buffer_peek_memory (output, 0) == memory);
-  fail_unless (roi_of (output, 0) == (Roi{100, 90, 60, 80}));
-  fail_unless (roi_of (output, 1) == (Roi{100, 90, 60, 80}));
+  ck_assert_ptr_eq (gst_buffer_peek_memory (output, 0), memory);
+  fail_unless_cmp (roi_of (output, 0), ==, (Roi{100, 90, 60, 80}));
+  fail_unless_cmp (roi_of (output, 1), ==, (Roi{100, 90, 60, 80}));
   fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 3);
   fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 3);
   {
@@ -110,7 +110,7 @@ GST_START_TEST (test_frames_before_the_camera_has_settled_teach_nothing)
   for (int i = 0; i < 2; i++)
     fail_unless (push (h, scene (rig, i, true)).empty ());
   fail_unless (push (h, scene (rig, 2, false)).empty ());
-  fail_unless (push (h, scene (rig, 3, true)) == (Roi{100, 90, 60, 80}));
+  fail_unless_cmp (push (h, scene (rig, 3, true)), ==, (Roi{100, 90, 60, 80}));
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -120,7 +120,7 @@ GST_START_TEST (test_margin_grows_the_roi)
   const Rig rig = ring_rig (1);
   GstHarness *h = roi_harness (rig, "roiextract background-frames=1 margin=5");
   push (h, scene (rig, 0, false));
-  fail_unless (push (h, scene (rig, 1, true)) == (Roi{95, 85, 70, 90}));
+  fail_unless_cmp (push (h, scene (rig, 1, true)), ==, (Roi{95, 85, 70, 90}));
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -195,7 +195,7 @@ GST_START_TEST (test_flush_gap_and_eos_keep_the_background)
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
-  fail_unless (push (h, scene (rig, 2, true)) == (Roi{100, 90, 60, 80}));
+  fail_unless_cmp (push (h, scene (rig, 2, true)), ==, (Roi{100, 90, 60, 80}));
   fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
   gst_harness_teardown (h);
 }
@@ -212,7 +212,7 @@ GST_START_TEST (test_background_is_saved_and_loaded)
     push (h, scene (rig, i, false));
   gst_harness_teardown (h);
   h = roi_harness (rig, load);
-  fail_unless (push (h, scene (rig, 0, true)) == (Roi{100, 90, 60, 80}));
+  fail_unless_cmp (push (h, scene (rig, 0, true)), ==, (Roi{100, 90, 60, 80}));
   gst_harness_teardown (h);
   g_unlink (path);
   g_free (path);
@@ -235,7 +235,7 @@ GST_START_TEST (test_place_that_a_background_cannot_be_saved_to_is_one_error_at_
     fail_unless_equals_int (
         gst_element_set_state (element, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
     const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
-    fail_unless (said.find (text) != std::string::npos, said.c_str ());
+    fail_unless_contains (said, text);
     fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
     gst_element_set_state (element, GST_STATE_NULL);
     gst_element_set_bus (element, nullptr);
@@ -258,8 +258,7 @@ GST_START_TEST (test_stream_too_short_for_a_background_to_save_is_a_warning)
     push (h, scene (rig, i, false));
   fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
   const std::string said = next_message_text (bus, GST_MESSAGE_WARNING);
-  fail_unless (said.find ("not written: the stream ended after 2 frames") != std::string::npos,
-      said.c_str ());
+  fail_unless_contains (said, "not written: the stream ended after 2 frames");
   fail_if (g_file_test (path, G_FILE_TEST_EXISTS));
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
@@ -276,8 +275,7 @@ GST_START_TEST (test_missing_background_file_is_one_error_that_names_it)
   gst_element_set_bus (h->element, bus);
   gst_harness_set_src_caps (
       h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
-  fail_unless (
-      next_message_text (bus, GST_MESSAGE_ERROR).find ("/nowhere/b.yml") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "/nowhere/b.yml");
   /* Caps that were refused come again with the next buffer. */
   gst_harness_set_src_caps (
       h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
@@ -297,7 +295,7 @@ GST_START_TEST (test_tells_upstream_the_roi_once_for_a_person_who_stays)
     push (h, scene (rig, i, true));
   const std::vector<Roi> told = rois_told (h);
   fail_unless_equals_int (told.size (), 1);
-  fail_unless (told[0] == (Roi{84, 74, 92, 112}));
+  fail_unless_cmp (told[0], ==, (Roi{84, 74, 92, 112}));
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -323,7 +321,7 @@ GST_START_TEST (test_growing_person_is_told_before_the_edge_is_reached)
     for (const Roi &roi : rois_told (h))
       told_width = roi.width;
   }
-  fail_unless (told_width >= 60 + 40 + 16);
+  ck_assert_int_ge (told_width, 60 + 40 + 16);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -410,7 +408,7 @@ GST_START_TEST (test_who_sits_still_stays_and_the_wall_may_change_slowly)
     Roi last;
     for (; i < 100; i++)
       last = push (h, boxes (rig, i * GST_SECOND / 2, 80 + i, {person}));
-    fail_unless (adapts == (last == person)); /* else the wall is as new as the person */
+    ck_assert_int_eq (adapts, (last == person)); /* else the wall is as new as the person */
     gst_harness_teardown (h);
   }
 }
@@ -458,7 +456,7 @@ GST_START_TEST (test_view_that_is_there_twice_is_one_error)
   gst_element_set_bus (h->element, bus);
   fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_ERROR);
   const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (said.find ("view 0 is there twice") != std::string::npos, said.c_str ());
+  fail_unless_contains (said, "view 0 is there twice");
   fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
@@ -479,7 +477,7 @@ GST_START_TEST (test_several_people_are_in_the_roi_and_max_people_keeps_the_larg
   for (const auto &c : cases) {
     GstHarness *h = roi_harness (rig, c.launch);
     push (h, boxes (rig, 0, 110, {}));
-    fail_unless (push (h, boxes (rig, 1, 110, people)) == c.box);
+    fail_unless_cmp (push (h, boxes (rig, 1, 110, people)), ==, c.box);
     gst_harness_teardown (h);
   }
 }
@@ -517,14 +515,15 @@ GST_START_TEST (test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set)
                         "! rangesplit name=s s.depth ! identity");
   for (int i = 0; i < 4; i++) {
     GstBuffer *coded = gst_harness_push_and_pull (coder, scene (rig, i * GST_MSECOND, false));
-    fail_unless (gst_buffer_get_size (coded) < 500);
+    ck_assert_uint_lt (gst_buffer_get_size (coded), 500);
     gst_buffer_unref (coded);
     GstBuffer *depth = gst_harness_push_and_pull (whole, scene (rig, i * GST_MSECOND, false));
     fail_unless_equals_uint64 (GST_BUFFER_PTS (depth), i * GST_MSECOND);
     GstMapInfo map;
     gst_buffer_map (depth, &map, GST_MAP_READ);
-    fail_unless (map.size > 0 && std::all_of (map.data, map.data + map.size,
-                                     [] (guint8 byte) { return byte == 0; }));
+    ck_assert_uint_gt (map.size, 0);
+    fail_unless (
+        std::all_of (map.data, map.data + map.size, [] (guint8 byte) { return byte == 0; }));
     gst_buffer_unmap (depth, &map);
     gst_buffer_unref (depth);
   }
@@ -545,8 +544,8 @@ GST_START_TEST (test_damaged_background_file_is_one_error_that_says_what_was_exp
   gst_harness_set_src_caps (
       h, gstrange::make_range_caps (gstrange::make_info (ring_rig (1), 30, 1)));
   const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find (path) != std::string::npos, "%s", text.c_str ());
-  fail_unless (text.find ("expected") != std::string::npos, "%s", text.c_str ());
+  fail_unless_contains (text, path);
+  fail_unless_contains (text, "expected");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);

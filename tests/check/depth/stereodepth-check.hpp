@@ -84,7 +84,7 @@ struct RigFile {
     view.right = PartnerCamera{view.intrinsics, {}, {kIdentity3, {-0.1, 0, 0}}};
     if (with_third)
       view.third = PartnerCamera{view.intrinsics, {}, {kIdentity3, {0, 0.1, 0}}};
-    fail_unless (save_rig (path, rig).ok ());
+    fail_unless_ok (save_rig (path, rig));
   }
   ~RigFile ()
   {

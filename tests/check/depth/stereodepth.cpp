@@ -2,6 +2,8 @@
 /* stereodepth with two cameras. With three: stereodepththird. */
 #include "stereodepth-check.hpp"
 
+#include <mutex>
+
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -14,7 +16,7 @@ GST_START_TEST (test_depth_is_that_of_the_disparity)
   {
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
     const RangeImage &image = frame.views ()[0];
-    fail_unless (image.roi == (Roi{0, 0, 160, 120}));
+    fail_unless_cmp (image.roi, ==, (Roi{0, 0, 160, 120}));
     int right = 0;
     for (int y = 10; y < 110; y++)
       for (int x = 40; x < 150; x++)
@@ -247,11 +249,11 @@ GST_START_TEST (test_rig_without_the_view_or_of_another_shape_is_one_error)
   const char *square = "video/x-raw,format=RGBx,width=160,height=160,framerate=25/1";
   RigFile rig;
   const std::string missing = error_of (rig.property () + " view-id=7", same);
-  fail_unless (missing.find ("no view with view-id 7") != std::string::npos, missing.c_str ());
+  fail_unless_contains (missing, "no view with view-id 7");
   const std::string shape = error_of (rig.property (), square, square);
-  fail_unless (shape.find (rig.path) != std::string::npos, shape.c_str ());
-  fail_unless (shape.find ("320x240") != std::string::npos, shape.c_str ());
-  fail_unless (shape.find ("160x160") != std::string::npos, shape.c_str ());
+  fail_unless_contains (shape, rig.path);
+  fail_unless_contains (shape, "320x240");
+  fail_unless_contains (shape, "160x160");
 }
 GST_END_TEST;
 
@@ -265,7 +267,7 @@ GST_START_TEST (test_rig_of_another_size_is_scaled_to_the_pictures)
   fail_unless (output != nullptr, "%s", next_message_text (s.bus, GST_MESSAGE_ERROR).c_str ());
   GstCaps *caps = gst_pad_get_current_caps (s.left->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   const View &view = info.rig.views[0];
   fail_unless_equals_int (view.width, 160);
   fail_unless_equals_int (view.height, 120);
@@ -273,7 +275,7 @@ GST_START_TEST (test_rig_of_another_size_is_scaled_to_the_pictures)
   fail_unless_equals_float (view.intrinsics.cx, 79.5); /* (159.5 + 0.5) / 2 - 0.5 */
   {
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-    fail_unless (std::abs (frame.views ()[0].depth.at (100, 60) - 8000) < 100);
+    ck_assert_int_lt (std::abs (frame.views ()[0].depth.at (100, 60) - 8000), 100);
   }
   gst_caps_unref (caps);
   gst_buffer_unref (output);
@@ -284,13 +286,11 @@ GST_START_TEST (test_bad_settings_are_one_error_that_names_them)
 {
   const char *same = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
   const char *larger = "video/x-raw,format=RGBx,width=80,height=240,framerate=25/1";
-  fail_unless (error_of (kProperties, larger).find ("pad right is 80x240") != std::string::npos);
-  fail_unless (error_of ("", same).find ("focal-length") != std::string::npos);
-  fail_unless (error_of ("rig=/no/rig.yaml", same).find ("/no/rig.yaml") != std::string::npos);
-  fail_unless (error_of ("focal-length=160 baseline=0.1 near=0.05", same).find ("near") !=
-               std::string::npos);
-  fail_unless (error_of (std::string (kProperties) + " block-size=4", same).find ("block size") !=
-               std::string::npos);
+  fail_unless_contains (error_of (kProperties, larger), "pad right is 80x240");
+  fail_unless_contains (error_of ("", same), "focal-length");
+  fail_unless_contains (error_of ("rig=/no/rig.yaml", same), "/no/rig.yaml");
+  fail_unless_contains (error_of ("focal-length=160 baseline=0.1 near=0.05", same), "near");
+  fail_unless_contains (error_of (std::string (kProperties) + " block-size=4", same), "block size");
 }
 GST_END_TEST;
 
@@ -432,7 +432,7 @@ GST_START_TEST (test_late_frames_are_dropped_before_matching_and_said)
     gst_buffer_unref (output);
     fail_unless_equals_uint64 (s.stat ("dropped-late"), qos ? 2 : 0);
     GstMessage *message = gst_bus_pop_filtered (s.bus, GST_MESSAGE_QOS);
-    fail_unless ((message != nullptr) == qos);
+    ck_assert_int_eq ((message != nullptr), qos);
     gst_clear_message (&message);
   }
 }
@@ -481,6 +481,79 @@ GST_START_TEST (test_cameras_that_never_take_a_picture_at_once_are_one_warning)
 }
 GST_END_TEST;
 
+/* What GST_DEBUG=stereodepth:6 prints, as "object: message". */
+struct Log {
+  std::mutex lock;
+  std::vector<std::string> lines;
+
+  Log ()
+  {
+    gst_debug_set_active (TRUE);
+    gst_debug_remove_log_function (gst_debug_log_default); /* not on stderr */
+    gst_debug_add_log_function (add, this, nullptr);
+    gst_debug_set_threshold_for_name ("stereodepth", GST_LEVEL_LOG);
+  }
+  ~Log ()
+  {
+    gst_debug_unset_threshold_for_name ("stereodepth");
+    gst_debug_remove_log_function (add);
+  }
+  static void add (GstDebugCategory *category, GstDebugLevel, const gchar *, const gchar *, gint,
+      GObject *object, GstDebugMessage *message, gpointer data)
+  {
+    if (!g_str_equal (gst_debug_category_get_name (category), "stereodepth"))
+      return;
+    auto log = static_cast<Log *> (data);
+    std::lock_guard guard (log->lock);
+    log->lines.push_back (
+        (GST_IS_PAD (object) ? std::string (GST_OBJECT_NAME (object)) + ": " : std::string ()) +
+        gst_debug_message_get (message));
+  }
+  /* Waits for a line that contains the text. */
+  bool says (const char *text)
+  {
+    for (const gint64 end = g_get_monotonic_time () + 20 * G_USEC_PER_SEC;
+         g_get_monotonic_time () < end; g_usleep (1000)) {
+      std::lock_guard guard (lock);
+      for (const std::string &line : lines)
+        if (line.find (text) != std::string::npos)
+          return true;
+    }
+    return false;
+  }
+};
+
+GST_START_TEST (test_log_says_why_nothing_comes)
+{
+  Log log;
+  {
+    Stereo s;
+    s.push (s.left, 0);
+    fail_unless (log.says ("right: waiting for a frame"));
+    s.push (s.right, 3 * kFrame / 4);
+    fail_unless (
+        log.says ("left: dropping frame at 0:00:00.000000000: no partner, pad right is 30.0 "
+                  "ms ahead, tolerance 20.0 ms"));
+    s.push (s.left, kFrame);
+    gst_buffer_unref (gst_harness_pull (s.left));
+    gst_harness_push_upstream_event (
+        s.left, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2.0, kFrame, kFrame));
+    s.push (s.left, 2 * kFrame);
+    s.push (s.right, 2 * kFrame);
+    fail_unless (log.says ("dropping pair at 0:00:00.080000000: late by 40.0 ms (QoS)"));
+    GstCaps *caps = gst_caps_from_string ("video/x-h264");
+    fail_if (gst_pad_peer_query_accept_caps (s.right->srcpad, caps));
+    gst_caps_unref (caps);
+    fail_unless (log.says ("right: refused caps video/x-h264"));
+  }
+  RigFile rig;
+  Stereo s (rig.property () + " view-id=7");
+  s.push (s.left, 0);
+  s.push (s.right, 0);
+  fail_unless (log.says ("has no view with view-id 7"));
+}
+GST_END_TEST;
+
 static Suite *
 stereodepth_suite ()
 {
@@ -510,6 +583,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_sources_with_padded_rows_need_not_copy);
   tcase_add_test (tc, test_without_a_framerate_pictures_5_ms_apart_are_a_pair);
   tcase_add_test (tc, test_cameras_that_never_take_a_picture_at_once_are_one_warning);
+  tcase_add_test (tc, test_log_says_why_nothing_comes);
   return suite;
 }
 

@@ -13,11 +13,11 @@ GST_START_TEST (test_caps_carry_the_rig_and_come_back_equal)
   const auto info = gstrange::make_info (ring_rig (4), 30, 1);
   GstCaps *caps = gstrange::make_range_caps (info);
   gstrange::RangeInfo parsed;
-  fail_unless (gstrange::parse_caps (caps, parsed).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, parsed));
   fail_unless_equals_int (parsed.width, 320);
   fail_unless_equals_int (parsed.views (), 4);
   fail_unless_equals_uint64 (parsed.frame_duration (), GST_SECOND / 30);
-  fail_unless (encode_rig (parsed.rig) == encode_rig (info.rig));
+  fail_unless_cmp (encode_rig (parsed.rig), ==, encode_rig (info.rig));
   GstCaps *filter = gst_caps_from_string (GST_RANGE_CAPS);
   fail_unless (gst_caps_is_subset (caps, filter));
   gst_caps_unref (filter);
@@ -30,12 +30,11 @@ GST_START_TEST (test_bad_caps_are_refused_by_field)
   gstrange::RangeInfo parsed;
   GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (2), 30, 1));
   gst_caps_set_simple (caps, "views", G_TYPE_INT, 3, nullptr);
-  fail_unless (
-      gstrange::parse_caps (caps, parsed).message ().find ("views=3") != std::string::npos);
+  fail_unless_contains (gstrange::parse_caps (caps, parsed).message (), "views=3");
   gst_caps_set_simple (caps, "views", G_TYPE_INT, 2, "width", G_TYPE_INT, 100, nullptr);
-  fail_unless (gstrange::parse_caps (caps, parsed).message ().find ("larger") != std::string::npos);
+  fail_unless_contains (gstrange::parse_caps (caps, parsed).message (), "larger");
   gst_structure_remove_field (gst_caps_get_structure (caps, 0), "rig");
-  fail_unless (gstrange::parse_caps (caps, parsed).message ().find ("rig") != std::string::npos);
+  fail_unless_contains (gstrange::parse_caps (caps, parsed).message (), "rig");
   gst_caps_unref (caps);
 }
 GST_END_TEST;
@@ -46,7 +45,7 @@ GST_START_TEST (test_application_reads_camera_from_caps)
   GstRangeCamera camera;
   fail_unless (gst_range_caps_get_camera (caps, 1, &camera));
   fail_unless_equals_float (camera.fx, 320);
-  fail_unless (std::abs (camera.world_from_view[3] - 0.8) < 1e-9);
+  fail_unless_cmp (std::abs (camera.world_from_view[3] - 0.8), <, 1e-9);
   fail_if (gst_range_caps_get_camera (caps, 4, &camera));
   fail_if (gst_range_caps_get_camera (caps, 4000000000u, &camera));
   gst_caps_unref (caps);
@@ -61,12 +60,12 @@ GST_START_TEST (test_append_shares_memory_and_shifts_offsets)
   GstBuffer *a = make_frame_set (first, 5), *b = make_frame_set (second, 5, {10, 20, 33, 17});
   fail_unless (gst_range_buffer_append (a, b));
   fail_unless_equals_int (gst_buffer_n_range_metas (a), 2);
-  fail_unless (gst_buffer_peek_memory (a, 1) == gst_buffer_peek_memory (b, 0));
+  ck_assert_ptr_eq (gst_buffer_peek_memory (a, 1), gst_buffer_peek_memory (b, 0));
   {
     gstrange::RangeFrameMap frame (a, GST_MAP_READ), part (b, GST_MAP_READ);
-    fail_unless (frame.views ()[1].depth.data == part.views ()[0].depth.data);
-    fail_unless (frame.views ()[1].colour.data == part.views ()[0].colour.data);
-    fail_unless (frame.views ()[1].roi == (Roi{10, 20, 33, 17}));
+    ck_assert_ptr_eq (frame.views ()[1].depth.data, part.views ()[0].depth.data);
+    ck_assert_ptr_eq (frame.views ()[1].colour.data, part.views ()[0].colour.data);
+    fail_unless_cmp (frame.views ()[1].roi, ==, (Roi{10, 20, 33, 17}));
   }
   gst_buffer_unref (b);
   gst_buffer_unref (a);
@@ -166,14 +165,14 @@ GST_START_TEST (test_crop_moves_the_planes_without_touching_pixels)
   }
   {
     gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    fail_unless (frame.views ()[0].roi == (Roi{140, 100, 50, 40}));
+    fail_unless_cmp (frame.views ()[0].roi, ==, (Roi{140, 100, 50, 40}));
     fail_unless_equals_int (frame.views ()[0].depth.at (10, 10), expected);
     fail_unless_equals_int (frame.views ()[0].colour.at (10, 10).r, 150);
     frame.crop (0, {});
   }
   {
     gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
-    fail_unless (frame.status ().ok ());
+    fail_unless_ok (frame.status ());
     fail_unless (frame.views ()[0].roi.empty ());
   }
   gst_buffer_unref (buffer);
@@ -299,7 +298,7 @@ GST_START_TEST (test_a_pool_gets_memories_back_that_went_into_another_buffer)
     const GstRangeMeta *meta = gst_range_buffer_add_view (buffer, 1, 0, 0, 32, 24, 7);
     fail_unless (meta && gst_range_buffer_add_view (buffer, 0, 0, 0, 16, 24, 7));
     first = first ? first : gst_buffer_peek_memory (buffer, 0);
-    fail_unless (gst_buffer_peek_memory (buffer, 0) == first);
+    ck_assert_ptr_eq (gst_buffer_peek_memory (buffer, 0), first);
     if (i % 2) {
       gst_buffer_unref (other);
       other = gst_range_buffer_copy_view (buffer, meta);
@@ -346,14 +345,12 @@ GST_START_TEST (test_caps_beyond_the_limit_are_refused_by_name)
   gstrange::RangeInfo parsed;
   GstCaps *caps =
       gstrange::make_range_caps (gstrange::make_info (ring_rig (64, 2048, 2048), 30, 1));
-  fail_unless (
-      gstrange::parse_caps (caps, parsed).message ().find ("134217728") != std::string::npos);
+  fail_unless_contains (gstrange::parse_caps (caps, parsed).message (), "134217728");
   gst_caps_unref (caps);
   caps = gstrange::make_range_caps (gstrange::make_info (ring_rig (2), 30, 1));
   gst_caps_set_simple (
       caps, "width", G_TYPE_INT, G_MAXINT, "height", G_TYPE_INT, G_MAXINT, nullptr);
-  fail_unless (
-      gstrange::parse_caps (caps, parsed).message ().find ("134217728") != std::string::npos);
+  fail_unless_contains (gstrange::parse_caps (caps, parsed).message (), "134217728");
   gst_caps_unref (caps);
 }
 GST_END_TEST;
@@ -415,10 +412,10 @@ GST_END_TEST;
 GST_START_TEST (test_process_has_one_pool_of_threads)
 {
   Dl_info found{};
-  fail_unless (dladdr (reinterpret_cast<void *> (&rangecast::run_workers), &found) != 0);
+  ck_assert_int_ne (dladdr (reinterpret_cast<void *> (&rangecast::run_workers), &found), 0);
   fail_unless (found.dli_sname != nullptr);
-  fail_unless (dlsym (RTLD_DEFAULT, found.dli_sname) == found.dli_saddr);
-  fail_unless (found.dli_saddr == reinterpret_cast<void *> (&rangecast::run_workers));
+  ck_assert_ptr_eq (dlsym (RTLD_DEFAULT, found.dli_sname), found.dli_saddr);
+  ck_assert_ptr_eq (found.dli_saddr, reinterpret_cast<void *> (&rangecast::run_workers));
 }
 GST_END_TEST;
 

@@ -104,7 +104,7 @@ rig_of_pad (GstHarness *h, const char *media_type)
   fail_unless (caps != nullptr);
   fail_unless_equals_string (gst_structure_get_name (gst_caps_get_structure (caps, 0)), media_type);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   fail_unless_equals_int (info.fps_n, 30);
   gst_caps_unref (caps);
   return info.rig;

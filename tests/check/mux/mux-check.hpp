@@ -72,7 +72,7 @@ struct Mux {
       *capture = gst_range_buffer_get_capture_time (buffer);
     {
       gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
-      fail_unless (frame.status ().ok ());
+      fail_unless_ok (frame.status ());
     }
     gst_buffer_unref (buffer);
     return views;

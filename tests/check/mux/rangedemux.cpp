@@ -34,7 +34,7 @@ GST_START_TEST (test_each_view_has_a_pad_with_its_own_rig)
   fail_unless_equals_string (demux.told.c_str (), "+src_0+src_1+src_2.");
   for (int id = 0; id < 3; id++) {
     const Rig one = rig_of_pad (demux[id], "video/x-range");
-    fail_unless (encode_rig (one) == encode_rig (views_of (rig, {id})));
+    fail_unless_cmp (encode_rig (one), ==, encode_rig (views_of (rig, {id})));
   }
   GstCaps *caps = gst_pad_get_current_caps (demux[2]->sinkpad);
   int width = 0;
@@ -57,11 +57,11 @@ GST_START_TEST (test_pixels_are_shared_and_the_rest_is_kept)
   for (guint id : {0u, 1u}) {
     GstBuffer *view = demux.pull (int (id));
     fail_unless_equals_int (gst_buffer_n_range_metas (view), 1);
-    fail_unless (first_depth (view, id) == first_depth (input, id));
+    ck_assert_ptr_eq (first_depth (view, id), first_depth (input, id));
     const GstRangeMeta *meta = gst_buffer_get_range_meta (view, id);
     fail_unless_equals_int (meta->x, 100);
     fail_unless_equals_int (meta->height, 43);
-    fail_unless (gst_buffer_get_size (view) < gst_buffer_get_size (input));
+    ck_assert_uint_lt (gst_buffer_get_size (view), gst_buffer_get_size (input));
     fail_unless_equals_uint64 (GST_BUFFER_PTS (view), 5 * kFrame);
     fail_unless_equals_uint64 (GST_BUFFER_DURATION (view), kFrame);
     fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (view), 5 * kFrame + 7 * id);
@@ -117,7 +117,7 @@ GST_START_TEST (test_padded_strides_stay)
   for (guint id : {0u, 1u}) {
     GstBuffer *view = demux.pull (int (id));
     fail_unless_equals_int (gst_buffer_get_range_meta (view, id)->depth_stride, 66);
-    fail_unless (first_depth (view, id) == first_depth (input, id));
+    ck_assert_ptr_eq (first_depth (view, id), first_depth (input, id));
     gst_buffer_unref (view);
   }
   gst_buffer_unref (input);
@@ -129,8 +129,8 @@ GST_START_TEST (test_coded_views_have_their_own_units_and_caps)
   Demux demux;
   const Rig rig = ring_rig (2, 32, 24);
   demux.set_caps (coded_caps (rig));
-  fail_unless (encode_rig (rig_of_pad (demux[1], "application/x-neighbour-code")) ==
-               encode_rig (views_of (rig, {1})));
+  fail_unless_cmp (encode_rig (rig_of_pad (demux[1], "application/x-neighbour-code")), ==,
+      encode_rig (views_of (rig, {1})));
   const auto a = slice_unit (0, true, 11, 1, 2), b = slice_unit (1, true, 12, 2, 4),
              c = slice_unit (0, true, 11, 3, 2, 2);
   const Units of_view0 = {a, c}, of_view1 = {b};
@@ -300,7 +300,7 @@ GST_START_TEST (test_64_views)
   fail_unless_equals_int (demux.push (gst_buffer_ref (input)), GST_FLOW_OK);
   for (int id = 0; id < 64; id++) {
     GstBuffer *view = demux.pull (id);
-    fail_unless (first_depth (view, guint (id)) == first_depth (input, guint (id)));
+    ck_assert_ptr_eq (first_depth (view, guint (id)), first_depth (input, guint (id)));
     gst_buffer_unref (view);
   }
   gst_buffer_unref (input);
@@ -332,18 +332,20 @@ GST_START_TEST (test_rangemux_puts_together_what_came_apart)
         "wait-on-eos=false";
     GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
     fail_unless (pipeline != nullptr);
-    fail_if (gst_element_set_state (pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE);
+    ck_assert_int_ne (
+        gst_element_set_state (pipeline, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
     GstBus *bus = gst_element_get_bus (pipeline);
     GstMessage *message = gst_bus_timed_pop_filtered (
         bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-    fail_unless (message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS);
+    fail_unless (message);
+    ck_assert_int_eq (GST_MESSAGE_TYPE (message), GST_MESSAGE_EOS);
     gst_message_unref (message);
     gst_object_unref (bus);
     const auto whole = all_of (pipeline, "whole"), again = all_of (pipeline, "again");
     fail_unless_equals_int (whole.size (), 4);
     fail_unless_equals_int (again.size (), 4);
     if (*code)
-      fail_unless (whole == again);
+      fail_unless_cmp (whole, ==, again);
     gst_element_set_state (pipeline, GST_STATE_NULL);
     gst_object_unref (pipeline);
   }

@@ -48,12 +48,12 @@ GST_START_TEST (test_caps_are_the_union_and_memory_is_shared)
     mux.push (i, 5, 5);
   GstBuffer *output = gst_harness_pull (mux.out);
   fail_unless_equals_int (gst_buffer_n_memory (output), 4);
-  fail_unless (gst_buffer_peek_memory (output, 3) == memory);
+  ck_assert_ptr_eq (gst_buffer_peek_memory (output, 3), memory);
   gst_buffer_unref (output);
   GstCaps *caps = gst_pad_get_current_caps (mux.out->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
-  fail_unless (encode_rig (info.rig) == encode_rig (mux.rig));
+  fail_unless_ok (gstrange::parse_caps (caps, info));
+  fail_unless_cmp (encode_rig (info.rig), ==, encode_rig (mux.rig));
   gst_caps_unref (caps);
 }
 GST_END_TEST;
@@ -202,9 +202,9 @@ GST_START_TEST (test_two_pads_with_one_view_are_one_error_that_names_both)
   mux.push (0, 0, 0);
   gst_harness_push (mux.in[1], make_frame_set (mux.one (0), 0));
   const std::string text = next_message_text (mux.bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("sink_0") != std::string::npos, text.c_str ());
-  fail_unless (text.find ("sink_1") != std::string::npos, text.c_str ());
-  fail_unless (text.find ("view-id 0") != std::string::npos, text.c_str ());
+  fail_unless_contains (text, "sink_0");
+  fail_unless_contains (text, "sink_1");
+  fail_unless_contains (text, "view-id 0");
 }
 GST_END_TEST;
 
@@ -215,8 +215,7 @@ GST_START_TEST (test_raw_and_coded_together_are_one_error)
       gstrange::make_neighbour_code_caps (gstrange::make_info (mux.one (1), 25, 1), "access-unit"));
   mux.push (0, 0, 0);
   gst_harness_push (mux.in[1], gst_buffer_new_memdup ("abc", 3));
-  fail_unless (
-      next_message_text (mux.bus, GST_MESSAGE_ERROR).find ("all coded") != std::string::npos);
+  fail_unless_contains (next_message_text (mux.bus, GST_MESSAGE_ERROR), "all coded");
 }
 GST_END_TEST;
 
@@ -296,7 +295,7 @@ GST_START_TEST (test_17_streams_keep_the_pixels_of_each_view)
     gstrange::RangeFrameMap frame (output, GST_MAP_READ);
     fail_unless_equals_int (frame.views ().size (), 17);
     for (const auto &view : frame.views ()) {
-      fail_unless (view.roi == (Roi{1, 2, 8 + view.view_id % 3, 12}));
+      fail_unless_cmp (view.roi, ==, (Roi{1, 2, 8 + view.view_id % 3, 12}));
       fail_unless_equals_int (view.depth.at (7, 11), 1000 + view.view_id);
       fail_unless_equals_int (view.colour.at (3, 4).b, (3 + 2 * 4 + 40 * view.view_id) & 255);
     }

@@ -95,7 +95,7 @@ GST_START_TEST (test_net_client_clock_gets_the_pipelines_time)
   GstClock *clock = clock_ahead (3600 * GST_SECOND);
   gst_pipeline_use_clock (GST_PIPELINE (parent.pipeline), clock);
   fail_unless (parent.go_to (GST_STATE_PLAYING));
-  fail_unless (client_error (parent.port (), clock) < 5 * GST_SECOND);
+  ck_assert_int_lt (client_error (parent.port (), clock), 5 * GST_SECOND);
   gst_object_unref (clock);
 }
 GST_END_TEST;
@@ -110,7 +110,7 @@ GST_START_TEST (test_another_clock_is_told_on_the_same_port)
   gst_pipeline_use_clock (GST_PIPELINE (parent.pipeline), clock);
   fail_unless (parent.go_to (GST_STATE_PLAYING));
   fail_unless_equals_int (parent.port (), port);
-  fail_unless (client_error (port, clock) < 5 * GST_SECOND);
+  ck_assert_int_lt (client_error (port, clock), 5 * GST_SECOND);
   gst_object_unref (clock);
 }
 GST_END_TEST;
@@ -121,7 +121,7 @@ GST_START_TEST (test_any_port_can_be_read_while_it_is_taken)
   fail_unless_equals_int (parent.port (), 0);
   fail_unless (parent.go_to (GST_STATE_PAUSED));
   const int port = parent.port ();
-  fail_unless (port > 0);
+  ck_assert_int_gt (port, 0);
   fail_unless (take_port (port) == nullptr);
   fail_unless (parent.go_to (GST_STATE_READY));
   fail_unless_equals_int (parent.port (), 0);
@@ -177,7 +177,7 @@ GST_START_TEST (test_plays_twice_on_the_same_port)
   for (int i = 0; i < 2; i++) {
     fail_unless (parent.go_to (GST_STATE_PLAYING));
     GstClock *clock = gst_pipeline_get_clock (GST_PIPELINE (parent.pipeline));
-    fail_unless (client_error (port, clock) < 5 * GST_SECOND);
+    ck_assert_int_lt (client_error (port, clock), 5 * GST_SECOND);
     gst_object_unref (clock);
     fail_unless (parent.go_to (GST_STATE_NULL));
   }

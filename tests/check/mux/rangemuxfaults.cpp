@@ -142,7 +142,7 @@ GST_START_TEST (
     fail_unless (contains (warnings, "view 1") && contains (warnings, "3600.0"), warnings.c_str ());
     mux.ahead[1] = 0;
     fail_unless_equals_int (mux.always (3), 0b111);
-    fail_unless (mux.told ().at (0).state == "in");
+    fail_unless_cmp (mux.told ().at (0).state, ==, "in");
     fail_unless_equals_uint64 (mux.stat ("out-of-step"), 2 * kSecond);
   }
 }
@@ -338,7 +338,7 @@ struct RigFile {
     gchar *folder = g_dir_make_tmp ("rangemux-XXXXXX", nullptr);
     path = std::string (folder) + "/rig.yaml";
     g_free (folder);
-    fail_unless (save_rig (path, rig).ok ());
+    fail_unless_ok (save_rig (path, rig));
   }
   ~RigFile ()
   {
@@ -360,7 +360,7 @@ GST_START_TEST (test_a_host_with_another_rig_is_told_and_left_out)
   fail_unless_equals_int (mux.always (kSecond), 0b101);
   const std::string warnings = mux.warnings ();
   fail_unless (contains (warnings, "view 1") && contains (warnings, "0.01"), warnings.c_str ());
-  fail_unless (mux.told ().at (0).state == "other-rig");
+  fail_unless_cmp (mux.told ().at (0).state, ==, "other-rig");
 }
 GST_END_TEST;
 
@@ -382,7 +382,7 @@ GST_START_TEST (test_a_rig_that_is_no_file_is_one_error)
   GstElement *mux = gst_parse_launch ("rangemux rig=/nonexistent.yaml", nullptr);
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (mux, bus);
-  fail_unless (gst_element_set_state (mux, GST_STATE_PAUSED) == GST_STATE_CHANGE_FAILURE);
+  ck_assert_int_eq (gst_element_set_state (mux, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
   fail_unless (contains (next_message_text (bus, GST_MESSAGE_ERROR), "/nonexistent.yaml"));
   gst_element_set_state (mux, GST_STATE_NULL);
   gst_element_set_bus (mux, nullptr);

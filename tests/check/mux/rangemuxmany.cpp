@@ -63,10 +63,10 @@ static void
 check_views (GstBuffer *frame_set, int number)
 {
   gstrange::RangeFrameMap map (frame_set, GST_MAP_READ);
-  fail_unless (map.status ().ok ());
+  fail_unless_ok (map.status ());
   fail_unless_equals_int (map.views ().size (), number);
   for (const auto &view : map.views ()) {
-    fail_unless (view.roi == (Roi{1, 2, 8 + view.view_id % 3, 12}));
+    fail_unless_cmp (view.roi, ==, (Roi{1, 2, 8 + view.view_id % 3, 12}));
     fail_unless_equals_int (view.depth.at (7, 11), 1000 + view.view_id);
     fail_unless_equals_int (view.colour.at (3, 4).b, (3 + 2 * 4 + 40 * view.view_id) & 255);
   }
@@ -158,7 +158,7 @@ GST_START_TEST (test_coded_views_are_right_and_no_byte_is_copied_twice)
         if (frame > 0)
           fail_unless_equals_uint64 (watch.mapped, copied);
       }
-      fail_unless (bytes_of (output) == expected);
+      fail_unless_cmp (bytes_of (output), ==, expected);
       fail_unless_equals_int (gst_buffer_n_memory (output), std::min (streams, 16));
       gst_buffer_unref (output);
     }

@@ -65,7 +65,7 @@ GST_START_TEST (test_without_balance_and_blend_colours_are_the_cameras)
         fail_unless_equals_uint64 (plane[i], before.at (view)[i]);
         kept++;
       }
-  fail_unless (kept > 1000);
+  ck_assert_uint_gt (kept, 1000);
 }
 GST_END_TEST;
 
@@ -108,7 +108,7 @@ GST_START_TEST (test_blend_changes_colours_about_seams_and_no_depth)
                    scene, "cylinderfilter overlap=1 colour-balance=off mode=blend blend-width=0");
   const std::size_t some = different (winner, blend, valid);
   fail_unless (some > valid / 50 && some < valid * 7 / 10, "%zu of %zu", some, valid);
-  fail_unless (different (winner, wide, valid) > some * 5 / 4);
+  ck_assert_uint_gt (different (winner, wide, valid), some * 5 / 4);
   fail_unless_equals_uint64 (different (winner, none, valid), 0);
 }
 GST_END_TEST;
@@ -140,7 +140,7 @@ GST_START_TEST (test_gains_start_anew_after_a_flush)
       sum[1] += static_cast<double> (again.at (0)[i] >> 8 & 0xff);
       n++;
     }
-  fail_unless (n > 500);
+  fail_unless_cmp (n, >, 500);
   fail_unless (std::abs (sum[1] / sum[0] - 1) < 0.02, "%f", sum[1] / sum[0]);
 }
 GST_END_TEST;

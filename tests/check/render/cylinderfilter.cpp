@@ -29,7 +29,7 @@ static std::size_t
 points_of_view (GstBuffer *buffer, std::size_t index)
 {
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
-  fail_unless (frame.status ().ok ());
+  fail_unless_ok (frame.status ());
   const RangeImage &image = frame.views ()[index];
   std::size_t n = 0;
   for (int y = 0; y < image.depth.height; y++)
@@ -60,8 +60,8 @@ GST_START_TEST (test_clears_what_another_view_sees_and_keeps_times)
   GstBuffer *out = gst_harness_push_and_pull (h, in);
   fail_unless_equals_int (points_of_view (out, 0), points);
   /* Of views in one place the others keep corners of their outline. */
-  fail_unless (points_of_view (out, 1) < points / 20);
-  fail_unless (points_of_view (out, 2) < points / 20);
+  ck_assert_uint_lt (points_of_view (out, 1), points / 20);
+  ck_assert_uint_lt (points_of_view (out, 2), points / 20);
   fail_unless_equals_uint64 (GST_BUFFER_PTS (out), 5 * GST_SECOND);
   fail_unless_equals_uint64 (GST_BUFFER_DURATION (out), 7);
   fail_unless (GST_BUFFER_FLAG_IS_SET (out, GST_BUFFER_FLAG_MARKER));
@@ -77,14 +77,14 @@ GST_START_TEST (test_works_in_place_and_leaves_shared_buffers_alone)
   const Rig rig = same_place_rig (2);
   GstHarness *h = harness_for (rig);
   GstBuffer *in = make_frame_set (rig), *out = gst_harness_push_and_pull (h, in);
-  fail_unless (in == out);
+  ck_assert_ptr_eq (in, out);
   gst_buffer_unref (out);
 
   in = make_frame_set (rig);
   const std::size_t points = points_of_view (in, 1);
   out = gst_harness_push_and_pull (h, gst_buffer_ref (in));
-  fail_unless (in != out);
-  fail_unless (points_of_view (out, 1) < points / 20);
+  ck_assert_ptr_ne (in, out);
+  ck_assert_uint_lt (points_of_view (out, 1), points / 20);
   fail_unless_equals_int (points_of_view (in, 1), points);
   gst_buffer_unref (in);
   gst_buffer_unref (out);
@@ -99,13 +99,13 @@ GST_START_TEST (test_mode_off_passes_everything_and_may_change_while_playing)
   GstBuffer *in = make_frame_set (rig);
   const std::size_t points = points_of_view (in, 1);
   GstBuffer *out = gst_harness_push_and_pull (h, gst_buffer_ref (in));
-  fail_unless (in == out);
+  ck_assert_ptr_eq (in, out);
   fail_unless_equals_int (points_of_view (out, 1), points);
   gst_buffer_unref (in);
   gst_buffer_unref (out);
   gst_harness_set (h, "cylinderfilter", "mode", 1, nullptr);
   out = gst_harness_push_and_pull (h, make_frame_set (rig));
-  fail_unless (points_of_view (out, 1) < points_of_view (out, 0) / 20);
+  ck_assert_uint_lt (points_of_view (out, 1), points_of_view (out, 0) / 20);
   gst_buffer_unref (out);
   gst_harness_teardown (h);
 }
@@ -155,8 +155,8 @@ GST_START_TEST (test_caps_may_change_in_the_stream)
   const Rig larger = same_place_rig (5, 160, 120);
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (larger, 15, 1)));
   GstBuffer *out = gst_harness_push_and_pull (h, make_frame_set (larger));
-  fail_unless (points_of_view (out, 0) > 0);
-  fail_unless (points_of_view (out, 4) < points_of_view (out, 0) / 10);
+  ck_assert_uint_gt (points_of_view (out, 0), 0);
+  ck_assert_uint_lt (points_of_view (out, 4), points_of_view (out, 0) / 10);
   fail_unless_equals_uint64 (stat (element, "frames"), 2);
   gst_buffer_unref (out);
   gst_object_unref (element);
@@ -178,7 +178,7 @@ GST_START_TEST (test_stats_count_frames_points_and_units)
   fail_unless_equals_uint64 (stat (element, "frames"), 3);
   fail_unless_equals_uint64 (stat (element, "points-in"), 6 * points);
   fail_unless_equals_uint64 (stat (element, "points-out"), 3 * (points + points_of_view (out, 1)));
-  fail_unless (stat (element, "units") > 0);
+  ck_assert_uint_gt (stat (element, "units"), 0);
   fail_unless_equals_uint64 (stat (element, "units"), stat (element, "units-shared"));
   GstStructure *stats = nullptr;
   g_object_get (element, "stats", &stats, nullptr);
@@ -211,7 +211,7 @@ GST_START_TEST (test_forgets_winners_on_discont_flush_and_another_rig)
   GstElement *element = gst_harness_find_element (h, "cylinderfilter");
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), 0);
   const guint64 all = held_by_frame (h, element, rig, false);
-  fail_unless (all > 0);
+  ck_assert_uint_gt (all, 0);
   fail_unless_equals_uint64 (stat (element, "units-changed"), 0);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, true), 0);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false), all);
@@ -241,10 +241,10 @@ GST_START_TEST (test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is)
   GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
   GstElement *element = gst_harness_find_element (h, "cylinderfilter");
   held_by_frame (h, element, rig, true, 0);
-  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 30) > 0);
-  fail_unless (held_by_frame (h, element, rig, true, GST_SECOND / 10) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, true, GST_SECOND / 30), 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, true, GST_SECOND / 10), 0);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, 5 * GST_SECOND), 0);
-  fail_unless (held_by_frame (h, element, rig, false, 9 * GST_SECOND) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, false, 9 * GST_SECOND), 0);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, true, GST_SECOND), 0);
   gst_object_unref (element);
   gst_harness_teardown (h);
@@ -257,16 +257,16 @@ GST_START_TEST (test_another_stream_and_another_unit_height_begin_anew)
   GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
   GstElement *element = gst_harness_find_element (h, "cylinderfilter");
   held_by_frame (h, element, rig, false, 0);
-  fail_unless (held_by_frame (h, element, rig, false, GST_SECOND / 30) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, false, GST_SECOND / 30), 0);
   gst_harness_push_event (h, gst_event_new_stream_start ("another"));
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 2 * GST_SECOND / 30), 0);
-  fail_unless (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30), 0);
   g_object_set (element, "unit-height", 0.006, nullptr);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 4 * GST_SECOND / 30), 0);
-  fail_unless (held_by_frame (h, element, rig, false, 5 * GST_SECOND / 30) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, false, 5 * GST_SECOND / 30), 0);
   gst_object_unref (element);
   gst_harness_teardown (h);
 }
@@ -282,7 +282,7 @@ GST_START_TEST (test_forgets_winners_while_it_is_off)
   held_by_frame (h, element, rig, false, GST_SECOND / 30);
   g_object_set (element, "mode", 1, nullptr);
   fail_unless_equals_uint64 (held_by_frame (h, element, rig, false, 2 * GST_SECOND / 30), 0);
-  fail_unless (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30) > 0);
+  ck_assert_uint_gt (held_by_frame (h, element, rig, false, 3 * GST_SECOND / 30), 0);
   gst_object_unref (element);
   gst_harness_teardown (h);
 }
@@ -312,7 +312,7 @@ GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
     RANGECAST_SKIP ("operator new is somebody else's");
   /* On one thread: OpenCV's pool waits for ever where it has no memory for its own threads. */
   const Rig rig = same_place_rig (2, 32, 24);
-  fail_unless (run_out_of_memory ("cylinderfilter n-threads=1 mode=blend", rig) > 20);
+  ck_assert_int_gt (run_out_of_memory ("cylinderfilter n-threads=1 mode=blend", rig), 20);
 }
 GST_END_TEST;
 
@@ -366,7 +366,9 @@ GST_START_TEST (test_bodies_and_steadiness_may_change_while_playing)
     GstStructure *stats = nullptr;
     gint count = 0;
     g_object_get (element, "stats", &stats, nullptr);
-    fail_unless (gst_structure_get_int (stats, "bodies", &count) && count >= 1 && count <= bodies);
+    fail_unless (gst_structure_get_int (stats, "bodies", &count));
+    ck_assert_int_ge (count, 1);
+    ck_assert_int_le (count, bodies);
     gst_structure_free (stats);
   }
   double hysteresis = 0, agreement = 0;
@@ -389,7 +391,7 @@ GST_START_TEST (test_views_of_one_pixel_and_64_views_pass)
     for (int i = 0; i < 3; i++) {
       GstBuffer *out = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 9, 1, 1}));
       fail_unless_equals_int (gst_buffer_n_range_metas (out), views);
-      fail_unless (points_of_view (out, 0) <= 1);
+      ck_assert_uint_le (points_of_view (out, 0), 1);
       gst_buffer_unref (out);
     }
     gst_harness_teardown (h);
@@ -445,7 +447,7 @@ GST_START_TEST (test_view_that_the_caps_lack_is_one_error_by_name)
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (element, bus);
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (3))), GST_FLOW_ERROR);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("view 2") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "view 2");
   fail_if (gst_bus_have_pending (bus));
   gst_element_set_bus (element, nullptr);
   gst_object_unref (bus);
@@ -462,7 +464,7 @@ GST_START_TEST (test_caps_without_rig_are_refused_with_an_error)
   gst_harness_set_src_caps_str (
       h, "video/x-range,format=Z16_RGBx,width=320,height=240,framerate=30/1,views=2");
   gst_harness_push (h, make_frame_set (ring_rig (2)));
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("rig") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "rig");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);

@@ -15,7 +15,7 @@ static GstCaps *
 nudged_caps (const Scene &scene, Vec3 metres, double degrees)
 {
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (scene.caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (scene.caps, info));
   Pose &pose = info.rig.views[1].world_from_view;
   const double s = std::sin (degrees * M_PI / 180), c = std::cos (degrees * M_PI / 180);
   pose = {Mat3{c, 0, s, 0, 1, 0, -s, 0, c} * pose.rotation, pose.translation + metres};
@@ -26,7 +26,7 @@ static Vec3
 place_of (GstCaps *caps, std::size_t view)
 {
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   return info.rig.views[view].world_from_view * Vec3{0, 0, 0.8};
 }
 
@@ -94,7 +94,7 @@ GST_START_TEST (test_rig_that_is_off_goes_on_corrected_with_the_first_frame_set)
   Filter filter ("cylinderfilter", gst_caps_ref (wrong));
   filter.run (scene, 1);
   GstCaps *caps = filter.caps ();
-  fail_unless (norm (place_of (caps, 1) - should) < 0.5 * norm (was - should));
+  fail_unless_cmp (norm (place_of (caps, 1) - should), <, 0.5 * norm (was - should));
   GstCaps *back = gstrange::with_rig (caps, Rig{}), *plain = gstrange::with_rig (wrong, Rig{});
   fail_unless (gst_caps_is_equal (back, plain), "more than the rig changed");
   filter.run (scene, 29);
@@ -176,7 +176,8 @@ GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_a_warning_and_stats_
       fail_unless_equals_int (left_out, leaves_out && i == 1);
       if (leaves_out)
         fail_unless (i == 1 ? consistency < 0.35 : consistency > 0.9, "%u: %f", i, consistency);
-      fail_unless (moved >= 0 && turned >= 0);
+      fail_unless_cmp (moved, >=, 0);
+      fail_unless_cmp (turned, >=, 0);
     }
     gst_structure_free (stats);
   }
@@ -218,7 +219,7 @@ GST_START_TEST (test_without_colour_balance_a_dark_view_is_no_contradiction)
   const Scene scene (8, kWidth, kHeight, 1, kStill);
   {
     gstrange::RangeFrameMap frame (scene.frame_sets[0], GST_MAP_READWRITE);
-    fail_unless (frame.status ().ok ());
+    fail_unless_ok (frame.status ());
     const RangeImage &dark = frame.views ()[1];
     for (int y = 0; y < dark.colour.height; y++)
       std::fill_n (dark.colour.row (y), dark.colour.width, Rgbx{255, 0, 255});

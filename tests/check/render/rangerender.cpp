@@ -18,7 +18,7 @@ struct Recording {
   {
     gchar *name = nullptr;
     const gint file = g_file_open_tmp ("rangecast-XXXXXX.rcnc", &name, nullptr);
-    fail_unless (file >= 0);
+    ck_assert_int_ge (file, 0);
     g_close (file, nullptr);
     path = name;
     g_free (name);
@@ -174,7 +174,7 @@ GST_START_TEST (test_playbin_seeks_to_the_frame_set_at_a_time)
       gst_element_get_state (playbin, nullptr, nullptr, 20 * GST_SECOND), GST_STATE_CHANGE_SUCCESS);
   gint64 duration = 0;
   fail_unless (gst_element_query_duration (playbin, GST_FORMAT_TIME, &duration));
-  fail_unless (std::abs (duration - gint64 (800 * GST_MSECOND)) < gint64 (GST_MSECOND));
+  ck_assert_int_lt (std::abs (duration - gint64 (800 * GST_MSECOND)), gint64 (GST_MSECOND));
   fail_unless (gst_element_seek_simple (playbin, GST_FORMAT_TIME,
       GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE), 500 * GST_MSECOND));
   GstSample *sample = gst_app_sink_try_pull_preroll (GST_APP_SINK (sink), 20 * GST_SECOND);
@@ -195,7 +195,7 @@ GST_START_TEST (test_properties_inside_can_be_set)
   gint columns = 0;
   gst_child_proxy_get (GST_CHILD_PROXY (element), "render::auto-orbit", &orbit, "cylinder::columns",
       &columns, nullptr);
-  fail_unless (orbit == 30);
+  fail_unless_cmp (orbit, ==, 30);
   fail_unless_equals_int (columns, 180);
   gst_object_unref (element);
 }

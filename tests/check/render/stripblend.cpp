@@ -105,10 +105,10 @@ GST_START_TEST (test_surface_beyond_the_blend_range_is_hidden)
   GstHarness *h = render_harness (rig, "azimuth=20");
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
-  fail_unless (middle (render (h, walls_apart (rig, 0.01)))[0] > 60);
-  fail_unless (middle (render (h, walls_apart (rig, 0.1)))[0] < 1);
+  fail_unless_cmp (middle (render (h, walls_apart (rig, 0.01)))[0], >, 60);
+  fail_unless_cmp (middle (render (h, walls_apart (rig, 0.1)))[0], <, 1);
   gst_harness_set (h, "striprender", "blend-range", 0.2, nullptr);
-  fail_unless (middle (render (h, walls_apart (rig, 0.1)))[0] > 60);
+  fail_unless_cmp (middle (render (h, walls_apart (rig, 0.1)))[0], >, 60);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -171,7 +171,7 @@ GST_START_TEST (test_outlines_are_antialiased_and_have_no_dark_rims)
       const int alpha = picture.at (x, y, 3);
       rim += alpha > 0 && alpha < 255;
       for (int c = 0; c < 3; c++)
-        fail_unless (std::abs (picture.at (x, y, c) - (alpha > 0 ? 255 : 0)) <= 1);
+        ck_assert_int_le (std::abs (picture.at (x, y, c) - (alpha > 0 ? 255 : 0)), 1);
     }
   fail_unless (rim > 100, "%d pixels", rim);
   fail_unless_equals_int (picture.at (160, 120, 3), 255);
@@ -240,7 +240,7 @@ GST_START_TEST (test_draws_in_a_locale_with_a_decimal_comma)
   const Rig rig = two_of_nine ();
   GstHarness *h = render_harness (rig, "azimuth=0");
   if (h) {
-    fail_unless (middle (render (h, wall_of_two (rig)))[0] > 100);
+    fail_unless_cmp (middle (render (h, wall_of_two (rig)))[0], >, 100);
     gst_harness_teardown (h);
   }
   setlocale (LC_NUMERIC, "C");
@@ -258,10 +258,10 @@ GST_START_TEST (test_modes_may_take_turns)
   gst_harness_set (h, "striprender", "mode", 0, nullptr);
   const RenderedPicture blend = render (h, wall_of_two (rig));
   gst_harness_set (h, "striprender", "mode", 1, nullptr);
-  fail_unless (render (h, wall_of_two (rig)).rgba == strips.rgba);
+  fail_unless_cmp (render (h, wall_of_two (rig)).rgba, ==, strips.rgba);
   gst_harness_set (h, "striprender", "mode", 0, nullptr);
-  fail_unless (render (h, wall_of_two (rig)).rgba == blend.rgba);
-  fail_unless (blend.rgba != strips.rgba);
+  fail_unless_cmp (render (h, wall_of_two (rig)).rgba, ==, blend.rgba);
+  fail_unless_cmp (blend.rgba, !=, strips.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;

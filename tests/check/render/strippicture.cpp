@@ -222,9 +222,9 @@ GST_START_TEST (test_samples_smooth_edges_and_may_change_any_time)
   fail_unless_equals_int (smooth.at (160, 120, 0), 0xff);
   fail_unless_equals_int (smooth.at (5, 5, 2), 0x2a);
   set_samples (64); /* more than there are anywhere: as many as there are */
-  fail_unless (mixed_pixels (render (h, disc ())) > 100);
+  ck_assert_int_gt (mixed_pixels (render (h, disc ())), 100);
   set_samples (1);
-  fail_unless (render (h, disc ()).rgba == plain.rgba);
+  fail_unless_cmp (render (h, disc ()).rgba, ==, plain.rgba);
   gst_object_unref (element);
   gst_harness_teardown (h);
 }
@@ -487,7 +487,7 @@ GST_START_TEST (test_frame_set_without_views_is_the_background)
   for (int i = 0; i < 320 * 240; i++)
     fail_unless_equals_int (picture.rgba[4 * i + 1], 0x24);
   fail_unless_equals_uint64 (stats_field (h, "points"), 0);
-  fail_unless (render (h, wall (rig)).rgba == full.rgba);
+  fail_unless_cmp (render (h, wall (rig)).rgba, ==, full.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -526,10 +526,10 @@ GST_START_TEST (test_new_rig_in_mid_stream_is_drawn_by_its_own_cameras)
   };
   use (small);
   const RenderedPicture other = render (h, make_frame_set (small));
-  fail_if (other.rgba == before.rgba);
+  fail_unless_cmp (other.rgba, !=, before.rgba);
   fail_if (is_background (other, 160, 120));
   use (large);
-  fail_unless (render (h, wall (large)).rgba == before.rgba);
+  fail_unless_cmp (render (h, wall (large)).rgba, ==, before.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;

@@ -78,7 +78,7 @@ GST_START_TEST (test_edges_of_a_smaller_roi_do_not_read_the_last_frame)
   for (int i = 0; i < 2; i++) /* there may be two of each texture, in turns */
     render (h, gst_buffer_ref (large));
   gst_buffer_unref (large);
-  fail_unless (render (h, small_roi (rig)).rgba == fresh.rgba);
+  fail_unless_cmp (render (h, small_roi (rig)).rgba, ==, fresh.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -117,7 +117,7 @@ GST_START_TEST (test_padded_strides_give_the_same_picture)
   GstBuffer *packed = make_frame_set (rig);
   GstBuffer *wide = padded (packed);
   const RenderedPicture expected = render (h, packed);
-  fail_unless (render (h, wide).rgba == expected.rgba);
+  fail_unless_cmp (render (h, wide).rgba, ==, expected.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -162,7 +162,8 @@ GST_START_TEST (test_mouse_turns_and_zooms_and_r_goes_back)
   fail_unless (std::abs (distance - 0.8 / 1.1) < 1e-6, "distance %f", distance);
   send (gst_navigation_event_new_key_press ("r", GST_NAVIGATION_MODIFIER_NONE));
   g_object_get (element, "azimuth", &azimuth, "distance", &distance, nullptr);
-  fail_unless (azimuth == 0 && distance == 0);
+  fail_unless_cmp (azimuth, ==, 0);
+  fail_unless_cmp (distance, ==, 0);
   gst_object_unref (src);
   gst_object_unref (element);
   gst_harness_teardown (h);
@@ -356,7 +357,7 @@ GST_START_TEST (test_azimuth_can_be_controlled)
   double azimuth = 0;
   g_object_get (element, "azimuth", &azimuth, nullptr);
   fail_unless (std::abs (azimuth - 45) < 1e-6, "azimuth %f", azimuth);
-  fail_if (straight.rgba == turned.rgba);
+  fail_unless_cmp (straight.rgba, !=, turned.rgba);
   gst_object_unref (source);
   gst_object_unref (element);
   gst_harness_teardown (h);
@@ -378,7 +379,7 @@ GST_START_TEST (test_output_size_changes_in_mid_stream)
   fail_unless (std::abs (middle[0] - 130) <= 2, "%d", middle[0]);
   gst_buffer_unref (small);
   set_output_caps (h->element, "width=320,height=240");
-  fail_unless (render (h, wall (rig)).rgba == before.rgba);
+  fail_unless_cmp (render (h, wall (rig)).rgba, ==, before.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -411,7 +412,7 @@ GST_START_TEST (test_gap_and_eos_and_flush_pass_and_it_goes_on)
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
-  fail_unless (render (h, wall (rig)).rgba == first.rgba);
+  fail_unless_cmp (render (h, wall (rig)).rgba, ==, first.rgba);
   gst_harness_push_event (h, gst_event_new_eos ());
   fail_unless (event_arrives (h, GST_EVENT_EOS));
   gst_harness_teardown (h);
@@ -503,13 +504,13 @@ GST_START_TEST (test_flush_begins_auto_orbit_anew)
   if (!h)
     RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture first = render (h, wall (rig, GST_SECOND));
-  fail_if (render (h, wall (rig, 2 * GST_SECOND)).rgba == first.rgba);
+  fail_unless_cmp (render (h, wall (rig, 2 * GST_SECOND)).rgba, !=, first.rgba);
   gst_harness_push_event (h, gst_event_new_flush_start ());
   gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
-  fail_unless (render (h, wall (rig, GST_SECOND / 2)).rgba == first.rgba);
+  fail_unless_cmp (render (h, wall (rig, GST_SECOND / 2)).rgba, ==, first.rgba);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -584,7 +585,7 @@ GST_START_TEST (test_pictures_larger_than_opengl_has_are_one_error)
   const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
   fail_unless (found.find ("70000x16") != std::string::npos, "'%s'", found.c_str ());
   while (GstMessage *more = gst_bus_timed_pop_filtered (bus, GST_SECOND / 4, GST_MESSAGE_ERROR)) {
-    fail_if (GST_MESSAGE_SRC (more) == GST_OBJECT (element));
+    ck_assert_ptr_ne (GST_MESSAGE_SRC (more), GST_OBJECT (element));
     gst_message_unref (more);
   }
   gst_element_set_state (pipeline, GST_STATE_NULL);
@@ -625,7 +626,7 @@ GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
   gst_element_set_bus (element, bus);
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (2))), GST_FLOW_ERROR);
   const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (found.find ("view 1 is not in the rig") != std::string::npos, "%s", found.c_str ());
+  fail_unless_contains (found, "view 1 is not in the rig");
   fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
   gst_element_set_bus (element, nullptr);
   gst_object_unref (bus);
@@ -686,7 +687,7 @@ GST_START_TEST (test_new_rig_and_states_twice)
     gst_element_set_state (h->element, GST_STATE_NULL);
     gst_harness_play (h);
     gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-    fail_unless (render (h, wall (rig)).rgba == first.rgba);
+    fail_unless_cmp (render (h, wall (rig)).rgba, ==, first.rgba);
   }
   gst_harness_teardown (h);
 }

@@ -88,7 +88,7 @@ GST_START_TEST (test_known_point_has_the_disparity_of_its_distance)
   }
   const double parallel = disparity ("eye-distance=0.1 convergence=1000", 10000);
   fail_unless (std::abs (parallel - f_times_eye) < 0.6, "in parallel: %f", parallel);
-  fail_unless (std::abs (disparity ("eye-distance=0", 10000)) < 0.01);
+  fail_unless_cmp (std::abs (disparity ("eye-distance=0", 10000)), <, 0.01);
 }
 GST_END_TEST;
 
@@ -142,7 +142,7 @@ GST_START_TEST (test_two_eyes_cost_one_upload)
     uploaded[two] = stats_field (h, "uploaded-bytes");
     gst_harness_teardown (h);
   }
-  fail_unless (uploaded[0] > 0);
+  ck_assert_uint_gt (uploaded[0], 0);
   fail_unless_equals_uint64 (uploaded[1], uploaded[0]);
 }
 GST_END_TEST;
@@ -401,7 +401,7 @@ GST_START_TEST (test_statistics_are_in_a_corner_and_leave_the_rest_alone)
   fail_unless_equals_int (
       pixels_that_differ (written.part (0, 120, 320, 120), plain.part (0, 120, 320, 120)), 0);
   g_object_set (r, "show-stats", FALSE, nullptr);
-  fail_unless (render (h, make_frame_set (rig), 320).rgba == plain.rgba);
+  fail_unless_cmp (render (h, make_frame_set (rig), 320).rgba, ==, plain.rgba);
   gst_object_unref (r);
   gst_harness_teardown (h);
 }
@@ -480,7 +480,7 @@ GST_START_TEST (test_lost_context_is_one_error_that_says_so)
   gst_object_unref (context);
   fail_unless_equals_int (gst_harness_push (h, dot (rig, 8000)), GST_FLOW_ERROR);
   const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("context is lost") != std::string::npos, "%s", text.c_str ());
+  fail_unless_contains (text, "context is lost");
   fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
@@ -498,7 +498,7 @@ GST_START_TEST (test_no_context_at_all_is_one_error)
   GstBus *bus = gst_element_get_bus (pipeline);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
   const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (text.find ("gles1") != std::string::npos, "%s", text.c_str ());
+  fail_unless_contains (text, "gles1");
   int ours = 0;
   while (
       GstMessage *message = gst_bus_timed_pop_filtered (bus, GST_SECOND / 4, GST_MESSAGE_ERROR)) {
@@ -558,7 +558,7 @@ GST_START_TEST (test_one_finger_turns_two_move_and_zoom)
   fail_unless (std::abs (t.elevation + 22.5) < 1e-6, "elevation %f", t.elevation);
   gst_pad_send_event (src, gst_navigation_event_new_touch_cancel (none));
   move (9, 0, 0);
-  fail_unless (values_of (r).azimuth == t.azimuth);
+  fail_unless_cmp (values_of (r).azimuth, ==, t.azimuth);
   gst_object_unref (src);
   gst_object_unref (r);
 }

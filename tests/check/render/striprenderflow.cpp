@@ -314,7 +314,7 @@ GST_START_TEST (test_drain_gives_all_buffers_back_and_the_picture_stays)
     gst_query_unref (query);
     fail_unless_equals_int (gone, 3);
     const RenderedPicture after = next ();
-    fail_unless (after.rgba == before.rgba);
+    fail_unless_cmp (after.rgba, ==, before.rgba);
     fail_unless_equals_uint64 (after.shows, before.shows);
     if (is_live) {
       fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), uploads);
@@ -544,7 +544,7 @@ GST_START_TEST (test_caps_that_nobody_can_make_while_the_stream_stalls_are_an_er
 }
 GST_END_TEST;
 
-GST_START_TEST (test_drawing_thread_tells_of_its_begin_and_end)
+GST_START_TEST (test_output_task_posts_stream_status)
 {
   Live live;
   if (!live.h)
@@ -555,7 +555,7 @@ GST_START_TEST (test_drawing_thread_tells_of_its_begin_and_end)
   live.next ();
   gst_element_set_state (live.h->element, GST_STATE_READY);
   for (GstStreamStatusType expected :
-      {GST_STREAM_STATUS_TYPE_ENTER, GST_STREAM_STATUS_TYPE_LEAVE}) {
+      {GST_STREAM_STATUS_TYPE_CREATE, GST_STREAM_STATUS_TYPE_ENTER, GST_STREAM_STATUS_TYPE_LEAVE}) {
     GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_STREAM_STATUS);
     GstStreamStatusType type;
     fail_unless (message != nullptr);
@@ -629,7 +629,7 @@ GST_START_TEST (test_statistics_count_pictures_and_points)
   gst_structure_get_uint64 (stats, "points", &counted);
   gst_structure_get_uint64 (stats, "late", &late);
   fail_unless_equals_uint64 (frames, 3);
-  fail_unless (points > 0);
+  ck_assert_uint_gt (points, 0);
   fail_unless_equals_uint64 (counted, points);
   fail_unless_equals_uint64 (late, 0);
   gst_message_unref (message);
@@ -663,7 +663,7 @@ striprenderflow_suite ()
   tcase_add_test (tc, test_new_stream_is_drawn_after_the_last_one_failed);
   tcase_add_test (tc, test_flush_or_end_of_downstream_while_the_stream_stalls_is_no_error);
   tcase_add_test (tc, test_caps_that_nobody_can_make_while_the_stream_stalls_are_an_error);
-  tcase_add_test (tc, test_drawing_thread_tells_of_its_begin_and_end);
+  tcase_add_test (tc, test_output_task_posts_stream_status);
   tcase_add_test (tc, test_memory_that_ends_is_one_error_and_no_crash);
   tcase_add_test (tc, test_memory_that_ends_on_the_drawing_thread_is_one_error);
   return suite;

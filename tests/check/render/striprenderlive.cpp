@@ -173,7 +173,7 @@ GST_START_TEST (test_times_that_go_back_or_lack_do_no_harm)
   const GstClockTime ms = GST_MSECOND, d = kPeriod;
   const auto pictures = convert ("", "framerate=20/1", 10,
       {{300 * ms, d}, {100 * ms, d}, {GST_CLOCK_TIME_NONE, d}, {500 * ms, 0}});
-  fail_unless (pictures.size () >= 4);
+  ck_assert_uint_ge (pictures.size (), 4);
   for (std::size_t i = 1; i < pictures.size (); i++)
     fail_unless_equals_uint64 (pictures[i].pts, pictures[i - 1].pts + GST_SECOND / 20);
 }
@@ -209,7 +209,7 @@ GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
   live.push (0);
   live.next ();
   const guint64 once = stats_field (live.r, "uploaded-total");
-  fail_unless (once > 0);
+  ck_assert_uint_gt (once, 0);
   fail_unless_equals_uint64 (stats_field (live.r, "uploaded-bytes"), once);
   for (int i = 0; i < 3; i++)
     live.next ();
@@ -217,12 +217,12 @@ GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
   fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), once);
   g_object_set (live.r, "merge", 0.0, nullptr); /* other strips */
   live.next ();
-  fail_unless (stats_field (live.r, "uploaded-bytes") > once);
+  ck_assert_uint_gt (stats_field (live.r, "uploaded-bytes"), once);
   live.push (600 * GST_MSECOND);
   live.next ();
   live.next ();
   const guint64 with_next = stats_field (live.r, "uploaded-total");
-  fail_unless (with_next > 2 * once);
+  ck_assert_uint_gt (with_next, 2 * once);
 }
 GST_END_TEST;
 
@@ -233,13 +233,13 @@ GST_START_TEST (test_held_picture_follows_keys_and_properties)
     RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   const RenderedPicture still = live.next ();
-  fail_unless (live.next ().rgba == still.rgba);
+  fail_unless_cmp (live.next ().rgba, ==, still.rgba);
   gst_pad_send_event (
       live.src, gst_navigation_event_new_key_press ("Right", GST_NAVIGATION_MODIFIER_NONE));
   const RenderedPicture turned = live.next ();
-  fail_if (turned.rgba == still.rgba);
+  fail_unless_cmp (turned.rgba, !=, still.rgba);
   g_object_set (live.r, "mode", 2, "azimuth", 40.0, nullptr);
-  fail_if (live.next ().rgba == turned.rgba);
+  fail_unless_cmp (live.next ().rgba, !=, turned.rgba);
   g_object_set (live.r, "mode", 0, "azimuth", 0.0, nullptr);
   fail_unless (live.next ().rgba == still.rgba, "strips are not made anew");
 }
@@ -469,7 +469,7 @@ GST_START_TEST (test_gap_of_a_live_stream_is_filled_not_passed_on)
   for (int i = 1; i < 5; i++)
     live.next ();
   while (GstEvent *event = gst_harness_try_pull_event (live.h)) {
-    fail_if (GST_EVENT_TYPE (event) == GST_EVENT_GAP);
+    ck_assert_int_ne (GST_EVENT_TYPE (event), GST_EVENT_GAP);
     gst_event_unref (event);
   }
 }

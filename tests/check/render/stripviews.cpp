@@ -123,8 +123,8 @@ fail_if_fitted (const RenderedPicture &picture)
 {
   const Drawn drawn (picture);
   fail_if (drawn.empty ());
-  fail_unless (drawn.right - drawn.left < 0.7 * picture.width &&
-               drawn.bottom - drawn.top < 0.7 * picture.height);
+  fail_unless_cmp (drawn.right - drawn.left, <, 0.7 * picture.width);
+  fail_unless_cmp (drawn.bottom - drawn.top, <, 0.7 * picture.height);
 }
 
 GST_START_TEST (test_fit_outlasts_other_sizes_and_corrected_rigs)
@@ -148,7 +148,7 @@ GST_START_TEST (test_fit_outlasts_other_sizes_and_corrected_rigs)
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (corrected, 30, 1)));
   fail_if_fitted (render (h, patch (corrected, other, 1300 * GST_MSECOND)));
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-  fail_unless (render (h, patch (rig, first, 1400 * GST_MSECOND)).rgba == at_first.rgba);
+  fail_unless_cmp (render (h, patch (rig, first, 1400 * GST_MSECOND)).rgba, ==, at_first.rgba);
 
   const Rig more = ring_rig (2); /* other cameras, another fit */
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (more, 30, 1)));
@@ -169,8 +169,9 @@ GST_START_TEST (test_fit_holds_until_a_key_asks_for_another)
     fail_unless_fitted (at_first);
     render (h, patch (rig, first, 600 * GST_MSECOND)); /* about the same: settled */
     const Drawn moved (render (h, patch (rig, other, 2 * GST_SECOND)));
-    fail_unless (moved.right - moved.left < 180 && moved.middle_x () > 165);
-    fail_unless (render (h, patch (rig, first, 3 * GST_SECOND)).rgba == at_first.rgba);
+    ck_assert_int_lt (moved.right - moved.left, 180);
+    fail_unless_cmp (moved.middle_x (), >, 165);
+    fail_unless_cmp (render (h, patch (rig, first, 3 * GST_SECOND)).rgba, ==, at_first.rgba);
     press_key (h, key);
     fail_unless_fitted (render (h, patch (rig, other, 4 * GST_SECOND)));
     gst_harness_teardown (h);
@@ -219,7 +220,8 @@ GST_START_TEST (test_fit_gives_up_on_a_view_that_is_lost)
   const RenderedPicture both = render (h, make_frame_set (rig, 0));
   fail_if (Drawn (both).empty ());
   const Drawn waits (render (h, patch (rig, roi, 4 * GST_SECOND)));
-  fail_unless (waits.right - waits.left < 0.75 * 320 && waits.bottom - waits.top < 0.75 * 240);
+  fail_unless_cmp (waits.right - waits.left, <, 0.75 * 320);
+  fail_unless_cmp (waits.bottom - waits.top, <, 0.75 * 240);
   fail_unless_fitted (render (h, patch (rig, roi, 6 * GST_SECOND)));
   fail_unless_fitted (render (h, patch (rig, roi, 7 * GST_SECOND))); /* settled */
   fail_if_fitted (render (h, patch (rig, other, 20 * GST_SECOND)));
@@ -264,11 +266,12 @@ GST_START_TEST (test_hand_and_properties_go_before_the_fit)
       smaller.bottom - smaller.top);
   /* the person goes, before the fit has settled, and comes back: nothing moves */
   render (h, patch (rig, {200, 100, 40, 40}, GST_SECOND));
-  fail_unless (render (h, patch (rig, roi, 2 * GST_SECOND)).rgba == zoomed.rgba);
+  fail_unless_cmp (render (h, patch (rig, roi, 2 * GST_SECOND)).rgba, ==, zoomed.rgba);
   GstElement *r = gst_harness_find_element (h, "striprender");
   g_object_set (r, "distance", 8.0, nullptr);
   const Drawn far_away (render (h, patch (rig, roi, 3 * GST_SECOND)));
-  fail_unless (far_away.bottom - far_away.top < 30 && std::abs (far_away.middle_x () - 159.5) < 3);
+  ck_assert_int_lt (far_away.bottom - far_away.top, 30);
+  fail_unless_cmp (std::abs (far_away.middle_x () - 159.5), <, 3);
   gst_object_unref (r);
   gst_harness_teardown (h);
 }
@@ -283,12 +286,13 @@ GST_START_TEST (test_fit_may_be_set_any_time)
   const Roi roi = {10, 10, 60, 60};
   const RenderedPicture before = render (h, patch (rig, roi, 0));
   const Drawn first (before);
-  fail_unless (first.left <= 11 && first.right < 75);
+  ck_assert_int_le (first.left, 11);
+  ck_assert_int_lt (first.right, 75);
   GstElement *r = gst_harness_find_element (h, "striprender");
   g_object_set (r, "fit", TRUE, nullptr);
   fail_unless_fitted (render (h, patch (rig, roi, GST_SECOND)));
   g_object_set (r, "fit", FALSE, nullptr);
-  fail_unless (render (h, patch (rig, roi, 2 * GST_SECOND)).rgba == before.rgba);
+  fail_unless_cmp (render (h, patch (rig, roi, 2 * GST_SECOND)).rgba, ==, before.rgba);
   gst_object_unref (r);
   gst_harness_teardown (h);
 }
@@ -410,7 +414,7 @@ GST_START_TEST (test_view_mask_draws_those_views_alone)
     fail_unless (second.green && !second.red);
     fail_unless (Drawn (with (0)).empty ());
     fail_unless_equals_uint64 (stats_field (r, "points"), 0);
-    fail_unless (with (G_MAXUINT64).rgba == both.rgba);
+    fail_unless_cmp (with (G_MAXUINT64).rgba, ==, both.rgba);
     gst_object_unref (r);
     gst_harness_teardown (h);
   }
@@ -426,7 +430,7 @@ GST_START_TEST (test_view_mask_reaches_the_last_view_id)
   const auto set = [&] { return make_frame_set (rig, 0, {120, 90, 80, 60}); };
   render (h, set ());
   const guint64 one = stats_field (h, "points");
-  fail_unless (one > 0);
+  ck_assert_uint_gt (one, 0);
   GstElement *r = gst_harness_find_element (h, "striprender");
   g_object_set (r, "view-mask", G_MAXUINT64, nullptr);
   render (h, set ());
@@ -448,14 +452,14 @@ GST_START_TEST (test_view_mask_changes_a_held_picture_and_can_be_controlled)
   for (std::size_t i = 0; i < none.rgba.size (); i += 4)
     fail_unless_equals_int (none.rgba[i], 0x20);
   g_object_set (live.r, "view-mask", G_MAXUINT64, nullptr);
-  fail_unless (live.next ().rgba == all.rgba);
+  fail_unless_cmp (live.next ().rgba, ==, all.rgba);
   GstControlSource *source = gst_interpolation_control_source_new ();
   g_object_set (source, "mode", GST_INTERPOLATION_MODE_NONE, nullptr);
   gst_object_add_control_binding (GST_OBJECT (live.r),
       gst_direct_control_binding_new_absolute (GST_OBJECT (live.r), "view-mask", source));
   gst_timed_value_control_source_set (GST_TIMED_VALUE_CONTROL_SOURCE (source), 0, 2);
   gst_object_unref (source);
-  fail_unless (live.next ().rgba == none.rgba);
+  fail_unless_cmp (live.next ().rgba, ==, none.rgba);
 }
 GST_END_TEST;
 

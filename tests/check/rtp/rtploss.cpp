@@ -139,7 +139,7 @@ GST_START_TEST (test_good_network_loses_nothing)
   const Received received = send (ring_rig (2, 160, 120), "");
   fail_unless_equals_int (received.frames, kFrames);
   fail_unless_equals_int (received.in_order, kFrames);
-  fail_unless (received.right_pixels == 1);
+  fail_unless_cmp (received.right_pixels, ==, 1);
 }
 GST_END_TEST;
 
@@ -163,7 +163,7 @@ GST_START_TEST (test_conceal_last_fills_what_is_lost)
   NEED_NETSIM;
   const Received received = send (ring_rig (2, 160, 120), "drop-probability=0.1", "conceal=last");
   fail_unless (received.frames > kFrames - 5, "%d frames", received.frames);
-  fail_unless (received.missing > 0);
+  ck_assert_uint_gt (received.missing, 0);
   /* Only what was lost from the first frame set on stays away until it comes once. */
   fail_unless (received.right_pixels > 0.99, "%g right", received.right_pixels);
 }
@@ -175,7 +175,7 @@ GST_START_TEST (test_repeated_packets_change_nothing)
   const Rig rig = ring_rig (2, 160, 120);
   const Received once = send (rig, ""), twice = send (rig, "duplicate-probability=0.5");
   fail_unless_equals_int (twice.frames, kFrames);
-  fail_unless (twice.right_pixels == 1);
+  fail_unless_cmp (twice.right_pixels, ==, 1);
   fail_unless_equals_uint64 (twice.points, once.points);
 }
 GST_END_TEST;
@@ -270,7 +270,8 @@ receive (const Packets &packets, const Losses &losses, const char *decoder = "")
   while (GstBuffer *buffer = gst_harness_try_pull (h)) {
     const GstClockTime time = gst_range_buffer_get_capture_time (buffer);
     const auto i = std::size_t ((time + Scene::kInterval / 2) / Scene::kInterval);
-    fail_unless (i < received.size () && received[i].empty ());
+    ck_assert_uint_lt (i, received.size ());
+    fail_unless (received[i].empty ());
     received[i] = pixels_of (buffer, Packets::kWidth, Packets::kHeight);
     gst_buffer_unref (buffer);
   }
@@ -370,7 +371,7 @@ GST_START_TEST (test_at_5_percent_loss_exactly_the_pixels_of_packets_that_came_a
         lossy_sets += compare (whole[i], lossy[i]).right_share () < 1;
       }
     }
-    fail_unless (lossy_sets > 8);
+    ck_assert_int_gt (lossy_sets, 8);
   }
 }
 GST_END_TEST;
@@ -393,7 +394,7 @@ GST_START_TEST (
       const auto lossy = receive (packets, losses);
       double sum = 0;
       for (std::size_t i = 0; i < whole.size (); i++) {
-        fail_unless (packets.frame_sets[i].size () >= 20);
+        ck_assert_uint_ge (packets.frame_sets[i].size (), 20);
         const double right = compare (whole[i], lossy[i]).right_share ();
         fail_unless (
             right >= 0.93 && right < 1, "%s, seed %u, frame set %zu: %g", profile, seed, i, right);

@@ -97,7 +97,7 @@ GST_START_TEST (test_access_units_come_back_byte_for_byte)
     gst_harness_push (h, gst_buffer_ref (packet));
   for (std::size_t i = 0; i < sent.access_units.size (); i++) {
     GstBuffer *received = gst_harness_pull (h);
-    fail_unless (bytes_of (received) == bytes_of (sent.access_units[i]));
+    fail_unless_cmp (bytes_of (received), ==, bytes_of (sent.access_units[i]));
     fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (received), i * GST_SECOND / 25);
     gst_buffer_unref (received);
   }
@@ -108,16 +108,17 @@ GST_END_TEST;
 GST_START_TEST (test_every_packet_fits_the_mtu_and_holds_whole_units)
 {
   const Sent sent (ring_rig (2));
-  fail_unless (sent.packets.size () > 20);
+  ck_assert_uint_gt (sent.packets.size (), 20);
   for (GstBuffer *packet : sent.packets) {
-    fail_unless (gst_buffer_get_size (packet) <= 1400);
+    ck_assert_uint_le (gst_buffer_get_size (packet), 1400);
     const auto payload = payload_of (packet);
     UnitReader reader (payload);
     UnitHeader header;
     int units = 0;
     while (reader.next (header))
       units++;
-    fail_unless (reader.status ().ok () && units > 0);
+    fail_unless_ok (reader.status ());
+    ck_assert_int_gt (units, 0);
   }
 }
 GST_END_TEST;
@@ -179,11 +180,11 @@ GST_START_TEST (test_rig_of_64_views_comes_in_band)
   for (GstBuffer *packet : sent.packets)
     gst_harness_push (h, gst_buffer_ref (packet));
   GstBuffer *received = gst_harness_pull (h);
-  fail_unless (bytes_of (received) == bytes_of (sent.access_units[0]));
+  fail_unless_cmp (bytes_of (received), ==, bytes_of (sent.access_units[0]));
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
-  fail_unless (encode_rig (info.rig) == encode_rig (rig));
+  fail_unless_ok (gstrange::parse_caps (caps, info));
+  fail_unless_cmp (encode_rig (info.rig), ==, encode_rig (rig));
   fail_unless_equals_int (info.fps_n, 25);
   gst_caps_unref (caps);
   gst_buffer_unref (received);
@@ -233,7 +234,7 @@ GST_START_TEST (test_slices_of_views_that_the_rig_has_not_are_damaged_units)
     fail_unless_equals_int (views, 0b011);
     gst_buffer_unref (received);
   }
-  fail_unless (stat (h, "bad-units") > 0);
+  ck_assert_uint_gt (stat (h, "bad-units"), 0);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -256,7 +257,7 @@ GST_START_TEST (test_damaged_packets_are_counted_and_never_fatal)
       fail_unless_equals_int (gst_harness_push (h, bad), GST_FLOW_OK);
     }
   g_rand_free (random);
-  fail_unless (stat (h, "bad-units") > 50);
+  ck_assert_uint_gt (stat (h, "bad-units"), 50);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -270,8 +271,7 @@ GST_START_TEST (test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_s
   const Rig rig = ring_rig (1);
   gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
   fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
-  fail_unless (
-      next_message_text (bus, GST_MESSAGE_ERROR).find ("max-slice-size") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "max-slice-size");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -286,7 +286,7 @@ GST_START_TEST (test_bad_rig_in_the_caps_is_one_error)
   GstCaps *caps = gst_caps_from_string (kPlainRtpCaps);
   gst_caps_set_simple (caps, "rig", G_TYPE_STRING, "AAAA", nullptr);
   gst_harness_set_src_caps (h, caps);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find ("rig") != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "rig");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);

@@ -76,8 +76,8 @@ GST_START_TEST (test_no_packet_is_longer_than_the_mtu)
     gsize longest = 0;
     for (const Packet &packet : pull_packets (h))
       longest = std::max (longest, packet.size);
-    fail_unless (longest <= gsize (mtu));
-    fail_unless (longest > gsize (mtu) * 2 / 3);
+    ck_assert_uint_le (longest, gsize (mtu));
+    ck_assert_uint_gt (longest, gsize (mtu) * 2 / 3);
     gst_harness_teardown (h);
   }
 }
@@ -100,7 +100,7 @@ GST_START_TEST (test_no_packet_is_longer_than_the_mtu_with_header_extensions)
     gst_harness_push (h, access_unit (rig, 0, "max-slice-size=300"));
     gsize longest = 0;
     auto packets = pull_all (h);
-    fail_unless (packets.size () > 3);
+    ck_assert_uint_gt (packets.size (), 3);
     for (GstBuffer *packet : packets) {
       GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
       gpointer data = nullptr;
@@ -124,7 +124,7 @@ GST_START_TEST (test_every_packet_decodes_alone)
   GstHarness *h = payloader (rig, "mtu=1400");
   gst_harness_push (h, access_unit (rig));
   AccessUnitDecoder decoder;
-  fail_unless (decoder.set_rig (rig).ok ());
+  fail_unless_ok (decoder.set_rig (rig));
   DecoderResult all;
   GstBuffer *canvas = make_frame_set (rig);
   {
@@ -137,7 +137,7 @@ GST_START_TEST (test_every_packet_decodes_alone)
       std::vector<RangeImage> images;
       for (const auto &view : decoder.views ())
         images.push_back (frame.views ()[std::size_t (view.view_id)]);
-      fail_unless (decoder.decode (images, 1, all).ok ());
+      fail_unless_ok (decoder.decode (images, 1, all));
     }
   }
   gst_buffer_unref (canvas);
@@ -155,7 +155,7 @@ GST_START_TEST (test_mtu_may_change_while_playing)
     g_object_set (h->element, "mtu", mtu, nullptr);
     gst_harness_push (h, access_unit (rig));
     for (const Packet &packet : pull_packets (h))
-      fail_unless (packet.size <= mtu);
+      ck_assert_uint_le (packet.size, mtu);
   }
   gst_harness_teardown (h);
 }
@@ -243,7 +243,8 @@ GST_START_TEST (test_caps_without_a_rig_are_an_error)
     ErrorCounter errors (h);
     gst_harness_set_src_caps_str (h, "application/x-neighbour-code,version=1,alignment=access-unit,"
                                      "width=320,height=240,framerate=30/1,views=1");
-    fail_unless (errors.take () > 0); /* again with each event: GStreamer repeats refused caps */
+    ck_assert_int_gt (
+        errors.take (), 0); /* again with each event: GStreamer repeats refused caps */
   }
   gst_harness_teardown (h);
 }
@@ -257,7 +258,7 @@ GST_START_TEST (test_states_change_twice)
     gst_harness_push (h, access_unit (rig));
     fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), 1);
     for (const GstState state : {GST_STATE_READY, GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
-      fail_unless (gst_element_set_state (h->element, state) == GST_STATE_CHANGE_SUCCESS);
+      ck_assert_int_eq (gst_element_set_state (h->element, state), GST_STATE_CHANGE_SUCCESS);
     gst_harness_play (h);
     gst_harness_set_src_caps (h, coded_caps (rig));
   }
@@ -307,7 +308,7 @@ GST_START_TEST (test_new_rig_is_sent_at_once)
     fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), int (rig->views.size ()));
     GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
     const gchar *width = gst_structure_get_string (gst_caps_get_structure (caps, 0), "width");
-    fail_unless (std::to_string (rig->views[0].width) == width);
+    fail_unless_cmp (std::to_string (rig->views[0].width), ==, width);
     gst_caps_unref (caps);
   }
   gst_harness_teardown (h);
@@ -396,7 +397,7 @@ GST_START_TEST (test_slices_leave_as_they_come_and_the_last_has_the_marker)
   for (int frame = 0; frame < 2; frame++) {
     push_slices (h, units, frame * GST_SECOND / 30, true);
     const auto packets = pull_packets (h);
-    fail_unless (packets.size () >= units.size ());
+    ck_assert_uint_ge (packets.size (), units.size ());
     fail_unless_equals_int (count (packets, UnitType::kSlice), int (units.size ()));
     fail_unless_equals_int (count (packets, UnitType::kRigView), 2);
     for (std::size_t i = 0; i < packets.size (); i++) {

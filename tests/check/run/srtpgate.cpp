@@ -139,7 +139,7 @@ GST_START_TEST (test_a_flood_of_ssrcs_makes_no_streams_and_keeps_nobody_out)
     fail_if (decrypter.opens (wrong.packet (1000 + i, 1)));
   fail_unless_equals_int (decrypter.streams (), 1);
   fail_unless (decrypter.opens (right.packet (7, 2)));
-  fail_unless (decrypter.opens_after (late, 8) > 0);
+  ck_assert_int_gt (decrypter.opens_after (late, 8), 0);
   fail_unless_equals_int (decrypter.streams (), 2);
 }
 GST_END_TEST;
@@ -169,7 +169,7 @@ GST_START_TEST (test_the_streams_of_genuine_senders_are_bounded_and_those_who_se
   for (int i = 65530; i < 65550; i++) /* its sequence numbers begin anew */
     fail_unless (decrypter.opens (good.packet (7, guint16 (i))));
   for (guint32 i = 0; i < 300; i++) {
-    fail_unless (decrypter.opens_after (good, 1000 + i) > 0);
+    ck_assert_int_gt (decrypter.opens_after (good, 1000 + i), 0);
     fail_unless (decrypter.opens (good.packet (7, guint16 (100 + i))));
   }
   fail_unless (decrypter.streams () <= 257, "%u streams", decrypter.streams ());
@@ -217,7 +217,7 @@ GST_START_TEST (test_a_flood_of_strangers_does_not_keep_out_a_sender_of_unknown_
       after = i;
     g_usleep (2000);
   }
-  fail_unless (after >= 0);
+  ck_assert_int_ge (after, 0);
   fail_unless_equals_int (decrypter.streams (), 1);
 }
 GST_END_TEST;
@@ -242,7 +242,7 @@ GST_START_TEST (test_sequence_numbers_may_begin_anew_while_the_roll_over_is_look
     sender.wrap (7, 60);
     for (int i = 0; i < 0x10000; i += 0x4000) /* and on to the end */
       gst_buffer_unref (sender.packet (7, guint16 (i)));
-    fail_unless (decrypter.opens_late (sender, 7, 65534, 400) > 2);
+    ck_assert_int_gt (decrypter.opens_late (sender, 7, 65534, 400), 2);
   }
   Encrypter sender (1);
   Decrypter decrypter;
@@ -265,7 +265,7 @@ GST_START_TEST (test_a_known_sender_is_found_again_after_a_long_loss_and_replays
   GstBuffer *old[8];
   for (guint16 i = 0; i < 8; i++)
     old[i] = sender.packet (7, 100 + i);
-  fail_unless (decrypter.opens_late (sender, 7, 400, 20) > 0);
+  ck_assert_int_gt (decrypter.opens_late (sender, 7, 400, 20), 0);
   for (int i = 500; i < 40000; i += 0x4000)
     gst_buffer_unref (sender.packet (7, guint16 (i)));
   int after = -1;
@@ -275,7 +275,7 @@ GST_START_TEST (test_a_known_sender_is_found_again_after_a_long_loss_and_replays
       after = i;
     g_usleep (4000);
   }
-  fail_unless (after >= 0);
+  ck_assert_int_ge (after, 0);
   for (GstBuffer *buffer : old)
     fail_if (decrypter.opens (buffer));
   fail_unless (decrypter.opens (sender.packet (7, guint16 (40000 + after + 1))));
@@ -289,11 +289,11 @@ GST_START_TEST (test_a_sender_that_begins_again_with_the_same_ssrc_is_found)
   Encrypter before (1), again (1);
   Decrypter decrypter;
   before.wrap (7, 3);
-  fail_unless (decrypter.opens_late (before, 7, 100, 20) > 0);
+  ck_assert_int_gt (decrypter.opens_late (before, 7, 100, 20), 0);
   const gint64 began_us = g_get_monotonic_time ();
   const int after = decrypter.opens_late (again, 7, 100, 20000);
-  fail_unless (after > 0);
-  fail_unless (g_get_monotonic_time () - began_us > 9'000'000);
+  ck_assert_int_gt (after, 0);
+  ck_assert_int_gt (g_get_monotonic_time () - began_us, 9'000'000);
   fail_unless (decrypter.opens (again.packet (7, guint16 (100 + after + 1))));
   /* Was it a replay, then its true sender gets the stream back, and the replay does not. */
   int back = -1;
@@ -304,7 +304,7 @@ GST_START_TEST (test_a_sender_that_begins_again_with_the_same_ssrc_is_found)
       back = i;
     g_usleep (4000);
   }
-  fail_unless (back > 0);
+  ck_assert_int_gt (back, 0);
   fail_if (decrypter.opens (again.packet (7, guint16 (100 + after + 2 + i))));
   fail_unless (decrypter.opens (before.packet (7, guint16 (200 + i))));
 }
@@ -320,7 +320,7 @@ GST_START_TEST (test_replays_stay_out_when_senders_were_forgotten)
   GstBuffer *old = good.packet (7, sequence), *again = gst_buffer_copy_deep (old);
   fail_unless (decrypter.opens (old));
   for (guint32 i = 0; decrypter.streams () > i; i++) {
-    fail_unless (decrypter.opens_after (good, 1000 + i) > 0);
+    ck_assert_int_gt (decrypter.opens_after (good, 1000 + i), 0);
     if (i % 10 == 0)
       fail_unless (decrypter.opens (good.packet (7, ++sequence)));
   }

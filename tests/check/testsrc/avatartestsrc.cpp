@@ -49,7 +49,7 @@ GST_START_TEST (test_all_views_come_in_one_frame_set)
   fail_unless_equals_int (gst_buffer_n_range_metas (buffer), 3);
   GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
   gstrange::RangeInfo info;
-  fail_unless (gstrange::parse_caps (caps, info).ok ());
+  fail_unless_ok (gstrange::parse_caps (caps, info));
   fail_unless_equals_int (info.views (), 3);
   fail_unless_equals_int (info.width, 64);
   gst_caps_unref (caps);
@@ -67,7 +67,8 @@ GST_START_TEST (test_person_only_crops_and_empty_frames_have_nobody)
   GstBuffer *empty = gst_harness_pull (h), *person = gst_harness_pull (h);
   fail_unless_equals_int (gst_buffer_get_range_meta (empty, 2)->width, 0);
   const GstRangeMeta *meta = gst_buffer_get_range_meta (person, 2);
-  fail_unless (meta->width > 40 && meta->width < 140);
+  ck_assert_int_gt (meta->width, 40);
+  ck_assert_int_lt (meta->width, 140);
   gst_buffer_unref (empty);
   gst_buffer_unref (person);
   gst_harness_teardown (h);
@@ -101,9 +102,8 @@ run (const char *line)
 
 GST_START_TEST (test_bad_view_and_model_are_named)
 {
-  fail_unless (run ("avatartestsrc view-id=9 ! fakesink").find ("view-id") != std::string::npos);
-  fail_unless (run ("avatartestsrc location=/no/head.glb ! fakesink").find ("/no/head.glb") !=
-               std::string::npos);
+  fail_unless_contains (run ("avatartestsrc view-id=9 ! fakesink"), "view-id");
+  fail_unless_contains (run ("avatartestsrc location=/no/head.glb ! fakesink"), "/no/head.glb");
 }
 GST_END_TEST;
 
@@ -133,9 +133,9 @@ GST_START_TEST (test_state_changes_can_be_repeated)
     for (int i = 0; i < 2; i++)
       for (GstState state : {GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED, GST_STATE_READY,
                GST_STATE_PLAYING, GST_STATE_NULL}) {
-        fail_if (gst_element_set_state (pipeline, state) == GST_STATE_CHANGE_FAILURE);
-        fail_if (gst_element_get_state (pipeline, nullptr, nullptr, 10 * GST_SECOND) ==
-                 GST_STATE_CHANGE_FAILURE);
+        ck_assert_int_ne (gst_element_set_state (pipeline, state), GST_STATE_CHANGE_FAILURE);
+        ck_assert_int_ne (gst_element_get_state (pipeline, nullptr, nullptr, 10 * GST_SECOND),
+            GST_STATE_CHANGE_FAILURE);
       }
     gst_object_unref (pipeline);
   }
@@ -168,7 +168,7 @@ GST_START_TEST (test_rig_is_exported_with_the_size_of_the_caps)
       path);
   fail_unless (run (line).empty ());
   Rig rig;
-  fail_unless (load_rig (path, rig).ok ());
+  fail_unless_ok (load_rig (path, rig));
   fail_unless_equals_int (static_cast<int> (rig.views.size ()), 4);
   fail_unless_equals_int (rig.views[0].width, 64);
   fail_unless (rig.views[0].right.has_value ());
@@ -286,9 +286,9 @@ GST_END_TEST;
 
 GST_START_TEST (test_loop_that_needs_too_much_memory_is_an_error_that_names_it)
 {
-  fail_unless (run ("avatartestsrc name=s loop-frames=5000000 s.left ! "
-                    "video/x-raw,width=64,height=48 ! fakesink")
-                   .find ("loop-frames 5000000") != std::string::npos);
+  fail_unless_contains (run ("avatartestsrc name=s loop-frames=5000000 s.left ! "
+                             "video/x-raw,width=64,height=48 ! fakesink"),
+      "loop-frames 5000000");
 }
 GST_END_TEST;
 
@@ -298,7 +298,7 @@ GST_START_TEST (test_each_camera_pad_gives_its_own_cameras_picture)
   settings.width = 64;
   settings.height = 48;
   std::unique_ptr<Scene> scene;
-  fail_unless (Scene::create (settings, scene).ok ());
+  fail_unless_ok (Scene::create (settings, scene));
   const char *pads[] = {"left", "right", "third"};
   for (int i = 0; i < 3; i++) {
     GstHarness *h = source_harness (pads[i], "video/x-raw,format=RGBx,width=64,height=48");
@@ -306,7 +306,7 @@ GST_START_TEST (test_each_camera_pad_gives_its_own_cameras_picture)
     gst_harness_play (h);
     std::string expected (64 * 48 * 4, 0);
     const ImageView<Rgbx> view{reinterpret_cast<Rgbx *> (expected.data ()), 64, 48, 64 * 4};
-    fail_unless (scene->render (0, static_cast<SceneCamera> (i), 0, false, view, {}, {}).ok ());
+    fail_unless_ok (scene->render (0, static_cast<SceneCamera> (i), 0, false, view, {}, {}));
     fail_unless (take_bytes (gst_harness_pull (h)) == expected, "%s", pads[i]);
     gst_harness_teardown (h);
   }
@@ -369,14 +369,14 @@ GST_START_TEST (test_padded_strides_of_downstreams_pool_are_kept_to)
     GstHarness *plain = source_harness ("left", caps.c_str ());
     gst_harness_play (plain);
     GstBuffer *a = gst_harness_pull (padded), *b = gst_harness_pull (plain);
-    fail_unless (a->pool == pool);
+    ck_assert_ptr_eq (a->pool, pool);
     GstVideoInfo video;
     GstCaps *fixed = gst_caps_from_string (caps.c_str ());
     gst_video_info_from_caps (&video, fixed);
     GstVideoFrame x, y;
     fail_unless (gst_video_frame_map (&x, &video, a, GST_MAP_READ));
     fail_unless (gst_video_frame_map (&y, &video, b, GST_MAP_READ));
-    fail_unless (GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0) > GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0));
+    ck_assert_int_gt (GST_VIDEO_FRAME_PLANE_STRIDE (&x, 0), GST_VIDEO_FRAME_PLANE_STRIDE (&y, 0));
     const auto bytes = static_cast<std::size_t> (50 * GST_VIDEO_FRAME_COMP_PSTRIDE (&x, 0));
     for (int row = 0; row < 40; row++)
       fail_unless (std::memcmp (static_cast<guint8 *> (GST_VIDEO_FRAME_PLANE_DATA (&x, 0)) +
@@ -469,7 +469,9 @@ GST_START_TEST (test_downstreams_pool_that_refuses_is_replaced)
   gst_object_ref_sink (pool);
   GstHarness *h = harness_with_pool ("left", "video/x-raw,format=RGBx", pool);
   GstBuffer *buffer = gst_harness_pull (h);
-  fail_unless (buffer && buffer->pool && buffer->pool != pool);
+  fail_unless (buffer);
+  fail_unless (buffer->pool);
+  ck_assert_ptr_ne (buffer->pool, pool);
   gst_buffer_unref (buffer);
   gst_harness_teardown (h);
   gst_object_unref (pool);
@@ -488,7 +490,7 @@ GST_START_TEST (test_file_that_is_no_model_is_one_error_that_names_it)
   GstElement *pipeline = gst_parse_launch (line, nullptr);
   GstBus *bus = gst_element_get_bus (pipeline);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  fail_unless (next_message_text (bus, GST_MESSAGE_ERROR).find (path) != std::string::npos);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), path);
   gst_element_set_state (pipeline, GST_STATE_PAUSED);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr, "a second error");
@@ -526,14 +528,13 @@ GST_START_TEST (test_dressed_figure_is_another_picture)
     pictures[dressed] = take_bytes (gst_harness_pull (h));
     gst_harness_teardown (h);
   }
-  fail_if (pictures[0] == pictures[1]);
+  fail_unless_cmp (pictures[0], !=, pictures[1]);
 }
 GST_END_TEST;
 
 GST_START_TEST (test_model_top_that_is_no_length_is_named)
 {
-  fail_unless (
-      run ("avatartestsrc model-top=0.05 ! fakesink").find ("model-top") != std::string::npos);
+  fail_unless_contains (run ("avatartestsrc model-top=0.05 ! fakesink"), "model-top");
 }
 GST_END_TEST;
 
@@ -567,7 +568,7 @@ GST_START_TEST (test_capsfilters_change_changes_all_pads_at_one_frame)
       gst_sample_unref (sample);
     }
   }
-  fail_unless (changed[0] != GST_CLOCK_TIME_NONE);
+  ck_assert_uint_ne (changed[0], GST_CLOCK_TIME_NONE);
   fail_unless_equals_uint64 (changed[0], changed[1]);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   for (GstElement *element : {filter, sinks[0], sinks[1], pipeline})
@@ -584,7 +585,7 @@ GST_START_TEST (test_second_run_begins_as_the_first)
     GstBuffer *buffer = gst_harness_pull (h);
     fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), 0);
     if (run == 1)
-      fail_unless (bytes_of (buffer) == first);
+      fail_unless_cmp (bytes_of (buffer), ==, first);
     first = take_bytes (buffer);
     gst_element_set_state (h->element, GST_STATE_NULL);
     while (GstBuffer *rest = gst_harness_try_pull (h))

@@ -476,3 +476,50 @@ TEST (Scene, test_room_settings_out_of_range_are_named)
   refuse ([] (SceneSettings &s) { s.wall_texture = 2; }, "wall-texture");
   refuse ([] (SceneSettings &s) { s.wall_warmth = 2; }, "wall-warmth");
 }
+
+/* ---- what the built-in figure wears ---- */
+
+static int
+nearer_pixels (unsigned dress, int view)
+{
+  SceneSettings settings;
+  settings.motion = settings.noise_sigma = 0;
+  Image<Rgbx> colour (320, 240);
+  Image<std::uint16_t> depths[2] = {{320, 240}, {320, 240}};
+  for (int i = 0; i < 2; i++) {
+    settings.dress = i ? dress : 0;
+    std::unique_ptr<Scene> scene;
+    EXPECT_TRUE (Scene::create (settings, scene).ok ());
+    EXPECT_TRUE (
+        scene->render (view, SceneCamera::kLeft, 0, false, colour.view (), depths[i].view (), {})
+            .ok ());
+  }
+  int nearer = 0, farther = 0;
+  for (int y = 0; y < 240; y++)
+    for (int x = 0; x < 320; x++) {
+      const int bare = depths[0].view ().at (x, y), dressed = depths[1].view ().at (x, y);
+      nearer += dressed && (!bare || dressed + 20 < bare); /* 2 mm */
+      farther += bare && (!dressed || dressed > bare);
+    }
+  EXPECT_EQ (farther, 0) << "what it wears takes nothing of the figure away";
+  return nearer;
+}
+
+TEST (Dress, test_each_piece_lies_before_the_bare_figure)
+{
+  EXPECT_GT (nearer_pixels (kDressHair, 0), 2000);
+  EXPECT_GT (nearer_pixels (kDressHair, 2), 5000);
+  EXPECT_GT (nearer_pixels (kDressGlasses, 0), 60);
+  EXPECT_GT (nearer_pixels (kDressCollar, 1), 100);
+  EXPECT_GT (nearer_pixels (kDressHand, 0), 2500);
+}
+
+TEST (Dress, test_unknown_flags_are_refused)
+{
+  SceneSettings settings;
+  settings.dress = 16;
+  std::unique_ptr<Scene> scene;
+  const Status status = Scene::create (settings, scene);
+  EXPECT_EQ (status.code (), StatusCode::kBadValue);
+  EXPECT_NE (status.message ().find ("dress"), std::string::npos);
+}

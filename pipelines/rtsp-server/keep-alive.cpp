@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "holder.hpp"
+#include "keep-alive.hpp"
 
 #include <chrono>
 
 #include "media.hpp"
 
-static const char kReleasedKey[] = "rangecast-released"; /* of a media: is not held again */
+namespace {
 
-static GstRTSPTransport *
+const char kReleasedKey[] = "rangecast-released"; /* object data of a media: is not held again */
+
+GstRTSPTransport *
 make_transport (GstRTSPLowerTrans lower)
 {
   GstRTSPTransport *transport = nullptr;
@@ -18,15 +20,14 @@ make_transport (GstRTSPLowerTrans lower)
   return transport;
 }
 
-/* A stream's sinks for UDP, so that they need not be made when the first such viewer joins. */
-static void
+void
 make_sinks (GstRTSPStream *stream, GstRTSPLowerTrans lower)
 {
   GstRTSPTransport *transport = make_transport (lower);
   bool has_sockets = false;
   for (GSocketFamily family : {G_SOCKET_FAMILY_IPV4, G_SOCKET_FAMILY_IPV6}) {
     if (!gst_rtsp_stream_allocate_udp_sockets (stream, family, transport, FALSE))
-      continue; /* no such addresses here */
+      continue; /* the host lacks this address family */
     has_sockets = true;
     if (lower == GST_RTSP_LOWER_TRANS_UDP_MCAST)
       if (GstRTSPAddress *group = gst_rtsp_stream_get_multicast_address (stream, family)) {
@@ -37,16 +38,16 @@ make_sinks (GstRTSPStream *stream, GstRTSPLowerTrans lower)
   if (has_sockets)
     gst_rtsp_stream_complete_stream (stream, transport);
   else
-    g_printerr ("rtsp-server: warning: there are no sockets for %s; who joins by it may stop the "
+    g_printerr ("rtsp-server: warning: no sockets for %s; a viewer that joins by it may stop the "
                 "stream\n",
         lower == GST_RTSP_LOWER_TRANS_UDP ? "UDP" : "multicast");
   gst_rtsp_transport_free (transport);
 }
 
-/* The library would make what a transport needs when its first viewer joins, in the midst of what
- * runs: of more than two transports it links a queue before it starts it, and a packet that comes
- * in between ends the stream for all viewers, in silence. */
-static void
+/* gst-rtsp-server 1.22 makes the sinks of a lower transport when its first viewer joins. In a
+ * running pipeline it links their queue before it sets its state: a packet that arrives in between
+ * is refused (FLUSHING), which ends the stream for all viewers without a message. */
+void
 make_all_sinks (GstRTSPMedia *media)
 {
   const GstRTSPLowerTrans served = gst_rtsp_media_get_protocols (media);
@@ -56,22 +57,22 @@ make_all_sinks (GstRTSPMedia *media)
         make_sinks (gst_rtsp_media_get_stream (media, i), lower);
 }
 
-/* A transport that sends nothing to nobody. */
-static GstRTSPStreamTransport *
-make_dry_transport (GstRTSPStream *stream)
+/* A TCP transport that discards packets. */
+GstRTSPStreamTransport *
+make_null_transport (GstRTSPStream *stream)
 {
   GstRTSPTransport *transport = make_transport (GST_RTSP_LOWER_TRANS_TCP);
   transport->interleaved = {0, 1};
-  transport->destination = g_strdup ("nobody"); /* reports are compared with it */
-  GstRTSPStreamTransport *dry = gst_rtsp_stream_transport_new (stream, transport);
-  const auto swallow = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
-  const auto swallow_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
-  gst_rtsp_stream_transport_set_callbacks (dry, swallow, swallow, nullptr, nullptr);
-  gst_rtsp_stream_transport_set_list_callbacks (dry, swallow_list, swallow_list, nullptr, nullptr);
-  return dry;
+  transport->destination = g_strdup ("nobody"); /* compared with the address of RTCP packets */
+  GstRTSPStreamTransport *null = gst_rtsp_stream_transport_new (stream, transport);
+  const auto discard = [] (GstBuffer *, guint8, gpointer) -> gboolean { return TRUE; };
+  const auto discard_list = [] (GstBufferList *, guint8, gpointer) -> gboolean { return TRUE; };
+  gst_rtsp_stream_transport_set_callbacks (null, discard, discard, nullptr, nullptr);
+  gst_rtsp_stream_transport_set_list_callbacks (null, discard_list, discard_list, nullptr, nullptr);
+  return null;
 }
 
-static void
+void
 deactivate (GPtrArray *transports)
 {
   for (guint i = 0; i < transports->len; i++)
@@ -79,41 +80,43 @@ deactivate (GPtrArray *transports)
         GST_RTSP_STREAM_TRANSPORT (g_ptr_array_index (transports, i)), FALSE);
 }
 
+} // namespace
+
 bool
-MediaHolder::hold (GstRTSPMedia *media)
+MediaKeepAlive::hold (GstRTSPMedia *media)
 {
   {
     std::unique_lock guard (lock_);
-    /* Who plays before it has its sinks would have them made in the midst. */
+    /* a viewer must not play before the media has its sinks */
     changed_.wait_for (guard, std::chrono::seconds (1),
-        [&] { return media_ != media || phase_ != Phase::kTaking; });
+        [&] { return media_ != media || phase_ != Phase::kPreparing; });
     if (media_ || g_object_get_data (G_OBJECT (media), kReleasedKey))
       return media_ == media;
     media_ = GST_RTSP_MEDIA (g_object_ref (media));
-    phase_ = Phase::kTaking;
-    unwanted_ = false;
+    phase_ = Phase::kPreparing;
+    released_ = false;
   }
   GPtrArray *transports = nullptr;
   if (gst_rtsp_media_prepare (media, nullptr)) {
     transports = g_ptr_array_new_with_free_func (g_object_unref);
     for (guint i = 0; i < gst_rtsp_media_n_streams (media); i++)
-      g_ptr_array_add (transports, make_dry_transport (gst_rtsp_media_get_stream (media, i)));
+      g_ptr_array_add (transports, make_null_transport (gst_rtsp_media_get_stream (media, i)));
     make_all_sinks (media);
-    send_as_they_come (media);
+    disable_live_sync (media);
     gst_rtsp_media_complete_pipeline (media, transports);
   }
   std::unique_lock guard (lock_);
   transports_ = transports;
   phase_ = Phase::kHeld;
   changed_.notify_all ();
-  if (transports && !unwanted_)
+  if (transports && !released_)
     return true;
-  let_go (guard);
+  release_held (guard);
   return false;
 }
 
 void
-MediaHolder::start (GstRTSPMedia *media)
+MediaKeepAlive::start (GstRTSPMedia *media)
 {
   GPtrArray *transports = nullptr;
   {
@@ -125,21 +128,21 @@ MediaHolder::start (GstRTSPMedia *media)
   }
   gst_rtsp_media_set_state (media, GST_STATE_PLAYING, transports);
   std::lock_guard guard (lock_);
-  if (media_ != media) /* released meanwhile: nothing may stay behind in its streams */
+  if (media_ != media) /* released meanwhile: its streams must not keep transports */
     deactivate (transports);
   g_ptr_array_unref (transports);
 }
 
 bool
-MediaHolder::has_started (GstRTSPMedia *media)
+MediaKeepAlive::has_started (GstRTSPMedia *media)
 {
   std::lock_guard guard (lock_);
   return media_ == media && phase_ == Phase::kStarted;
 }
 
-/* With the lock, which is not held while the media ends. */
+/* With the lock, which is not held while the media stops. */
 void
-MediaHolder::let_go (std::unique_lock<std::mutex> &guard)
+MediaKeepAlive::release_held (std::unique_lock<std::mutex> &guard)
 {
   GstRTSPMedia *media = media_;
   GPtrArray *transports = transports_;
@@ -162,37 +165,37 @@ MediaHolder::let_go (std::unique_lock<std::mutex> &guard)
 }
 
 void
-MediaHolder::release (GstRTSPMedia *only)
+MediaKeepAlive::release (GstRTSPMedia *only)
 {
   std::unique_lock guard (lock_);
   if (only)
     g_object_set_data (G_OBJECT (only), kReleasedKey, only);
   if (only && media_ != only)
     return;
-  if (phase_ == Phase::kTaking)
-    unwanted_ = true; /* who takes it lets it go */
+  if (phase_ == Phase::kPreparing)
+    released_ = true; /* hold() releases it */
   else
-    let_go (guard);
+    release_held (guard);
 }
 
 void
-MediaHolder::release_unless_asked_since (gint64 monotonic_us)
+MediaKeepAlive::release_unless_asked_since (gint64 monotonic_us)
 {
   std::unique_lock guard (lock_);
-  if (asked_at_us_ < monotonic_us && phase_ != Phase::kTaking)
-    let_go (guard);
+  if (requested_at_us_ < monotonic_us && phase_ != Phase::kPreparing)
+    release_held (guard);
 }
 
 void
-MediaHolder::note_asking ()
+MediaKeepAlive::record_request ()
 {
   std::unique_lock guard (lock_);
-  asked_at_us_ = g_get_monotonic_time ();
+  requested_at_us_ = g_get_monotonic_time ();
   changed_.wait (guard, [this] { return releasing_ == 0; });
 }
 
 bool
-MediaHolder::holds_any ()
+MediaKeepAlive::holds_any ()
 {
   std::lock_guard guard (lock_);
   return media_ != nullptr;

@@ -11,20 +11,20 @@
 #include "strippainter.hpp"
 
 /** What to draw into one output buffer. */
-struct StripDrawingJob {
+struct RenderJob {
   const StripScene *scene;
   const StripRenderSettings *settings;
-  const rangecast::SceneFrame *frame; ///< where the camera's home is
+  const rangecast::SceneFrame *frame; ///< the camera's default position
   rangecast::Orbit orbit;
   rangecast::ImageView<const rangecast::Rgbx> panel = {}; ///< over the picture; empty: none
   bool panel_changed = false;
 };
 
-/** Draws frame sets into buffers of OpenGL memory: both eyes, cameras, statistics. What is OpenGL's
- *  own lives from start() to stop(). */
-class StripDrawing {
+/** Renders scenes into buffers of OpenGL memory: the frame set, for one or two eyes, the
+ * background, the rig's cameras and the panel. Has objects of OpenGL's from start() to stop(). */
+class Renderer {
 public:
-  /** @name In the GL thread @{ */
+  /** @name On the OpenGL thread @{ */
   bool start (GstGLContext *context, GError **error);
   void stop ();
   /** @return false if OpenGL has no framebuffer as large as the pictures; `error` names sizes */
@@ -35,31 +35,29 @@ public:
 
   struct Result {
     bool drawn = false;
-    const char *reason = "the output is not its memory"; ///< why it is not drawn
-    guint64 uploaded = 0;              ///< bytes; a scene that is there already costs none
+    const char *reason = "the output is not OpenGL memory"; ///< why it is not drawn
+    guint64 uploaded = 0;              ///< bytes; 0 if the scene was uploaded before
     rangecast::OrbitMatrices matrices; ///< of the first eye
     int width = 0, height = 0;         ///< of the first eye's picture, pixels
   };
-  /** Draws in the GL thread and waits for it. The buffer's memories are OpenGL's. Exceptions of the
-   *  GL thread are thrown here. */
-  Result draw (GstGLContext *context, const StripDrawingJob &job, GstBuffer *out);
+  /** Draws on the OpenGL thread and waits for that. The buffer's memories are OpenGL's. Exceptions
+   *  of the OpenGL thread are thrown here. */
+  Result draw (GstGLContext *context, const RenderJob &job, GstBuffer *out);
 
 private:
   struct Call;
-  static void draw_in_gl_thread (GstGLContext *context, gpointer call);
-  static gboolean draw_bound (gpointer call);
+  void draw_buffer (Call &call);
   bool upload (Call &call);
   void draw_memory (Call &call);
-  void draw_memories (Call &call);
-  void draw_eye (Call &call, const EyePlace &place, bool antialiased);
-  StripPainter::Picture make_picture (
-      const StripDrawingJob &job, const EyePlace &place, Result &result) const;
+  void draw_eye (Call &call, const EyeViewport &viewport, bool antialiased);
+  RenderPicture make_picture (
+      const RenderJob &job, const EyeViewport &viewport, Result &result) const;
 
   GstGLContext *context_ = nullptr;
   GstGLFramebuffer *framebuffer_ = nullptr;
   int width_ = 0, height_ = 0;
   bool can_blend_ = false;
-  EyePlaces eyes_;
+  MultiviewLayout layout_;
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;
   BackgroundPainter background_painter_;

@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "trigger.hpp"
+
+#include <algorithm>
+
+#include "camera/aravis/debug.hpp"
+#include "common/realtimepriority.hpp"
+
+namespace {
+
+/* A requested trigger keeps its time if it is not later than this: the host is busy. */
+constexpr GstClockTime kMaxLateness = 20 * GST_MSECOND;
+
+/* Scheduled action commands are sent this long before their tick. */
+constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
+
+} // namespace
+
+CameraStatus
+CameraTrigger::start (Cameras cameras, rangecast::TickRate rate, Failed failed)
+{
+  stop ();
+  if (!settings_.triggers_cameras ())
+    return {};
+  if (settings_.trigger == TriggerMode::kAction) {
+    std::vector<std::string> interfaces;
+    for (const auto &camera : cameras)
+      interfaces.push_back (camera->interface_address ());
+    if (CameraStatus status = action_.open (interfaces); !status.ok ())
+      return status;
+    lead_ = settings_.action_scheduled ? kActionLead : 0;
+  }
+  cameras_ = std::move (cameras);
+  failed_ = std::move (failed);
+  rate_ = rate;
+  last_tick_ = -1;
+  last_requested_ = 0;
+  on_request_ = settings_.single_shot || !rate.valid ();
+  std::lock_guard guard (lock_);
+  running_ = paused_since_tick_ = true;
+  requests_.clear ();
+  thread_ = std::thread ([this] { run (); });
+  return {};
+}
+
+void
+CameraTrigger::stop ()
+{
+  {
+    std::lock_guard guard (lock_);
+    running_ = false;
+    changed_.notify_all ();
+    clock_wait_.interrupt ();
+  }
+  if (thread_.joinable ())
+    thread_.join ();
+  action_.close ();
+  cameras_.clear ();
+}
+
+void
+CameraTrigger::set_playing (bool playing)
+{
+  std::lock_guard guard (lock_);
+  playing_ = playing;
+  paused_since_tick_ |= !playing;
+  changed_.notify_all ();
+  if (!playing)
+    clock_wait_.interrupt ();
+}
+
+bool
+CameraTrigger::request (GstClockTime time)
+{
+  std::lock_guard guard (lock_);
+  if (!running_ || !playing_ || !on_request_ || requests_.size () >= kMaxRequests)
+    return false;
+  requests_.push_back (time);
+  changed_.notify_all ();
+  clock_wait_.interrupt (); /* it may be due before the one that is waited for */
+  return true;
+}
+
+/* ---- the thread ---- */
+
+void
+CameraTrigger::run ()
+{
+  const ScopedRealtimePriority priority; /* threads of the pool inherit it */
+  if (settings_.trigger == TriggerMode::kSoftware) {
+    const auto call = [] (gpointer camera, gpointer self) {
+      auto trigger = static_cast<CameraTrigger *> (self);
+      const CameraStatus status = static_cast<Camera *> (camera)->trigger_software ();
+      if (!status.ok ())
+        trigger->failed_ (loss_or_fault (*static_cast<Camera *> (camera), status));
+      std::lock_guard guard (trigger->lock_);
+      trigger->calls_pending_--;
+      trigger->changed_.notify_all ();
+    };
+    GError *error = nullptr;
+    pool_ = g_thread_pool_new (call, this, static_cast<gint> (cameras_.size ()), TRUE, &error);
+    if (error) {
+      failed_ (
+          {CameraFault::kFailed, std::string ("cannot start trigger threads: ") + error->message});
+      g_clear_error (&error);
+      std::lock_guard guard (lock_);
+      running_ = false;
+    }
+  }
+  std::unique_lock guard (lock_);
+  while (running_) {
+    if (!playing_ || (on_request_ && requests_.empty ())) {
+      changed_.wait (guard);
+      continue;
+    }
+    GstClock *clock = clock_of_element (element_);
+    const GstClockTime base = gst_element_get_base_time (element_);
+    GstClockTime now = gst_clock_get_time (clock);
+    const GstClockTime time = on_request_ ? next_request (now) : next_tick (now, base);
+    const bool due = clock_wait_.wait_until (guard, clock, time - MIN (time, lead_));
+    now = gst_clock_get_time (clock);
+    gst_object_unref (clock);
+    if (!due)
+      continue;
+    guard.unlock ();
+    if (on_request_)
+      handle_request (time, MAX (now, base));
+    else
+      handle_tick (time, now);
+    guard.lock ();
+  }
+  guard.unlock ();
+  if (pool_)
+    g_thread_pool_free (std::exchange (pool_, nullptr), FALSE, TRUE);
+}
+
+/* With the lock. */
+GstClockTime
+CameraTrigger::next_request (GstClockTime now)
+{
+  for (GstClockTime &time : requests_)
+    if (!GST_CLOCK_TIME_IS_VALID (time))
+      time = now + lead_;
+  return *std::ranges::min_element (requests_);
+}
+
+/* With the lock. */
+GstClockTime
+CameraTrigger::next_tick (GstClockTime now, GstClockTime base) const
+{
+  std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (MAX (now + lead_, base)));
+  if (tick <= last_tick_ && !paused_since_tick_)
+    tick = last_tick_ + 1;
+  return static_cast<GstClockTime> (rate_.time_of (tick));
+}
+
+/* A trigger that is late has the time when it happens. */
+void
+CameraTrigger::handle_request (GstClockTime time, GstClockTime now)
+{
+  if (!pairing_.may_trigger (settings_.single_shot, g_get_monotonic_time () * 1000)) {
+    g_usleep (1000); /* until the cameras have answered the previous trigger */
+    return;
+  }
+  {
+    std::lock_guard guard (lock_);
+    if (const auto it = std::ranges::find (requests_, time); it != requests_.end ())
+      requests_.erase (it);
+  }
+  const bool in_time = now + lead_ <= time + kMaxLateness + lead_ / 2;
+  last_requested_ = MAX (in_time ? time : now + lead_, last_requested_ + 1);
+  trigger (last_requested_);
+}
+
+/* A tick is triggered until half a period after it; after that it is missed. */
+void
+CameraTrigger::handle_tick (GstClockTime time, GstClockTime now)
+{
+  const bool ready = pairing_.may_trigger (settings_.single_shot, g_get_monotonic_time () * 1000);
+  const std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (time));
+  const bool late = now > time + static_cast<GstClockTime> (rate_.period_ns ()) / 2;
+  {
+    std::lock_guard guard (lock_);
+    if (!paused_since_tick_)
+      missed_ += static_cast<guint64> (tick - last_tick_ - 1) + (late || !ready);
+    paused_since_tick_ = false;
+    last_tick_ = tick;
+  }
+  if (ready && !late)
+    trigger (time);
+  else
+    GST_DEBUG_OBJECT (element_, "no trigger at %" GST_TIME_FORMAT ": %s", GST_TIME_ARGS (time),
+        late ? "more than half a period late" : "cameras have not answered the previous one");
+}
+
+void
+CameraTrigger::trigger (GstClockTime time)
+{
+  const std::int64_t now_ns = g_get_monotonic_time () * 1000;
+  last_trigger_ns_ = now_ns;
+  /* before it is sent: a camera may answer before another one acknowledges */
+  pairing_.add_trigger (time, now_ns + static_cast<std::int64_t> (lead_));
+  GST_LOG_OBJECT (element_, "trigger for %" GST_TIME_FORMAT, GST_TIME_ARGS (time));
+  if (settings_.trigger == TriggerMode::kSoftware) {
+    trigger_software ();
+    return;
+  }
+  ActionCommand command;
+  command.device_key = settings_.action_device_key;
+  command.group_key = settings_.action_group_key;
+  command.group_mask = settings_.action_group_mask;
+  if (settings_.action_scheduled)
+    command.time_ns = time;
+  if (CameraStatus status = action_.send (command); !status.ok ())
+    failed_ (std::move (status));
+}
+
+/* All cameras at the same moment; returns when all have acknowledged. */
+void
+CameraTrigger::trigger_software ()
+{
+  std::unique_lock guard (lock_);
+  calls_pending_ = cameras_.size ();
+  for (const auto &camera : cameras_)
+    g_thread_pool_push (pool_, camera.get (), nullptr);
+  changed_.wait (guard, [this] { return calls_pending_ == 0; });
+}

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+/* What the painters share. All functions are called on the OpenGL thread. */
+
+#include <gst/gl/gl.h>
+#include <gst/gl/gstglfuncs.h>
+
+#include <rangecast/surface/view_matrices.hpp>
+
+#include "category.hpp"
+
+/* Of OpenGL 3.3 and OpenGL ES 3.0, but not in every header. */
+#ifndef GL_DRAW_FRAMEBUFFER_BINDING
+#define GL_DRAW_FRAMEBUFFER_BINDING 0x8CA6
+#endif
+#ifndef GL_RGBA8
+#define GL_RGBA8 0x8058
+#endif
+#ifndef GL_DEPTH_COMPONENT24
+#define GL_DEPTH_COMPONENT24 0x81A6
+#endif
+
+/** Whether the context is one of OpenGL ES 3.0 or later. */
+inline bool
+is_gles (GstGLContext *context)
+{
+  return gst_gl_context_check_gl_version (context, GST_GL_API_GLES2, 3, 0);
+}
+
+/** Allocates or replaces the image of the texture that is bound to GL_TEXTURE_2D; fetches get its
+ *  nearest texel. @param data  nullptr: undefined content */
+void define_texture (const GstGLFuncs *gl, guint internal, int width, int height, guint format,
+    guint type, const void *data = nullptr);
+
+/** @name Shaders @{ */
+
+/** Compiles and links sources without a version line, for OpenGL 3.3 or OpenGL ES 3.0.
+ *  Returns: (transfer full): or nullptr, with the compiler's log in `error` */
+GstGLShader *make_shader (
+    GstGLContext *context, const char *vertex, const char *fragment, GError **error);
+
+/** Covers the viewport with one triangle, see draw_covering(), at a depth of u_covering_depth (-1
+ * to 1; 0 unless it is set). */
+extern const char *const kCoveringVertexShader;
+/** Draws kCoveringVertexShader. @param array  without attributes: the core profile draws nothing
+ *  without a vertex array */
+void draw_covering (const GstGLFuncs *gl, guint array);
+
+/** Fragment shader that writes the colour of the vertex shader's v_colour. */
+extern const char *const kColourFragmentShader;
+
+/** For vertex shaders: `vec4 clip_position (vec2 at, float depth)` of a view's pixel `at` (column,
+ *  row of the ROI), moved away from the viewer. Its uniforms: set_position_uniforms(). */
+extern const char *const kPositionFunction;
+/** @param clip_from_pixel  see rangecast::clip_from_pixel()
+ *  @param shift            how far away from the viewer, without another place in the picture */
+void set_position_uniforms (GstGLShader *shader, const rangecast::Mat4 &clip_from_pixel,
+    const rangecast::DepthShift &shift);
+
+/** The shader of a painter that is used now and then: compiled by the first picture that needs it.
+ */
+class LazyShader {
+public:
+  /** Compiles unless that has been done, with a vertex array. @return false after a failure, which
+   *  is logged once */
+  bool make (GstGLContext *context, const char *vertex, const char *fragment, const char *purpose);
+  /** After make(). */
+  [[nodiscard]] GstGLShader *shader () const { return shader_; }
+  [[nodiscard]] guint array () const { return array_; }
+  /** Deletes what OpenGL has of it. @return the context; nullptr if there was nothing */
+  GstGLContext *stop ();
+
+private:
+  GstGLContext *context_ = nullptr;
+  GstGLShader *shader_ = nullptr;
+  guint array_ = 0;
+  bool failed_ = false;
+};
+/** @} */

@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "outputtask.hpp"
+
+OutputTask::~OutputTask ()
+{
+  if (id_)
+    gst_clock_id_unref (id_);
+  gst_clear_object (&clock_);
+}
+
+bool
+OutputTask::start (GstPad *src, Tick tick)
+{
+  {
+    std::lock_guard guard (lock_);
+    if (src_)
+      return true;
+    src_ = src;
+    tick_ = tick;
+    quit_ = false;
+  }
+  const auto function = [] (gpointer self) { static_cast<OutputTask *> (self)->iterate (); };
+  if (gst_pad_start_task (src, function, this, nullptr))
+    return true;
+  stop ();
+  return false;
+}
+
+void
+OutputTask::stop ()
+{
+  GstPad *src;
+  {
+    std::lock_guard guard (lock_);
+    quit_ = true;
+    interrupt ();
+    src = src_;
+  }
+  if (src)
+    gst_pad_stop_task (src);
+  std::lock_guard guard (lock_);
+  src_ = nullptr;
+}
+
+/* With the lock. A clock that is about to be waited for returns at once, too. */
+void
+OutputTask::interrupt ()
+{
+  if (waiting_)
+    gst_clock_id_unschedule (id_);
+  changed_.notify_all ();
+}
+
+void
+OutputTask::set_playing (bool playing)
+{
+  std::lock_guard guard (lock_);
+  playing_ = playing;
+  woken_ = true; /* the base time is another */
+  interrupt ();
+}
+
+void
+OutputTask::wake ()
+{
+  std::lock_guard guard (lock_);
+  woken_ = true;
+  interrupt ();
+}
+
+void
+OutputTask::wait (std::unique_lock<std::mutex> &guard, GstClockTime due)
+{
+  GstElement *element = GST_PAD_PARENT (src_);
+  GstClock *clock = GST_CLOCK_TIME_IS_VALID (due) ? gst_element_get_clock (element) : nullptr;
+  if (!clock) { /* nothing is due, or the clock has been removed: time does not go on */
+    changed_.wait (guard, [this] { return quit_ || woken_; });
+    return;
+  }
+  const GstClockTime time = gst_element_get_base_time (element) + due;
+  if (clock != clock_ || !gst_clock_single_shot_id_reinit (clock, id_, time)) {
+    if (id_)
+      gst_clock_id_unref (id_);
+    id_ = gst_clock_new_single_shot_id (clock, time);
+    gst_object_replace (reinterpret_cast<GstObject **> (&clock_), GST_OBJECT (clock));
+  }
+  gst_object_unref (clock);
+  waiting_ = true;
+  guard.unlock ();
+  gst_clock_id_wait (id_, nullptr);
+  guard.lock ();
+  waiting_ = false;
+}
+
+/* GstTask calls this again and again. */
+void
+OutputTask::iterate ()
+{
+  std::unique_lock guard (lock_);
+  GstPad *src = src_; /* stop() clears it after the task */
+  GST_PAD_STREAM_UNLOCK (src);
+  changed_.wait (guard, [this] { return quit_ || playing_; });
+  woken_ = false;
+  if (!quit_) {
+    const Tick tick = tick_;
+    guard.unlock ();
+    const GstClockTime due = tick (GST_PAD_PARENT (src));
+    guard.lock ();
+    if (!quit_ && !woken_ && due != 0)
+      wait (guard, due);
+  }
+  guard.unlock ();
+  GST_PAD_STREAM_LOCK (src);
+}
