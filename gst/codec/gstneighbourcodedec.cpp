@@ -40,8 +40,7 @@
 
 #include "common/bufferpools.hpp"
 #include "common/codedunits.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
 #include "concealment.hpp"
 
@@ -50,8 +49,6 @@ using rangecast::Status;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
-
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
@@ -476,18 +473,6 @@ decoder_properties ()
   return table;
 }
 
-static void
-gst_neighbour_code_dec_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!decoder_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
 static GstStructure *
 make_stats (const GstNeighbourCodeDecPrivate *priv)
 {
@@ -498,19 +483,6 @@ make_stats (const GstNeighbourCodeDecPrivate *priv)
       "missing-pixels", G_TYPE_UINT64, guint64{totals.missing_pixels}, "unknown-pixels",
       G_TYPE_UINT64, guint64{totals.unknown_pixels}, "raw-bytes", G_TYPE_UINT64,
       guint64{totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes, nullptr);
-}
-
-static void
-gst_neighbour_code_dec_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value, make_stats (priv));
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!decoder_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
@@ -537,15 +509,11 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->set_property = gst_neighbour_code_dec_set_property;
-  object_class->get_property = gst_neighbour_code_dec_get_property;
   object_class->finalize = gst_neighbour_code_dec_finalize;
 
-  decoder_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstNeighbourCodeDec, decoder_properties, make_stats> (object_class,
       "Counters since the element was started: frames, points, slices, bad-slices, "
       "missing-pixels, unknown-pixels, raw-bytes, coded-bytes");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

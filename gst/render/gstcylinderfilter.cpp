@@ -28,7 +28,7 @@
 #include <rangecast/base/guarded.hpp>
 
 #include "common/controlledvalues.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
 #include "cylindersettings.hpp"
 
@@ -37,8 +37,6 @@ using rangecast::Status;
 
 GST_DEBUG_CATEGORY (gst_cylinder_filter_debug);
 #define GST_CAT_DEFAULT gst_cylinder_filter_debug
-
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 namespace {
 
@@ -400,17 +398,6 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
 
 /* ---- properties ---- */
 
-static void
-gst_cylinder_filter_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstCylinderFilterPrivate *priv = GST_CYLINDER_FILTER (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* it has locks of its own, and sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  const std::lock_guard guard (priv->lock);
-  if (!cylinder_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
 namespace {
 
 void
@@ -432,7 +419,7 @@ add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
 }
 
 GstStructure *
-stats_structure (const GstCylinderFilterPrivate *priv)
+make_stats (const GstCylinderFilterPrivate *priv)
 {
   const CylinderCounts &counts = priv->counts;
   GstStructure *stats =
@@ -457,19 +444,6 @@ stats_structure (const GstCylinderFilterPrivate *priv)
 } // namespace
 
 static void
-gst_cylinder_filter_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto priv = GST_CYLINDER_FILTER (object)->priv;
-  const std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value, stats_structure (priv));
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!cylinder_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
 gst_cylinder_filter_finalize (GObject *object)
 {
   delete GST_CYLINDER_FILTER (object)->priv;
@@ -492,16 +466,12 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
 
-  object_class->set_property = gst_cylinder_filter_set_property;
-  object_class->get_property = gst_cylinder_filter_get_property;
   object_class->finalize = gst_cylinder_filter_finalize;
 
-  cylinder_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstCylinderFilter, cylinder_properties, make_stats> (object_class,
       "Counters since READY: frames, points-contradicted, points-in, points-out, units, "
       "units-shared, units-held, units-changed; of the last frame: bodies, axis-position, "
       "axis-direction, views");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

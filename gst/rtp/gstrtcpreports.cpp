@@ -28,15 +28,13 @@
 #include <optional>
 #include <span>
 
-#include "common/properties.hpp"
+#include "common/elementproperties.hpp"
 #include "netarrival.hpp"
 #include "rtcppackets.hpp"
 #include "rtcpreceivers.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtcp_reports_debug);
 #define GST_CAT_DEFAULT gst_rtcp_reports_debug
-
-enum : guint { PROP_STATS = 1, PROP_SETTINGS };
 
 namespace {
 struct Settings {
@@ -354,27 +352,12 @@ reports_properties ()
   return table;
 }
 
-static void
-gst_rtcp_reports_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstRtcpReportsPrivate *priv)
 {
-  GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (!reports_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_rtcp_reports_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRtcpReportsPrivate *priv = GST_RTCP_REPORTS (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (
-        value, gst_structure_new ("application/x-rtcpreports-stats", "receivers", G_TYPE_UINT64,
-                   guint64 (priv->receivers), "refused", G_TYPE_UINT64, priv->refused, "malformed",
-                   G_TYPE_UINT64, priv->malformed, nullptr));
-  else if (!reports_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  return gst_structure_new ("application/x-rtcpreports-stats", "receivers", G_TYPE_UINT64,
+      guint64 (priv->receivers), "refused", G_TYPE_UINT64, priv->refused, "malformed",
+      G_TYPE_UINT64, priv->malformed, nullptr);
 }
 
 static void
@@ -415,12 +398,9 @@ gst_rtcp_reports_class_init (GstRtcpReportsClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->set_property = gst_rtcp_reports_set_property;
-  object_class->get_property = gst_rtcp_reports_get_property;
   object_class->finalize = gst_rtcp_reports_finalize;
 
-  reports_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRtcpReports, reports_properties, make_stats> (object_class,
       "Current number of receivers, and the RTCP packets refused and malformed since the "
       "element was started");
 
