@@ -6,6 +6,7 @@
 #include <span>
 
 #include "camera/aravis/debug.hpp"
+#include "clock.hpp"
 #include "conflict.hpp"
 
 namespace {
@@ -187,8 +188,8 @@ CameraGroup::start ()
     if (CameraStatus status = start_stream (i); !status.ok ())
       return status;
   for (std::size_t i = 0; i < cameras_.size (); i++)
-    heartbeats_[i].start (cameras_[i]->is_gige () ? cameras_[i]->info ().address : "",
-        g_get_monotonic_time () * 1000);
+    heartbeats_[i].start (
+        cameras_[i]->is_gige () ? cameras_[i]->info ().address : "", monotonic_ns ());
   return {};
 }
 
@@ -339,7 +340,7 @@ read_offset (Camera &camera, std::int64_t &shortest_us, std::int64_t &offset_ns)
 CameraStatus
 CameraGroup::read_clocks ()
 {
-  clocks_read_ns_ = g_get_monotonic_time () * 1000;
+  clocks_read_ns_ = monotonic_ns ();
   bool ptp = true;
   for (const auto &camera : cameras_)
     ptp = ptp && camera->clock_is_ptp ();

@@ -1,10 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <cstdint>
 #include <gst/gst.h>
-
 #include <rangecast/base/status.hpp>
 #include <string>
+
+/** Time of this host's monotonic clock, ns. */
+inline std::int64_t
+monotonic_ns ()
+{
+  return g_get_monotonic_time () * 1000;
+}
 
 /** The clock of another host, which stereocamsrc provides to its pipeline. */
 class NetworkClock {

@@ -5,6 +5,7 @@
 #include <gstrange/gstrange.h>
 
 #include "camera/aravis/debug.hpp"
+#include "clock.hpp"
 #include "common/clockwait.hpp"
 
 void
@@ -52,7 +53,7 @@ SetOutput::send (ImageSet &set)
   }
   sent_++;
   last_pts_ = pts;
-  last_sent_ns_ = g_get_monotonic_time () * 1000;
+  last_sent_ns_ = monotonic_ns ();
   covered_until_ = pts + period_;
   return settings_.num_buffers < 0 || sent_ < static_cast<guint64> (settings_.num_buffers);
 }
@@ -64,7 +65,7 @@ SetOutput::capture_time (const ImageSet &set) const
   if (GST_CLOCK_TIME_IS_VALID (set.trigger_time))
     return set.trigger_time;
   GstClock *clock = clock_of_element (element_);
-  const std::int64_t age_ns = g_get_monotonic_time () * 1000 - set.exposed_ns;
+  const std::int64_t age_ns = monotonic_ns () - set.exposed_ns;
   const auto now_ns = static_cast<std::int64_t> (gst_clock_get_time (clock));
   gst_object_unref (clock);
   std::int64_t time_ns = std::max<std::int64_t> (now_ns - age_ns, 0);

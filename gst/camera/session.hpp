@@ -101,7 +101,7 @@ private:
   void handle_frames ();
   void begin_playing ();
   void warn_if_not_ptp (GstClock *clock);
-  void check_progress ();
+  void run_periodic_checks ();
   void check_silence (std::int64_t now_ns);
   void warn_about_losses ();
   void update_latency ();

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* A session while its cameras stream: frames become sets, sets go to the pads, and ten times a
- * second it checks that all still goes on. */
+ * second cameras, clocks and losses are checked. */
 #include "session.hpp"
 
 #include <algorithm>
 
 #include "camera/aravis/debug.hpp"
+#include "clock.hpp"
 
 namespace {
 
@@ -15,6 +16,8 @@ constexpr std::int64_t kStatsInterval_ns = 5 * kSecond_ns;
 constexpr std::int64_t kSilence_ns = kSecond_ns;        /* of all cameras, before GAPs are sent */
 constexpr std::int64_t kMaxSilence_ns = 3 * kSecond_ns; /* of a camera that should send */
 constexpr int kMaxSilentPeriods = 3;                    /* ... if that is longer */
+constexpr guint64 kMinIncompleteImages = 20;            /* before a warning, which also needs ... */
+constexpr guint64 kMaxIncompleteShare = 4; /* ... more than 1 incomplete image in 4 complete ones */
 
 } // namespace
 
@@ -40,20 +43,20 @@ CameraSession::stream ()
       begin_playing ();
     was_playing_ = playing;
     handle_frames ();
-    const std::int64_t now_ns = g_get_monotonic_time () * 1000;
+    const std::int64_t now_ns = monotonic_ns ();
     if (now_ns - checked_ns_ < kCheckInterval_ns)
       continue;
     checked_ns_ = now_ns;
     if (cameras_.needs_negotiation ())
       return End::kRenegotiate;
-    check_progress ();
+    run_periodic_checks ();
   }
 }
 
 void
 CameraSession::begin_playing ()
 {
-  playing_since_ns_ = g_get_monotonic_time () * 1000;
+  playing_since_ns_ = monotonic_ns ();
   GstClock *clock = gst_element_get_clock (element_);
   if (clock_ && clock && clock != clock_)
     GST_ELEMENT_WARNING (element_, CORE, CLOCK,
@@ -95,8 +98,10 @@ CameraSession::handle_frames ()
     pairing_.add_frame (event.camera, std::move (event.frame));
     ImageSet set;
     while (pairing_.next_set (set)) {
-      if (was_playing_ && !output_.send (set))
+      if (was_playing_ && !output_.send (set)) {
         send_eos (gst_util_seqnum_next ());
+        was_playing_ = false; /* later sets of the batch are beyond num-buffers */
+      }
       set = {};
     }
   }
@@ -106,7 +111,7 @@ CameraSession::handle_frames ()
 /* ---- ten times a second ---- */
 
 void
-CameraSession::check_progress ()
+CameraSession::run_periodic_checks ()
 {
   if (CameraStatus status = cameras_.check_heartbeats (checked_ns_); !status.ok ())
     fail (std::move (status));
@@ -136,7 +141,7 @@ CameraSession::check_silence (std::int64_t now_ns)
   const std::int64_t max_ns = std::max (kMaxSilence_ns, kMaxSilentPeriods * period_ns);
   if (output_.last_sent_ns () > 0 &&
       now_ns - output_.last_sent_ns () > std::max (kSilence_ns, max_ns / 2))
-    send_gaps (latency_); /* images in transfer may still come */
+    send_gaps (latency_); /* up to `latency_` ago: later images may be in transfer */
   if (ticks && now_ns - std::max (trigger_.last_trigger_ns (), playing_since_ns_) > max_ns)
     fail ({CameraFault::kTimedOut,
         "the pipeline clock has stopped: no tick for " + std::to_string (max_ns / kSecond_ns) +
@@ -159,7 +164,7 @@ CameraSession::warn_about_losses ()
             settings_.n_buffers),
         (nullptr));
   const CameraStatistics all = cameras_.statistics ();
-  if (all.failures > 20 && all.failures > all.completed / 4 &&
+  if (all.failures > kMinIncompleteImages && all.failures > all.completed / kMaxIncompleteShare &&
       !std::exchange (warned_incomplete_, true))
     GST_ELEMENT_WARNING (element_, RESOURCE, READ,
         ("Many images arrive incomplete: lower packet-size to the network's MTU, raise "

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "camera/aravis/debug.hpp"
+#include "clock.hpp"
 #include "common/realtimepriority.hpp"
 
 namespace {
@@ -158,7 +159,7 @@ CameraTrigger::next_tick (GstClockTime now, GstClockTime base) const
 void
 CameraTrigger::handle_request (GstClockTime time, GstClockTime now)
 {
-  if (!pairing_.may_trigger (settings_.single_shot, g_get_monotonic_time () * 1000)) {
+  if (!pairing_.may_trigger (settings_.single_shot, monotonic_ns ())) {
     g_usleep (1000); /* until the cameras have answered the previous trigger */
     return;
   }
@@ -176,7 +177,7 @@ CameraTrigger::handle_request (GstClockTime time, GstClockTime now)
 void
 CameraTrigger::handle_tick (GstClockTime time, GstClockTime now)
 {
-  const bool ready = pairing_.may_trigger (settings_.single_shot, g_get_monotonic_time () * 1000);
+  const bool ready = pairing_.may_trigger (settings_.single_shot, monotonic_ns ());
   const std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (time));
   const bool late = now > time + static_cast<GstClockTime> (rate_.period_ns ()) / 2;
   {
@@ -196,7 +197,7 @@ CameraTrigger::handle_tick (GstClockTime time, GstClockTime now)
 void
 CameraTrigger::trigger (GstClockTime time)
 {
-  const std::int64_t now_ns = g_get_monotonic_time () * 1000;
+  const std::int64_t now_ns = monotonic_ns ();
   last_trigger_ns_ = now_ns;
   /* before it is sent: a camera may answer before another one acknowledges */
   pairing_.add_trigger (time, now_ns + static_cast<std::int64_t> (lead_));

@@ -82,9 +82,9 @@ struct GstNeighbourCodeEncPrivate {
   RecycledMemories memories;
   bool by_slices = false;          /* alignment of the output */
   GstBuffer *input = nullptr;      /* the frame set in encoder, until all of it is pushed */
-  std::size_t part = 0;            /* the next one of encoder; for by_slices, as the two below */
-  rangecast::UnitReader units{{}}; /* of the part before */
-  std::span<const guint8> slice;   /* the next one; empty before the first */
+  std::size_t part = 0;            /* by_slices: the next of encoder's parts */
+  rangecast::UnitReader units{{}}; /* by_slices: rest of the previous part */
+  std::span<const guint8> slice;   /* by_slices: the next slice; empty before the first */
 };
 
 struct _GstNeighbourCodeEnc {
@@ -128,7 +128,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
 /* ---- a frame set: rate, key frame sets, encoding ---- */
 
 static GstClockTime
-running_time_of (GstNeighbourCodeEnc *self, GstBuffer *input)
+input_running_time (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
   return gst_segment_to_running_time (
       &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
@@ -156,16 +156,17 @@ request_key_if_due (
     GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  const GstClockTime now = running_time_of (self, input), last = priv->last_key;
+  const GstClockTime now = input_running_time (self, input), last = priv->last_key;
   const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
   const GstClockTime next = now + settings.coding.frame_interval_ns;
-  const bool is_old = settings.key_interval_ms > 0 && has_times &&
-                      (now < last || next - last > settings.key_interval_ms * GST_MSECOND);
-  const bool is_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
-                       now >= last && now - last < settings.min_forced_key_interval;
-  if (!is_old && (is_soon || !priv->key_requests.is_due (now)))
+  const bool interval_passed = settings.key_interval_ms > 0 && has_times &&
+                               (now < last || next - last > settings.key_interval_ms * GST_MSECOND);
+  const bool too_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
+                        now >= last && now - last < settings.min_forced_key_interval;
+  if (!interval_passed && (too_soon || !priv->key_requests.is_due (now)))
     return;
-  GST_DEBUG_OBJECT (self, "key frame set: %s", is_old ? "key-interval has passed" : "requested");
+  GST_DEBUG_OBJECT (
+      self, "key frame set: %s", interval_passed ? "key-interval has passed" : "requested");
   priv->encoder.request_key ();
 }
 
@@ -222,7 +223,7 @@ static void
 answer_key_requests (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  const GstClockTime pts = GST_BUFFER_PTS (input), running_time = running_time_of (self, input);
+  const GstClockTime pts = GST_BUFFER_PTS (input), running_time = input_running_time (self, input);
   const GstClockTime stream_time =
       gst_segment_to_stream_time (&GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, pts);
   priv->last_key = running_time;
@@ -242,9 +243,8 @@ encode_input (GstNeighbourCodeEnc *self)
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
-  settings.coding.frame_interval_ns = priv->info.fps_n > 0 ? gst_util_uint64_scale_int (GST_SECOND,
-                                                                 priv->info.fps_d, priv->info.fps_n)
-                                                           : GST_SECOND / 30;
+  settings.coding.frame_interval_ns =
+      priv->info.fps_n > 0 ? priv->info.frame_duration () : GST_SECOND / 30;
   const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
   if (GstMessage *message = priv->rate.make_message (GST_OBJECT (self))) {
     gst_element_post_message (GST_ELEMENT (self), message);
@@ -422,7 +422,7 @@ gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)->src_event (base, event);
 }
 
-/* ---- life ---- */
+/* ---- states and properties ---- */
 
 static std::vector<StatsRow>
 collect_stats (GstElement *element)

@@ -63,12 +63,12 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
  *
  *   sink_event       records the caps of each pad
  *   aggregate
- *     take_pair      takes a left and a right image of one running time off their pads
- *     drop_if_late   drops the pair if its depth would arrive too late (QoS)
- *     take_third     takes the third image of that time, if there is a pad for it
- *     negotiate      after new caps: loads the view, configures the matcher, sets output caps
- *     push_gap,
- *     push_pair      announces time without pairs; rectifies, matches and pushes
+ *     take_pair      takes a left and a right image of one running time off their pads. A left
+ * image waits for a right one without a deadline: it is dropped when a later right image or a GAP
+ * arrives push_gap       announces time without pairs drop_if_late   drops the pair if its depth
+ * would arrive too late (QoS) take_third     takes the third image of that time, if there is a pad
+ * for it; waits for it until the deadline negotiate      after new caps: loads the view, configures
+ * the matcher, sets output caps push_pair      rectifies, matches and pushes
  *
  * A pair that waits for its third image is kept in `pair`, off its pads: a source that feeds all
  * pads from one thread and loses a third image would otherwise block on pad left for ever. So caps

@@ -116,11 +116,11 @@ struct GstRangeMuxPrivate {
   MuxStreams current_streams; /* see CurrentStreams */
   WaitingBuffers waiting;
   ClockConsensus consensus;
-  std::vector<ClockConsensus::Stream> votes;
-  std::vector<MuxStream *> voters; /* whose votes they are */
+  std::vector<ClockConsensus::Stream> clock_offsets;
+  std::vector<MuxStream *> offset_streams; /* in the order of clock_offsets */
   Recordings recordings;
   FrameSetJoiner joiner;
-  GstClockTime now = GST_CLOCK_TIME_NONE; /* running time of the oldest buffer that waits */
+  GstClockTime oldest_running = GST_CLOCK_TIME_NONE; /* of the buffers that wait */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
   FrameTimes last; /* of the last frame set */
 };
@@ -202,7 +202,8 @@ WaitingBuffers::release ()
 
 /* ---- 2. which streams make up frame sets; caps with the union of their rigs ---- */
 
-/* Sets a stream's state, and reports it if it is news that lasts.
+/* Sets a stream's state, and reports it when it changes: kLate and kOutOfSync once they have lasted
+ * kMinReportTime.
  * @param running  of the buffer that shows the state, or GST_CLOCK_TIME_NONE */
 static void
 set_state (GstRangeMux *self, MuxStream &stream, StreamState state, GstClockTime running)
@@ -244,7 +245,7 @@ update_streams (GstRangeMux *self, const MuxStreams &streams)
       w.stream->seen = w.running;
       now = std::min (now, w.running);
     }
-  priv->now = now;
+  priv->oldest_running = now;
   if (!GST_CLOCK_TIME_IS_VALID (now))
     return;
   for (const auto &stream : streams) {
@@ -271,7 +272,7 @@ negotiate (GstRangeMux *self, const MuxStreams &streams)
   for (const auto &stream : streams)
     if (stream->alive && (!stream->other_rig.ok () || !stream->clash.ok ()))
       set_state (self, *stream, stream->clash.ok () ? StreamState::kOtherRig : StreamState::kClash,
-          priv->now);
+          priv->oldest_running);
   if (format.info.views () == 0)
     return GST_FLOW_OK; /* no stream is left */
   GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
@@ -299,20 +300,20 @@ compare_clocks (GstRangeMux *self, const MuxStreams &streams)
       w.stream->offset = ClockConsensus::offset_of (w.capture, base + w.running);
       w.stream->offset_known = true;
     }
-  priv->votes.clear ();
-  priv->voters.clear ();
+  priv->clock_offsets.clear ();
+  priv->offset_streams.clear ();
   for (const auto &stream : streams)
     if (stream->chosen && stream->alive && stream->offset_known) {
-      priv->votes.push_back ({stream->offset});
-      priv->voters.push_back (stream.get ());
+      priv->clock_offsets.push_back ({stream->offset});
+      priv->offset_streams.push_back (stream.get ());
     }
-  if (priv->consensus.update (priv->votes)) {
+  if (priv->consensus.update (priv->clock_offsets)) {
     GST_DEBUG_OBJECT (self, "most streams have another clock now: its offset is %" GST_STIME_FORMAT,
         GST_STIME_ARGS (priv->consensus.reference ()));
     priv->last.capture = GST_CLOCK_TIME_NONE; /* a time of the other clock */
   }
-  for (std::size_t i = 0; i < priv->voters.size (); i++)
-    priv->voters[i]->in_sync = priv->votes[i].in_sync;
+  for (std::size_t i = 0; i < priv->offset_streams.size (); i++)
+    priv->offset_streams[i]->in_sync = priv->clock_offsets[i].in_sync;
 }
 
 /* Not live: compares capture times. */
@@ -484,7 +485,7 @@ join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
 
 /* Running times of live streams can be compared; those of recordings follow the capture times. */
 static GstClockTime
-running_time_of (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
+output_running_time (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
 {
   if (!priv->live)
     return running_time_after (priv->last, match.times, match.speed,
@@ -508,7 +509,7 @@ push_frame_set (GstRangeMux *self, std::size_t streams, GstClockTime tolerance)
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  priv->last = {first, running_time_of (priv, match, tolerance)};
+  priv->last = {first, output_running_time (priv, match, tolerance)};
   gstrange::stamp (
       GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
   GST_LOG_OBJECT (
@@ -547,7 +548,8 @@ make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
     compare_recordings (self);
   const GstClockTime tolerance = matching_tolerance (priv);
   if (drop_past_gaps (self, tolerance, timeout) || drop_unusable (self, tolerance))
-    return GST_AGGREGATOR_FLOW_NEED_DATA; /* the buffers behind them may be at their pads already */
+    return GST_AGGREGATOR_FLOW_NEED_DATA; /* GstAggregator looks at the pads again: the next buffers
+                                             may be there already */
   if (waiting.list.empty () || (waiting.missing > 0 && !timeout)) {
     GST_LOG_OBJECT (self, "waiting for %d streams", waiting.missing);
     return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -647,7 +649,7 @@ gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->last = {};
-  priv->now = GST_CLOCK_TIME_NONE;
+  priv->oldest_running = GST_CLOCK_TIME_NONE;
   priv->consensus.reset ();
   std::lock_guard guard (priv->lock);
   for (const auto &stream : priv->streams) {
@@ -659,16 +661,18 @@ gst_range_mux_flush (GstAggregator *aggregator)
 
 /* ---- request pads ---- */
 
-static GstPad *
-gst_range_mux_request_new_pad (
-    GstElement *element, GstPadTemplate *pad_template, const gchar *name, const GstCaps *caps)
+/* The stream exists before the pad is added: a handler of pad-added may link it, and caps follow.
+ */
+static GstAggregatorPad *
+gst_range_mux_create_new_pad (
+    GstAggregator *aggregator, GstPadTemplate *pad_template, const gchar *name, const GstCaps *caps)
 {
-  auto self = GST_RANGE_MUX (element);
-  GstPad *pad = GST_ELEMENT_CLASS (gst_range_mux_parent_class)
-                    ->request_new_pad (element, pad_template, name, caps);
+  GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
+  GstAggregatorPad *pad = GST_AGGREGATOR_CLASS (gst_range_mux_parent_class)
+                              ->create_new_pad (aggregator, pad_template, name, caps);
   if (pad) {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->streams.push_back (std::make_shared<MuxStream> (GST_AGGREGATOR_PAD (pad)));
+    std::lock_guard guard (priv->lock);
+    priv->streams.push_back (std::make_shared<MuxStream> (pad));
   }
   return pad;
 }
@@ -744,7 +748,8 @@ make_stats (const GstRangeMuxPrivate *priv)
   return stats;
 }
 
-/* Of a pad, frame sets without its stream are lost, also those before its first buffer. */
+/* A pad's `lost` counts the frame sets that its stream is missing from, also those before its first
+ * buffer. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
@@ -779,7 +784,7 @@ gst_range_mux_start (GstAggregator *aggregator)
     settings = priv->settings;
   }
   priv->caps_dirty = true;
-  priv->frame_duration = priv->now = GST_CLOCK_TIME_NONE;
+  priv->frame_duration = priv->oldest_running = GST_CLOCK_TIME_NONE;
   priv->last = {};
   priv->consensus.reset ();
   priv->rig = {};
@@ -893,10 +898,10 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
       "Combines the views of several range streams into frame sets by capture time",
       "gst-rangecast");
 
-  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_range_mux_request_new_pad);
   element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_mux_release_pad);
   element_class->set_clock = GST_DEBUG_FUNCPTR (gst_range_mux_set_clock);
 
+  aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_range_mux_create_new_pad);
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_range_mux_start);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_range_mux_stop);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_mux_flush);

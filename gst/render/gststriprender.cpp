@@ -132,7 +132,7 @@ gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
     std::lock_guard guard (priv->lock);
     priv->rate = strip_output_rate (in, out);
   }
-  strip_select_regime (self);
+  strip_select_mode (self);
   return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
 }
 

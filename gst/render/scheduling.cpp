@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* When striprender draws. There are two regimes:
+/* When striprender draws. There are two modes:
  *
  * One picture per frame set: the output has the input's frame rate, or none.
  *   chain -> submit_input_buffer() -> transform() -> push, all on the streaming thread. A picture
@@ -8,18 +8,20 @@
  * A frame rate of its own: downstream asked for another one than the input's, or keep-rate is set.
  *   chain -> submit_input_buffer() -> OutputSchedule, which says when there are pictures and which
  *   frame set each of them shows. They are drawn
- *   - not live: by generate_output() on the streaming thread, once their frame set is certain;
+ *   - not live: by generate_output() on the streaming thread, once no later frame set can replace
+ *     theirs;
  *   - live: by the source pad's task, by the clock, also while the stream stalls.
- *   Serialized events go out after the pictures before them. What of a GAP the pictures do not fill
- *   waits in priv->gap until they are out.
+ *   Serialized events go out after the pictures before them: drain() draws those on the streaming
+ *   thread, live or not. The part of a GAP that pictures do not cover is kept in priv->gap until
+ *   they are out.
  *
  * Locks, in the order in which they are taken:
  * 1. the sink pad's stream lock, which the streaming thread holds;
  * 2. the source pad's stream lock. The thread that draws and pushes holds it while both may:
  *    for serialized events and queries, and for each picture of the task. The task takes both to
  *    negotiate and releases the sink pad's before it draws, so that frame sets come in meanwhile;
- * 3. GstStripRenderPrivate::lock: settings, statistics, schedule. Never held while pushing, posting
- *    or querying, nor together with the output task's own lock, which is the last one, too. */
+ * 3. GstStripRenderPrivate::lock (settings, statistics, schedule), or OutputTask's own lock. No
+ * other lock is taken while one of them is held, and nothing is pushed, posted or queried. */
 #include <algorithm>
 #include <utility>
 
@@ -65,9 +67,9 @@ parent_class ()
   return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_GL_BASE_FILTER));
 }
 
-/* ---- regime ---- */
+/* ---- mode ---- */
 
-/* Reverse segments, and those not in time, have none. With either stream lock. */
+/* False for reverse segments and those not in time. With either stream lock. */
 bool
 has_own_rate (GstStripRender *self)
 {
@@ -115,7 +117,7 @@ query_whether_live (GstStripRender *self)
 
 /* ---- late pictures ---- */
 
-const char *const kLate = "late according to QoS events";
+const char *const kLateReason = "late according to QoS events";
 
 bool
 is_late (GstStripRender *self, GstClockTime running)
@@ -140,7 +142,8 @@ drop_pictures (GstStripRender *self, const char *reason, guint64 count, GstClock
   guint64 drawn, dropped;
   {
     std::lock_guard guard (priv->lock);
-    dropped = priv->stats.dropped += count;
+    priv->stats.dropped += count;
+    dropped = priv->stats.dropped;
     priv->discont = true;
     drawn = priv->stats.frames;
     earliest = priv->earliest;
@@ -165,7 +168,7 @@ negotiate (GstStripRender *self)
   if (self->priv->live && has_own_rate (self))
     return true; /* the task negotiates */
   StreamLocks locks (base);
-  strip_select_regime (self);
+  strip_select_mode (self);
   return gst_base_transform_reconfigure (base) && gst_pad_has_current_caps (base->srcpad);
 }
 
@@ -224,6 +227,8 @@ schedule_frame_set (GstStripRender *self, GstBuffer *in)
 
 } // namespace
 
+/* Replaces GstBaseTransform's, which drops late buffers by their input times and sends QoS messages
+ * of its own: pictures of the schedule have other times. It negotiates as that one does. */
 GstFlowReturn
 gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffer *in)
 {
@@ -246,7 +251,7 @@ gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffe
     return schedule_frame_set (self, in);
   const bool late = is_late (self, strip_running_time (self, pts));
   if (late || !follows_schedule (self, pts)) {
-    drop_pictures (self, late ? kLate : "before the last picture", 1, pts, duration);
+    drop_pictures (self, late ? kLateReason : "before the last picture", 1, pts, duration);
     gst_buffer_unref (in);
     return GST_BASE_TRANSFORM_FLOW_DROPPED;
   }
@@ -304,7 +309,7 @@ draw_next (GstStripRender *self, GstClockTime limit, GstBuffer **out)
   while (flow == GST_FLOW_OK && !*out && next_picture (self, limit, picture)) {
     const GstClockTime running = strip_running_time (self, picture.pts);
     if (is_late (self, running))
-      drop_pictures (self, kLate, 1, picture.pts, picture.duration);
+      drop_pictures (self, kLateReason, 1, picture.pts, picture.duration);
     else if (GST_CLOCK_TIME_IS_VALID (running))
       flow = draw_picture (self, picture, out);
     else
@@ -499,7 +504,7 @@ output_tick (GstElement *element)
   StreamLocks locks (base);
   if (!task_draws (self) || GST_PAD_IS_FLUSHING (base->srcpad))
     return GST_CLOCK_TIME_NONE;
-  strip_select_regime (self);
+  strip_select_mode (self);
   if (!gst_base_transform_reconfigure (base)) {
     const bool flushing = GST_PAD_IS_FLUSHING (base->srcpad);
     const bool posted = priv->no_context || priv->gl_error_posted;
@@ -515,8 +520,8 @@ output_tick (GstElement *element)
 
 /* ---- gaps ---- */
 
-/* Sends what pictures do not fill of the gap before the one at `next`, stream position, or
- * GST_CLOCK_TIME_NONE if there is none. With the source pad's stream lock. */
+/* Sends the part of the gap that pictures before `next` do not cover. `next` is the position of the
+ * next picture, or GST_CLOCK_TIME_NONE if there is none. With the source pad's stream lock. */
 void
 push_gap (GstStripRender *self, GstClockTime next)
 {
@@ -688,7 +693,7 @@ gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
 }
 
 void
-strip_select_regime (GstStripRender *self)
+strip_select_mode (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   GstClockTime before, period;

@@ -86,7 +86,7 @@ void strip_handle_timing_event (GstStripRender *self, GstEvent *event);
 
 /** Selects one picture per frame set or a frame rate of its own, from caps and properties. With
  *  both stream locks. */
-void strip_select_regime (GstStripRender *self);
+void strip_select_mode (GstStripRender *self);
 /** Forgets the stream. With both stream locks, or while stopped. */
 void strip_reset_stream (GstStripRender *self);
 
