@@ -6,12 +6,27 @@
 #include <limits>
 
 namespace rangecast {
+namespace {
 
 /* One point in so many is enough to find the clusters. */
 constexpr std::size_t kStep = 4;
 
+/* Calls work for a place and the places beside it. */
+template <typename Work>
 void
-Clusters::lay_grid (const WorldPoints &cloud)
+for_neighbours (int place, int side, const Work &work)
+{
+  const int column = place % side, row = place / side;
+  for (int r = std::max (row - 1, 0); r <= std::min (row + 1, side - 1); r++)
+    for (int c = std::max (column - 1, 0); c <= std::min (column + 1, side - 1); c++)
+      work (r * side + c);
+}
+
+} // namespace
+
+/* Lays the grid over the points, and counts those of each place. */
+void
+Clusters::count_points (const WorldPoints &cloud)
 {
   constexpr float kHuge = std::numeric_limits<float>::max ();
   float x_max = -kHuge, z_max = -kHuge;
@@ -25,11 +40,6 @@ Clusters::lay_grid (const WorldPoints &cloud)
     }
   const float side = std::max ({x_max - x_min_, z_max - z_min_, 0.f});
   places_per_metre_ = 1 / std::max (kPlace, side / (kSide - 1));
-}
-
-void
-Clusters::count_points (const WorldPoints &cloud)
-{
   points_.assign (kSide * kSide, 0);
   counted_ = 0;
   for (const WorldPoints::Part &part : cloud.parts ())
@@ -37,18 +47,7 @@ Clusters::count_points (const WorldPoints &cloud)
       points_[place_of (cloud.x[i], cloud.z[i])]++;
 }
 
-/* Calls work for the places beside a place. */
-template <typename Work>
-static void
-for_neighbours (int place, int side, const Work &work)
-{
-  const int column = place % side, row = place / side;
-  for (int r = std::max (row - 1, 0); r <= std::min (row + 1, side - 1); r++)
-    for (int c = std::max (column - 1, 0); c <= std::min (column + 1, side - 1); c++)
-      work (r * side + c);
-}
-
-/* Labels all that is connected with a place. @return its points */
+/* Labels the component of a place. @return the number of its points */
 std::uint32_t
 Clusters::fill_cluster (std::uint16_t place, std::uint16_t label)
 {
@@ -68,7 +67,7 @@ Clusters::fill_cluster (std::uint16_t place, std::uint16_t label)
   return points;
 }
 
-/* Places of nobody go to the nearest cluster. */
+/* Assigns all other places to the nearest cluster. */
 void
 Clusters::spread ()
 {
@@ -120,7 +119,6 @@ Clusters::find (const WorldPoints &cloud, int most)
   count_ = 1;
   if (most <= 1 || cloud.size () == 0)
     return 1;
-  lay_grid (cloud);
   count_points (cloud);
   std::array<Found, kMaxClusters + 1> found{};
   count_ = std::max (1, label_places (most, found));

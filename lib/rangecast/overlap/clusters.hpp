@@ -27,7 +27,7 @@ public:
    *  @return how many there are, at least 1 */
   int find (const WorldPoints &cloud, int most);
 
-  /** Brings the points of each cluster together in a part.
+  /** Sorts the points of a part by cluster.
    *  @param[out] ends  end of each cluster in the part; the first one begins with it. Parts may be
    *                    sorted at the same time */
   void sort_part (
@@ -37,7 +37,6 @@ private:
   static constexpr int kSide = 128; /* places each way */
   static constexpr std::uint8_t kNoCluster = 255;
 
-  void lay_grid (const WorldPoints &cloud);
   void count_points (const WorldPoints &cloud);
   struct Found {
     std::uint32_t points = 0;

@@ -33,9 +33,9 @@ public:
    *  agree are left alone, bit by bit. */
   static constexpr float kLeftUndone = 0.002f;
 
-  /** Takes the cameras and forgets the stream. */
+  /** Sets the cameras and resets all gains. */
   Status set_rig (const Rig &rig);
-  /** Takes other poses and keeps what it knows of the stream. */
+  /** Sets other poses; gains are kept. */
   Status change_rig (const Rig &rig);
   void reset ();
 
@@ -63,7 +63,6 @@ private:
     std::array<Histogram, 3> ratios{};
   };
 
-  void learn (std::span<const RangeImage> images);
   void age (std::span<const RangeImage> images);
   void count_ratios (std::span<const RangeImage> images, std::size_t from);
   void compare (std::span<const RangeImage> images, std::size_t from, int x, int y);

@@ -16,13 +16,13 @@ struct ColourSettings {
  *  overlaps are still there, after() blends the seams that were made. */
 class ColourMatch {
 public:
-  /** Takes the cameras and forgets the stream. */
+  /** Sets the cameras and resets all gains. */
   Status set_rig (const Rig &rig)
   {
     const Status status = balance_.set_rig (rig);
     return status.ok () ? blend_.set_rig (rig) : status;
   }
-  /** Takes other poses and keeps what it knows of the stream. */
+  /** Sets other poses; gains are kept. */
   Status change_rig (const Rig &rig)
   {
     const Status status = balance_.change_rig (rig);

@@ -145,14 +145,6 @@ template <typename L> struct RedundantPoints::CoverLoop {
     F left, right, top, bottom;
   };
 
-  static void widen (Extent &extent, const F &u, const F &v)
-  {
-    extent.left = u < extent.left ? u : extent.left;
-    extent.right = u > extent.right ? u : extent.right;
-    extent.top = v < extent.top ? v : extent.top;
-    extent.bottom = v > extent.bottom ? v : extent.bottom;
-  }
-
   /* Where a pixel and its neighbours are seen, row by row; the pixel itself for those that do not
    * join it. */
   struct Patch {
@@ -203,8 +195,13 @@ template <typename L> struct RedundantPoints::CoverLoop {
       return;
     const F u = patch.u[4], v = patch.v[4];
     Extent extent = {u, u, v, v};
-    for (int k = 0; k < 9; k++)
-      widen (extent, u + overlap * (patch.u[k] - u), v + overlap * (patch.v[k] - v));
+    for (int k = 0; k < 9; k++) {
+      const F to_u = u + overlap * (patch.u[k] - u), to_v = v + overlap * (patch.v[k] - v);
+      extent.left = to_u < extent.left ? to_u : extent.left;
+      extent.right = to_u > extent.right ? to_u : extent.right;
+      extent.top = to_v < extent.top ? to_v : extent.top;
+      extent.bottom = to_v > extent.bottom ? to_v : extent.bottom;
+    }
     covered &= (extent.left >= 0) & (extent.top >= 0) &
                (extent.right <= static_cast<float> (other.depth.width - 1)) &
                (extent.bottom <= static_cast<float> (other.depth.height - 1));
@@ -214,7 +211,9 @@ template <typename L> struct RedundantPoints::CoverLoop {
           is_closed (static_cast<int> (extent.left[i]), last_before (extent.right[i]),
               static_cast<int> (extent.top[i]), last_before (extent.bottom[i]))) {
         won[i] = kGoes;
-        remove (first + i, y);
+        for (int row = y - 1; row <= y; row++)
+          std::fill_n (state.surface.row (row) + first + i - 1, 2, std::uint8_t{0});
+        owner.count_++;
       }
   }
 
@@ -235,13 +234,6 @@ template <typename L> struct RedundantPoints::CoverLoop {
       }
     }
     return true;
-  }
-
-  void remove (int x, int y) const
-  {
-    for (int row = y - 1; row <= y; row++)
-      std::fill_n (state.surface.row (row) + x - 1, 2, std::uint8_t{0});
-    owner.count_++;
   }
 
   void run () const

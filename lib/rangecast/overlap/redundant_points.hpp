@@ -34,9 +34,9 @@ struct ResolvedFrame {
  *  - The point's surface faces the winner: the other side of a thin thing is not covered.
  *  Pixels join as in striprender: their depths differ by no more than kDepthStep.
  *
- *  Images are worked on one after the other. What is found to go covers nothing any more, so each
- *  point that goes is covered by points that stay, and where the regions of two views meet, the
- *  later one keeps an overlap of a pixel or two. */
+ *  Images are processed in order. A point that goes no longer covers others, so each one that goes
+ * is covered by points that stay, and where the regions of two views meet, the later one keeps an
+ *  overlap of a pixel or two. */
 class RedundantPoints {
 public:
   /** @param overlap  how far from the point what goes with it is covered, in pixels of its own
@@ -75,7 +75,7 @@ private:
     Plane surface;
     /* Number of the image that won the pixel's cell; kNoWinner: it is no candidate; kGoes. */
     Plane winner;
-    std::uint64_t winners = 0; /* bit i: image i is in there */
+    std::uint64_t winners = 0; /* bit i: image i is in `winner` */
   };
   static constexpr std::uint8_t kSurface = 0xff, kNoWinner = 0xff, kGoes = 0xfe;
 
@@ -100,8 +100,8 @@ private:
   std::size_t count_ = 0;
   std::array<Row, 3> rows_;
   std::vector<Range> candidates_; /* of each row */
-  /* Of each slice of one plane its first node, kNoNode of others. There node_of_ tells the node of
-   * each point; kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
+  /* First node of each slice of one plane, kNoNode for others, whose points have their node in
+   * node_of_: kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
   std::vector<std::uint32_t> first_node_, node_of_;
   static constexpr std::uint32_t kNoNode = UINT32_MAX;
 };

@@ -11,7 +11,9 @@
 
 namespace rangecast {
 
+namespace {
 constexpr std::uint32_t kNone = UINT32_MAX;
+}
 
 /* Cuts the cells of a slice into layers, and links the entries of each view in their order. */
 struct Cells::Cutter {
@@ -41,24 +43,11 @@ struct Cells::Cutter {
       entry_end = 0;
       cut_cells (ends, columns);
     }
-    close_rings ();
-    slice.layer_count = layer_end - slice.begin;
-  }
-
-  void link (std::uint32_t entry, std::uint32_t view)
-  {
-    const std::uint64_t bit = std::uint64_t{1} << view;
-    (views & bit ? work.chain[last[view]] : first[view]) = entry;
-    last[view] = entry;
-    views |= bit;
-  }
-
-  void close_rings ()
-  {
-    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
+    for (std::uint64_t rest = views; rest; rest &= rest - 1) { /* close the rings */
       const int view = std::countr_zero (rest);
       work.chain[last[view]] = first[view];
     }
+    slice.layer_count = layer_end - slice.begin;
   }
 
   /* Makes a layer of points, which come in the order of the cloud, so view after view.
@@ -91,8 +80,13 @@ struct Cells::Cutter {
       return true;
     layer.radius = radii / static_cast<float> (end - begin);
     layer.entry_count = to - entry_end;
-    for (; entry_end < to; entry_end++)
-      link (entry_end, work.entries[entry_end].view ());
+    for (; entry_end < to; entry_end++) {
+      const std::uint32_t view = work.entries[entry_end].view ();
+      const std::uint64_t bit = std::uint64_t{1} << view;
+      (views & bit ? work.chain[last[view]] : first[view]) = entry_end;
+      last[view] = entry_end;
+      views |= bit;
+    }
     layer_end++;
     return false;
   }
@@ -307,16 +301,11 @@ struct Cells::Tangents {
 
   void find ()
   {
-    if (slice.planes > 1) {
-      find_layered ();
+    if (slice.planes <= 1) {
+      for (std::uint32_t e = 0; e < entry_count; e++)
+        point_at (e, next_entry (e));
       return;
     }
-    for (std::uint32_t e = 0; e < entry_count; e++)
-      point_at (e, next_entry (e));
-  }
-
-  void find_layered ()
-  {
     std::array<Followers, kMaxViews> followers;
     for (std::uint32_t e = 0; e < entry_count; e++) {
       Followers &of_view = followers[work.entries[e].view ()];
