@@ -26,10 +26,10 @@ constexpr float kFar = 2 * kMaxImageSide; ///< pixels: no view sees as far aside
 constexpr double kEnough = 100;           ///< points; more do not add weight to a pair
 /* A pose is expected to be off by this, metres; the prior of no motion follows from it. */
 constexpr double kExpected = 0.003;
-/* Errors of depth are alike over large parts of a surface: so many of a pair's are independent. */
+/* Number of independent errors of a pair: they are alike over large parts of a surface. */
 constexpr double kIndependent = 8;
 constexpr double kMinError = 0.0003; ///< of depth, metres
-constexpr double kRadius = 0.15;     ///< metres: a turn moves the surface that much
+constexpr double kRadius = 0.15;     ///< metres: distance of the surface from the centre of turns
 constexpr double kMinPairWeight = 1; ///< of a pair that counts, points
 constexpr double kFaded = 1e-6;      ///< points: less counts as 0
 constexpr double kMinAgreement = 0.3, kFullAgreement = 0.6; ///< of pairs that count
@@ -268,7 +268,7 @@ struct PoseAlignment::Comparison {
                 off = distance / (kSurfaceFootprints * footprint);
     if (distance < -kSeenThrough * footprint)
       pair.through++;
-    if (std::abs (off) >= 1) /* behind: hidden, which says nothing */
+    if (std::abs (off) >= 1) /* behind: hidden, not a contradiction */
       return;
     const float full_x = static_cast<float> (from.image.roi.x + x),
                 full_y = static_cast<float> (from.image.roi.y + y);

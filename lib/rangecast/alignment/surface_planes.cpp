@@ -10,8 +10,8 @@ namespace rangecast {
 
 namespace {
 
-/* A plane is laid through neighbours at a distance of so many pixels: of 2 at a focal length of 400
- * pixels, so the same angle in all cameras. */
+/* A plane passes through neighbours at a distance of focal length / kFocalPerReach pixels, so at
+ * the same angle in all cameras. */
 constexpr float kFocalPerReach = 200;
 constexpr int kMinReach = 2, kMaxReach = 7;
 constexpr float kMinCosine2 = 0.14f; ///< squared, of 68 degrees

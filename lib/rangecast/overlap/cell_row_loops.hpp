@@ -254,6 +254,16 @@ template <typename L> struct CellRows::RowLoops {
     L::at (&rows.next_[here]) = best.view; /* not first_, which the next columns read */
   }
 
+  /* Whether some of a block's neighbours have another winner. */
+  bool differ (std::size_t here, const Neighbours &around) const
+  {
+    const I &own = L::at (&rows.first_[here]);
+    I other = {};
+    for (int k = 0; k < around.count; k++)
+      other |= (around.winners[k] != own) & (around.winners[k] >= 0);
+    return L::any (other);
+  }
+
   void decide_row (std::uint32_t row, int number, Pass pass) const
   {
     Neighbours around;
@@ -267,12 +277,8 @@ template <typename L> struct CellRows::RowLoops {
       if (pass == Pass::kWithNeighbours) {
         around.count = 0;
         find_neighbours (around, number, c, radius);
-        const I &own = L::at (&rows.first_[here]);
-        I differ = {};
-        for (int k = 0; k < around.count; k++)
-          differ |= (around.winners[k] != own) & (around.winners[k] >= 0);
-        if (!L::any (differ)) { /* neighbours with the same winner do not change it */
-          L::at (&rows.next_[here]) = own;
+        if (!differ (here, around)) { /* then they do not change the winners */
+          L::at (&rows.next_[here]) = L::at (&rows.first_[here]);
           continue;
         }
       }

@@ -61,7 +61,7 @@ public:
   };
 
   void begin (int columns, double slice_height_m, int images, std::size_t slices);
-  /** Appends a slice with room for so many planes; slices of a cluster are consecutive. */
+  /** Appends a slice; slices of a cluster are consecutive. @param planes  number of its rows */
   void add_slice (int cluster, int number, int planes);
   /** Makes room for the slices' rows, and empties them. */
   void make_room ();

@@ -8,7 +8,7 @@
 namespace rangecast {
 namespace {
 
-/* One point in so many is enough to find the clusters. */
+/* Every fourth point is enough to find the clusters. */
 constexpr std::size_t kStep = 4;
 
 /* Calls work for a place and the places beside it. */
@@ -86,7 +86,7 @@ Clusters::spread ()
 
 /* Labels connected places, and lists the largest. @return how many are listed */
 int
-Clusters::label_places (int most, std::array<Found, kMaxClusters + 1> &found)
+Clusters::label_places (int max_clusters, std::array<Found, kMaxClusters + 1> &found)
 {
   /* A place with a point or two is noise between clusters, not a bridge. */
   const std::uint32_t least = 1 + counted_ / 5000;
@@ -104,24 +104,24 @@ Clusters::label_places (int most, std::array<Found, kMaxClusters + 1> &found)
     if (points <= enough)
       continue;
     found[count] = {points, label};
-    count = std::min (count + 1, most);
+    count = std::min (count + 1, max_clusters);
     std::sort (found.begin (), found.end (), [] (const Found &a, const Found &b) {
       return a.points != b.points ? a.points > b.points : a.label < b.label;
     });
-    found[most] = {};
+    found[max_clusters] = {};
   }
   return count;
 }
 
 int
-Clusters::find (const WorldPoints &cloud, int most)
+Clusters::find (const WorldPoints &cloud, int max_clusters)
 {
   count_ = 1;
-  if (most <= 1 || cloud.size () == 0)
+  if (max_clusters <= 1 || cloud.size () == 0)
     return 1;
   count_points (cloud);
   std::array<Found, kMaxClusters + 1> found{};
-  count_ = std::max (1, label_places (most, found));
+  count_ = std::max (1, label_places (max_clusters, found));
   if (count_ == 1)
     return 1;
   cluster_.assign (kSide * kSide, kNoCluster);

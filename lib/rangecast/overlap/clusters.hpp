@@ -23,9 +23,9 @@ public:
   static constexpr double kMinShare = 0.05;
 
   /** Finds the clusters.
-   *  @param most  clusters, 1 .. kMaxClusters; of more the largest are taken
+   *  @param max_clusters  1 .. kMaxClusters; of more the largest are used
    *  @return how many there are, at least 1 */
-  int find (const WorldPoints &cloud, int most);
+  int find (const WorldPoints &cloud, int max_clusters);
 
   /** Sorts the points of a part by cluster.
    *  @param[out] ends  end of each cluster in the part; the first one begins with it. Parts may be
@@ -42,7 +42,7 @@ private:
     std::uint32_t points = 0;
     std::uint16_t label = 0;
   };
-  int label_places (int most, std::array<Found, kMaxClusters + 1> &found);
+  int label_places (int max_clusters, std::array<Found, kMaxClusters + 1> &found);
   std::uint32_t fill_cluster (std::uint16_t place, std::uint16_t label);
   void spread ();
   [[nodiscard]] int place_of (float x, float z) const

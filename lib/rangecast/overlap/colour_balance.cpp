@@ -16,12 +16,12 @@ namespace {
 constexpr int kSamples = 8192;       ///< grid pixels of all images together
 constexpr int kFirstSamples = 65536; ///< in the first frame
 constexpr float kBinsPerLog = 400;   ///< so histograms reach from -0.8 to 0.8: 0.45 to 2.2
-constexpr float kFewest = 30;        ///< shared pixels that tell something of a pair
-constexpr float kKept = 0.9f;        ///< share of what was counted that counts in the next frame
+constexpr float kMinShared = 30;     ///< shared pixels of a pair that counts
+constexpr float kKept = 0.9f;        ///< weight of older counts in the next frame
 /* Of kMaxDepthDifferenceM. Where stereo is wrong on a shaded surface the colours are always wrong
  * the same way, so places that it has right tell more than many that it has nearly right. */
 constexpr float kSamePlace = 0.3f;
-constexpr double kMany = 300; ///< more than so many do not count more
+constexpr double kMaxShared = 300; ///< more do not add weight to a pair
 /* Pulls gains towards 1 where overlaps say little: as 3 shared pixels. */
 constexpr double kPrior = 0.01;
 
@@ -37,8 +37,8 @@ log_table ()
   return table;
 }
 
-/* Dark pixels have no colour to speak of, bright ones may be clipped. Asked of both together, so
- * that it does not favour the ratios of one side. */
+/* Dark pixels have hardly any colour, bright ones may be clipped. Both are tested together, so that
+ * no side's ratios are favoured. */
 bool
 are_usable (int a, int b)
 {
@@ -136,7 +136,7 @@ ColourBalance::reset ()
   pairs_.clear ();
 }
 
-/* What pairs of this frame's views counted fades; what others counted waits until they are back. */
+/* Reduces the older counts of pairs of this frame's views; those of missing views are kept. */
 void
 ColourBalance::age (std::span<const RangeImage> images)
 {
@@ -194,7 +194,7 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
   }
 }
 
-/* Every step-th pixel each way, another one in each frame. */
+/* Counts every step-th pixel of every step-th row, other ones in each frame. */
 void
 ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t from)
 {
@@ -205,7 +205,7 @@ ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t fro
                        (double (fresh_ ? kFirstSamples : kSamples) / double (images.size ()));
   const int step = std::max (1, static_cast<int> (std::ceil (std::sqrt (share))));
   const auto steps = static_cast<std::uint32_t> (step);
-  /* Any order that comes to all places of a step x step square soon. */
+  /* Visits all places of a step x step square soon. */
   const int left = static_cast<int> (frame_ * 5 % steps),
             top = static_cast<int> ((frame_ * 3 + frame_ / steps) % steps);
   for (int y = top; y < image.depth.height; y += step)
@@ -246,11 +246,12 @@ ColourBalance::solve ()
       float count = 0;
       for (float bin : bins)
         count += bin;
-      if (count < kFewest)
+      if (count < kMinShared)
         continue;
       linked_ |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
       const std::size_t i = number_among (views, pair.first), j = number_among (views, pair.second);
-      const double weight = std::min (1.0, double{count} / kMany), ratio = median_of (bins, count);
+      const double weight = std::min (1.0, double{count} / kMaxShared),
+                   ratio = median_of (bins, count);
       matrix_[i * n + i] += weight;
       matrix_[j * n + j] += weight;
       matrix_[i * n + j] -= weight;
@@ -275,7 +276,7 @@ ColourBalance::follow (std::span<const RangeImage> images)
   const float most = std::log (kMaxGain);
   for (const RangeImage &image : images) {
     const auto id = static_cast<std::size_t> (image.view_id);
-    if (!(linked_ >> id & 1)) /* what it shared before still holds */
+    if (!(linked_ >> id & 1)) /* keeps its gains */
       continue;
     if (!(started_ >> id & 1))
       frames_[id] = 0;

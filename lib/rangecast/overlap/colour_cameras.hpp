@@ -52,7 +52,7 @@ struct ColourCameras {
     of[static_cast<std::size_t> (image.view_id)].lookup.find (point, place.x, place.y, place.depth);
     place.x -= static_cast<float> (image.roi.x);
     place.y -= static_cast<float> (image.roi.y);
-    /* Written so that what is not a number is not on the plane. */
+    /* False for NaN. */
     return place.depth > 0 && place.x >= 0 && place.y >= 0 &&
            place.x <= static_cast<float> (image.depth.width - 1) &&
            place.y <= static_cast<float> (image.depth.height - 1);

@@ -12,8 +12,8 @@ struct ColourSettings {
   int threads = 1;          ///< views at a time; 0 = number of cores
 };
 
-/** What is done to colours round the clearing of overlaps: before() balances the views while their
- *  overlaps are still there, after() blends the seams that were made. */
+/** Colour correction before and after overlaps are cleared: before() balances the views by their
+ *  overlaps, after() blends the seams. */
 class ColourMatch {
 public:
   /** Sets the cameras and resets all gains. */

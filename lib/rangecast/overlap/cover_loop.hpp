@@ -17,8 +17,8 @@ namespace rangecast {
 /* Neighbours whose depths differ by more than this share are not joined; as striprender's
  * depth-step. */
 constexpr float kDepthStep = 0.03f;
-/* How far off a surface a point may lie, in footprints of that view's pixels along the surface.
- * Exact depth needs none; what is farther off may be another surface. */
+/* Maximum distance of a point from a surface that it lies on, in footprints of that view's pixels
+ * along the surface. 0 would do for exact depth. */
 constexpr float kTolerance = 1;
 
 /* Whether pixels of one image cover those of another that it won: the winner, called "other". */
@@ -74,7 +74,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
     return row;
   }
 
-  /* A place so near a pixel is that pixel, so that the outline of one view ends at another's. */
+  /* A place this near a pixel is that pixel, so that the outline of one view ends at another's. */
   static constexpr float kSnap = 1.f / 32;
   static float snapped (float place)
   {
@@ -110,7 +110,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
     compare_depths (u, v, z, seen, L::at (&row.on_surface[at]));
   }
 
-  /* Whether what is seen at a place lies on the surface of the four pixels round it. */
+  /* Whether a point lies on the surface of the four pixels around its place. */
   void compare_depths (const F &u, const F &v, const F &z, const I &seen, I &on_surface) const
   {
     F corners[4] = {}, right_share = {}, down_share = {};
@@ -140,7 +140,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
     on_surface = seen & (least > 0) & (off <= kTolerance * (z * per_focal + (most - least)));
   }
 
-  /* What goes with a pixel, in the other image's plane. */
+  /* Bounding box of a pixel and the triangles around it, in the other image's plane. */
   struct Extent {
     F left, right, top, bottom;
   };

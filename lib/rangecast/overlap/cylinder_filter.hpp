@@ -64,11 +64,11 @@ struct CylinderResult {
  *  - Points of a cell with a gap in radius between them are different surfaces and do not compete.
  *  - T is summed over a neighbourhood, and a view competes in a cell that it has no point in, but
  *    points on both sides of. Without either, winners along a seam are a matter of chance.
- *  - Optical axes need not lie in the slice plane. What is compared is |N . a| (N: normal of T in
+ *  - Optical axes need not lie in the slice plane. So |N . a| is compared (N: normal of T in
  *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
- *  - A point goes only if the winner's own surface covers what its view draws of it
+ *  - A point is cleared only if the winner's own surface covers the surface around it
  *    (RedundantPoints): a cell can be larger than what its winner sees of it, the winner may see
  *    something before the point, have a hole there, or see a thin thing from its other side.
  *  - Where no tangent is known, T is the circle's. Of equals, the first image wins.

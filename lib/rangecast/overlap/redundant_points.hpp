@@ -39,8 +39,8 @@ struct ResolvedFrame {
  *  overlap of a pixel or two. */
 class RedundantPoints {
 public:
-  /** @param overlap  how far from the point what goes with it is covered, in pixels of its own
-   *                  view; 1: as far as its triangles reach; more keeps a wider overlap */
+  /** @param overlap  radius around a point within which its surface must be covered, in pixels of
+   * its own view; 1: as far as its triangles reach; more keeps a wider overlap */
   void find (const ResolvedFrame &frame, double overlap, int threads);
 
   /** Makes the pixels found invalid. */

@@ -50,6 +50,14 @@ struct Cells::Cutter {
     slice.layer_count = layer_end - slice.begin;
   }
 
+  void link (std::uint32_t entry, std::uint32_t view)
+  {
+    const std::uint64_t bit = std::uint64_t{1} << view;
+    (views & bit ? work.chain[last[view]] : first[view]) = entry;
+    last[view] = entry;
+    views |= bit;
+  }
+
   /* Makes a layer of points, which come in the order of the cloud, so view after view.
    * @param any  whether they may lie further apart than a gap
    * @return whether they do; then nothing has been made */
@@ -80,13 +88,8 @@ struct Cells::Cutter {
       return true;
     layer.radius = radii / static_cast<float> (end - begin);
     layer.entry_count = to - entry_end;
-    for (; entry_end < to; entry_end++) {
-      const std::uint32_t view = work.entries[entry_end].view ();
-      const std::uint64_t bit = std::uint64_t{1} << view;
-      (views & bit ? work.chain[last[view]] : first[view]) = entry_end;
-      last[view] = entry_end;
-      views |= bit;
-    }
+    for (; entry_end < to; entry_end++)
+      link (entry_end, work.entries[entry_end].view ());
     layer_end++;
     return false;
   }
@@ -301,11 +304,16 @@ struct Cells::Tangents {
 
   void find ()
   {
-    if (slice.planes <= 1) {
-      for (std::uint32_t e = 0; e < entry_count; e++)
-        point_at (e, next_entry (e));
+    if (slice.planes > 1) {
+      find_layered ();
       return;
     }
+    for (std::uint32_t e = 0; e < entry_count; e++)
+      point_at (e, next_entry (e));
+  }
+
+  void find_layered ()
+  {
     std::array<Followers, kMaxViews> followers;
     for (std::uint32_t e = 0; e < entry_count; e++) {
       Followers &of_view = followers[work.entries[e].view ()];
