@@ -198,21 +198,15 @@ colour_at (double s, double y, std::uint32_t seed)
   return mixed (out, shirt, smooth_step (collar + 0.002, collar - 0.002, y));
 }
 
-/** v = 0 to 1 from crown to chest. */
-double
-height_of (double v)
-{
-  return kTop + (kBottom - kTop) * v;
-}
-
 MipMap
 make_texture (std::uint32_t seed)
 {
   std::vector<Rgbx> pixels (static_cast<std::size_t> (kTextureSize) * kTextureSize);
   for (int j = 0; j < kTextureSize; j++)
     for (int i = 0; i < kTextureSize; i++) {
-      const double s = ((i + 0.5) / kTextureSize * 2 - 1) * M_PI;
-      const Vec3 c = colour_at (s, height_of ((j + 0.5) / kTextureSize), seed);
+      const double s = ((i + 0.5) / kTextureSize * 2 - 1) * M_PI,
+                   y = kTop + (kBottom - kTop) * ((j + 0.5) / kTextureSize);
+      const Vec3 c = colour_at (s, y, seed);
       pixels[static_cast<std::size_t> (j) * kTextureSize + i] = {
           to_byte (c.x), to_byte (c.y), to_byte (c.z), 0};
     }
@@ -229,7 +223,7 @@ make_body (std::uint32_t seed)
       const double u = double (i) / kColumns, v = double (j) / kRows;
       /* The seam's two ends are one point; so is the crown. */
       const double s = (double (i % kColumns) / kColumns * 2 - 1) * M_PI;
-      mesh.vertices.push_back (figure_vertex (surface (j ? s : 0, height_of (v), seed), u, v));
+      mesh.vertices.push_back (figure_vertex (surface (j ? s : 0, kTop + (kBottom - kTop) * v, seed), u, v));
     }
   const auto index = [] (int i, int j) {
     return static_cast<std::uint32_t> (j * (kColumns + 1) + i);

@@ -129,13 +129,16 @@ DisparityRefiner::begin (const Job &job, const cv::Size &size, const Tiles &tile
   steps_.setTo (1);
   valid_.create (all, CV_8U);
   valid_.setTo (0);
-  for (int c = 0; c < 3; c++) {
-    colours_[c].create (all, CV_8U);
-    colours_[c].setTo (0);
-    for (int y = 0; y < job.colour.rows; y++) {
-      const auto from = job.colour.ptr<std::uint8_t> (y);
+  for (cv::Mat &plane : colours_) {
+    plane.create (all, CV_8U);
+    plane.setTo (0);
+  }
+  const cv::Mat &colour = job.colour;
+  for (int y = 0; y < colour.rows; y++) {
+    const auto from = colour.ptr<std::uint8_t> (y);
+    for (int c = 0; c < 3; c++) {
       auto to = colours_[c].ptr<std::uint8_t> (y + kPad) + kPad;
-      for (int x = 0; x < job.colour.cols; x++)
+      for (int x = 0; x < colour.cols; x++)
         to[x] = from[4 * x + c];
     }
   }
