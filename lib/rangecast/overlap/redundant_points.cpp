@@ -10,7 +10,7 @@
 namespace rangecast {
 
 void
-RedundantPoints::Plane::reset (int width, int height, std::uint8_t value)
+RedundantPoints::BytePlane::reset (int width, int height, std::uint8_t value)
 {
   stride_ = static_cast<std::size_t> (width + 2 * kMargin);
   const std::size_t size = stride_ * static_cast<std::size_t> (height + 2);
@@ -68,7 +68,7 @@ RedundantPoints::list_winners (const ResolvedFrame &frame)
 }
 
 void
-RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
+RedundantPoints::make_surface (const RangeImage &image, BytePlane &surface) const
 {
   constexpr std::uint32_t kStep = static_cast<std::uint32_t> (kDepthStep * 65536);
   for (int y = 0; y + 1 < image.depth.height; y++) {
@@ -86,7 +86,8 @@ RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
 
 /* Finds which columns of each row another image won. @return whether any */
 bool
-RedundantPoints::find_candidates (const RangeImage &image, const Plane &winners, std::size_t winner)
+RedundantPoints::find_candidates (
+    const RangeImage &image, const BytePlane &winners, std::size_t winner)
 {
   const auto number = static_cast<std::uint8_t> (winner);
   bool any = false;

@@ -53,7 +53,7 @@ private:
   template <typename L> struct CoverLoop; /* cover_loop.hpp */
 
   /* A byte for each pixel of an image, with a margin. */
-  class Plane {
+  class BytePlane {
   public:
     void reset (int width, int height, std::uint8_t value);
     [[nodiscard]] std::uint8_t *row (int y) { return bytes_.data () + offset (y); }
@@ -72,9 +72,9 @@ private:
   struct ImageState {
     /* kSurface where the pixel, the one to its right and the two below are one surface of points
      * that stay; else 0. */
-    Plane surface;
+    BytePlane surface;
     /* Number of the image that won the pixel's cell; kNoWinner: it is no candidate; kGoes. */
-    Plane winner;
+    BytePlane winner;
     std::uint64_t winners = 0; /* bit i: image i is in `winner` */
   };
   static constexpr std::uint8_t kSurface = 0xff, kNoWinner = 0xff, kGoes = 0xfe;
@@ -93,8 +93,8 @@ private:
   void begin (const ResolvedFrame &frame);
   void find_nodes (const ResolvedFrame &frame);
   void list_winners (const ResolvedFrame &frame);
-  void make_surface (const RangeImage &image, Plane &surface) const;
-  bool find_candidates (const RangeImage &image, const Plane &winners, std::size_t winner);
+  void make_surface (const RangeImage &image, BytePlane &surface) const;
+  bool find_candidates (const RangeImage &image, const BytePlane &winners, std::size_t winner);
 
   std::array<ImageState, kMaxViews> images_;
   std::size_t count_ = 0;
