@@ -223,7 +223,8 @@ make_body (std::uint32_t seed)
       const double u = double (i) / kColumns, v = double (j) / kRows;
       /* The seam's two ends are one point; so is the crown. */
       const double s = (double (i % kColumns) / kColumns * 2 - 1) * M_PI;
-      mesh.vertices.push_back (figure_vertex (surface (j ? s : 0, kTop + (kBottom - kTop) * v, seed), u, v));
+      mesh.vertices.push_back (
+          figure_vertex (surface (j ? s : 0, kTop + (kBottom - kTop) * v, seed), u, v));
     }
   const auto index = [] (int i, int j) {
     return static_cast<std::uint32_t> (j * (kColumns + 1) + i);
